@@ -1,0 +1,1 @@
+"""Campaigns: many missions, their seeds, executors and result files."""

@@ -1,0 +1,60 @@
+"""Errors that are meant for the user: each says where, what is wrong, and what would be right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class SuaveDesError(Exception):
+    """Base of every error that the command line prints as one line, without a traceback."""
+
+
+class InputError(SuaveDesError):
+    """Something that the user gave cannot be used; the command line ends with exit status 2.
+
+    Args:
+        problem: what is wrong, with the offending value.
+        file: the file it stands in, if there is one.
+        place: where in the file: "line 12", a key path such as "signals.water_visibility.period_s", or both.
+        remedy: what would be right.
+    """
+
+    def __init__(
+        self, problem: str, *, file: Path | str | None = None, place: str | None = None, remedy: str | None = None
+    ) -> None:
+        self.problem = problem
+        self.file = None if file is None else str(file)
+        self.place = place
+        self.remedy = remedy
+        where = ": ".join(part for part in (self.file, place) if part)
+        message = f"{where}: {problem}" if where else problem
+        super().__init__(f"{message} ({remedy})" if remedy else message)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Survive the trip from a worker process to its parent with all parts."""
+        return (_rebuild, (type(self), self.problem, self.file, self.place, self.remedy))
+
+
+def _rebuild(
+    kind: type[InputError], problem: str, file: str | None, place: str | None, remedy: str | None
+) -> InputError:
+    return kind(problem, file=file, place=place, remedy=remedy)
+
+
+class KnowledgeError(InputError):
+    """An ontology, a rule or a state of the knowledge base that cannot be reasoned with."""
+
+
+class MissionError(SuaveDesError):
+    """A mission that could not be finished: names the manager, the run and the mission time."""
+
+    def __init__(self, manager: str, run: int, time_s: float, cause: str) -> None:
+        self.manager = manager
+        self.run = run
+        self.time_s = time_s
+        self.cause = cause
+        super().__init__(f"manager {manager}, run {run}, mission time {time_s:.2f} s: {cause}")
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Survive the trip from a worker process to its parent with all parts."""
+        return (type(self), (self.manager, self.run, self.time_s, self.cause))

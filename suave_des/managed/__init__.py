@@ -1,0 +1,1 @@
+"""Managed subsystem: functions, modes and the mode manager, the mission coordinator."""

@@ -1,0 +1,1 @@
+"""Managing subsystems: their interface, and none, random, metacontrol, bt."""

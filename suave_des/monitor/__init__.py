@@ -1,0 +1,1 @@
+"""Monitors: the diagnostics bus and what publishes on it."""

@@ -1,0 +1,1 @@
+"""Scenario: the validated description of a mission, and its files."""

@@ -1,0 +1,1 @@
+"""World: pipeline geometry, what is in view of it, signals over time."""
