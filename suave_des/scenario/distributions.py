@@ -1,4 +1,4 @@
-"""Distributions that a scenario may give in place of a number; each run draws its own value from a named stream."""
+"""Distributions that may stand in place of a number; each run draws its own value from a named stream."""
 
 from __future__ import annotations
 
@@ -28,7 +28,9 @@ class Normal(Strict):
         low = self.mean - 4 * self.std if self.minimum is None else self.minimum
         high = self.mean + 4 * self.std if self.maximum is None else self.maximum
         if low > high or (self.std == 0 and not low <= self.mean <= high):
-            raise ValueError("minimum must not be above maximum, and the interval must hold values near the mean")
+            raise ValueError(
+                "minimum must not be above maximum, and the interval must hold values near the mean"
+            )
         if self.mean + 4 * self.std < low or self.mean - 4 * self.std > high:
             raise ValueError("the interval [minimum, maximum] lies more than 4 std from the mean")
         return self

@@ -1,0 +1,143 @@
+"""A scenario file over the files that it builds on: its base scenario, and its revision of the exemplar."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+from suave_des.errors import InputError
+from suave_des.resources import find, shipped_folder
+from suave_des.scenario.layers import Layer, merge
+from suave_des.scenario.revision import Revision
+from suave_des.scenario.yamlfile import KeyPath, YamlDocument, did_you_mean, read_bytes, read_yaml, shown
+
+_ONTOLOGY_LIMIT_BYTES = 100_000_000
+_CHAIN_LIMIT = 20
+
+
+class Files:
+    """Reads files and keeps the hash of each, for a manifest.
+
+    Attributes:
+        inputs: SHA-256 of each file read, by its name as shown: a shipped one as "shipped/scenarios/NAME", another as given.
+    """
+
+    def __init__(self) -> None:
+        self.inputs: dict[str, str] = {}
+
+    def yaml(self, path: Path) -> YamlDocument:
+        """A YAML file."""
+        document = read_yaml(path)
+        self.note(path, document.sha256)
+        return document
+
+    def ontology(self, path: Path) -> None:
+        """An ontology, which is only hashed here."""
+        self.note(path, hashlib.sha256(read_bytes(path, _ONTOLOGY_LIMIT_BYTES)).hexdigest())
+
+    def note(self, path: Path, sha256: str) -> None:
+        """Keep the hash of a file that was read."""
+        self.inputs[_shown_name(path)] = sha256
+
+
+def _shown_name(path: Path) -> str:
+    for kind in ("ontology", "scenarios"):
+        folder = shipped_folder(kind)
+        if path.is_relative_to(folder):
+            return f"shipped/{kind}/{path.relative_to(folder).as_posix()}"
+    return path.as_posix()
+
+
+def scenario_layer(files: Files, path: Path, above: tuple[Path, ...] = ()) -> Layer:
+    """A scenario file merged over its base, its revision written out in full.
+
+    Args:
+        files: reader.
+        path: of the scenario.
+        above: files of which this one is the base.
+
+    Raises:
+        InputError: a file that cannot be read, or is its own base; a revision that is not known.
+    """
+    layer = Layer.of(files.yaml(path), len(above))
+    base = None
+    if "base" in layer.data:
+        base = find_named(layer, ("base",), layer.data["base"], "scenarios")
+        _check_chain(layer, ("base",), (*above, path, base))
+    layer = _with_whole_revision(files, layer.without("base"), len(above), inherited=base is not None)
+    if base is None:
+        return layer
+    below = scenario_layer(files, base, (*above, path))
+    if "revision" in layer.data and set(Revision.model_fields) <= set(layer.data["revision"]):
+        below = below.without("revision")
+    return merge(below, layer)
+
+
+def find_named(layer: Layer, key_path: KeyPath, name: object, kind: str) -> Path:
+    """A file that a layer names: beside the file in which its name stands, or shipped.
+
+    Raises:
+        InputError: there is none, with the line that names it.
+    """
+    if not isinstance(name, str) or not name:
+        raise layer.error(f"{shown(name)} is no file name", key_path, "a path, or the name of a shipped file")
+    try:
+        return find(name, kind, beside=layer.place(key_path).file.parent)
+    except InputError as error:
+        raise layer.error(f"no such file: {name}", key_path, error.remedy) from None
+
+
+def _check_chain(layer: Layer, key_path: KeyPath, chain: tuple[Path, ...]) -> None:
+    resolved = [path.resolve() for path in chain]
+    if len(set(resolved)) < len(resolved) or len(resolved) > _CHAIN_LIMIT:
+        names = " -> ".join(path.name for path in chain)
+        raise layer.error(f"the bases never end: {names}", key_path, "a file must not be its own base")
+
+
+def _with_whole_revision(files: Files, layer: Layer, depth: int, *, inherited: bool) -> Layer:
+    """The layer with its revision as a mapping; one that names none is left to be merged over an inherited one."""
+    value = layer.data.get("revision")
+    if isinstance(value, dict) and "base" in value:
+        own = layer.below("revision").without("base")
+        whole = merge(_revision_layer(files, layer, ("revision", "base"), value["base"], depth + 1), own)
+    elif isinstance(value, dict):
+        missing = [key for key in Revision.model_fields if key not in value]
+        if missing and not inherited:
+            remedy = 'name the revision to start from, such as base: "2023", beside what differs from it'
+            raise layer.error(f"has no {missing[0]}", ("revision",), remedy)
+        return layer
+    elif "revision" in layer.data:
+        whole = _revision_layer(files, layer, ("revision",), value, depth + 1)
+    else:
+        return layer
+    return layer.replaced("revision", whole)
+
+
+def _revision_layer(
+    files: Files, named: Layer, key_path: KeyPath, name: object, depth: int, above: tuple[Path, ...] = ()
+) -> Layer:
+    """A revision by its name or path, merged over its own base."""
+    path = _revision_path(named, key_path, name)
+    _check_chain(named, key_path, (*above, path))
+    layer = Layer.of(files.yaml(path), depth)
+    if "base" not in layer.data:
+        return layer
+    below = _revision_layer(files, layer, ("base",), layer.data["base"], depth + 1, (*above, path))
+    return merge(below, layer.without("base"))
+
+
+def _revision_path(named: Layer, key_path: KeyPath, name: object) -> Path:
+    folder = shipped_folder("scenarios") / "revisions"
+    shipped = {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+    if isinstance(name, int | float) and not isinstance(name, bool):
+        name = f"{name:g}"  # 2023 and 1.5 need no quotes
+    if not isinstance(name, str) or not name:
+        remedy = f"one of {', '.join(shipped)}, a path, or a mapping with base"
+        raise named.error(f"{shown(name)} is no revision", key_path, remedy)
+    if name in shipped:
+        return shipped[name]
+    path = named.place(key_path).file.parent / name
+    if path.is_file():
+        return path
+    problem = f"there is no revision {shown(name)}"
+    raise named.error(problem, key_path, f"{did_you_mean(name, shipped, 'shipped')}; or the path of a file")

@@ -1,0 +1,157 @@
+"""From the name of a scenario to everything that its missions need, read once and checked."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from suave_des.errors import InputError
+from suave_des.resources import find
+from suave_des.scenario.bases import Files, find_named, scenario_layer
+from suave_des.scenario.layers import Layer
+from suave_des.scenario.models import Scenario, TableSignal
+from suave_des.scenario.modes import UNGROUND_MODE, ModeTable, modes_of
+from suave_des.scenario.problems import input_error
+from suave_des.scenario.tables import Table, read_table
+from suave_des.scenario.yamlfile import KeyPath, did_you_mean, shown
+
+MISSION_FUNCTIONS = ("f_maintain_motion", "f_generate_search_path", "f_follow_pipeline")
+"""Functions that the mission's two tasks need, so that a modes file must have them."""
+
+
+@dataclass(frozen=True)
+class LoadedScenario:
+    """A scenario with the content of every file it names, apart from the ontologies, which are named by their paths.
+
+    It can be pickled, so that it travels to worker processes by value.
+
+    Attributes:
+        scenario: the validated description.
+        path: the scenario's file.
+        ontologies: ontology files, in the order given.
+        modes: functions and their modes.
+        modes_path: the modes file.
+        tables: times (s) and values of each table signal, by the signal's name.
+        inputs: SHA-256 of each file read, by its name as shown to the user.
+    """
+
+    scenario: Scenario
+    path: Path
+    ontologies: tuple[Path, ...]
+    modes: ModeTable
+    modes_path: Path
+    tables: Mapping[str, Table]
+    inputs: Mapping[str, str]
+
+
+def load_scenario(
+    name: str | Path,
+    *,
+    ontologies: Sequence[str | Path] = (),
+    modes_file: str | Path | None = None,
+    reasoner: str | None = None,
+) -> LoadedScenario:
+    """Read and check a scenario and the files that it names.
+
+    Files named inside a file are looked for beside it, then among the shipped ones.
+
+    Args:
+        name: path of a scenario file, or name of a shipped one with or without ".yaml".
+        ontologies: files to use in place of the scenario's.
+        modes_file: file to use in place of the scenario's.
+        reasoner: to use in place of the scenario's.
+
+    Raises:
+        InputError: a file that cannot be read, or a value that cannot be right, with file and line.
+    """
+    files = Files()
+    path = find(name, "scenarios")
+    layer = scenario_layer(files, path)
+    layer = Layer({**layer.data, "name": _name(layer, path)}, layer.places)
+    try:
+        scenario = Scenario.model_validate(layer.data)
+    except ValidationError as error:
+        raise input_error(error, layer, Scenario) from None
+
+    if modes_file is None:
+        modes_path = _named(layer, path, ("modes_file",), scenario.modes_file, "scenarios")
+    else:
+        modes_path = find(modes_file, "scenarios")
+    modes = modes_of(files.yaml(modes_path))
+    _check_modes(layer, scenario, modes)
+
+    ontology_paths = tuple(find(each, "ontology") for each in ontologies) or tuple(
+        _named(layer, path, ("knowledge", "ontologies", index), each, "ontology")
+        for index, each in enumerate(scenario.knowledge.ontologies)
+    )
+    for each in ontology_paths:
+        files.ontology(each)
+
+    tables = {}
+    for signal_name, signal in scenario.signals.items():
+        if isinstance(signal, TableSignal):
+            table_path = _named(layer, path, ("signals", signal_name, "file"), signal.file, "scenarios")
+            tables[signal_name], digest = read_table(table_path)
+            files.note(table_path, digest)
+
+    scenario = _overridden(scenario, ontologies, modes_file, reasoner)
+    return LoadedScenario(scenario, path, ontology_paths, modes, modes_path, tables, files.inputs)
+
+
+def _overridden(
+    scenario: Scenario, ontologies: Sequence[str | Path], modes_file: str | Path | None, reasoner: str | None
+) -> Scenario:
+    """The scenario as if it had named what was given in its place."""
+    knowledge: dict[str, object] = {}
+    if ontologies:
+        knowledge["ontologies"] = tuple(map(str, ontologies))
+    if reasoner is not None:
+        knowledge["reasoner"] = reasoner
+    update: dict[str, object] = {"knowledge": scenario.knowledge.model_copy(update=knowledge)}
+    if modes_file is not None:
+        update["modes_file"] = str(modes_file)
+    return scenario.model_copy(update=update)
+
+
+def _name(layer: Layer, path: Path) -> object:
+    """The scenario's name: its own, or its file's; never its base's, whose results would be mistaken for its own."""
+    if "name" in layer.data and layer.place(("name",)).depth == 0:
+        return layer.data["name"]
+    stem = re.sub(r"[^A-Za-z0-9_.-]", "_", path.stem)[:90]
+    return stem if re.match(r"[A-Za-z_]", stem) else f"_{stem}"
+
+
+def _named(layer: Layer, path: Path, key_path: KeyPath, name: str, kind: str) -> Path:
+    """A file that the scenario names, or that it leaves at its default: then it is looked for beside the scenario."""
+    if layer.stands(key_path):
+        return find_named(layer, key_path, name, kind)
+    return find(name, kind, beside=path.parent)
+
+
+def _check_modes(layer: Layer, scenario: Scenario, modes: ModeTable) -> None:
+    """See that the modes file has what the mission and the scenario's default modes ask for."""
+    for function in MISSION_FUNCTIONS:
+        if function not in modes.functions:
+            raise InputError(
+                f"defines no function {function}, which the mission needs",
+                file=modes.source,
+                remedy=did_you_mean(function, modes.functions, "its functions"),
+            )
+        if UNGROUND_MODE not in modes.modes(function):
+            raise InputError(
+                f"function {function} has no mode {UNGROUND_MODE}",
+                file=modes.source,
+                remedy=f"add {UNGROUND_MODE}: {{NODE: inactive}}, which a cancelled task sets",
+            )
+    for function, mode in scenario.default_modes.items():
+        key_path = ("default_modes", function)
+        if function not in modes.functions:
+            remedy = did_you_mean(function, modes.functions, f"functions in {modes.source}")
+            raise layer.error(f"there is no function {shown(function)}", key_path, remedy)
+        if mode not in modes.modes(function):
+            remedy = did_you_mean(mode, modes.modes(function), f"its modes in {modes.source}")
+            raise layer.error(f"function {function} has no mode {shown(mode)}", key_path, remedy)

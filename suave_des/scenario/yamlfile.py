@@ -1,0 +1,295 @@
+"""YAML files read as plain data, with the line of every key, and nothing in them that could run or explode.
+
+Scalars follow the YAML 1.2 core schema, not PyYAML's 1.1: `1e3` is a number, `010` is ten, `1:30` and `2023-02-04` are
+text. No constructor of PyYAML is involved, so no tag can build an object.
+"""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+from yaml.composer import Composer
+from yaml.parser import Parser
+from yaml.reader import Reader, ReaderError
+from yaml.resolver import BaseResolver
+from yaml.scanner import Scanner
+
+from suave_des.errors import InputError
+
+KeyPath = tuple[str | int, ...]
+
+SIZE_LIMIT_BYTES = 1_000_000
+NODE_LIMIT = 100_000
+DEPTH_LIMIT = 100
+
+_TAG = "tag:yaml.org,2002:"
+
+
+@dataclass(frozen=True)
+class YamlDocument:
+    """One YAML file: plain data, and where each part of it stands.
+
+    Attributes:
+        path: the file.
+        data: its top-level mapping, of str, int, float, bool, None, list and dict with str keys.
+        lines: line (from 1) of each key path.
+        sha256: of the file's bytes, in hex.
+    """
+
+    path: Path
+    data: dict[str, Any]
+    lines: Mapping[KeyPath, int]
+    sha256: str
+
+    def line(self, key_path: KeyPath) -> int:
+        """Line of a key path, or of the nearest part of the file that holds it."""
+        for length in range(len(key_path), -1, -1):
+            if (line := self.lines.get(key_path[:length])) is not None:
+                return line
+        return 1
+
+    def error(self, problem: str, key_path: KeyPath, remedy: str | None = None) -> InputError:
+        """An error about what stands at a key path."""
+        return InputError(
+            problem, file=self.path, place=place_text(self.line(key_path), key_path), remedy=remedy
+        )
+
+
+def place_text(line: int, key_path: KeyPath) -> str:
+    """A place for the user: "line 12, thruster_events[0].time_s"."""
+    keys = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in key_path).lstrip(".")
+    return f"line {line}, {keys}" if keys else f"line {line}"
+
+
+def shown(value: object, limit: int = 60) -> str:
+    """A value as the user wrote it, cut to a readable length and one line."""
+    text = {"None": "nothing", "True": "true", "False": "false"}.get(repr(value), repr(value))
+    return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+def did_you_mean(word: object, known: Iterable[str], what: str = "known") -> str:
+    """A remedy for a misspelt word: the nearest known one, and the list of all."""
+    names = list(known)
+    near = difflib.get_close_matches(str(word), names, n=1, cutoff=0.6)
+    listing = f"{what}: {', '.join(names)}" if names else f"{what}: none"
+    return f"did you mean {near[0]!r}? {listing}" if near else listing
+
+
+def read_bytes(path: Path, limit: int = SIZE_LIMIT_BYTES) -> bytes:
+    """Content of a file that the user named.
+
+    Raises:
+        InputError: missing, a folder, unreadable, or longer than `limit` bytes.
+    """
+    try:
+        with path.open("rb") as stream:
+            content = stream.read(limit + 1)
+    except IsADirectoryError:
+        raise InputError("is a folder", file=path, remedy="name a file in it") from None
+    except FileNotFoundError:
+        raise InputError("no such file", file=path, remedy="check the name") from None
+    except OSError as error:
+        raise InputError(
+            f"cannot be read: {error.strerror}", file=path, remedy="check the name and the rights"
+        ) from None
+    if len(content) > limit:
+        raise InputError(f"is larger than {limit:,} bytes", file=path, remedy="split it or shorten it")
+    return content
+
+
+def decode(path: Path, content: bytes) -> str:
+    """Content as text; a byte order mark is dropped.
+
+    Raises:
+        InputError: not UTF-8, with the line.
+    """
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise InputError(
+            "is not UTF-8 text", file=path, place=f"line {line}", remedy="save it as UTF-8"
+        ) from None
+
+
+def read_yaml(path: Path | str) -> YamlDocument:
+    """Read a YAML file whose top level is a mapping.
+
+    Raises:
+        InputError: the file cannot be read, is no YAML, has a tag, a duplicate key or several documents, holds itself,
+            expands to more than NODE_LIMIT values, or has another top level; with the line.
+    """
+    path = Path(path)
+    content = read_bytes(path)
+    text = decode(path, content)
+    try:
+        root = _Composer(text).get_single_node()
+    except ReaderError as error:
+        line = text.count("\n", 0, error.position) + 1
+        problem = f"holds the character {chr(error.character)!r}, which is not allowed in YAML"
+        raise InputError(problem, file=path, place=f"line {line}", remedy="remove it") from None
+    except yaml.MarkedYAMLError as error:
+        raise _yaml_error(path, error) from None
+    if root is None:
+        raise InputError(
+            "is empty", file=path, place="line 1", remedy="a mapping of keys to values is needed"
+        )
+    if not isinstance(root, yaml.MappingNode):
+        raise InputError(
+            "is not a mapping at its top level",
+            file=path,
+            place=f"line {_line(root)}",
+            remedy="write `key: value` lines",
+        )
+    reading = _Reading(path)
+    data = reading.plain(root, (), ())
+    return YamlDocument(path, data, reading.lines, hashlib.sha256(content).hexdigest())
+
+
+def _yaml_error(path: Path, error: yaml.MarkedYAMLError) -> InputError:
+    mark = error.problem_mark or error.context_mark
+    problem = error.problem or error.context or "cannot be understood"
+    if isinstance(error, _TooMuchError):
+        remedy = "write it out, with fewer values or aliases"
+    elif "but found another document" in problem:
+        problem, remedy = "a second document begins here", "keep one document: remove the line ---"
+    else:
+        tab = "\\t" in problem
+        problem = f"is not valid YAML: {problem}"
+        remedy = (
+            "indent with spaces, not tabs"
+            if tab
+            else "check indentation, colons and quotes here and just above"
+        )
+    return InputError(problem, file=path, place=f"line {mark.line + 1}" if mark else None, remedy=remedy)
+
+
+def _line(node: yaml.Node) -> int:
+    return int(node.start_mark.line) + 1
+
+
+class _TooMuchError(yaml.MarkedYAMLError):
+    """A file that is well-formed but nested or long beyond any honest use."""
+
+
+class _Composer(Reader, Scanner, Parser, Composer, BaseResolver):
+    """PyYAML without its constructors: text to nodes, of bounded number and depth."""
+
+    def __init__(self, text: str) -> None:
+        Reader.__init__(self, text)
+        Scanner.__init__(self)
+        Parser.__init__(self)
+        Composer.__init__(self)
+        BaseResolver.__init__(self)
+        self._depth = 0
+        self._nodes = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        """One node with all below it."""
+        self._depth += 1
+        self._nodes += 1
+        if self._depth > DEPTH_LIMIT or self._nodes > NODE_LIMIT:
+            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+            raise _too_much(mark, deep=self._depth > DEPTH_LIMIT)
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
+
+def _too_much(mark: Any, *, deep: bool) -> _TooMuchError:
+    limit = (
+        f"is nested more than {DEPTH_LIMIT} deep" if deep else f"expands to more than {NODE_LIMIT:,} values"
+    )
+    return _TooMuchError(problem=limit, problem_mark=mark)
+
+
+_DIGITS = set("-+0123456789.")
+for _name, _pattern, _first in (
+    ("null", r"^(?:~|null|Null|NULL|)$", ["~", "n", "N", ""]),
+    ("bool", r"^(?:true|True|TRUE|false|False|FALSE)$", list("tTfF")),
+    ("int", r"^[-+]?[0-9]{1,18}$", sorted(_DIGITS)),
+    ("float", r"^[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?$", sorted(_DIGITS)),
+):
+    _Composer.add_implicit_resolver(_TAG + _name, re.compile(_pattern), _first)
+
+
+_SCALARS: dict[str, Callable[[str], Any]] = {
+    _TAG + "null": lambda text: None,
+    _TAG + "bool": lambda text: {"true": True, "false": False}[text.lower()],
+    _TAG + "int": int,
+    _TAG + "float": float,
+    _TAG + "str": str,
+}
+
+
+class _Reading:
+    """Turns nodes into plain data and notes the line of each key path."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.lines: dict[KeyPath, int] = {(): 1}
+        self._count = 0
+
+    def plain(self, node: yaml.Node, key_path: KeyPath, above: tuple[int, ...]) -> Any:
+        """Data of a node; `above` are the identities of the nodes that hold it."""
+        self._count += 1
+        if self._count > NODE_LIMIT or len(above) > DEPTH_LIMIT:
+            raise _yaml_error(self.path, _too_much(node.start_mark, deep=self._count <= NODE_LIMIT))
+        if id(node) in above:
+            raise self._error(node, key_path, "an alias stands for something that holds it", "write it out")
+        kind = {yaml.ScalarNode: "", yaml.SequenceNode: "seq", yaml.MappingNode: "map"}[type(node)]
+        if not (node.tag == _TAG + kind if kind else node.tag in _SCALARS):
+            tag = node.tag.replace(_TAG, "!!")
+            raise self._error(
+                node,
+                key_path,
+                f"the tag {shown(tag)} is not allowed",
+                "use plain text, numbers, lists and mappings",
+            )
+        inside = (*above, id(node))
+        if isinstance(node, yaml.MappingNode):
+            return self._mapping(node, key_path, inside)
+        if isinstance(node, yaml.SequenceNode):
+            for index, item in enumerate(node.value):
+                self.lines[(*key_path, index)] = _line(item)
+            return [self.plain(item, (*key_path, index), inside) for index, item in enumerate(node.value)]
+        try:
+            return _SCALARS[node.tag](node.value)
+        except (ValueError, KeyError):
+            wanted = node.tag.replace(_TAG, "!!")
+            raise self._error(
+                node, key_path, f"{shown(node.value)} is no {wanted}", "remove the tag"
+            ) from None
+
+    def _mapping(self, node: yaml.MappingNode, key_path: KeyPath, inside: tuple[int, ...]) -> dict[str, Any]:
+        data: dict[str, Any] = {}
+        first_lines: dict[str, int] = {}
+        for key_node, value_node in node.value:
+            if not isinstance(key_node, yaml.ScalarNode):
+                raise self._error(key_node, key_path, "a key must be text", "write `key: value`")
+            key = str(key_node.value)
+            if key in first_lines:
+                raise self._error(
+                    key_node,
+                    (*key_path, key),
+                    f"the key {shown(key)} stands twice, first in line {first_lines[key]}",
+                    "keep one of them",
+                )
+            first_lines[key] = _line(key_node)
+            if key == "<<":
+                raise self._error(
+                    key_node, key_path, "the merge key << is not supported", "write the keys out"
+                )
+            self.lines[(*key_path, key)] = _line(key_node)
+            data[key] = self.plain(value_node, (*key_path, key), inside)
+        return data
+
+    def _error(self, node: yaml.Node, key_path: KeyPath, problem: str, remedy: str) -> InputError:
+        return InputError(problem, file=self.path, place=place_text(_line(node), key_path), remedy=remedy)
