@@ -1,0 +1,136 @@
+"""The mission coordinator: the two tasks, their hand-over, the time limit, and the two metrics it writes down."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import simpy
+
+from suave_des.managed.detection import PipelineDetector
+from suave_des.managed.follow import FollowPipeline
+from suave_des.managed.node import Log, Process
+from suave_des.monitor.monitors import tick_at_or_after, until
+from suave_des.scenario.revision import CoordinatorRevision
+
+MAINTAIN_MOTION = "f_maintain_motion"
+SEARCH = "f_generate_search_path"
+FOLLOW = "f_follow_pipeline"
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A task of the mission, with the functions that it needs."""
+
+    name: str
+    functions: tuple[str, ...]
+
+
+class MissionCoordinator:
+    """Requests search_pipeline, then, when the pipeline is detected, inspect_pipeline.
+
+    Attributes:
+        ended: the event of the mission's end: the time limit, or the end of the path.
+        search_time_s: whole seconds until the pipeline was found, as the revision counts them; none while it is not found.
+        detected_s: mission time of the detection; none while there is none.
+        task: the task under way.
+
+    Args:
+        env: the mission's clock.
+        revision: how the exemplar's revision behaves.
+        detector: says when the pipeline is seen.
+        follow: says when its end is reached.
+        request: called with each task that begins.
+        cancel: called with each task that is over.
+        time_limit_s: mission time at which the mission ends, looked at at the ticks of a timer.
+        start_delay_s: from guided mode to the first request.
+        poll_phase_s: time of a tick of the coordinator's loop.
+        limit_phase_s: time of a tick of the limit's timer.
+        log: takes what happened.
+    """
+
+    def __init__(
+        self,
+        env: simpy.Environment,
+        revision: CoordinatorRevision,
+        detector: PipelineDetector,
+        follow: FollowPipeline,
+        request: Callable[[Task], None],
+        cancel: Callable[[Task], None],
+        *,
+        time_limit_s: float,
+        start_delay_s: float,
+        poll_phase_s: float,
+        limit_phase_s: float,
+        log: Log,
+    ) -> None:
+        self._env = env
+        self._revision = revision
+        self._detector = detector
+        self._follow = follow
+        self._request = request
+        self._cancel = cancel
+        self._time_limit_s = time_limit_s
+        self._start_delay_s = start_delay_s
+        self._poll_phase_s = poll_phase_s
+        self._log = log
+        self.ended = env.event()
+        self.search_time_s: float | None = None
+        self.detected_s: float | None = None
+        self.task: Task | None = None
+        shared = (MAINTAIN_MOTION,) if revision.maintain_motion_per_task else ()
+        self._search = Task("search_pipeline", (*shared, SEARCH))
+        self._inspect = Task("inspect_pipeline", (*shared, FOLLOW))
+        self.lasting_functions = () if revision.maintain_motion_per_task else (MAINTAIN_MOTION,)
+        """Functions that are needed from launch to the end, and belong to no task."""
+        self._limit_s = tick_at_or_after(time_limit_s, limit_phase_s, revision.limit_check_period_s)
+        env.process(self._coordinate())
+        env.process(self._watch_limit())
+
+    def search_time_or_limit_s(self) -> float:
+        """The search time metric; when the pipeline was not found what the revision writes then."""
+        if self.search_time_s is not None:
+            return self.search_time_s
+        if self._revision.search_time_when_not_found == "limit":
+            return self._time_limit_s
+        return self._env.now
+
+    def _coordinate(self) -> Process:
+        yield self._env.timeout(self._start_delay_s)
+        self._begin(self._search)
+        yield self._detector.detected
+        self.detected_s = self._env.now
+        self._log("detection", "pipeline_detected", f"point {self._detector.first_point}")
+        yield until(self._env, self._next_poll_s())
+        seen_s = self._env.now if self._revision.search_time == "poll" else self.detected_s
+        self.search_time_s = float(math.floor(seen_s + 1e-9))
+        self._end(self._search)
+        self._begin(self._inspect)
+        yield self._follow.finished
+        yield until(self._env, self._next_poll_s())
+        self._end(self._inspect)
+        self._finish("the end of the path is reached")
+
+    def _watch_limit(self) -> Process:
+        yield until(self._env, self._limit_s)
+        self._finish("time limit")
+
+    def _next_poll_s(self) -> float:
+        return tick_at_or_after(self._env.now, self._poll_phase_s, self._revision.poll_period_s)
+
+    def _begin(self, task: Task) -> None:
+        self.task = task
+        self._log("coordinator", "task_requested", task.name)
+        self._request(task)
+
+    def _end(self, task: Task) -> None:
+        self.task = None
+        self._log("coordinator", "task_done", task.name)
+        self._cancel(task)
+
+    def _finish(self, why: str) -> None:
+        # At the limit the present task is cancelled too, but the metrics are saved at once, before that has an effect.
+        if not self.ended.triggered:
+            self._log("coordinator", "mission_ended", why)
+            self.ended.succeed()

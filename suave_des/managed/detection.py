@@ -1,0 +1,80 @@
+"""Pipeline detection in mission time: looks ahead along the vehicle's way and tells the moment of the first sight."""
+
+from __future__ import annotations
+
+import numpy as np
+import simpy
+from numpy.typing import NDArray
+
+from suave_des.monitor.monitors import Measurements
+from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at
+from suave_des.world.pipeline import first_detection
+
+_LOOK_AHEAD_ROWS = 40
+
+
+def measured_at_rows(measurements: Measurements, rows: int) -> NDArray[np.float64]:
+    """Last measured value at each row of a track, shape (rows,); nan before the first measurement."""
+    changes = [row_at(t_s) for t_s in measurements.times_s]
+    lengths = np.diff(np.minimum([0, *changes, rows], rows))
+    return np.repeat(np.array([np.nan, *measurements.values]), lengths)
+
+
+class PipelineDetector:
+    """Watches from t = 0 until a point of the pipeline is seen for the first time.
+
+    The sight is found on the vehicle's own grid, by looking ahead under the present control; when control changes, what was
+    foreseen is dropped and looked at anew. So the moment does not depend on who reads the vehicle's position, or when.
+
+    Attributes:
+        detected: the event of the first sight.
+        first_point: index of the point seen, once detected.
+
+    Args:
+        env: the mission's clock.
+        vehicle: whose camera looks.
+        visibility_m: measured water visibility at each row of the vehicle's track.
+        points: points as the detection places them, shape (n, 3), m.
+    """
+
+    def __init__(
+        self,
+        env: simpy.Environment,
+        vehicle: Vehicle,
+        visibility_m: NDArray[np.float64],
+        points: NDArray[np.float64],
+    ) -> None:
+        self._env = env
+        self._vehicle = vehicle
+        self._visibility_m = visibility_m
+        self._points = points
+        self._version = 0
+        self.detected = env.event()
+        self.first_point: int | None = None
+        vehicle.on_control_change = self._look_ahead
+        self._look_ahead(0)
+
+    def _look_ahead(self, row: int) -> None:
+        self._version += 1
+        last = min(row + _LOOK_AHEAD_ROWS, self._vehicle.last_row)
+        if row >= last:
+            return
+        self._vehicle.look_ahead(last)
+        seen_row, point = first_detection(self._vehicle.track, row, last, self._visibility_m, self._points)
+        wake_s = (seen_row if point >= 0 else last) * STEP_S
+        event = self._env.timeout(
+            max(0.0, wake_s - self._env.now), value=(self._version, seen_row, point, last)
+        )
+        assert event.callbacks is not None  # a new event has its list of callbacks
+        event.callbacks.append(self._arrive)
+
+    def _arrive(self, event: simpy.Event) -> None:
+        version, _, point, last = event.value
+        if version != self._version:
+            return
+        if point < 0:
+            self._look_ahead(last)
+            return
+        self._vehicle.on_control_change = None
+        self.first_point = point
+        self.detected.succeed()

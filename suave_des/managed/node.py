@@ -1,0 +1,93 @@
+"""What every function of the managed subsystem is: a node with a life cycle, parameters, and an autopilot to talk to."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+
+import simpy
+
+from suave_des.scenario.modes import Mode
+from suave_des.vehicle.vehicle import Vehicle
+
+Process = Generator[simpy.Event, None, None]
+Log = Callable[[str, str, str], None]
+"""Called with source, event and detail of something worth telling."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """Steady error of a node's frame: where the vehicle ends up, as the simulator sees it, less where the node sent it."""
+
+    x_m: float = 0.0
+    y_m: float = 0.0
+    z_m: float = 0.0
+
+
+class SetPointSender:
+    """A node's way to the autopilot.
+
+    Args:
+        env: the mission's clock.
+        vehicle: whose autopilot gets the set-points.
+        frame: the node's frame error.
+        loss_probability: chance that a message is lost on its way.
+        stream: decides which.
+    """
+
+    def __init__(
+        self,
+        env: simpy.Environment,
+        vehicle: Vehicle,
+        frame: Frame,
+        loss_probability: float,
+        stream: random.Random,
+    ) -> None:
+        self._env = env
+        self._vehicle = vehicle
+        self._frame = frame
+        self._loss_probability = loss_probability
+        self._stream = stream
+        self.lost = 0
+
+    def send(self, x_m: float, y_m: float, z_m: float) -> None:
+        """Send a set-point, world frame; whether it arrived nobody is told."""
+        if self._loss_probability and self._stream.random() < self._loss_probability:
+            self.lost += 1
+            return
+        self._vehicle.command(
+            self._env.now, x_m + self._frame.x_m, y_m + self._frame.y_m, z_m + self._frame.z_m
+        )
+
+
+class FunctionNode:
+    """A function's life-cycle node: active or inactive, as the mode that was set last says.
+
+    Subclasses say what happens on activation, on deactivation and on a change of parameters while active; each hook is
+    called at the mission time at which the mode takes effect.
+    """
+
+    def __init__(self, env: simpy.Environment) -> None:
+        self.env = env
+        self.active = False
+
+    def apply(self, mode: Mode) -> None:
+        """Go over to a mode."""
+        if mode.active:
+            self.configure(mode)
+        if mode.active and not self.active:
+            self.active = True
+            self.activated()
+        elif self.active and not mode.active:
+            self.active = False
+            self.deactivated()
+
+    def configure(self, mode: Mode) -> None:
+        """Take the mode's parameters; called before the activation that the mode brings, too."""
+
+    def activated(self) -> None:
+        """The node has become active."""
+
+    def deactivated(self) -> None:
+        """The node has become inactive."""

@@ -1,0 +1,88 @@
+"""What a managing subsystem is: one class with a few hooks, and what it can see and do.
+
+The built-in managers use nothing that one of your own cannot. Give yours on the command line as `package.module:Class`, or
+register it by name as an entry point of the group `suave_des.managers`.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import simpy
+
+from suave_des.managed.coordinator import Task
+from suave_des.managed.mode_manager import ModeManager
+from suave_des.monitor.diagnostics import Diagnostic
+from suave_des.scenario.models import Scenario
+from suave_des.scenario.modes import UNGROUND_MODE
+
+AdaptationProcess = Generator[simpy.Event, None, None]
+
+
+@dataclass(frozen=True)
+class ManagedSystem:
+    """A manager's view of the managed subsystem: what it can read, and the only thing it can do: request modes.
+
+    Attributes:
+        env: the mission's clock; `env.timeout(s)` is an event to wait for.
+        scenario: the mission's scenario.
+        settings: what the scenario says under managers: for this manager's name.
+        modes: the mode manager.
+        lasting_functions: functions that are needed all the time and belong to no task.
+        stream: makes a named random stream of this run, the same for every manager.
+        log: takes an event and its detail for the mission's record.
+        knowledge: the knowledge base and a reasoner, opened on the first call.
+    """
+
+    env: simpy.Environment
+    scenario: Scenario
+    settings: Mapping[str, Any]
+    modes: ModeManager
+    lasting_functions: tuple[str, ...]
+    stream: Callable[[str], random.Random]
+    log: Callable[[str, str], None]
+    knowledge: Callable[[], Any]
+
+    @property
+    def now_s(self) -> float:
+        """Mission time."""
+        return float(self.env.now)
+
+    def change_mode(self, function: str, mode: str) -> bool:
+        """Request a mode of a function; the effect comes later. False if there is no such mode."""
+        return self.modes.change_mode(function, mode)
+
+
+class ManagingSubsystem:
+    """Base of all managers. Override the hooks you need; each is called at the mission time at which the thing happens.
+
+    A hook must not block: to let mission time pass, `adapt` may be a generator that yields events of `system.env`.
+
+    Attributes:
+        system: what can be seen and done.
+        period_s: time between calls of `adapt`; none: never called.
+        starts_s: mission time of the first call of `adapt`.
+    """
+
+    def __init__(self, system: ManagedSystem) -> None:
+        self.system = system
+        self.period_s: float | None = None
+        self.starts_s = 0.0
+
+    def task_requested(self, task: Task) -> None:
+        """A task begins, and needs its functions."""
+
+    def task_cancelled(self, task: Task) -> None:
+        """A task is over: by default its functions are set to fd_unground at once."""
+        for function in task.functions:
+            self.system.change_mode(function, UNGROUND_MODE)
+
+    def diagnostic(self, diagnostic: Diagnostic) -> None:
+        """A monitor has published: a component's status, or a measured value that differs from the one before."""
+
+    def adapt(self) -> AdaptationProcess | None:
+        """Called every `period_s`; a call that would come while an earlier one still runs is left out."""
+        return None

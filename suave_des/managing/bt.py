@@ -1,0 +1,83 @@
+"""The behaviour tree managers of revision 1.5 (facts: kas-lab/suave, revision 1.5).
+
+A tree is walked from its root at every tick: a sequence of what must be in order first. Written out, this is a table of
+conditions and modes; each tick asks for the modes of the first condition that holds for each function.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from suave_des.managed.coordinator import FOLLOW, MAINTAIN_MOTION, SEARCH, Task
+from suave_des.managed.recharge import RECHARGE
+from suave_des.managing.base import ManagedSystem, ManagingSubsystem
+from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
+from suave_des.scenario.modes import UNGROUND_MODE
+
+
+class BehaviourTree(ManagingSubsystem):
+    """bt: recover a failed thruster; search as high as the visibility allows; follow once the pipeline is detected."""
+
+    def __init__(self, system: ManagedSystem) -> None:
+        super().__init__(system)
+        self._settings = system.scenario.managers.bt
+        self.period_s = self._settings.tick_period_s
+        self.starts_s = system.stream("bt/phase").uniform(0.0, self.period_s)
+        self._functions: tuple[str, ...] = ()
+        self._failed: set[str] = set()
+        self._measured: dict[str, float] = {}
+
+    def task_requested(self, task: Task) -> None:
+        """From now on the tree acts on the task's functions, too."""
+        self._functions += task.functions
+
+    def task_cancelled(self, task: Task) -> None:
+        """The task's functions are set to fd_unground, and left alone."""
+        self._functions = tuple(name for name in self._functions if name not in task.functions)
+        super().task_cancelled(task)
+
+    def diagnostic(self, diagnostic: Diagnostic) -> None:
+        """Remember failed thrusters and measured values."""
+        if diagnostic.kind == Kind.QA_STATUS:
+            self._measured[diagnostic.key] = float(diagnostic.value)
+        elif diagnostic.value == FAILED:
+            self._failed.add(diagnostic.key)
+        else:
+            self._failed.discard(diagnostic.key)
+
+    def adapt(self) -> None:
+        """One tick of the tree."""
+        for function, mode in self._wanted():
+            self.system.change_mode(function, mode)
+
+    def _wanted(self) -> Iterator[tuple[str, str]]:
+        if MAINTAIN_MOTION in self._functions:
+            yield MAINTAIN_MOTION, "fd_recover_thrusters" if self._failed else "fd_all_thrusters"
+        if SEARCH in self._functions:
+            yield SEARCH, self._search_mode()
+        if FOLLOW in self._functions:
+            yield FOLLOW, self.system.scenario.default_modes.get(FOLLOW, "fd_follow_pipeline")
+
+    def _search_mode(self) -> str:
+        # A visibility that was not measured yet counts as good; below the lowest threshold the lowest altitude is left.
+        visibility_m = self._measured.get("water_visibility", float("inf"))
+        pairs = zip(self._settings.visibility_thresholds_m, self._settings.search_modes, strict=True)
+        return next(
+            (mode for threshold, mode in pairs if visibility_m >= threshold), self._settings.search_modes[-1]
+        )
+
+
+class ExtendedBehaviourTree(BehaviourTree):
+    """bt_extended: the same, but with a low battery the vehicle goes to recharge first, and then goes on."""
+
+    def __init__(self, system: ManagedSystem) -> None:
+        super().__init__(system)
+        self._recharging = False
+
+    def _wanted(self) -> Iterator[tuple[str, str]]:
+        level = self._measured.get("battery_level", 1.0)
+        # Once on its way the vehicle goes on until the level has risen: the station refills the battery at once.
+        self._recharging = level < self._settings.battery_limit
+        for function, mode in super()._wanted():
+            yield function, UNGROUND_MODE if self._recharging and function != MAINTAIN_MOTION else mode
+        yield RECHARGE, "normal" if self._recharging else UNGROUND_MODE

@@ -1,0 +1,174 @@
+"""Metacontrol: a MAPE-K loop over an OWL knowledge base (paper, section on Metacontrol; kas-lab/suave).
+
+Monitor: diagnostics update the state of the knowledge. Analyze: a reasoner infers what the rules say about that state.
+Plan: the best function design for each objective that needs one. Execute: request the design's mode, which has its name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from decimal import Decimal
+
+from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.planning import plan
+from suave_des.knowledge.reasoners import Reasoner
+from suave_des.knowledge.state import Decision, Inference, KnowledgeState, ObjectiveState, Plan
+from suave_des.managed.coordinator import SEARCH, Task
+from suave_des.managing.base import AdaptationProcess, ManagedSystem, ManagingSubsystem
+from suave_des.monitor.diagnostics import Diagnostic, Kind
+from suave_des.monitor.monitors import tick_at_or_after, until
+from suave_des.scenario.distributions import draw
+from suave_des.scenario.modes import UNGROUND_MODE
+
+UNGROUNDED = "UNGROUNDED"
+
+
+class Metacontrol(ManagingSubsystem):
+    """The metacontrol manager.
+
+    What it knows is an explicit state: objectives and their status, groundings, reported components, measured values. What
+    the reasoner infers from it is never written back, so nothing has to be retracted; a status persists only as a
+    transition of this state.
+    """
+
+    def __init__(self, system: ManagedSystem) -> None:
+        super().__init__(system)
+        self._revision = system.scenario.revision.metacontrol
+        self._knowledge_base, self._reasoner = _open(system)
+        self._objectives: dict[str, str | None] = {}
+        self._groundings: dict[str, str] = {}
+        self._components: dict[str, str] = {}
+        self._measurements: dict[str, Decimal] = {}
+        self._told: frozenset[str] = frozenset()
+        self._latency_stream = system.stream("metacontrol/inference")
+        self.period_s = system.scenario.managers.metacontrol.reasoning_period_s
+        self.starts_s = system.stream("metacontrol/phase").uniform(0.0, self.period_s)
+        bridge_period_s = self._revision.task_bridge_period_s
+        self._bridge_phase_s = system.stream("metacontrol/bridge").uniform(0.0, bridge_period_s)
+        self._add_objectives(system.lasting_functions)
+        if self._revision.objectives_at_launch:
+            self._add_objectives([SEARCH])
+
+    def task_requested(self, task: Task) -> None:
+        """Add an objective for each function of the task, when the task bridge passes it on."""
+        self.system.env.process(self._over_the_bridge(task, requested=True))
+
+    def task_cancelled(self, task: Task) -> None:
+        """Remove the task's objectives with their groundings, when the task bridge passes it on."""
+        self.system.env.process(self._over_the_bridge(task, requested=False))
+
+    def diagnostic(self, diagnostic: Diagnostic) -> None:
+        """Monitor: update what is known of components and quality attributes."""
+        if self._revision.ignores_diagnostics_without_objective and not self._objectives:
+            return
+        if diagnostic.kind == Kind.COMPONENT_STATUS:
+            self._components[diagnostic.key] = str(diagnostic.value)
+        else:
+            self._measurements[diagnostic.key] = Decimal(repr(float(diagnostic.value)))
+
+    def adapt(self) -> AdaptationProcess:
+        """Analyze and plan on the state as it is now; execute when the reasoner has taken its time."""
+        if not self._objectives or self._waits_for_measurement():
+            return
+        state = self._state()
+        inference = self._reasoner.infer(state)
+        decided = plan(self._knowledge_base, state, inference, to_adapt=self._improvable())
+        yield self.system.env.timeout(draw(self.system.scenario.latencies.inference_s, self._latency_stream))
+        self._tell_inferred(inference, state)
+        self._execute(decided)
+
+    def _over_the_bridge(self, task: Task, *, requested: bool) -> AdaptationProcess:
+        period_s = self._revision.task_bridge_period_s
+        if period_s > 0.0:
+            tick_s = tick_at_or_after(self.system.now_s, self._bridge_phase_s, period_s)
+            yield until(self.system.env, tick_s)
+        if requested:
+            self._add_objectives(task.functions)
+            return
+        for function in task.functions:
+            self._objectives.pop(function, None)
+            self._groundings.pop(function, None)
+            self.system.change_mode(function, UNGROUND_MODE)
+
+    def _add_objectives(self, functions: Iterable[str]) -> None:
+        for function in functions:
+            if function not in self._objectives:
+                self._objectives[function] = UNGROUNDED
+                self.system.log("objective", f"{function} {UNGROUNDED}")
+
+    def _state(self) -> KnowledgeState:
+        always = self._revision.search_always_improves
+        return KnowledgeState.of(
+            objectives=[
+                ObjectiveState(function, status, always and function == SEARCH)
+                for function, status in self._objectives.items()
+            ],
+            groundings=self._groundings,
+            components=self._components,
+            measurements=self._measurements,
+        )
+
+    def _waits_for_measurement(self) -> bool:
+        if not self._revision.waits_for_first_measurement:
+            return False
+        base = self._knowledge_base
+        expected = {
+            attribute
+            for function in self._objectives
+            for design in base.designs(function)
+            for attribute in base.expected(design)
+        }
+        # Only attributes that this mission measures can be waited for.
+        return any(
+            attribute in self.system.scenario.signals for attribute in expected - self._measurements.keys()
+        )
+
+    def _improvable(self) -> list[str]:
+        if not self._revision.search_improves_when_exceeded:
+            return []
+        return [function for function, design in self._groundings.items() if self._exceeds(design)]
+
+    def _exceeds(self, design: str) -> bool:
+        expected = self._knowledge_base.expected(design)
+        return any(self._measurements.get(name, value) > value for name, value in expected.items())
+
+    def _execute(self, decided: Plan) -> None:
+        for decision in decided.decisions:
+            if decision.function in self._objectives:
+                self._carry_out(decision)
+
+    def _carry_out(self, decision: Decision) -> None:
+        function, design = decision.function, decision.design
+        if design is None:
+            self.system.log("no_design_left", f"{function}: {decision.reason}")
+            return
+        if self.system.change_mode(function, design):
+            if self._groundings.get(function) != design:
+                before = self._groundings.get(function, "ungrounded")
+                self.system.log("adaptation", f"{function}: {before} -> {design}: {decision.reason}")
+            self._groundings[function] = design
+            self._objectives[function] = None
+
+    def _tell_inferred(self, inference: Inference, state: KnowledgeState) -> None:
+        told = frozenset(_statuses(inference, state))
+        for line in sorted(told - self._told):
+            self.system.log("inferred", line)
+        self._told = told
+
+
+def _open(system: ManagedSystem) -> tuple[KnowledgeBase, Reasoner]:
+    knowledge_base, reasoner = system.knowledge()
+    return knowledge_base, reasoner
+
+
+def _statuses(inference: Inference, state: KnowledgeState) -> Iterator[str]:
+    for objective in state.objectives:
+        status = inference.objective_status(objective.function)
+        if status is not None:
+            yield f"objective of {objective.function} is {status}"
+        if inference.is_updatable(objective.function) and not objective.always_improve:
+            yield f"objective of {objective.function} is updatable"
+    for function, design in state.groundings:
+        status = inference.grounding_status(function)
+        if status is not None:
+            yield f"grounding of {design} is {status}"

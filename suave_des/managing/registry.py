@@ -1,0 +1,64 @@
+"""Managers by name: the built-in ones, those that other packages register, and any class given as module:Class."""
+
+from __future__ import annotations
+
+import importlib
+from difflib import get_close_matches
+from importlib.metadata import entry_points
+
+from suave_des.errors import InputError
+from suave_des.managing.base import ManagingSubsystem
+
+ENTRY_POINT_GROUP = "suave_des.managers"
+_BUILT_IN = {
+    "none": "suave_des.managing.simple:NoManager",
+    "random": "suave_des.managing.simple:RandomManager",
+    "metacontrol": "suave_des.managing.metacontrol:Metacontrol",
+    "bt": "suave_des.managing.bt:BehaviourTree",
+    "bt_extended": "suave_des.managing.bt:ExtendedBehaviourTree",
+}
+
+
+def manager_names() -> tuple[str, ...]:
+    """Names that need no module:Class: built in first, then registered ones in alphabetical order."""
+    registered = sorted(point.name for point in entry_points(group=ENTRY_POINT_GROUP))
+    return (*_BUILT_IN, *(name for name in registered if name not in _BUILT_IN))
+
+
+def manager_class(name: str) -> type[ManagingSubsystem]:
+    """The class of a manager.
+
+    Raises:
+        InputError: there is no such manager, or what the name leads to is no subclass of ManagingSubsystem.
+    """
+    target = _BUILT_IN.get(name)
+    if target is None:
+        registered = {point.name: point.value for point in entry_points(group=ENTRY_POINT_GROUP)}
+        target = registered.get(name)
+    if target is None and ":" in name:
+        target = name
+    if target is None:
+        close = get_close_matches(name, manager_names(), n=1)
+        hint = f"did you mean {close[0]}?" if close else f"known: {', '.join(manager_names())}"
+        raise InputError(
+            f"there is no manager {name!r}", remedy=f"{hint}; your own is given as package.module:Class"
+        )
+    return _load(name, target)
+
+
+def _load(name: str, target: str) -> type[ManagingSubsystem]:
+    module_name, _, attribute = target.partition(":")
+    try:
+        module = importlib.import_module(module_name)
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"manager {name!r}: {error}",
+            remedy="the module must be importable: installed, or in a folder on PYTHONPATH or the current one",
+        ) from error
+    found = getattr(module, attribute, None)
+    if not (isinstance(found, type) and issubclass(found, ManagingSubsystem)):
+        raise InputError(
+            f"manager {name!r}: {module_name} has no subclass of ManagingSubsystem named {attribute!r}",
+            remedy="derive your class from suave_des.managing.base.ManagingSubsystem",
+        )
+    return found

@@ -1,0 +1,55 @@
+"""The paper's two managers without knowledge: none and random (paper, section on managing subsystems; kas-lab/suave)."""
+
+from __future__ import annotations
+
+from suave_des.managed.coordinator import Task
+from suave_des.managing.base import ManagedSystem, ManagingSubsystem
+
+
+class NoManager(ManagingSubsystem):
+    """none: each function gets its fixed default mode when its task begins, and nothing is ever adapted."""
+
+    def task_requested(self, task: Task) -> None:
+        """Set the default modes of the task's functions."""
+        for function in task.functions:
+            mode = self.system.scenario.default_modes.get(function)
+            if mode is not None:
+                self.system.change_mode(function, mode)
+
+
+class RandomManager(ManagingSubsystem):
+    """random: every period, each function of the task gets one of all its modes, with equal chance.
+
+    Functions without a default mode (maintain_motion) are left alone; fd_unground and __DEFAULT__ are modes like others.
+    Revision 2023 picks only on its timer, which runs since launch; revision 1.5 at each task request too.
+    """
+
+    def __init__(self, system: ManagedSystem) -> None:
+        super().__init__(system)
+        revision = system.scenario.revision.random
+        self.period_s = system.scenario.managers.random.adaptation_period_s
+        self._stream = system.stream("random_manager/picks")
+        self._on_task_request = revision.on_task_request
+        if revision.starts_at_launch:
+            self.starts_s = system.stream("random_manager/phase").uniform(0.0, self.period_s)
+        else:
+            self.starts_s = self.period_s
+        self._functions: tuple[str, ...] = ()
+
+    def task_requested(self, task: Task) -> None:
+        """Remember the task's functions."""
+        self._functions = tuple(name for name in task.functions if name in self.system.scenario.default_modes)
+        if self._on_task_request:
+            self.adapt()
+
+    def task_cancelled(self, task: Task) -> None:
+        """Forget them, and set them to fd_unground."""
+        self._functions = ()
+        super().task_cancelled(task)
+
+    def adapt(self) -> None:
+        """Pick a mode for each function."""
+        for function in self._functions:
+            self.system.change_mode(
+                function, self._stream.choice(self.system.modes.available_modes(function))
+            )

@@ -1,0 +1,1 @@
+"""Simulation: wires one mission, scenario + manager + run + seed, into a SimPy environment."""

@@ -1,0 +1,34 @@
+"""Opens the knowledge base of a scenario, and checks that it fits the mission and the modes file."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+from suave_des.errors import InputError
+from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.reasoners import Reasoner, make_reasoner
+from suave_des.scenario.loader import MISSION_FUNCTIONS, LoadedScenario
+
+
+def open_knowledge(loaded: LoadedScenario) -> tuple[KnowledgeBase, Reasoner]:
+    """The scenario's knowledge base, and the reasoner that the scenario names.
+
+    Raises:
+        KnowledgeError: the ontologies cannot be read, or lack a design for a function of the mission.
+        InputError: a function design of the knowledge base has no mode of its name in the modes file.
+    """
+    knowledge = loaded.scenario.knowledge
+    base = KnowledgeBase.load(
+        loaded.ontologies, values={name: Decimal(repr(value)) for name, value in knowledge.values.items()}
+    )
+    base.check(MISSION_FUNCTIONS)
+    for function in MISSION_FUNCTIONS:
+        for design in base.designs(function):
+            if design not in loaded.modes.modes(function):
+                raise InputError(
+                    f"function {function} has no mode {design}, but the ontology has a function design of that name",
+                    file=loaded.modes_path,
+                    place=function,
+                    remedy="add the mode, or remove the design from the ontology",
+                )
+    return base, make_reasoner(knowledge.reasoner, base)

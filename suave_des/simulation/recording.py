@@ -1,0 +1,94 @@
+"""The record of one mission: its events as a timeline, and its trajectory."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
+
+import simpy
+
+from suave_des.managed.coordinator import MAINTAIN_MOTION
+from suave_des.monitor.diagnostics import Diagnostic, Kind
+from suave_des.monitor.monitors import Measurements
+from suave_des.simulation.result import Event, TrajectoryPoint
+from suave_des.scenario.modes import Mode
+from suave_des.vehicle.vehicle import STEP_S, Vehicle
+
+TRAJECTORY_PERIOD_ROWS = 4
+
+
+class Recorder:
+    """Takes note of what happens, if it is enabled; a campaign's missions do without.
+
+    Args:
+        env: the mission's clock.
+        enabled: whether to keep anything.
+    """
+
+    def __init__(self, env: simpy.Environment, *, enabled: bool) -> None:
+        self._env = env
+        self._enabled = enabled
+        self.events: list[Event] = []
+        self._modes: list[tuple[float, str]] = [(0.0, "")]
+
+    def log(self, source: str, event: str, detail: str) -> None:
+        """Keep an event."""
+        if self._enabled:
+            self.events.append(Event(float(self._env.now), source, event, detail))
+
+    def diagnostic_of(self, thresholds: Sequence[float]) -> Callable[[Diagnostic], None]:
+        """A subscriber that keeps component reports, and visibility measurements that cross a threshold."""
+        band: int | None = None
+        rising = sorted(thresholds)
+
+        def take(diagnostic: Diagnostic) -> None:
+            nonlocal band
+            if not self._enabled:
+                return
+            if diagnostic.kind == Kind.COMPONENT_STATUS:
+                self.log("thruster_monitor", "component_status", f"{diagnostic.key} {diagnostic.value}")
+            elif diagnostic.key == "water_visibility":
+                value = float(diagnostic.value)
+                now_in = bisect_right(rising, value)
+                if band is None:
+                    self.log("visibility_monitor", "first_measurement", f"{value:.2f} m")
+                elif now_in != band:
+                    word, edge = (
+                        ("rises to", rising[now_in - 1]) if now_in > band else ("falls below", rising[now_in])
+                    )
+                    self.log(
+                        "visibility_monitor", "visibility_crossing", f"{word} {edge:g} m ({value:.2f} m)"
+                    )
+                band = now_in
+
+        return take
+
+    def mode_effect(self, function: str, mode: Mode) -> None:
+        """Keep the mode of the function that moves the vehicle, for the trajectory."""
+        if self._enabled and function != MAINTAIN_MOTION:
+            self._modes.append((float(self._env.now), mode.name))
+
+    def trajectory(self, vehicle: Vehicle, visibility: Measurements) -> tuple[TrajectoryPoint, ...]:
+        """The vehicle's way until now, with the mode in force and the visibility measured at each point."""
+        if not self._enabled:
+            return ()
+        points = []
+        mode_times = [t_s for t_s, _ in self._modes]
+        for row in range(0, int(self._env.now / STEP_S) + 1, TRAJECTORY_PERIOD_ROWS):
+            t_s = round(row * STEP_S, 6)
+            pose = vehicle.pose(t_s)
+            measured = bisect_right(visibility.times_s, t_s)
+            points.append(
+                TrajectoryPoint(
+                    t_s,
+                    pose.x_m,
+                    pose.y_m,
+                    pose.z_m,
+                    pose.roll_rad,
+                    pose.pitch_rad,
+                    pose.yaw_rad,
+                    self._modes[bisect_right(mode_times, t_s) - 1][1],
+                    visibility.values[measured - 1] if measured else None,
+                )
+            )
+        return tuple(points)

@@ -1,0 +1,78 @@
+"""What a mission gives: its metrics, and, if asked for, its events and trajectory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something worth telling that happened in a mission."""
+
+    t_s: float
+    source: str
+    event: str
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class MissionMetrics:
+    """One row of runs.csv.
+
+    Attributes:
+        scenario: name of the scenario.
+        manager: name of the managing subsystem.
+        run: number of the run, from 1; equal runs of different managers meet the same sea.
+        seed: seed of the campaign.
+        initial_x_m: where the vehicle was put, world frame; likewise initial_y_m.
+        mission_duration_s: mission time at the end.
+        pipeline_found: whether the search ended with the pipeline found.
+        search_time_s: as the revision counts it; the time limit (rev 1.5: the duration) if not found.
+        distance_inspected_m: as published last by the follow function.
+        mean_reaction_time_s: mean of the completed reactions, none if there was none.
+        adaptations: mode changes of functions in use.
+        detection_time_s: exact mission time of the first sight, none if there was none.
+        detection_x_m: x of the pipeline point seen first, none if there was none; likewise detection_y_m.
+    """
+
+    scenario: str
+    manager: str
+    run: int
+    seed: int
+    initial_x_m: float
+    initial_y_m: float
+    mission_duration_s: float
+    pipeline_found: bool
+    search_time_s: float
+    distance_inspected_m: float
+    mean_reaction_time_s: float | None
+    adaptations: int
+    detection_time_s: float | None
+    detection_x_m: float | None
+    detection_y_m: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class TrajectoryPoint:
+    """Where the vehicle was at a mission time, and under which mode; visibility as measured, none before that."""
+
+    t_s: float
+    x_m: float
+    y_m: float
+    z_m: float
+    roll_rad: float
+    pitch_rad: float
+    yaw_rad: float
+    mode: str
+    visibility_m: float | None
+
+
+@dataclass(frozen=True)
+class MissionResult:
+    """A mission's metrics, with the record of how it went if that was asked for."""
+
+    metrics: MissionMetrics
+    events: tuple[Event, ...] = ()
+    trajectory: tuple[TrajectoryPoint, ...] = ()
+    drawn: dict[str, float] = field(default_factory=dict)
+    """What this run's streams gave for the scenario's distributions, by key path."""

@@ -1,0 +1,384 @@
+"""One mission: scenario, manager, run and seed, wired into a SimPy environment."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Generator, Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import simpy
+
+from suave_des.errors import MissionError, SuaveDesError
+from suave_des.managed.coordinator import FOLLOW, MAINTAIN_MOTION, SEARCH, MissionCoordinator, Task
+from suave_des.managed.detection import PipelineDetector, measured_at_rows
+from suave_des.managed.follow import FollowPipeline
+from suave_des.managed.mode_manager import ModeManager
+from suave_des.managed.motion import MaintainMotion
+from suave_des.managed.node import Frame, FunctionNode, SetPointSender
+from suave_des.managed.reactions import ReactionMeter
+from suave_des.managed.recharge import RECHARGE, GenerateRechargePath
+from suave_des.managed.search import GenerateSearchPath
+from suave_des.managing.base import ManagedSystem, ManagingSubsystem
+from suave_des.managing.registry import manager_class
+from suave_des.monitor.diagnostics import DiagnosticsBus
+from suave_des.monitor.monitors import (
+    Measurements,
+    ThrusterFault,
+    battery_monitor,
+    measure,
+    signal_monitor,
+    thruster_monitor,
+    until,
+)
+from suave_des.simulation.recording import Recorder
+from suave_des.simulation.result import MissionMetrics, MissionResult
+from suave_des.scenario.distributions import Distribution, draw
+from suave_des.scenario.loader import LoadedScenario
+from suave_des.scenario.models import Battery
+from suave_des.streams import Streams
+from suave_des.vehicle.bluerov2 import BLUEROV2
+from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle
+from suave_des.world.pipeline import path_to_inspect, sample_points
+from suave_des.simulation.signals import build_signal
+
+Process = Generator[simpy.Event, None, None]
+
+
+class Simulator:
+    """Runs missions of one scenario in this process; what does not change between missions is made once.
+
+    Args:
+        loaded: the scenario with its files.
+    """
+
+    def __init__(self, loaded: LoadedScenario) -> None:
+        self.loaded = loaded
+        pipeline = loaded.scenario.pipeline
+        self.points = sample_points(pipeline.vertices_m, pipeline.points_per_piece)
+        height = loaded.scenario.revision.monitors.detected_point_height_m
+        self.detection_points = self.points + np.array([0.0, 0.0, height])
+
+    @cached_property
+    def knowledge(self) -> tuple[Any, Any]:
+        """The scenario's knowledge base and its reasoner, opened and checked against the modes on first use."""
+        from suave_des.simulation.knowledge import (
+            open_knowledge,
+        )  # owlready2 and numpy's friends load only when needed
+
+        return open_knowledge(self.loaded)
+
+    def run(self, manager: str, run: int, seed: int, *, record: bool = False) -> MissionResult:
+        """Run one mission.
+
+        Args:
+            manager: name of the managing subsystem, or module:Class.
+            run: number of the run in its campaign; together with the seed it decides everything that is random.
+            seed: seed of the campaign.
+            record: whether to keep events and trajectory.
+
+        Raises:
+            MissionError: the manager raised; the error names it, the run and the mission time.
+            InputError: the manager or the knowledge base cannot be used.
+        """
+        return _Mission(self, manager, run, seed, record=record).result()
+
+
+class _Mission:
+    """The wiring of one mission."""
+
+    def __init__(self, simulator: Simulator, manager: str, run: int, seed: int, *, record: bool) -> None:
+        self.simulator = simulator
+        self.scenario = simulator.loaded.scenario
+        self.revision = self.scenario.revision
+        self.manager_name, self.run, self.seed = manager, run, seed
+        self.streams = Streams(seed, run)
+        self.env = simpy.Environment()
+        self.drawn: dict[str, float] = {}
+        self.recorder = Recorder(self.env, enabled=record)
+        self.bus = DiagnosticsBus()
+        self.duration_s = self.scenario.mission.time_limit_s + self.revision.coordinator.limit_check_period_s
+        self.vehicle = self._make_vehicle()
+        self.visibility = self._start_monitors()
+        self.detector = PipelineDetector(
+            self.env,
+            self.vehicle,
+            measured_at_rows(self.visibility, self.vehicle.last_row + 1),
+            simulator.detection_points,
+        )
+        self.follow, nodes = self._make_functions()
+        self.modes = ModeManager(
+            self.env,
+            simulator.loaded.modes,
+            nodes,
+            self._sampler("latencies.mode_change_s", self.scenario.latencies.mode_change_s),
+            self.recorder.log,
+        )
+        self.reactions = ReactionMeter(self.env, self.scenario.reaction_metric, self.visibility)
+        self.bus.subscribe(self.reactions.diagnostic)
+        self.bus.subscribe(self.recorder.diagnostic_of(self.scenario.reaction_metric.visibility_thresholds_m))
+        self.modes.on_effect(self.reactions.mode_effect)
+        self.modes.on_effect(self.recorder.mode_effect)
+        self.coordinator = self._make_coordinator()
+        self.manager = self._start_manager()
+
+    def result(self) -> MissionResult:
+        """Run to the end and read the metrics."""
+        self.env.run(until=self.coordinator.ended)
+        point = self.detector.first_point
+        found = self.coordinator.search_time_s is not None
+        metrics = MissionMetrics(
+            scenario=self.scenario.name,
+            manager=self.manager_name,
+            run=self.run,
+            seed=self.seed,
+            initial_x_m=self.drawn["start.x_m"],
+            initial_y_m=self.drawn["start.y_m"],
+            mission_duration_s=float(self.env.now),
+            pipeline_found=found,
+            search_time_s=self.coordinator.search_time_or_limit_s(),
+            distance_inspected_m=self.follow.distance_m,
+            mean_reaction_time_s=self.reactions.mean_s,
+            adaptations=self.modes.adaptations,
+            detection_time_s=self.coordinator.detected_s if found else None,
+            detection_x_m=float(self.simulator.points[point, 0]) if found and point is not None else None,
+            detection_y_m=float(self.simulator.points[point, 1]) if found and point is not None else None,
+        )
+        trajectory = self.recorder.trajectory(self.vehicle, self.visibility)
+        return MissionResult(metrics, tuple(self.recorder.events), trajectory, self.drawn)
+
+    # Chance: every use has a stream of its own, named after the scenario's key.
+
+    def _draw(self, key: str, distribution: Distribution) -> float:
+        value = (
+            draw(distribution, self.streams.stream(key))
+            if not isinstance(distribution, float)
+            else distribution
+        )
+        self.drawn[key] = value
+        return value
+
+    def _sampler(self, key: str, distribution: Distribution) -> Callable[[], float]:
+        if isinstance(distribution, float):
+            return lambda: distribution
+        stream = self.streams.stream(key)
+        return lambda: draw(distribution, stream)
+
+    def _phase(self, timer: str, period_s: float) -> float:
+        """Phase of a timer: arbitrary per node, another one in each run."""
+        return self.streams.stream(f"phase/{timer}").random() * period_s
+
+    # The world and the vehicle.
+
+    def _make_vehicle(self) -> Vehicle:
+        start, current, calibration = self.scenario.start, self.scenario.current, self.scenario.calibration
+        x_m, y_m = self._draw("start.x_m", start.x_m), self._draw("start.y_m", start.y_m)
+        self.origin_m = (
+            x_m + self._draw("calibration.drift_x_m", calibration.drift_x_m),
+            y_m + self._draw("calibration.drift_y_m", calibration.drift_y_m),
+        )
+        z_m, heading_rad = (
+            self._draw("start.z_m", start.z_m),
+            self._draw("start.heading_rad", start.heading_rad),
+        )
+        loss = self._draw("calibration.real_time_factor_loss", calibration.real_time_factor_loss)
+        return Vehicle(
+            BLUEROV2,
+            Autopilot(
+                calibration.position_gain_per_s,
+                calibration.horizontal_speed_limit_m_per_s,
+                calibration.vertical_speed_limit_m_per_s,
+                calibration.velocity_time_constant_s,
+                self._draw("calibration.altitude_error_m", calibration.altitude_error_m),
+            ),
+            Pose(*self.origin_m, z_m, 0.0, 0.0, heading_rad),
+            self.duration_s,
+            current_m_per_s=(
+                self._draw("current.x_m_per_s", current.x_m_per_s),
+                self._draw("current.y_m_per_s", current.y_m_per_s),
+                self._draw("current.z_m_per_s", current.z_m_per_s),
+            ),
+            time_scale=1.0 / (1.0 + loss),
+        )
+
+    # The monitors.
+
+    def _start_monitors(self) -> Measurements:
+        measured = {name: self._measure(name) for name in sorted(self.scenario.signals)}
+        for measurements in measured.values():
+            self.env.process(signal_monitor(self.env, self.bus, measurements))
+        faults = [
+            ThrusterFault(
+                event.thruster,
+                event.event == "failure",
+                self._draw(f"thruster_events.{place}.time_s", event.time_s),
+            )
+            for place, event in enumerate(self.scenario.thruster_events)
+        ]
+        self.env.process(
+            thruster_monitor(
+                self.env,
+                self.bus,
+                faults,
+                lambda thruster, health: self.vehicle.set_thruster_health(self.env.now, thruster, health),
+                phase_s=self._phase("thruster_monitor", 1.0),
+                after_previous=self.revision.monitors.thruster_event_times == "after_previous",
+            )
+        )
+        if self.scenario.battery is not None:
+            self.env.process(self._battery(self.scenario.battery))
+        return measured["water_visibility"]
+
+    def _measure(self, name: str) -> Measurements:
+        signal = self.scenario.signals[name]
+        period_s = signal.publishing_period_s or self.revision.monitors.visibility_publishing_period_s
+        noisy = signal.noise != 0.0
+        return measure(
+            name,
+            build_signal(name, signal, self.simulator.loaded.tables, self._draw),
+            self.duration_s,
+            period_s=period_s,
+            phase_s=self._phase(f"signals.{name}", period_s),
+            time_step_s=signal.time_step_s,
+            noise=self._sampler(f"signals.{name}.noise", signal.noise) if noisy else None,
+        )
+
+    def _battery(self, battery: Battery) -> Process:
+        def is_at_station() -> bool:
+            x, y, _ = self.vehicle.position(self.env.now)
+            radius = battery.station_radius_m
+            return abs(x - battery.station_x_m) <= radius and abs(y - battery.station_y_m) <= radius
+
+        return battery_monitor(
+            self.env,
+            self.bus,
+            is_at_station,
+            discharge_time_s=battery.discharge_time_s,
+            period_s=battery.publishing_period_s,
+            phase_s=self._phase("battery_monitor", battery.publishing_period_s),
+        )
+
+    # The managed subsystem.
+
+    def _sender(self, node: str) -> SetPointSender:
+        set_points = self.revision.set_points
+        frame = Frame(
+            self._draw(f"revision.set_points.node_frame_offset_x_m/{node}", set_points.node_frame_offset_x_m),
+            self._draw(f"revision.set_points.node_frame_offset_y_m/{node}", set_points.node_frame_offset_y_m),
+            self._draw(f"revision.set_points.node_frame_offset_z_m/{node}", set_points.node_frame_offset_z_m),
+        )
+        stream = self.streams.stream(f"set_points/{node}")
+        return SetPointSender(self.env, self.vehicle, frame, set_points.loss_probability, stream)
+
+    def _make_functions(self) -> tuple[FollowPipeline, dict[str, FunctionNode]]:
+        env, vehicle, revision = self.env, self.vehicle, self.revision
+        follow = FollowPipeline(env, vehicle, self._sender(FOLLOW), revision.follow, self._path)
+        nodes: dict[str, FunctionNode] = {
+            MAINTAIN_MOTION: MaintainMotion(env, self.bus, revision.recovery, self._restore_thruster),
+            SEARCH: GenerateSearchPath(
+                env,
+                vehicle,
+                self._sender(SEARCH),
+                revision.spiral,
+                self.origin_m,
+                self._phase(SEARCH, 1.0),
+            ),
+            FOLLOW: follow,
+        }
+        if self.scenario.battery is not None:
+            battery = self.scenario.battery
+            station_m = (battery.station_x_m, battery.station_y_m)
+            nodes[RECHARGE] = GenerateRechargePath(env, self._sender(RECHARGE), station_m)
+        return follow, nodes
+
+    def _restore_thruster(self, thruster: int) -> None:
+        self.vehicle.set_thruster_health(self.env.now, thruster, 1.0)
+
+    def _path(self) -> list[tuple[float, float]] | None:
+        first = self.detector.first_point
+        return None if first is None else path_to_inspect(self.simulator.points.tolist(), first)
+
+    def _make_coordinator(self) -> MissionCoordinator:
+        settings = self.revision.coordinator
+        return MissionCoordinator(
+            self.env,
+            settings,
+            self.detector,
+            self.follow,
+            self._request,
+            self._cancel,
+            time_limit_s=self.scenario.mission.time_limit_s,
+            start_delay_s=self._draw("latencies.task_start_s", self.scenario.latencies.task_start_s),
+            poll_phase_s=self._phase("coordinator", settings.poll_period_s),
+            limit_phase_s=self._phase("limit", settings.limit_check_period_s),
+            log=self.recorder.log,
+        )
+
+    # The managing subsystem: what it raises is the mission's end, named after the manager, and nobody else's.
+
+    def _start_manager(self) -> ManagingSubsystem:
+        kind = manager_class(self.manager_name)
+        settings: Mapping[str, Any] = {}
+        extra = (self.scenario.managers.model_extra or {}).get(self.manager_name)
+        if isinstance(extra, Mapping):
+            settings = extra
+
+        def log(event: str, detail: str) -> None:
+            self.recorder.log(self.manager_name, event, detail)
+
+        def stream(name: str) -> random.Random:
+            return self.streams.stream(f"manager/{name}")
+
+        system = ManagedSystem(
+            env=self.env,
+            scenario=self.scenario,
+            settings=settings,
+            modes=self.modes,
+            lasting_functions=self.coordinator.lasting_functions,
+            stream=stream,
+            log=log,
+            knowledge=lambda: self.simulator.knowledge,
+        )
+        manager = self._guarded(kind, system)
+        if kind.diagnostic is not ManagingSubsystem.diagnostic:
+            self.bus.subscribe(lambda diagnostic: self._guarded(manager.diagnostic, diagnostic))
+        if manager.period_s is not None:
+            self.env.process(self._adapt_periodically(manager, manager.period_s))
+        return manager
+
+    def _request(self, task: Task) -> None:
+        self._guarded(self.manager.task_requested, task)
+
+    def _cancel(self, task: Task) -> None:
+        self.modes.task_over(task.functions)
+        self._guarded(self.manager.task_cancelled, task)
+
+    def _adapt_periodically(self, manager: ManagingSubsystem, period_s: float) -> Process:
+        yield until(self.env, manager.starts_s)
+        due_s = self.env.now
+        while True:
+            adaptation = self._guarded(manager.adapt)
+            if adaptation is not None:
+                yield from self._guarded_steps(adaptation)
+            while due_s <= self.env.now:
+                due_s += period_s
+            yield until(self.env, due_s)
+
+    def _guarded_steps(self, adaptation: Process) -> Process:
+        try:
+            yield from adaptation
+        except Exception as error:
+            raise self._mission_error(error) from error
+
+    def _guarded(self, hook: Callable[..., Any], *arguments: Any) -> Any:
+        try:
+            return hook(*arguments)
+        except Exception as error:
+            raise self._mission_error(error) from error
+
+    def _mission_error(self, error: Exception) -> SuaveDesError:
+        if isinstance(error, MissionError):
+            return error
+        cause = str(error) if isinstance(error, SuaveDesError) else f"{type(error).__name__}: {error}"
+        return MissionError(self.manager_name, self.run, float(self.env.now), cause)

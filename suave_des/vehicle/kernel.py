@@ -1,0 +1,173 @@
+"""The vehicle's motion: rigid body, thrusters and guided autopilot, stepped on a fixed grid by one compiled loop.
+
+One row of the track holds everything that the next step needs:
+
+    0:3   position p in the world frame, m (x east, y north, z up)
+    3:7   attitude: unit quaternion (w, x, y, z), body to world
+    7:13  nu, body frame, m/s and rad/s
+    13:16 integral of the velocity error, world frame, as an acceleration, m/s^2
+    16    integral of the heading error, as an angular acceleration, rad/s^2
+
+Attitude is a quaternion (Handbook, 2.2.2): no trigonometry in the loop, and no singularity for a vehicle that tumbles.
+"""
+
+from __future__ import annotations
+
+import math
+
+from suave_des.compiling import compiled
+from suave_des.vehicle.model import Array
+
+ROW = 17
+POSITION, ATTITUDE, VELOCITY, INTEGRAL = slice(0, 3), slice(3, 7), slice(7, 13), slice(13, 17)
+
+# Places in the parameter vector.
+MASS, IXX, IYY, IZZ, NET_BUOYANCY, RIGHTING = 0, 1, 2, 3, 4, 5
+DRAG = 6  # six places
+THRUST_LIMIT = 12
+POSITION_GAIN, SPEED_LIMIT_XY, SPEED_LIMIT_Z = 13, 14, 15
+VELOCITY_GAIN, VELOCITY_INTEGRAL_GAIN, INTEGRAL_LIMIT = 16, 17, 18
+ATTITUDE_GAIN, RATE_GAIN, HEADING_INTEGRAL_GAIN, HEADING_INTEGRAL_LIMIT = 19, 20, 21, 22
+CURRENT = 23  # three places, world frame
+PARAMETERS = 26
+
+
+@compiled
+def advance(
+    track: Array,
+    first: int,
+    last: int,
+    step_s: float,
+    set_point: Array,
+    parameters: Array,
+    allocation: Array,
+    effectiveness: Array,
+) -> None:
+    """Fill rows first + 1 .. last of the track from row `first`, with one set-point and thruster health throughout.
+
+    Args:
+        track: shape (rows, 17), see above; written in place.
+        first: row to start from.
+        last: last row to fill.
+        step_s: time between rows, as the simulated world counts it.
+        set_point: x, y, z in m and heading in rad, world frame, shape (4,).
+        parameters: vehicle and autopilot constants in the places named above.
+        allocation: thrusts for a demanded wrench, shape (6 thrusters, 6).
+        effectiveness: wrench for thrusts with each thruster's health folded in, shape (6, 6 thrusters).
+    """
+    prm = parameters
+    mass, ixx, iyy, izz = prm[MASS], prm[IXX], prm[IYY], prm[IZZ]
+    heading_w, heading_z = math.cos(set_point[3] / 2.0), math.sin(set_point[3] / 2.0)
+    x, y, z, qw, qx, qy, qz, u, v, w, p, q, r, ix, iy, iz, ir = track[first, :ROW]
+    h = step_s
+    t0 = t1 = t2 = t3 = t5 = 0.0
+    for row in range(first + 1, last + 1):
+        # Rotation matrix R, body to world (Handbook, 2.69).
+        r00 = 1.0 - 2.0 * (qy * qy + qz * qz)
+        r01 = 2.0 * (qx * qy - qz * qw)
+        r02 = 2.0 * (qx * qz + qy * qw)
+        r10 = 2.0 * (qx * qy + qz * qw)
+        r11 = 1.0 - 2.0 * (qx * qx + qz * qz)
+        r12 = 2.0 * (qy * qz - qx * qw)
+        r20 = 2.0 * (qx * qz - qy * qw)
+        r21 = 2.0 * (qy * qz + qx * qw)
+        r22 = 1.0 - 2.0 * (qx * qx + qy * qy)
+
+        # Guided autopilot, outer loop: position error to velocity set-point, limited in the horizontal and vertical.
+        vx_sp = prm[POSITION_GAIN] * (set_point[0] - x)
+        vy_sp = prm[POSITION_GAIN] * (set_point[1] - y)
+        vz_sp = prm[POSITION_GAIN] * (set_point[2] - z)
+        speed_sp = math.sqrt(vx_sp * vx_sp + vy_sp * vy_sp)
+        if speed_sp > prm[SPEED_LIMIT_XY]:
+            vx_sp *= prm[SPEED_LIMIT_XY] / speed_sp
+            vy_sp *= prm[SPEED_LIMIT_XY] / speed_sp
+        vz_sp = min(max(vz_sp, -prm[SPEED_LIMIT_Z]), prm[SPEED_LIMIT_Z])
+
+        # Inner loop: proportional-integral on the velocity in the world frame, demanded as a force in the body frame.
+        ex = vx_sp - (r00 * u + r01 * v + r02 * w)
+        ey = vy_sp - (r10 * u + r11 * v + r12 * w)
+        ez = vz_sp - (r20 * u + r21 * v + r22 * w)
+        bound = prm[INTEGRAL_LIMIT]
+        ix = min(max(ix + h * prm[VELOCITY_INTEGRAL_GAIN] * ex, -bound), bound)
+        iy = min(max(iy + h * prm[VELOCITY_INTEGRAL_GAIN] * ey, -bound), bound)
+        iz = min(max(iz + h * prm[VELOCITY_INTEGRAL_GAIN] * ez, -bound), bound)
+        fx = mass * (prm[VELOCITY_GAIN] * ex + ix)
+        fy = mass * (prm[VELOCITY_GAIN] * ey + iy)
+        fz = mass * (prm[VELOCITY_GAIN] * ez + iz)
+        d0 = r00 * fx + r10 * fy + r20 * fz
+        d1 = r01 * fx + r11 * fy + r21 * fz
+        d2 = r02 * fx + r12 * fy + r22 * fz
+
+        # Attitude: the vector part of conj(q) * q_heading is half the turn that is left, in the body frame.
+        ew = qw * heading_w + qz * heading_z
+        sign = 2.0 if ew >= 0.0 else -2.0
+        e_roll = sign * (-qx * heading_w - qy * heading_z)
+        e_yaw = sign * (-qz * heading_w + qw * heading_z)
+        bound = prm[HEADING_INTEGRAL_LIMIT]
+        ir = min(max(ir + h * prm[HEADING_INTEGRAL_GAIN] * e_yaw, -bound), bound)
+        d3 = ixx * (prm[ATTITUDE_GAIN] * e_roll - prm[RATE_GAIN] * p)
+        d5 = izz * (prm[ATTITUDE_GAIN] * e_yaw - prm[RATE_GAIN] * r + ir)
+
+        # Thrusters: allocate as if all worked, limit each, and get what the working ones give.
+        t0 = t1 = t2 = t3 = t4 = t5 = 0.0
+        limit = prm[THRUST_LIMIT]
+        for i in range(6):
+            thrust = (
+                allocation[i, 0] * d0
+                + allocation[i, 1] * d1
+                + allocation[i, 2] * d2
+                + allocation[i, 3] * d3
+                + allocation[i, 5] * d5
+            )
+            thrust = min(max(thrust, -limit), limit)
+            t0 += effectiveness[0, i] * thrust
+            t1 += effectiveness[1, i] * thrust
+            t2 += effectiveness[2, i] * thrust
+            t3 += effectiveness[3, i] * thrust
+            t4 += effectiveness[4, i] * thrust
+            t5 += effectiveness[5, i] * thrust
+
+        # Buoyancy above the centre of mass: a net force, and a moment that rights roll and pitch (Handbook, 4.1).
+        t0 += prm[NET_BUOYANCY] * r20
+        t1 += prm[NET_BUOYANCY] * r21
+        t2 += prm[NET_BUOYANCY] * r22
+        t3 -= prm[RIGHTING] * r21
+        t4 += prm[RIGHTING] * r20
+
+        # M nu' = tau - C(nu) nu - D(nu_r) nu_r, drag taken implicitly: it stays stable at any speed.
+        cu = r00 * prm[CURRENT] + r10 * prm[CURRENT + 1] + r20 * prm[CURRENT + 2]
+        cv = r01 * prm[CURRENT] + r11 * prm[CURRENT + 1] + r21 * prm[CURRENT + 2]
+        cw = r02 * prm[CURRENT] + r12 * prm[CURRENT + 1] + r22 * prm[CURRENT + 2]
+        au = t0 / mass - (q * w - r * v)
+        av = t1 / mass - (r * u - p * w)
+        aw = t2 / mass - (p * v - q * u)
+        ap = (t3 - (izz - iyy) * q * r) / ixx
+        aq = (t4 - (ixx - izz) * r * p) / iyy
+        ar = (t5 - (iyy - ixx) * p * q) / izz
+        u = cu + (u + h * au - cu) / (1.0 + h * prm[DRAG] * abs(u - cu) / mass)
+        v = cv + (v + h * av - cv) / (1.0 + h * prm[DRAG + 1] * abs(v - cv) / mass)
+        w = cw + (w + h * aw - cw) / (1.0 + h * prm[DRAG + 2] * abs(w - cw) / mass)
+        p = (p + h * ap) / (1.0 + h * prm[DRAG + 3] * abs(p) / ixx)
+        q = (q + h * aq) / (1.0 + h * prm[DRAG + 4] * abs(q) / iyy)
+        r = (r + h * ar) / (1.0 + h * prm[DRAG + 5] * abs(r) / izz)
+
+        # Kinematics with the new velocity (semi-implicit Euler): p' = R v, q' = T_q(q) omega (Handbook, 2.86).
+        x += h * (r00 * u + r01 * v + r02 * w)
+        y += h * (r10 * u + r11 * v + r12 * w)
+        z += h * (r20 * u + r21 * v + r22 * w)
+        dw = -qx * p - qy * q - qz * r
+        dx = qw * p + qy * r - qz * q
+        dy = qw * q + qz * p - qx * r
+        dz = qw * r + qx * q - qy * p
+        qw += 0.5 * h * dw
+        qx += 0.5 * h * dx
+        qy += 0.5 * h * dy
+        qz += 0.5 * h * dz
+        scale = 1.0 / math.sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
+        qw, qx, qy, qz = qw * scale, qx * scale, qy * scale, qz * scale
+
+        track[row, 0], track[row, 1], track[row, 2] = x, y, z
+        track[row, 3], track[row, 4], track[row, 5], track[row, 6] = qw, qx, qy, qz
+        track[row, 7], track[row, 8], track[row, 9] = u, v, w
+        track[row, 10], track[row, 11], track[row, 12] = p, q, r
+        track[row, 13], track[row, 14], track[row, 15], track[row, 16] = ix, iy, iz, ir

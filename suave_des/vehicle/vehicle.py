@@ -1,0 +1,214 @@
+"""A vehicle in mission time: commanded and disturbed at events, read at any time, integrated only as far as needed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from suave_des.vehicle import kernel
+from suave_des.vehicle.model import Array, VehicleModel, allocation_matrix, autopilot_allocation
+
+STEP_S = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """eta in the world frame: position in m, attitude as Euler angles in rad (rotation order z, y, x; Handbook, 2.2.1)."""
+
+    x_m: float
+    y_m: float
+    z_m: float
+    roll_rad: float
+    pitch_rad: float
+    yaw_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class Autopilot:
+    """The guided controller: ArduSub's cascade of position, velocity and attitude loops, in its simplest form.
+
+    The attitude loop's gains are those of a double integrator with the natural frequency of a BlueROV2's angle
+    controller (a few rad/s); what follows from them is not sensitive to the exact value.
+
+    Attributes:
+        position_gain_per_s: velocity demanded for each metre of position error.
+        horizontal_speed_limit_m_per_s: limit of the demanded horizontal velocity.
+        vertical_speed_limit_m_per_s: limit of the demanded vertical velocity.
+        velocity_time_constant_s: how fast the velocity follows its demand; the integral gain makes the loop critically
+            damped for a body without drag.
+        altitude_error_m: steady error: the autopilot holds its altitude set-point plus this.
+        attitude_frequency_rad_per_s: natural frequency of roll and heading control.
+    """
+
+    position_gain_per_s: float
+    horizontal_speed_limit_m_per_s: float
+    vertical_speed_limit_m_per_s: float
+    velocity_time_constant_s: float
+    altitude_error_m: float = 0.0
+    attitude_frequency_rad_per_s: float = 3.0
+
+
+def _parameters(
+    model: VehicleModel, autopilot: Autopilot, current_m_per_s: tuple[float, float, float]
+) -> Array:
+    vector = np.zeros(kernel.PARAMETERS)
+    vector[kernel.MASS] = model.mass_kg
+    vector[[kernel.IXX, kernel.IYY, kernel.IZZ]] = model.inertia_kg_m2
+    vector[kernel.NET_BUOYANCY] = model.buoyancy_n - model.weight_n
+    vector[kernel.RIGHTING] = model.buoyancy_n * model.centre_of_buoyancy_m
+    vector[kernel.DRAG : kernel.DRAG + 6] = model.quadratic_drag
+    vector[kernel.THRUST_LIMIT] = model.thrust_limit_n
+    vector[kernel.POSITION_GAIN] = autopilot.position_gain_per_s
+    vector[kernel.SPEED_LIMIT_XY] = autopilot.horizontal_speed_limit_m_per_s
+    vector[kernel.SPEED_LIMIT_Z] = autopilot.vertical_speed_limit_m_per_s
+    rate = 1.0 / autopilot.velocity_time_constant_s
+    vector[kernel.VELOCITY_GAIN] = rate
+    vector[kernel.VELOCITY_INTEGRAL_GAIN] = rate * rate / 4.0
+    # An integral may ask for as much as the four horizontal thrusters together give along one axis, and no more.
+    vector[kernel.INTEGRAL_LIMIT] = 4.0 * model.thrust_limit_n * math.sqrt(0.5) / model.mass_kg
+    omega = autopilot.attitude_frequency_rad_per_s
+    vector[kernel.ATTITUDE_GAIN] = omega * omega
+    vector[kernel.RATE_GAIN] = 2.0 * omega
+    vector[kernel.HEADING_INTEGRAL_GAIN] = omega**3 / 8.0
+    vector[kernel.HEADING_INTEGRAL_LIMIT] = 4.0 * omega * omega
+    vector[kernel.CURRENT : kernel.CURRENT + 3] = current_m_per_s
+    return vector
+
+
+class Vehicle:
+    """The vehicle of one mission.
+
+    The track is a table of states on a grid of `STEP_S` seconds of mission time. A reading at time t is the state at the
+    grid point nearest to t; a change of control at time t acts from that grid point on. Rows are filled when they are first
+    needed; a change of control drops the rows after it. So reading, however often, never changes the trajectory, and asking
+    what lies ahead under the present control costs nothing but the integration.
+
+    Args:
+        model: constants of body and thrusters.
+        autopilot: the guided controller.
+        start: pose at t = 0, at rest; the autopilot's first set-point is this place with heading 0.
+        duration_s: length of the mission; nothing can be read beyond it.
+        current_m_per_s: velocity of the water, world frame.
+        time_scale: simulated seconds that pass in a second of mission time (the simulator's real-time factor).
+    """
+
+    def __init__(
+        self,
+        model: VehicleModel,
+        autopilot: Autopilot,
+        start: Pose,
+        duration_s: float,
+        *,
+        current_m_per_s: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        time_scale: float = 1.0,
+    ) -> None:
+        self._B = allocation_matrix(model)
+        self._allocation = autopilot_allocation(model)
+        self._health = np.ones(len(model.thrusters))
+        self._effectiveness = self._B.copy()
+        self._parameters = _parameters(model, autopilot, current_m_per_s)
+        self._altitude_error_m = autopilot.altitude_error_m
+        self._step_s = STEP_S * time_scale
+        self.last_row = row_at(duration_s) + 1
+        self.track: Array = np.empty((self.last_row + 1, kernel.ROW))
+        self.track[0] = 0.0
+        self.track[0, kernel.POSITION] = (start.x_m, start.y_m, start.z_m)
+        self.track[0, kernel.ATTITUDE] = quaternion(start.roll_rad, start.pitch_rad, start.yaw_rad)
+        self.computed_row = 0
+        self._set_point = np.array([start.x_m, start.y_m, start.z_m, 0.0])
+        self.on_control_change: Callable[[int], None] | None = None
+        """Called with the row from which on the future is another one."""
+
+    def command(self, t_s: float, x_m: float, y_m: float, z_m: float) -> None:
+        """Give the autopilot a new position set-point; it replaces the one before."""
+        self._change_control(row_at(t_s))
+        self._set_point[0] = x_m
+        self._set_point[1] = y_m
+        self._set_point[2] = z_m + self._altitude_error_m
+        self._tell(t_s)
+
+    def set_thruster_health(self, t_s: float, thruster: int, health: float) -> None:
+        """Set what share of its thrust thruster 1 .. n gives: 1 works, 0 is lost. The autopilot does not learn of it."""
+        self._change_control(row_at(t_s))
+        self._health[thruster - 1] = health
+        self._effectiveness[:] = self._B * self._health
+        self._tell(t_s)
+
+    def thruster_health(self, thruster: int) -> float:
+        """Share of its thrust that thruster 1 .. n gives."""
+        return float(self._health[thruster - 1])
+
+    def position(self, t_s: float) -> tuple[float, float, float]:
+        """Position x, y, z in m at time t."""
+        row = row_at(t_s)
+        if row > self.computed_row:
+            self.look_ahead(row)
+        track = self.track
+        return track.item(row, 0), track.item(row, 1), track.item(row, 2)
+
+    def pose(self, t_s: float) -> Pose:
+        """Pose eta at time t."""
+        row = row_at(t_s)
+        self.look_ahead(row)
+        return Pose(
+            *self.track[row, kernel.POSITION].tolist(), *euler_angles(self.track[row, kernel.ATTITUDE])
+        )
+
+    def nu(self, t_s: float) -> tuple[float, ...]:
+        """Velocity nu in the body frame at time t, six components in m/s and rad/s."""
+        row = row_at(t_s)
+        self.look_ahead(row)
+        return tuple(self.track[row, kernel.VELOCITY].tolist())
+
+    def look_ahead(self, row: int) -> None:
+        """Fill the track up to a row as it will be if control does not change."""
+        if row > self.computed_row:
+            kernel.advance(
+                self.track,
+                self.computed_row,
+                row,
+                self._step_s,
+                self._set_point,
+                self._parameters,
+                self._allocation,
+                self._effectiveness,
+            )
+            self.computed_row = row
+
+    def _change_control(self, row: int) -> None:
+        self.look_ahead(row)
+        self.computed_row = row
+
+    def _tell(self, t_s: float) -> None:
+        if self.on_control_change is not None:
+            self.on_control_change(row_at(t_s))
+
+
+def row_at(t_s: float) -> int:
+    """Row of the track nearest to a mission time: the one rounding rule that reading and commanding share."""
+    return round(t_s / STEP_S)
+
+
+def quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> tuple[float, float, float, float]:
+    """Unit quaternion (w, x, y, z) of Euler angles (Handbook, 2.2.3)."""
+    cr, sr = math.cos(roll_rad / 2), math.sin(roll_rad / 2)
+    cp, sp = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
+    cy, sy = math.cos(yaw_rad / 2), math.sin(yaw_rad / 2)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+def euler_angles(attitude: Array) -> tuple[float, float, float]:
+    """Roll, pitch and yaw in rad of a unit quaternion (w, x, y, z), shape (4,) (Handbook, 2.2.3)."""
+    w, x, y, z = (float(part) for part in attitude)
+    roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    pitch = math.asin(min(1.0, max(-1.0, 2.0 * (w * y - z * x))))
+    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return roll, pitch, yaw

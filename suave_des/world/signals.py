@@ -1,0 +1,50 @@
+"""Signals over mission time: what the water, or anything else that is measured, does by itself."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
+
+Signal = Callable[[float], float]
+"""Value at a mission time in s."""
+
+
+def sinusoid(period_s: float, minimum: float, maximum: float, shift_s: float = 0.0) -> Signal:
+    """a cos(2 pi (t + shift) / period) + a + minimum with a = (maximum - minimum) / 2, the exemplar's water visibility."""
+    amplitude = (maximum - minimum) / 2.0
+    return lambda t_s: amplitude * math.cos(2.0 * math.pi * (t_s + shift_s) / period_s) + amplitude + minimum
+
+
+def constant(value: float) -> Signal:
+    """The same value all the time."""
+    return lambda t_s: value
+
+
+def step(time_s: float, before: float, after: float) -> Signal:
+    """`before` until time_s, `after` from then on."""
+    return lambda t_s: after if t_s >= time_s else before
+
+
+def table(times_s: Sequence[float], values: Sequence[float], *, linear: bool = False) -> Signal:
+    """Values at given times (increasing); between them the value before, or a straight line; the end values outside."""
+
+    def value(t_s: float) -> float:
+        after = bisect_right(times_s, t_s)
+        if after == 0:
+            return values[0]
+        if not linear or after == len(times_s):
+            return values[after - 1]
+        t0, t1 = times_s[after - 1], times_s[after]
+        share = (t_s - t0) / (t1 - t0)
+        return values[after - 1] + share * (values[after] - values[after - 1])
+
+    return value
+
+
+def in_time_steps(signal: Signal, time_step_s: float) -> Signal:
+    """The signal at mission time cut to multiples of time_step_s (the exemplar's monitor counts whole seconds)."""
+    if time_step_s == 0.0:
+        return signal
+    # A time within a millionth of a step below a multiple counts as the multiple: timers add up rounding errors.
+    return lambda t_s: signal(math.floor(t_s / time_step_s + 1e-6) * time_step_s)
