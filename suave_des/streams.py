@@ -9,8 +9,9 @@ import random
 class Streams:
     """The random streams of one run of a campaign.
 
-    A stream depends on the campaign's seed, the run's number and its own name, and on nothing else: not on the manager, so
-    the same run gives every manager the same sea, and not on which other streams exist or in which order they are asked for.
+    A stream depends on the campaign's seed, the run's number and its own name, and on nothing else: not on the manager,
+    so the same run gives every manager the same sea, and not on which other streams exist or in which order they are
+    asked for.
     """
 
     def __init__(self, seed: int, run: int) -> None:

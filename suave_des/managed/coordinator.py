@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import simpy
 
+from suave_des.clock import Process, tick_at_or_after, until
 from suave_des.managed.detection import PipelineDetector
 from suave_des.managed.follow import FollowPipeline
-from suave_des.managed.node import Log, Process
-from suave_des.monitor.monitors import tick_at_or_after, until
+from suave_des.managed.node import Log
 from suave_des.scenario.revision import CoordinatorRevision
 
 MAINTAIN_MOTION = "f_maintain_motion"
@@ -32,7 +32,8 @@ class MissionCoordinator:
 
     Attributes:
         ended: the event of the mission's end: the time limit, or the end of the path.
-        search_time_s: whole seconds until the pipeline was found, as the revision counts them; none while it is not found.
+        search_time_s: whole seconds until the pipeline was found, as the revision counts them; none while it is not
+            found.
         detected_s: mission time of the detection; none while there is none.
         task: the task under way.
 

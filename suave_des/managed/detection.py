@@ -6,6 +6,7 @@ import numpy as np
 import simpy
 from numpy.typing import NDArray
 
+from suave_des.clock import call_at
 from suave_des.monitor.monitors import Measurements
 from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at
 from suave_des.world.pipeline import first_detection
@@ -23,8 +24,9 @@ def measured_at_rows(measurements: Measurements, rows: int) -> NDArray[np.float6
 class PipelineDetector:
     """Watches from t = 0 until a point of the pipeline is seen for the first time.
 
-    The sight is found on the vehicle's own grid, by looking ahead under the present control; when control changes, what was
-    foreseen is dropped and looked at anew. So the moment does not depend on who reads the vehicle's position, or when.
+    The sight is found on the vehicle's own grid, by looking ahead under the present control; when control changes, what
+    was foreseen is dropped and looked at anew. So the moment does not depend on who reads the vehicle's position, or
+    when.
 
     Attributes:
         detected: the event of the first sight.
@@ -62,14 +64,10 @@ class PipelineDetector:
         self._vehicle.look_ahead(last)
         seen_row, point = first_detection(self._vehicle.track, row, last, self._visibility_m, self._points)
         wake_s = (seen_row if point >= 0 else last) * STEP_S
-        event = self._env.timeout(
-            max(0.0, wake_s - self._env.now), value=(self._version, seen_row, point, last)
-        )
-        assert event.callbacks is not None  # a new event has its list of callbacks
-        event.callbacks.append(self._arrive)
+        call_at(self._env, wake_s, self._arrive, (self._version, point, last))
 
-    def _arrive(self, event: simpy.Event) -> None:
-        version, _, point, last = event.value
+    def _arrive(self, foreseen: tuple[int, int, int]) -> None:
+        version, point, last = foreseen
         if version != self._version:
             return
         if point < 0:

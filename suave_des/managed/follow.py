@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 
 import simpy
 
-from suave_des.managed.node import FunctionNode, Process, SetPointSender
-from suave_des.monitor.monitors import tick_at_or_after, until
+from suave_des.clock import Process, tick_at_or_after, until
+from suave_des.managed.node import FunctionNode, SetPointSender
 from suave_des.scenario.revision import FollowRevision
 from suave_des.vehicle.vehicle import Vehicle
 from suave_des.world.pipeline import SEA_BED_Z_M

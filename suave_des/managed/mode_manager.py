@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 import simpy
 
+from suave_des.clock import call_at
 from suave_des.managed.node import FunctionNode, Log
 from suave_des.scenario.modes import UNGROUND_MODE, Mode, ModeTable
 
@@ -15,12 +16,12 @@ Listener = Callable[[str, Mode], None]
 class ModeManager:
     """Offers change_mode and available_modes for the functions of a modes file.
 
-    A request is answered at once: True for any known mode, even the one that is already set, in which case nothing happens.
-    The effect comes later; effects on one function keep the order of their requests.
+    A request is answered at once: True for any known mode, even the one that is already set, in which case nothing
+    happens. The effect comes later; effects on one function keep the order of their requests.
 
     Attributes:
-        adaptations: changes from one mode to another of functions in use; neither a task's first mode of a function nor the
-            fd_unground at its end counts.
+        adaptations: changes from one mode to another of functions in use; neither a task's first mode of a function nor
+            the fd_unground at its end counts.
 
     Args:
         env: the mission's clock.
@@ -80,13 +81,11 @@ class ModeManager:
         self._log("mode_manager", "mode_requested", f"{function} -> {mode}")
         due_s = max(self._env.now + self._latency_s(), self._effect_due_s.get(function, 0.0))
         self._effect_due_s[function] = due_s
-        effect = self._env.timeout(max(0.0, due_s - self._env.now), value=(function, mode))
-        assert effect.callbacks is not None  # a new event has its list of callbacks
-        effect.callbacks.append(self._take_effect)
+        call_at(self._env, due_s, self._take_effect, (function, mode))
         return True
 
-    def _take_effect(self, event: simpy.Event) -> None:
-        function, name = event.value
+    def _take_effect(self, effect: tuple[str, str]) -> None:
+        function, name = effect
         mode = self._table.mode(function, name)
         self._nodes[function].apply(mode)
         self._log("mode_manager", "mode_set", f"{function} = {name}")

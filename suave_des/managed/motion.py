@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import simpy
 
-from suave_des.managed.node import FunctionNode, Process
+from suave_des.clock import Process
+from suave_des.managed.node import FunctionNode
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.monitors import thruster_name
 from suave_des.scenario.revision import RecoveryRevision
@@ -54,9 +55,7 @@ class MaintainMotion(FunctionNode):
             yield self.env.timeout(RECOVERY_TIME_S)
             for thruster in range(1, THRUSTERS + 1):
                 self._restore(thruster)
-                self._bus.publish(
-                    Diagnostic(self.env.now, Kind.COMPONENT_STATUS, thruster_name(thruster), RECOVERED)
-                )
+                self._bus.publish(Diagnostic(self.env.now, Kind.COMPONENT_STATUS, thruster_name(thruster), RECOVERED))
                 yield self.env.timeout(THRUSTER_PERIOD_S)
         except simpy.Interrupt:
             return

@@ -1,9 +1,9 @@
-"""What every function of the managed subsystem is: a node with a life cycle, parameters, and an autopilot to talk to."""
+"""What every function of the managed subsystem is: a node with a life cycle, and a way to the autopilot."""
 
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import simpy
@@ -11,14 +11,13 @@ import simpy
 from suave_des.scenario.modes import Mode
 from suave_des.vehicle.vehicle import Vehicle
 
-Process = Generator[simpy.Event, None, None]
 Log = Callable[[str, str, str], None]
 """Called with source, event and detail of something worth telling."""
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """Steady error of a node's frame: where the vehicle ends up, as the simulator sees it, less where the node sent it."""
+    """Steady error of a node's frame: where the vehicle ends up in the simulator, less where the node sent it."""
 
     x_m: float = 0.0
     y_m: float = 0.0
@@ -56,9 +55,7 @@ class SetPointSender:
         if self._loss_probability and self._stream.random() < self._loss_probability:
             self.lost += 1
             return
-        self._vehicle.command(
-            self._env.now, x_m + self._frame.x_m, y_m + self._frame.y_m, z_m + self._frame.z_m
-        )
+        self._vehicle.command(self._env.now, x_m + self._frame.x_m, y_m + self._frame.y_m, z_m + self._frame.z_m)
 
 
 class FunctionNode:

@@ -16,12 +16,12 @@ from suave_des.scenario.modes import Mode
 class ReactionMeter:
     """Times from an event that asks for an adaptation to the adaptation's effect.
 
-    Three kinds of event: a thruster failure is reported, until maintain_motion is active; the measured visibility does not
-    fit the search altitude, until the fitting altitude is set; the battery is low, until the recharge path is active.
-    An event that is never answered does not count.
+    Three kinds of event: a thruster failure is reported, until maintain_motion is active; the measured visibility does
+    not fit the search altitude, until the fitting altitude is set; the battery is low, until the recharge path is
+    active. An event that is never answered does not count.
 
-    The altitude is compared at every visibility message of the whole mission, except while the battery is low. A mismatch
-    ends only when the expected altitude is set, not when the visibility comes back.
+    The altitude is compared at every visibility message of the whole mission, except while the battery is low. A
+    mismatch ends only when the expected altitude is set, not when the visibility comes back.
 
     Args:
         env: the mission's clock.

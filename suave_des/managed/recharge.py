@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import simpy
 
-from suave_des.managed.node import FunctionNode, Process, SetPointSender
+from suave_des.clock import Process
+from suave_des.managed.node import FunctionNode, SetPointSender
 from suave_des.world.pipeline import SEA_BED_Z_M
 
 RECHARGE = "generate_recharge_path"
@@ -21,9 +22,7 @@ class GenerateRechargePath(FunctionNode):
         station_m: the station's place in x and y.
     """
 
-    def __init__(
-        self, env: simpy.Environment, sender: SetPointSender, station_m: tuple[float, float]
-    ) -> None:
+    def __init__(self, env: simpy.Environment, sender: SetPointSender, station_m: tuple[float, float]) -> None:
         super().__init__(env)
         self._sender = sender
         self._station_m = station_m

@@ -6,8 +6,8 @@ import math
 
 import simpy
 
-from suave_des.managed.node import FunctionNode, Process, SetPointSender
-from suave_des.monitor.monitors import tick_at_or_after, until
+from suave_des.clock import Process, tick_at_or_after, until
+from suave_des.managed.node import FunctionNode, SetPointSender
 from suave_des.scenario.modes import Mode
 from suave_des.scenario.revision import SpiralRevision
 from suave_des.vehicle.vehicle import Vehicle
@@ -111,9 +111,7 @@ class GenerateSearchPath(FunctionNode):
         if self._set_point is None:
             return True, True
         x, y, z = self._vehicle.position(self.env.now)
-        near_xy = (
-            abs(x - self._set_point[0]) <= REACHED_BOX_M and abs(y - self._set_point[1]) <= REACHED_BOX_M
-        )
+        near_xy = abs(x - self._set_point[0]) <= REACHED_BOX_M and abs(y - self._set_point[1]) <= REACHED_BOX_M
         return near_xy, abs(z - self._set_point[2]) <= REACHED_BOX_M
 
     def _issue_next(self) -> None:

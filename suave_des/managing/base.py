@@ -1,7 +1,7 @@
 """What a managing subsystem is: one class with a few hooks, and what it can see and do.
 
-The built-in managers use nothing that one of your own cannot. Give yours on the command line as `package.module:Class`, or
-register it by name as an entry point of the group `suave_des.managers`.
+The built-in managers use nothing that one of your own cannot. Give yours on the command line as `package.module:Class`,
+or register it by name as an entry point of the group `suave_des.managers`.
 """
 
 from __future__ import annotations

@@ -62,9 +62,7 @@ class BehaviourTree(ManagingSubsystem):
         # A visibility that was not measured yet counts as good; below the lowest threshold the lowest altitude is left.
         visibility_m = self._measured.get("water_visibility", float("inf"))
         pairs = zip(self._settings.visibility_thresholds_m, self._settings.search_modes, strict=True)
-        return next(
-            (mode for threshold, mode in pairs if visibility_m >= threshold), self._settings.search_modes[-1]
-        )
+        return next((mode for threshold, mode in pairs if visibility_m >= threshold), self._settings.search_modes[-1])
 
 
 class ExtendedBehaviourTree(BehaviourTree):

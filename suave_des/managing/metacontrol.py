@@ -1,7 +1,8 @@
 """Metacontrol: a MAPE-K loop over an OWL knowledge base (paper, section on Metacontrol; kas-lab/suave).
 
 Monitor: diagnostics update the state of the knowledge. Analyze: a reasoner infers what the rules say about that state.
-Plan: the best function design for each objective that needs one. Execute: request the design's mode, which has its name.
+Plan: the best function design for each objective that needs one. Execute: request the design's mode, which has its
+name.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from decimal import Decimal
 
+from suave_des.clock import tick_at_or_after, until
 from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.planning import plan
 from suave_des.knowledge.reasoners import Reasoner
@@ -16,7 +18,6 @@ from suave_des.knowledge.state import Decision, Inference, KnowledgeState, Objec
 from suave_des.managed.coordinator import SEARCH, Task
 from suave_des.managing.base import AdaptationProcess, ManagedSystem, ManagingSubsystem
 from suave_des.monitor.diagnostics import Diagnostic, Kind
-from suave_des.monitor.monitors import tick_at_or_after, until
 from suave_des.scenario.distributions import draw
 from suave_des.scenario.modes import UNGROUND_MODE
 
@@ -26,8 +27,8 @@ UNGROUNDED = "UNGROUNDED"
 class Metacontrol(ManagingSubsystem):
     """The metacontrol manager.
 
-    What it knows is an explicit state: objectives and their status, groundings, reported components, measured values. What
-    the reasoner infers from it is never written back, so nothing has to be retracted; a status persists only as a
+    What it knows is an explicit state: objectives and their status, groundings, reported components, measured values.
+    What the reasoner infers from it is never written back, so nothing has to be retracted; a status persists only as a
     transition of this state.
     """
 
@@ -119,9 +120,7 @@ class Metacontrol(ManagingSubsystem):
             for attribute in base.expected(design)
         }
         # Only attributes that this mission measures can be waited for.
-        return any(
-            attribute in self.system.scenario.signals for attribute in expected - self._measurements.keys()
-        )
+        return any(attribute in self.system.scenario.signals for attribute in expected - self._measurements.keys())
 
     def _improvable(self) -> list[str]:
         if not self._revision.search_improves_when_exceeded:

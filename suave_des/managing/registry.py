@@ -40,9 +40,7 @@ def manager_class(name: str) -> type[ManagingSubsystem]:
     if target is None:
         close = get_close_matches(name, manager_names(), n=1)
         hint = f"did you mean {close[0]}?" if close else f"known: {', '.join(manager_names())}"
-        raise InputError(
-            f"there is no manager {name!r}", remedy=f"{hint}; your own is given as package.module:Class"
-        )
+        raise InputError(f"there is no manager {name!r}", remedy=f"{hint}; your own is given as package.module:Class")
     return _load(name, target)
 
 

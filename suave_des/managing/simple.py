@@ -1,4 +1,4 @@
-"""The paper's two managers without knowledge: none and random (paper, section on managing subsystems; kas-lab/suave)."""
+"""The paper's two managers without knowledge: none and random (SEAMS 2023 paper; kas-lab/suave)."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ class NoManager(ManagingSubsystem):
 class RandomManager(ManagingSubsystem):
     """random: every period, each function of the task gets one of all its modes, with equal chance.
 
-    Functions without a default mode (maintain_motion) are left alone; fd_unground and __DEFAULT__ are modes like others.
-    Revision 2023 picks only on its timer, which runs since launch; revision 1.5 at each task request too.
+    Functions without a default mode (maintain_motion) are left alone; fd_unground and __DEFAULT__ are modes like
+    others. Revision 2023 picks only on its timer, which runs since launch; revision 1.5 at each task request too.
     """
 
     def __init__(self, system: ManagedSystem) -> None:
@@ -50,6 +50,4 @@ class RandomManager(ManagingSubsystem):
     def adapt(self) -> None:
         """Pick a mode for each function."""
         for function in self._functions:
-            self.system.change_mode(
-                function, self._stream.choice(self.system.modes.available_modes(function))
-            )
+            self.system.change_mode(function, self._stream.choice(self.system.modes.available_modes(function)))

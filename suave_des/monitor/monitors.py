@@ -1,31 +1,20 @@
 """Monitors: they watch signals, thrusters and battery, and publish diagnostics (facts: kas-lab/suave).
 
-A monitor that repeats an unchanged value tells nobody anything new, so a signal's diagnostics are published only when the
-value differs from the one before; they keep the times that the monitor's period gives them.
+A monitor that repeats an unchanged value tells nobody anything new, so a signal's diagnostics are published only when
+the value differs from the one before; they keep the times that the monitor's period gives them.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import simpy
 
+from suave_des.clock import Process, tick_at_or_after, until
 from suave_des.monitor.diagnostics import FAILED, RECOVERED, Diagnostic, DiagnosticsBus, Kind
 from suave_des.world.signals import Signal
-
-Process = Generator[simpy.Event, None, None]
-
-
-def tick_at_or_after(t_s: float, phase_s: float, period_s: float) -> float:
-    """First tick of a timer (phase, phase + period, ...) that is not before t; a rounding error counts as on time."""
-    return phase_s + max(0, math.ceil((t_s - phase_s) / period_s - 1e-9)) * period_s
-
-
-def until(env: simpy.Environment, t_s: float) -> simpy.Timeout:
-    """An event at mission time t, or now if t has passed."""
-    return env.timeout(max(0.0, t_s - env.now))
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,8 +96,8 @@ def thruster_monitor(
 ) -> Process:
     """Bring about the scheduled faults, and publish them.
 
-    Once a period the monitor looks at the first fault of the list that has not happened yet: so several that are due come
-    one period apart, in list order, and a later one waits for the one before it.
+    Once a period the monitor looks at the first fault of the list that has not happened yet: so several that are due
+    come one period apart, in list order, and a later one waits for the one before it.
 
     Args:
         env: the mission's clock.

@@ -10,8 +10,8 @@ import simpy
 from suave_des.managed.coordinator import MAINTAIN_MOTION
 from suave_des.monitor.diagnostics import Diagnostic, Kind
 from suave_des.monitor.monitors import Measurements
-from suave_des.simulation.result import Event, TrajectoryPoint
 from suave_des.scenario.modes import Mode
+from suave_des.simulation.result import Event, TrajectoryPoint
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
 
 TRAJECTORY_PERIOD_ROWS = 4
@@ -53,12 +53,8 @@ class Recorder:
                 if band is None:
                     self.log("visibility_monitor", "first_measurement", f"{value:.2f} m")
                 elif now_in != band:
-                    word, edge = (
-                        ("rises to", rising[now_in - 1]) if now_in > band else ("falls below", rising[now_in])
-                    )
-                    self.log(
-                        "visibility_monitor", "visibility_crossing", f"{word} {edge:g} m ({value:.2f} m)"
-                    )
+                    word, edge = ("rises to", rising[now_in - 1]) if now_in > band else ("falls below", rising[now_in])
+                    self.log("visibility_monitor", "visibility_crossing", f"{word} {edge:g} m ({value:.2f} m)")
                 band = now_in
 
         return take

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import simpy
 
+from suave_des.clock import Process, until
 from suave_des.errors import MissionError, SuaveDesError
 from suave_des.managed.coordinator import FOLLOW, MAINTAIN_MOTION, SEARCH, MissionCoordinator, Task
 from suave_des.managed.detection import PipelineDetector, measured_at_rows
@@ -30,20 +31,17 @@ from suave_des.monitor.monitors import (
     measure,
     signal_monitor,
     thruster_monitor,
-    until,
 )
-from suave_des.simulation.recording import Recorder
-from suave_des.simulation.result import MissionMetrics, MissionResult
 from suave_des.scenario.distributions import Distribution, draw
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import Battery
+from suave_des.simulation.recording import Recorder
+from suave_des.simulation.result import MissionMetrics, MissionResult
+from suave_des.simulation.signals import build_signal
 from suave_des.streams import Streams
 from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle
 from suave_des.world.pipeline import path_to_inspect, sample_points
-from suave_des.simulation.signals import build_signal
-
-Process = Generator[simpy.Event, None, None]
 
 
 class Simulator:
@@ -151,11 +149,7 @@ class _Mission:
     # Chance: every use has a stream of its own, named after the scenario's key.
 
     def _draw(self, key: str, distribution: Distribution) -> float:
-        value = (
-            draw(distribution, self.streams.stream(key))
-            if not isinstance(distribution, float)
-            else distribution
-        )
+        value = draw(distribution, self.streams.stream(key)) if not isinstance(distribution, float) else distribution
         self.drawn[key] = value
         return value
 
@@ -340,7 +334,7 @@ class _Mission:
             log=log,
             knowledge=lambda: self.simulator.knowledge,
         )
-        manager = self._guarded(kind, system)
+        manager: ManagingSubsystem = self._guarded(kind, system)
         if kind.diagnostic is not ManagingSubsystem.diagnostic:
             self.bus.subscribe(lambda diagnostic: self._guarded(manager.diagnostic, diagnostic))
         if manager.period_s is not None:

@@ -1,8 +1,8 @@
 """Constants of a vehicle, and how its thrusters make a generalised force.
 
-Body frame: x forward, y left, z up, origin at the centre of mass. Generalised force tau = (X, Y, Z, K, M, N) in N and N m,
-generalised velocity nu = (u, v, w, p, q, r) in m/s and rad/s (Fossen, Handbook of Marine Craft Hydrodynamics and Motion
-Control, section 2.1; the axes here follow the exemplar, z up, and so do the signs).
+Body frame: x forward, y left, z up, origin at the centre of mass. Generalised force tau = (X, Y, Z, K, M, N) in N and N
+m, generalised velocity nu = (u, v, w, p, q, r) in m/s and rad/s (Fossen, Handbook of Marine Craft Hydrodynamics and
+Motion Control, section 2.1; the axes here follow the exemplar, z up, and so do the signs).
 """
 
 from __future__ import annotations
@@ -72,7 +72,8 @@ def allocation_matrix(model: VehicleModel) -> Array:
 def autopilot_allocation(model: VehicleModel) -> Array:
     """Pseudo-inverse of B, shape (number of thrusters, 6): how an autopilot spreads a demanded wrench.
 
-    The autopilot allocates as if every thruster worked; a wrench that no thruster can make (pitch, on a BlueROV2) gets none.
+    The autopilot allocates as if every thruster worked; a wrench that no thruster can make (pitch, on a BlueROV2) gets
+    none.
     """
     matrix = np.ascontiguousarray(np.linalg.pinv(allocation_matrix(model), rcond=1e-9))
     matrix.flags.writeable = False

@@ -16,7 +16,9 @@ STEP_S = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """eta in the world frame: position in m, attitude as Euler angles in rad (rotation order z, y, x; Handbook, 2.2.1)."""
+    """eta in the world frame: position in m, attitude as Euler angles in rad (rotation order z, y, x; Handbook,
+    2.2.1).
+    """
 
     x_m: float
     y_m: float
@@ -51,9 +53,7 @@ class Autopilot:
     attitude_frequency_rad_per_s: float = 3.0
 
 
-def _parameters(
-    model: VehicleModel, autopilot: Autopilot, current_m_per_s: tuple[float, float, float]
-) -> Array:
+def _parameters(model: VehicleModel, autopilot: Autopilot, current_m_per_s: tuple[float, float, float]) -> Array:
     vector = np.zeros(kernel.PARAMETERS)
     vector[kernel.MASS] = model.mass_kg
     vector[[kernel.IXX, kernel.IYY, kernel.IZZ]] = model.inertia_kg_m2
@@ -81,10 +81,10 @@ def _parameters(
 class Vehicle:
     """The vehicle of one mission.
 
-    The track is a table of states on a grid of `STEP_S` seconds of mission time. A reading at time t is the state at the
-    grid point nearest to t; a change of control at time t acts from that grid point on. Rows are filled when they are first
-    needed; a change of control drops the rows after it. So reading, however often, never changes the trajectory, and asking
-    what lies ahead under the present control costs nothing but the integration.
+    The track is a table of states on a grid of `STEP_S` seconds of mission time. A reading at time t is the state at
+    the grid point nearest to t; a change of control at time t acts from that grid point on. Rows are filled when they
+    are first needed; a change of control drops the rows after it. So reading, however often, never changes the
+    trajectory, and asking what lies ahead under the present control costs nothing but the integration.
 
     Args:
         model: constants of body and thrusters.
@@ -131,7 +131,9 @@ class Vehicle:
         self._tell(t_s)
 
     def set_thruster_health(self, t_s: float, thruster: int, health: float) -> None:
-        """Set what share of its thrust thruster 1 .. n gives: 1 works, 0 is lost. The autopilot does not learn of it."""
+        """Set what share of its thrust thruster 1 .. n gives: 1 works, 0 is lost. The autopilot does not learn of
+        it.
+        """
         self._change_control(row_at(t_s))
         self._health[thruster - 1] = health
         self._effectiveness[:] = self._B * self._health
@@ -153,9 +155,8 @@ class Vehicle:
         """Pose eta at time t."""
         row = row_at(t_s)
         self.look_ahead(row)
-        return Pose(
-            *self.track[row, kernel.POSITION].tolist(), *euler_angles(self.track[row, kernel.ATTITUDE])
-        )
+        x_m, y_m, z_m = self.track[row, kernel.POSITION].tolist()
+        return Pose(x_m, y_m, z_m, *euler_angles(self.track[row, kernel.ATTITUDE]))
 
     def nu(self, t_s: float) -> tuple[float, ...]:
         """Velocity nu in the body frame at time t, six components in m/s and rad/s."""

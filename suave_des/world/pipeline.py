@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ def sample_points(
     """
     vertices = np.array(vertices_m, dtype=np.float64)
     share = np.arange(1, points_per_piece + 1) / points_per_piece
-    pieces = [a + share[:, None] * (b - a) for a, b in zip(vertices[:-1], vertices[1:], strict=True)]
+    pieces = [a + share[:, None] * (b - a) for a, b in pairwise(vertices)]
     points = np.concatenate(pieces)
     points.flags.writeable = False
     return points
@@ -39,9 +40,7 @@ def path_to_inspect(points: Sequence[Sequence[float]], first: int) -> list[tuple
 
 
 @compiled
-def first_point_in_view(
-    x_m: float, y_m: float, z_m: float, visibility_m: float, points: NDArray[np.float64]
-) -> int:
+def first_point_in_view(x_m: float, y_m: float, z_m: float, visibility_m: float, points: NDArray[np.float64]) -> int:
     """Lowest index of the points that a camera at (x, y, z) sees, -1 if none.
 
     With h the vertical distance to a point, the point is in view within h * tan(field of view / 2) in x and in y, and

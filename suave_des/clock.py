@@ -1,0 +1,27 @@
+"""Small additions to SimPy's clock: ticks of a periodic timer, events at a given mission time, and callbacks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator
+from typing import Any
+
+import simpy
+
+Process = Generator[simpy.Event, None, None]
+
+
+def tick_at_or_after(t_s: float, phase_s: float, period_s: float) -> float:
+    """First tick of a timer (phase, phase + period, ...) that is not before t; a rounding error counts as on time."""
+    return phase_s + max(0, math.ceil((t_s - phase_s) / period_s - 1e-9)) * period_s
+
+
+def until(env: simpy.Environment, t_s: float) -> simpy.Timeout:
+    """An event at mission time t, or now if t has passed."""
+    return env.timeout(max(0.0, t_s - env.now))
+
+
+def call_at(env: simpy.Environment, t_s: float, callback: Callable[[Any], None], value: Any) -> None:
+    """Have `callback` called with `value` at mission time t, or as the next thing now if t has passed."""
+    callbacks: Any = until(env, t_s).callbacks  # a list, until the event is processed
+    callbacks.append(lambda _: callback(value))
