@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from suave_des.errors import InputError
 
 _PACKAGE = Path(__file__).resolve().parent
-_KINDS = {"ontology": ".owl", "scenarios": ".yaml"}
+_KINDS = {"ontology": ".owl", "scenarios": ".yaml", "scenarios/revisions": ".yaml"}
 
 
 def shipped_folder(kind: str) -> Path:
-    """Folder of shipped files of one kind: "ontology" or "scenarios"."""
+    """Folder of shipped files of one kind: "ontology", "scenarios" or "scenarios/revisions"."""
     installed = _PACKAGE / "shipped" / kind
     return installed if installed.is_dir() else _PACKAGE.parent / kind
+
+
+def _is_a(kind: Callable[[Path], bool], path: Path) -> bool:
+    try:
+        return kind(path)
+    except OSError:  # a name too long, a folder that may not be looked into
+        return False
 
 
 def find(name: str | Path, kind: str, *, beside: Path | None = None) -> Path:
@@ -21,20 +29,22 @@ def find(name: str | Path, kind: str, *, beside: Path | None = None) -> Path:
 
     Args:
         name: a path, or the name of a shipped file with or without its ending.
-        kind: "ontology" or "scenarios".
-        beside: folder of the file that names it, tried before the current folder.
+        kind: as of shipped_folder.
+        beside: folder of the file that names it, looked in instead of the current folder, so that a file means the
+            same wherever the command is given.
 
     Raises:
         InputError: there is no such file, neither on disk nor shipped.
     """
     path = Path(name)
-    folders = [beside] if beside is not None and not path.is_absolute() else []
-    candidates = [folder / path for folder in folders] + [path]
+    candidates = [path if beside is None else beside / path]
     if len(path.parts) == 1:
         shipped = shipped_folder(kind) / path
         candidates += [shipped, shipped.with_name(path.name + _KINDS[kind])]
     for candidate in candidates:
-        if candidate.is_file():
+        if _is_a(Path.is_file, candidate):
             return candidate
+    if _is_a(Path.is_dir, candidates[0]):
+        raise InputError("is a folder", file=path, remedy="name a file in it")
     known = ", ".join(sorted(entry.name for entry in shipped_folder(kind).glob(f"*{_KINDS[kind]}")))
     raise InputError("no such file", file=path, remedy=f"give a path, or one of the shipped files: {known}")

@@ -13,16 +13,18 @@ from suave_des.scenario.yamlfile import KeyPath, YamlDocument, did_you_mean, rea
 
 _ONTOLOGY_LIMIT_BYTES = 100_000_000
 _CHAIN_LIMIT = 20
+_REVISIONS = "scenarios/revisions"
 
 
 class Files:
     """Reads files and keeps the hash of each, for a manifest.
 
     Attributes:
-        inputs: SHA-256 of each file read, by its name as shown: a shipped one as "shipped/scenarios/NAME", another as given.
+        inputs: SHA-256 of each file read, as "shipped/KIND/NAME" if it is shipped, else its path as given.
     """
 
     def __init__(self) -> None:
+        """Nothing read yet."""
         self.inputs: dict[str, str] = {}
 
     def yaml(self, path: Path) -> YamlDocument:
@@ -73,7 +75,7 @@ def scenario_layer(files: Files, path: Path, above: tuple[Path, ...] = ()) -> La
     return merge(below, layer)
 
 
-def find_named(layer: Layer, key_path: KeyPath, name: object, kind: str) -> Path:
+def find_named(layer: Layer, key_path: KeyPath, name: object, kind: str, remedy: str | None = None) -> Path:
     """A file that a layer names: beside the file in which its name stands, or shipped.
 
     Raises:
@@ -84,7 +86,7 @@ def find_named(layer: Layer, key_path: KeyPath, name: object, kind: str) -> Path
     try:
         return find(name, kind, beside=layer.place(key_path).file.parent)
     except InputError as error:
-        raise layer.error(f"no such file: {name}", key_path, error.remedy) from None
+        raise layer.error(f"{error.problem}: {name}", key_path, remedy or error.remedy) from None
 
 
 def _check_chain(layer: Layer, key_path: KeyPath, chain: tuple[Path, ...]) -> None:
@@ -95,7 +97,7 @@ def _check_chain(layer: Layer, key_path: KeyPath, chain: tuple[Path, ...]) -> No
 
 
 def _with_whole_revision(files: Files, layer: Layer, depth: int, *, inherited: bool) -> Layer:
-    """The layer with its revision as a mapping; one that names none is left to be merged over an inherited one."""
+    """The layer with its revision written out; parts of an inherited one are left as they are."""
     value = layer.data.get("revision")
     if isinstance(value, dict) and "base" in value:
         own = layer.below("revision").without("base")
@@ -127,17 +129,14 @@ def _revision_layer(
 
 
 def _revision_path(named: Layer, key_path: KeyPath, name: object) -> Path:
-    folder = shipped_folder("scenarios") / "revisions"
-    shipped = {path.stem: path for path in sorted(folder.glob("*.yaml"))}
     if isinstance(name, int | float) and not isinstance(name, bool):
         name = f"{name:g}"  # 2023 and 1.5 need no quotes
+    shipped = sorted(path.stem for path in shipped_folder(_REVISIONS).glob("*.yaml"))
     if not isinstance(name, str) or not name:
-        remedy = f"one of {', '.join(shipped)}, a path, or a mapping with base"
+        remedy = f"one of {', '.join(shipped)}, the path of a revision file, or a mapping with base"
         raise named.error(f"{shown(name)} is no revision", key_path, remedy)
-    if name in shipped:
-        return shipped[name]
-    path = named.place(key_path).file.parent / name
-    if path.is_file():
-        return path
-    problem = f"there is no revision {shown(name)}"
-    raise named.error(problem, key_path, f"{did_you_mean(name, shipped, 'shipped')}; or the path of a file")
+    try:
+        return find(name, _REVISIONS, beside=named.place(key_path).file.parent)
+    except InputError:
+        remedy = f"{did_you_mean(name, shipped, 'shipped')}; or the path of a revision file"
+        raise named.error(f"there is no revision {shown(name)}", key_path, remedy) from None

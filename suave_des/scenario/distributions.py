@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import random
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic_core import PydanticCustomError
+
+_LEAST_SHARE = 0.001
 
 
 class Strict(BaseModel):
@@ -14,34 +18,61 @@ class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
+def wrong(problem: str, remedy: str, *keys: str) -> PydanticCustomError:
+    """A validation error with its remedy; `keys` are those below that do not fit together."""
+    return PydanticCustomError(
+        "wrong", "{problem} ({remedy})", {"problem": problem, "remedy": remedy, "keys": " ".join(keys)}
+    )
+
+
+Number = Annotated[float, Field(strict=True)]
+"""A number written as one: "80" in quotes and true are none."""
+Positive = Annotated[float, Field(gt=0, strict=True)]
+NotNegative = Annotated[float, Field(ge=0, strict=True)]
+Probability = Annotated[float, Field(ge=0, lt=1, strict=True)]
+Period = Annotated[float, Field(ge=0.001, strict=True)]
+"""Period of something that happens in mission time, in s; the limit keeps a slip from stopping the clock."""
+
+
 class Normal(Strict):
     """Normal distribution, optionally cut to [minimum, maximum] (values outside are drawn again)."""
 
     distribution: Literal["normal"]
-    mean: float
-    std: Annotated[float, Field(ge=0)]
-    minimum: float | None = None
-    maximum: float | None = None
+    mean: Number
+    """Mean, before the cut."""
+    std: NotNegative
+    """Standard deviation, before the cut."""
+    minimum: Number | None = None
+    """Smallest value, if any."""
+    maximum: Number | None = None
+    """Greatest value, if any."""
 
     @model_validator(mode="after")
-    def _interval_holds_the_bulk(self) -> Self:
-        low = self.mean - 4 * self.std if self.minimum is None else self.minimum
-        high = self.mean + 4 * self.std if self.maximum is None else self.maximum
-        if low > high or (self.std == 0 and not low <= self.mean <= high):
-            raise ValueError(
-                "minimum must not be above maximum, and the interval must hold values near the mean"
+    def _interval_is_likely(self) -> Self:
+        low = -math.inf if self.minimum is None else self.minimum
+        high = math.inf if self.maximum is None else self.maximum
+        if low > high:
+            raise _reversed(low, high)
+        if self.std == 0:
+            share = 1.0 if low <= self.mean <= high else 0.0
+        else:
+            scale = self.std * math.sqrt(2)
+            share = (math.erf((high - self.mean) / scale) - math.erf((low - self.mean) / scale)) / 2
+        if share < _LEAST_SHARE:
+            remedy = "move or widen it, or use distribution: uniform"
+            raise wrong(
+                f"[{low:g}, {high:g}] leaves next to nothing of the distribution",
+                remedy,
+                "minimum",
+                "maximum",
             )
-        if self.mean + 4 * self.std < low or self.mean - 4 * self.std > high:
-            raise ValueError("the interval [minimum, maximum] lies more than 4 std from the mean")
         return self
 
     def draw(self, stream: random.Random) -> float:
         """One value."""
         while True:
             value = stream.normalvariate(self.mean, self.std)
-            if (self.minimum is None or value >= self.minimum) and (
-                self.maximum is None or value <= self.maximum
-            ):
+            if (self.minimum is None or value >= self.minimum) and (self.maximum is None or value <= self.maximum):
                 return value
 
 
@@ -49,13 +80,15 @@ class Uniform(Strict):
     """Uniform distribution over [minimum, maximum]."""
 
     distribution: Literal["uniform"]
-    minimum: float
-    maximum: float
+    minimum: Number
+    """Smallest value."""
+    maximum: Number
+    """Greatest value."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         if self.minimum > self.maximum:
-            raise ValueError(f"minimum {self.minimum} is above maximum {self.maximum}")
+            raise _reversed(self.minimum, self.maximum)
         return self
 
     def draw(self, stream: random.Random) -> float:
@@ -64,11 +97,13 @@ class Uniform(Strict):
 
 
 class Exponential(Strict):
-    """Exponential distribution with the given mean, from `minimum` on."""
+    """Exponential distribution: `minimum` plus a time of the given mean."""
 
     distribution: Literal["exponential"]
-    mean: Annotated[float, Field(ge=0)]
-    minimum: float = 0.0
+    mean: NotNegative
+    """Mean of what is added to the minimum."""
+    minimum: Number = 0.0
+    """Smallest value."""
 
     def draw(self, stream: random.Random) -> float:
         """One value."""
@@ -79,18 +114,44 @@ class Choice(Strict):
     """One of the given values, each with equal chance; a value given twice counts twice."""
 
     distribution: Literal["choice"]
-    values: Annotated[tuple[float, ...], Field(min_length=1)]
+    values: Annotated[tuple[Number, ...], Field(min_length=1)]
+    """The values."""
 
     def draw(self, stream: random.Random) -> float:
         """One value."""
         return stream.choice(self.values)
 
 
-def _kind(value: Any) -> str | None:
-    if isinstance(value, dict):
-        kind = value.get("distribution")
-        return kind if isinstance(kind, str) else None
-    return getattr(value, "distribution", "number")
+def _reversed(low: float, high: float) -> PydanticCustomError:
+    return wrong(f"minimum {low:g} is above maximum {high:g}", "give the smaller one as minimum", "minimum", "maximum")
+
+
+def ordered(minimum: float, maximum: float) -> None:
+    """Raise the error of a minimum above the maximum."""
+    if minimum > maximum:
+        raise _reversed(minimum, maximum)
+
+
+def one_of(key: str, known: str, otherwise: str | None = None, also: str = "") -> Discriminator:
+    """Tell the members of a union apart by what a mapping says under a key.
+
+    Args:
+        key: the key.
+        known: what it may say, separated by spaces.
+        otherwise: member for what is no mapping.
+        also: begins the remedy, as in "give a number, or ".
+    """
+
+    def tag(value: Any) -> str | None:
+        found = value.get(key) if isinstance(value, dict) else getattr(value, key, otherwise)
+        return found if isinstance(found, str) else None
+
+    return Discriminator(
+        tag,
+        custom_error_type="wrong_kind",
+        custom_error_message="{key} must be one of {known}",
+        custom_error_context={"key": key, "known": known, "also": also},
+    )
 
 
 Distribution = Annotated[
@@ -99,17 +160,29 @@ Distribution = Annotated[
     | Annotated[Uniform, Tag("uniform")]
     | Annotated[Exponential, Tag("exponential")]
     | Annotated[Choice, Tag("choice")],
-    Discriminator(
-        _kind,
-        custom_error_type="distribution",
-        custom_error_message="must be a number or a mapping with distribution: normal, uniform, exponential or choice",
-    ),
+    one_of("distribution", "normal uniform exponential choice", "number", "give a number, or "),
 ]
 
 
 def draw(distribution: float | Normal | Uniform | Exponential | Choice, stream: random.Random) -> float:
     """One value of a distribution; a plain number is its own value and draws nothing from the stream."""
     return distribution if isinstance(distribution, float | int) else distribution.draw(stream)
+
+
+def stated(distribution: float | Normal | Uniform | Exponential | Choice) -> tuple[float, ...]:
+    """The values that a scenario states for a distribution: itself, its mean, its bounds, its choices."""
+    match distribution:
+        case Normal():
+            bounds = (distribution.mean, distribution.minimum, distribution.maximum)
+            return tuple(bound for bound in bounds if bound is not None)
+        case Uniform():
+            return (distribution.minimum, distribution.maximum)
+        case Exponential():
+            return (distribution.minimum, distribution.minimum + distribution.mean)
+        case Choice():
+            return distribution.values
+        case number:
+            return (float(number),)
 
 
 def lower_bound(distribution: float | Normal | Uniform | Exponential | Choice) -> float:

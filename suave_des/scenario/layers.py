@@ -1,4 +1,4 @@
-"""Layers of a scenario: a file over its base, merged deeply, each value knowing the file and line in which it stands."""
+"""Layers of a scenario: a file merged deeply over its base, each value knowing its file and line."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from suave_des.errors import InputError
 from suave_des.scenario.yamlfile import KeyPath, YamlDocument, place_text
 
 _KIND_KEYS = ("kind", "distribution")
-"""Keys that say what a mapping is: one of another kind replaces the base's, whose other keys would not fit it."""
+"""Keys that say what a mapping is: one of another kind replaces the base's, whose keys would not fit."""
 
 _REMOVABLE_IN: tuple[KeyPath, ...] = (("signals",), ("knowledge", "values"))
 """Mappings of freely named entries, in which a null removes the base's entry."""
@@ -83,9 +83,7 @@ def merge(base: Layer, over: Layer) -> Layer:
     return Layer(data, {**kept, **over.places})
 
 
-def _merge(
-    base: dict[str, Any], over: dict[str, Any], path: KeyPath, replaced: set[KeyPath]
-) -> dict[str, Any]:
+def _merge(base: dict[str, Any], over: dict[str, Any], path: KeyPath, replaced: set[KeyPath]) -> dict[str, Any]:
     merged = dict(base)
     for key, value in over.items():
         below = (*path, key)

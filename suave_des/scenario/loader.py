@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib.metadata import entry_points
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -13,19 +14,21 @@ from suave_des.errors import InputError
 from suave_des.resources import find
 from suave_des.scenario.bases import Files, find_named, scenario_layer
 from suave_des.scenario.layers import Layer
-from suave_des.scenario.models import Scenario, TableSignal
+from suave_des.scenario.models import ManagerSettings, Scenario, TableSignal
 from suave_des.scenario.modes import UNGROUND_MODE, ModeTable, modes_of
 from suave_des.scenario.problems import input_error
 from suave_des.scenario.tables import Table, read_table
 from suave_des.scenario.yamlfile import KeyPath, did_you_mean, shown
 
+MANAGER_GROUP = "suave_des.managers"
+"""Entry point group in which packages register their managers."""
 MISSION_FUNCTIONS = ("f_maintain_motion", "f_generate_search_path", "f_follow_pipeline")
 """Functions that the mission's two tasks need, so that a modes file must have them."""
 
 
 @dataclass(frozen=True)
 class LoadedScenario:
-    """A scenario with the content of every file it names, apart from the ontologies, which are named by their paths.
+    """A scenario with the content of every file that it names, but of ontologies only the paths.
 
     It can be pickled, so that it travels to worker processes by value.
 
@@ -83,6 +86,7 @@ def load_scenario(
         modes_path = find(modes_file, "scenarios")
     modes = modes_of(files.yaml(modes_path))
     _check_modes(layer, scenario, modes)
+    _check_managers(layer, scenario)
 
     ontology_paths = tuple(find(each, "ontology") for each in ontologies) or tuple(
         _named(layer, path, ("knowledge", "ontologies", index), each, "ontology")
@@ -94,7 +98,8 @@ def load_scenario(
     tables = {}
     for signal_name, signal in scenario.signals.items():
         if isinstance(signal, TableSignal):
-            table_path = _named(layer, path, ("signals", signal_name, "file"), signal.file, "scenarios")
+            remedy = "a CSV file with columns t_s,value, named relative to the file that names it"
+            table_path = _named(layer, path, ("signals", signal_name, "file"), signal.file, "scenarios", remedy)
             tables[signal_name], digest = read_table(table_path)
             files.note(table_path, digest)
 
@@ -118,17 +123,17 @@ def _overridden(
 
 
 def _name(layer: Layer, path: Path) -> object:
-    """The scenario's name: its own, or its file's; never its base's, whose results would be mistaken for its own."""
+    """The scenario's name: its own, or its file's; a base's would make its results look like the base's."""
     if "name" in layer.data and layer.place(("name",)).depth == 0:
         return layer.data["name"]
     stem = re.sub(r"[^A-Za-z0-9_.-]", "_", path.stem)[:90]
     return stem if re.match(r"[A-Za-z_]", stem) else f"_{stem}"
 
 
-def _named(layer: Layer, path: Path, key_path: KeyPath, name: str, kind: str) -> Path:
-    """A file that the scenario names, or that it leaves at its default: then it is looked for beside the scenario."""
+def _named(layer: Layer, path: Path, key_path: KeyPath, name: str, kind: str, remedy: str | None = None) -> Path:
+    """A file that the scenario names, or leaves at its default: then it is looked for beside the scenario."""
     if layer.stands(key_path):
-        return find_named(layer, key_path, name, kind)
+        return find_named(layer, key_path, name, kind, remedy)
     return find(name, kind, beside=path.parent)
 
 
@@ -155,3 +160,23 @@ def _check_modes(layer: Layer, scenario: Scenario, modes: ModeTable) -> None:
         if mode not in modes.modes(function):
             remedy = did_you_mean(mode, modes.modes(function), f"its modes in {modes.source}")
             raise layer.error(f"function {function} has no mode {shown(mode)}", key_path, remedy)
+    for index, mode in enumerate(scenario.managers.bt.search_modes):
+        listed: KeyPath = ("managers", "bt", "search_modes", index)
+        known = modes.modes("f_generate_search_path")
+        # The default names the shipped modes, which another modes file need not have: it matters only to bt.
+        if layer.stands(listed) and mode not in known:
+            remedy = did_you_mean(mode, known, f"modes in {modes.source}")
+            raise layer.error(f"f_generate_search_path has no mode {shown(mode)}", listed, remedy)
+
+
+def _check_managers(layer: Layer, scenario: Scenario) -> None:
+    """See that settings are for a manager that can exist: built in, registered, or given as module:Class."""
+    others = scenario.managers.model_extra or {}
+    registered = [point.name for point in entry_points(group=MANAGER_GROUP)] if others else []
+    for name, settings in others.items():
+        key_path = ("managers", name)
+        if name not in registered and ":" not in name:
+            remedy = did_you_mean(name, [*ManagerSettings.model_fields, *sorted(registered)])
+            raise layer.error(f"there is no manager {shown(name)} with settings", key_path, f"{remedy}, module:Class")
+        if not isinstance(settings, dict):
+            raise layer.error(f"{shown(settings)} is not a mapping", key_path, "write `key: value` lines under it")

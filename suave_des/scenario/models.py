@@ -1,51 +1,117 @@
-"""The validated description of a mission: everything that decides a result, apart from manager, run and seed."""
+"""The validated description of a mission: everything that decides a result but manager, run and seed."""
 
 from __future__ import annotations
 
+import math
 import re
+from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import ConfigDict, Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from suave_des.scenario.distributions import Distribution, Strict, lower_bound
-from suave_des.scenario.revision import NotNegative, Positive, Revision
+from suave_des.scenario.distributions import (
+    Distribution,
+    Number,
+    Period,
+    Positive,
+    Strict,
+    lower_bound,
+    stated,
+    wrong,
+)
+from suave_des.scenario.revision import Revision
+from suave_des.scenario.settings import (
+    BehaviourTreeSettings,
+    ManagerSettings,
+    MetacontrolSettings,
+    RandomSettings,
+    paired,
+)
+from suave_des.scenario.signals import ConstantSignal, Signal, SinusoidSignal, StepSignal, TableSignal
+
+__all__ = [
+    "Battery",
+    "BehaviourTreeSettings",
+    "Calibration",
+    "ConstantSignal",
+    "Current",
+    "Knowledge",
+    "Latencies",
+    "ManagerSettings",
+    "MetacontrolSettings",
+    "Mission",
+    "Pipeline",
+    "RandomSettings",
+    "ReactionMetric",
+    "Scenario",
+    "Signal",
+    "SinusoidSignal",
+    "Start",
+    "StepSignal",
+    "TableSignal",
+    "ThrusterEvent",
+]
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_.-]*$", max_length=100)]
+FileName = Annotated[str, Field(min_length=1)]
+
+SEA_BED_Z_M = -20.0
+SURFACE_Z_M = 0.0
+THRUSTERS = 6
+_LONGEST_S = 100_000.0
 
 
 def _not_negative(value: Any) -> Any:
-    if lower_bound(value) < 0:
-        raise ValueError("must never be negative: give a number >= 0 or a distribution with minimum >= 0")
+    if (low := lower_bound(value)) < 0:
+        problem = "can become negative" if math.isinf(low) else f"{low:g} is negative"
+        raise wrong(problem, "give a number >= 0, or a distribution with minimum >= 0")
     return value
 
 
 class Mission(Strict):
-    """The coordinator's task list and limit."""
+    """The coordinator's limit."""
 
-    time_limit_s: Positive = 300.0
+    time_limit_s: Annotated[float, Field(gt=0, le=_LONGEST_S, strict=True)] = 300.0
+    """When the current task is cancelled and the metrics are taken."""
 
 
 class Start(Strict):
     """Pose at t = 0, in the world frame (x east, y north, z up; the sea bed is the plane z = -20)."""
 
     x_m: Distribution = -17.0
+    """East."""
     y_m: Distribution = 2.57
+    """North."""
     z_m: Distribution = -18.5
+    """Up; the sea bed is at -20, the surface at 0."""
     heading_rad: Distribution = 0.0
+    """Yaw, from east towards north."""
+
+    @field_validator("z_m", mode="after")
+    @classmethod
+    def _in_the_water(cls, value: Any) -> Any:
+        for z_m in stated(value):
+            if not SEA_BED_Z_M < z_m <= SURFACE_Z_M:
+                remedy = f"z must be above the sea bed at {SEA_BED_Z_M:g} m and at most {SURFACE_Z_M:g}"
+                raise wrong(f"{z_m:g} is not in the water", remedy)
+        return value
 
 
 class Current(Strict):
-    """Velocity of the water in the world frame, constant over a run."""
+    """Velocity of the water in the world frame, drawn once a run and constant over it."""
 
     x_m_per_s: Distribution = 0.0
+    """Towards east."""
     y_m_per_s: Distribution = 0.0
+    """Towards north."""
     z_m_per_s: Distribution = 0.0
+    """Upwards."""
 
 
 class Pipeline(Strict):
-    """Vertices of the pipeline, in order; each straight piece is sampled at evenly spaced points."""
+    """The pipeline on the sea bed."""
 
-    vertices_m: Annotated[tuple[tuple[float, float, float], ...], Field(min_length=2)] = (
+    vertices_m: Annotated[tuple[tuple[Number, Number, Number], ...], Field(min_length=2, max_length=1000)] = (
         (-15.0, 0.0, -20.0),
         (-25.0, 0.0, -20.0),
         (-35.0, 0.0, -20.0),
@@ -53,70 +119,10 @@ class Pipeline(Strict):
         (-44.49, -8.07, -20.0),
         (-51.56, -15.14, -20.0),
     )
-    """The default is the exemplar's pipeline (kas-lab/suave)."""
-    points_per_piece: Annotated[int, Field(ge=1, le=1000)] = 20
+    """Vertices [x, y, z] in order. The default is the exemplar's pipeline (kas-lab/suave)."""
+    points_per_piece: Annotated[int, Field(ge=1, le=1000, strict=True)] = 20
+    """Evenly spaced points on each straight piece, its first vertex excluded and its last included."""
 
-
-class _Signal(Strict):
-    publishing_period_s: Positive | None = None
-    """Period of the monitor that measures it; none: the revision's."""
-    time_step_s: NotNegative = 1.0
-    """Time is cut to multiples of this before the signal is evaluated (whole seconds in the exemplar); 0: not cut."""
-    noise: Distribution = 0.0
-    """Added to each measurement, drawn anew each time."""
-
-
-class SinusoidSignal(_Signal):
-    """a cos(2 pi (t + shift) / period) + a + minimum, with a = (maximum - minimum) / 2: it starts at its maximum."""
-
-    kind: Literal["sinusoid"]
-    period_s: Positive
-    minimum: float
-    maximum: float
-    shift_s: Distribution = 0.0
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        if self.minimum > self.maximum:
-            raise ValueError(f"minimum {self.minimum} is above maximum {self.maximum}")
-        return self
-
-
-class ConstantSignal(_Signal):
-    """The same value all the time."""
-
-    kind: Literal["constant"]
-    value: Distribution
-
-
-class StepSignal(_Signal):
-    """`before` until `time_s`, `after` from then on."""
-
-    kind: Literal["step"]
-    time_s: Distribution
-    before: float
-    after: float
-
-
-class TableSignal(_Signal):
-    """Values over time from a CSV file with columns t_s and value."""
-
-    kind: Literal["table"]
-    file: str
-    interpolation: Literal["previous", "linear"] = "previous"
-
-
-Signal = Annotated[
-    Annotated[SinusoidSignal, Tag("sinusoid")]
-    | Annotated[ConstantSignal, Tag("constant")]
-    | Annotated[StepSignal, Tag("step")]
-    | Annotated[TableSignal, Tag("table")],
-    Discriminator(
-        "kind",
-        custom_error_type="signal_kind",
-        custom_error_message="must be a mapping with kind: sinusoid, constant, step or table",
-    ),
-]
 
 _EVENT_TEXT = re.compile(r"^\(\s*(?P<thruster>[^,]*?)\s*,\s*(?P<event>[^,]*?)\s*,\s*(?P<time_s>[^,]*?)\s*\)$")
 
@@ -124,9 +130,12 @@ _EVENT_TEXT = re.compile(r"^\(\s*(?P<thruster>[^,]*?)\s*,\s*(?P<event>[^,]*?)\s*
 class ThrusterEvent(Strict):
     """A failure or recovery of one thruster; also given as the exemplar writes it: "(1,failure,35)"."""
 
-    thruster: Annotated[int, Field(ge=1, le=6, strict=True)]
+    thruster: Annotated[int, Field(ge=1, le=THRUSTERS, strict=True)]
+    """1 to 4 horizontal (front right, front left, rear right, rear left), 5 and 6 vertical (right, left)."""
     event: Literal["failure", "recovery"]
+    """What happens to it."""
     time_s: Distribution
+    """When, drawn once a run; the revision says whether after the start or after the event before."""
 
     @model_validator(mode="before")
     @classmethod
@@ -135,13 +144,19 @@ class ThrusterEvent(Strict):
             return value
         match = _EVENT_TEXT.match(value.strip())
         if match is None:
-            raise ValueError(f"{value!r} is not of the form (thruster,failure|recovery,time in s)")
+            raise wrong(
+                f"{value!r} is no thruster event",
+                "write (THRUSTER,failure or recovery,TIME), as in (1,failure,35)",
+            )
         parts: dict[str, Any] = match.groupdict()
-        for key, convert in (("thruster", int), ("time_s", float)):
+        for key, convert, remedy in (
+            ("thruster", int, "a whole number from 1 to 6"),
+            ("time_s", float, "a time in s, such as 35"),
+        ):
             try:
                 parts[key] = convert(parts[key])
             except ValueError:
-                raise ValueError(f"{parts[key]!r} in {value!r} is no number") from None
+                raise wrong(f"the {key} {parts[key]!r} in {value!r} is no number", remedy) from None
         return parts
 
 
@@ -149,22 +164,26 @@ class Battery(Strict):
     """Battery of revision 1.5: falls linearly from 1.0, recharged at once near the station."""
 
     discharge_time_s: Positive = 200.0
-    publishing_period_s: Positive = 1.0
-    station_x_m: float = -3.0
-    station_y_m: float = -2.0
+    """Time from full (1.0) to empty (0.0)."""
+    publishing_period_s: Period = 1.0
+    """Period at which its level is published."""
+    station_x_m: Number = -3.0
+    """Recharge station, east."""
+    station_y_m: Number = -2.0
+    """Recharge station, north."""
     station_radius_m: Positive = 0.5
     """Half-width of the box in x and y within which the vehicle counts as docked."""
 
 
 class Latencies(Strict):
-    """Times that software takes, each drawn anew at every occurrence."""
+    """Mission time that software takes, drawn anew at every occurrence."""
 
     task_start_s: Distribution = 0.0
     """From guided mode to the request of the first task."""
     mode_change_s: Distribution = 0.0
     """From the mode manager's answer to the mode's effect."""
     inference_s: Distribution = 1.0
-    """Mission time of one analyze and plan (stock Pellet starts a Java machine for each)."""
+    """One analyze and plan (stock Pellet starts a Java machine for each)."""
 
     @field_validator("*", mode="after")
     @classmethod
@@ -173,19 +192,24 @@ class Latencies(Strict):
 
 
 class Calibration(Strict):
-    """Parameters of vehicle, autopilot and simulator that the facts leave open; they act on every manager alike."""
+    """Parameters of vehicle, autopilot and simulator that the sources leave open, alike for every manager."""
 
     position_gain_per_s: Positive = 0.48
+    """Wanted speed for each metre to the set-point."""
     horizontal_speed_limit_m_per_s: Positive = 0.34
+    """Greatest horizontal speed that the autopilot wants."""
     vertical_speed_limit_m_per_s: Positive = 0.36
-    velocity_time_constant_s: Annotated[float, Field(ge=0.15)] = 0.5
+    """Greatest vertical speed that the autopilot wants."""
+    velocity_time_constant_s: Annotated[float, Field(ge=0.15, strict=True)] = 0.5
+    """Lag of the velocity behind the wanted one."""
     altitude_error_m: Distribution = 0.0
-    """Steady error of the autopilot's altitude: it holds its set-point plus this."""
+    """Steady error of the autopilot's altitude, drawn once a run: it holds its set-point plus this."""
     drift_x_m: Distribution = 0.0
+    """Way east from the spawning place to where guided mode begins, the origin of the local frame."""
     drift_y_m: Distribution = 0.0
-    """Way from the spawning place to the origin of the local frame (where guided mode begins)."""
+    """The same, north."""
     real_time_factor_loss: Distribution = 0.0
-    """The simulated world runs 1 / (1 + loss) as fast as the software's clock."""
+    """The simulated world runs 1 / (1 + loss) as fast as the software's clock; drawn once a run."""
 
     @field_validator("real_time_factor_loss", mode="after")
     @classmethod
@@ -193,95 +217,95 @@ class Calibration(Strict):
         return _not_negative(value)
 
 
-class RandomSettings(Strict):
-    """The random manager."""
-
-    adaptation_period_s: Positive = 15.0
-
-
-class MetacontrolSettings(Strict):
-    """The metacontrol manager."""
-
-    reasoning_period_s: Positive = 2.0
-
-
-class BehaviourTreeSettings(Strict):
-    """The behaviour tree manager of revision 1.5."""
-
-    tick_period_s: Positive = 0.1
-    visibility_thresholds_m: tuple[float, ...] = (3.25, 2.25, 1.25)
-    search_modes: tuple[str, ...] = ("fd_spiral_high", "fd_spiral_medium", "fd_spiral_low")
-    battery_limit: float = 0.25
-
-    @model_validator(mode="after")
-    def _paired(self) -> Self:
-        if len(self.visibility_thresholds_m) != len(self.search_modes):
-            raise ValueError("visibility_thresholds_m and search_modes must have the same length")
-        return self
-
-
-class ManagerSettings(Strict):
-    """Settings of managing subsystems by name; an outside manager finds its own under its own name."""
-
-    model_config = ConfigDict(extra="allow", frozen=True)
-
-    random: RandomSettings = RandomSettings()
-    metacontrol: MetacontrolSettings = MetacontrolSettings()
-    bt: BehaviourTreeSettings = BehaviourTreeSettings()
-
-
 class ReactionMetric(Strict):
     """What revision 1.5 calls a reaction (its metrics node)."""
 
-    visibility_thresholds_m: tuple[float, ...] = (3.25, 2.25, 1.25)
-    expected_altitudes_m: tuple[float, ...] = (3.0, 2.0, 1.0)
-    battery_limit: float = 0.25
+    visibility_thresholds_m: tuple[Number, ...] = (3.25, 2.25, 1.25)
+    """Falling visibilities; the first that is reached decides which altitude fits."""
+    expected_altitudes_m: tuple[Number, ...] = (3.0, 2.0, 1.0)
+    """Fitting altitude for each threshold."""
+    battery_limit: Number = 0.25
+    """Battery level below which the recharge path is expected to become active."""
 
     @model_validator(mode="after")
     def _paired(self) -> Self:
-        if len(self.visibility_thresholds_m) != len(self.expected_altitudes_m):
-            raise ValueError("visibility_thresholds_m and expected_altitudes_m must have the same length")
-        if list(self.visibility_thresholds_m) != sorted(self.visibility_thresholds_m, reverse=True):
-            raise ValueError("visibility_thresholds_m must fall")
+        paired(self, "visibility_thresholds_m", "expected_altitudes_m")
+        thresholds = self.visibility_thresholds_m
+        if any(later >= earlier for earlier, later in pairwise(thresholds)):
+            raise wrong(
+                f"{list(thresholds)} does not fall",
+                "give the greatest threshold first",
+                "visibility_thresholds_m",
+            )
         return self
 
 
 class Knowledge(Strict):
-    """The knowledge base: ontology files, and values that replace those in them."""
+    """The knowledge base."""
 
-    ontologies: Annotated[tuple[str, ...], Field(min_length=1)] = ("suave.owl",)
-    values: dict[str, float] = {}
-    """New hasValue of a named QAvalue individual, such as qa_water_visibility_low: 0.5."""
+    ontologies: Annotated[tuple[FileName, ...], Field(min_length=1)] = ("suave.owl",)
+    """Ontology files; what they import is resolved through the catalogue beside them."""
+    values: dict[str, Number] = Field(default_factory=dict)
+    """New value (hasValue) of named individuals of QAvalue, such as qa_water_visibility_low: 0.5."""
     reasoner: str = "pellet"
+    """Which reasoner analyzes: pellet, or owlready2 (the reference, slow)."""
+
+
+_DEFAULT_MODES = {"f_generate_search_path": "fd_spiral_low", "f_follow_pipeline": "fd_follow_pipeline"}
 
 
 class Scenario(Strict):
     """One mission's world, vehicle, software and knowledge."""
 
     name: Name
+    """Name in result files. In a YAML file: left out, the file's name without its ending."""
     description: str = ""
+    """For people."""
     revision: Revision
+    """How the exemplar's software of one revision behaves."""
     mission: Mission = Mission()
+    """The coordinator's limit."""
     start: Start = Start()
+    """Pose at t = 0, each part drawn once a run."""
     pipeline: Pipeline = Pipeline()
+    """The pipeline on the sea bed."""
     current: Current = Current()
+    """Velocity of the water."""
     signals: dict[Name, Signal]
+    """What is measured, by the name of its quality attribute; water_visibility (m) is needed."""
     thruster_events: tuple[ThrusterEvent, ...] = ()
+    """Failures and recoveries, in order."""
     battery: Battery | None = None
+    """The battery; left out: there is none."""
     latencies: Latencies = Latencies()
+    """Times that software takes."""
     calibration: Calibration = Calibration()
-    modes_file: str = "suave_modes.yaml"
-    default_modes: dict[Name, str] = {
-        "f_generate_search_path": "fd_spiral_low",
-        "f_follow_pipeline": "fd_follow_pipeline",
-    }
+    """What the sources leave open."""
+    modes_file: FileName = "suave_modes.yaml"
+    """System Modes file."""
+    default_modes: dict[Name, str] = Field(default_factory=lambda: dict(_DEFAULT_MODES))
+    """Mode that the manager none sets for each function; functions left out keep their default."""
     knowledge: Knowledge = Knowledge()
+    """The knowledge base."""
     managers: ManagerSettings = ManagerSettings()
+    """Settings of managing subsystems, by name; an outside manager finds its own under its own name."""
     reaction_metric: ReactionMetric = ReactionMetric()
+    """What counts as a reaction."""
 
     @field_validator("signals", mode="after")
     @classmethod
     def _visibility_is_there(cls, value: dict[str, Any]) -> dict[str, Any]:
         if "water_visibility" not in value:
-            raise ValueError("the detection of the pipeline needs a signal named water_visibility")
+            raise wrong("there is no signal named water_visibility", "add it: the pipeline's detection needs it")
         return value
+
+    @field_validator("default_modes", mode="after")
+    @classmethod
+    def _over_the_defaults(cls, value: dict[str, str]) -> dict[str, str]:
+        return {**_DEFAULT_MODES, **value}
+
+    @model_validator(mode="after")
+    def _one_battery(self) -> Self:
+        if self.battery is not None and "battery_level" in self.signals:
+            raise wrong("there are a battery and a signal battery_level", "remove one of them", "battery")
+        return self

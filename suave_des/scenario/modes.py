@@ -81,12 +81,12 @@ class ModeTable:
 def read_modes(path: Path | str) -> ModeTable:
     """Read a System Modes YAML file.
 
-    A function is an entry `type: system` whose parts are nodes; a system of systems only groups them and is passed over.
-    A function without a mode __DEFAULT__ gets one that is inactive, as each lifecycle node is before it is told.
+    A function is an entry `type: system` whose parts are nodes; a system of systems only groups functions and
+    is passed over. A function without a mode __DEFAULT__ gets one that is inactive, as its node is at first.
 
     Raises:
-        InputError: with file and line: what cannot be read, an entry or mode of another form, an unknown part, a mode that
-            names an undefined mode of a node, missing ros__parameters, a parameter of the wrong kind.
+        InputError: with file and line: what cannot be read, an entry or mode of another form, an unknown part,
+            an undefined mode of a node, missing ros__parameters, a parameter of the wrong kind.
     """
     return modes_of(read_yaml(path))
 
@@ -105,18 +105,14 @@ class _ModesFile:
         for key in document.data:
             name = key.removeprefix("/")
             if name in self.keys:
-                raise document.error(
-                    f"{name} stands twice, once with a leading slash", (key,), "keep one entry"
-                )
+                raise document.error(f"{name} stands twice, once with a leading slash", (key,), "keep one entry")
             self.keys[name] = key
         self.entries = {name: self._entry(key) for name, key in self.keys.items()}
 
     def table(self) -> ModeTable:
         """Every function with its modes."""
         systems = [name for name, entry in self.entries.items() if entry["type"] == "system"]
-        nodes = {
-            name: self._node_modes(name) for name, entry in self.entries.items() if entry["type"] == "node"
-        }
+        nodes = {name: self._node_modes(name) for name, entry in self.entries.items() if entry["type"] == "node"}
         functions: dict[str, Mapping[str, Mode]] = {}
         for name in systems:
             parts = self._parts(name)
@@ -155,9 +151,7 @@ class _ModesFile:
         known = ("type", "parts", "modes") if parameters["type"] == "system" else ("type", "modes")
         for other in parameters:
             if other not in known:
-                raise self.document.error(
-                    f"unknown key {shown(other)}", (*path, other), did_you_mean(other, known)
-                )
+                raise self.document.error(f"unknown key {shown(other)}", (*path, other), did_you_mean(other, known))
         return parameters
 
     def _parts(self, name: str) -> list[str]:
@@ -212,25 +206,17 @@ class _ModesFile:
 
     def _parameter(self, key: str, value: Any, path: KeyPath) -> float | str | bool:
         if key in _POSITIVE_NUMBERS and (isinstance(value, bool) or not isinstance(value, int | float)):
-            raise self.document.error(
-                f"{shown(value)} is no number", path, f"{key} is a length in m, such as 2.0"
-            )
+            raise self.document.error(f"{shown(value)} is no number", path, f"{key} is a length in m, such as 2.0")
         if key in _POSITIVE_NUMBERS and value <= 0:
-            raise self.document.error(
-                f"{shown(value)} is not above 0", path, f"{key} is a length in m, such as 2.0"
-            )
+            raise self.document.error(f"{shown(value)} is not above 0", path, f"{key} is a length in m, such as 2.0")
         if not isinstance(value, bool | int | float | str):
-            raise self.document.error(
-                f"{shown(value)} is no value", path, "a number, text, true or false is needed"
-            )
+            raise self.document.error(f"{shown(value)} is no value", path, "a number, text, true or false is needed")
         return value if isinstance(value, bool | str) else float(value)
 
     def _function(
         self, name: str, parts: list[str], nodes: Mapping[str, Mapping[str, Mapping[str, float | str | bool]]]
     ) -> dict[str, Mode]:
-        modes = {
-            mode: self._mode(name, mode, content, parts, nodes) for mode, content in self._modes(name).items()
-        }
+        modes = {mode: self._mode(name, mode, content, parts, nodes) for mode, content in self._modes(name).items()}
         return modes if DEFAULT_MODE in modes else {DEFAULT_MODE: Mode(DEFAULT_MODE, False, {}), **modes}
 
     def _mode(
@@ -268,7 +254,7 @@ class _ModesFile:
         return Mode(mode, active, parameters)
 
     def _node_mode(self, state: Any, modes: Mapping[str, object], node: str, path: KeyPath) -> str | None:
-        """The node's mode that a state names, or None when it is inactive; plain `active` means its __DEFAULT__."""
+        """The node's mode that a state names; None when inactive, __DEFAULT__ for plain `active`."""
         if state == "inactive":
             return None
         if state == "active":
@@ -277,7 +263,5 @@ class _ModesFile:
             raise self.document.error(f"{shown(state)} is no state of a node", path, f"write {_STATES}")
         mode = state.removeprefix("active.")
         if mode not in modes and mode != DEFAULT_MODE:
-            raise self.document.error(
-                f"{node} has no mode {shown(mode)}", path, did_you_mean(mode, modes, "its modes")
-            )
+            raise self.document.error(f"{node} has no mode {shown(mode)}", path, did_you_mean(mode, modes, "its modes"))
         return mode

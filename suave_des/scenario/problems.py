@@ -1,4 +1,4 @@
-"""What pydantic found wrong with a scenario, said as one line: file, line, key path, the value, and what would be right."""
+"""What pydantic found wrong with a scenario, as one line with file, line, key path, value and remedy."""
 
 from __future__ import annotations
 
@@ -11,8 +11,17 @@ from pydantic import BaseModel, Tag, ValidationError
 from pydantic_core import ErrorDetails
 
 from suave_des.errors import InputError
+from suave_des.scenario.distributions import Distribution
 from suave_des.scenario.layers import Layer
+from suave_des.scenario.signals import Signal
 from suave_des.scenario.yamlfile import KeyPath, did_you_mean, place_text, shown
+
+
+def _tags(union: Any) -> list[str]:
+    """Names of a union's members, which pydantic puts into locations although no file has them."""
+    members = typing.get_args(typing.get_args(union)[0])
+    return [mark.tag for member in members for mark in member.__metadata__ if isinstance(mark, Tag)]
+
 
 _MAPPING = "is not a mapping of keys to values"
 _TEXTS: Mapping[str, tuple[str, str]] = {
@@ -22,17 +31,13 @@ _TEXTS: Mapping[str, tuple[str, str]] = {
     "int_type": ("{value} is no whole number", "such as 3, without quotes"),
     "int_from_float": ("{value} is no whole number", "such as 3"),
     "finite_number": ("{value} is not finite", "give a finite number"),
-    "greater_than": ("{value} is out of range", "must be greater than {gt:g}"),
-    "greater_than_equal": ("{value} is out of range", "must be at least {ge:g}"),
-    "less_than": ("{value} is out of range", "must be less than {lt:g}"),
-    "less_than_equal": ("{value} is out of range", "must be at most {le:g}"),
     "string_type": ("{value} is no text", "put it in quotes"),
     "bool_type": ("{value} is neither true nor false", "write true or false"),
     "bool_parsing": ("{value} is neither true nor false", "write true or false"),
     "dict_type": (f"{{value}} {_MAPPING}", "write `key: value` lines under it, or leave it out"),
     "model_type": (f"{{value}} {_MAPPING}", "write `key: value` lines under it, or leave it out"),
     "model_attributes_type": (f"{{value}} {_MAPPING}", "write `key: value` lines under it, or leave it out"),
-    "tuple_type": ("{value} is no list", "write [ITEM, ITEM]"),
+    "tuple_type": ("{value} is no list", "write it in brackets: [{value}]"),
     "string_pattern_mismatch": (
         "{value} is no name",
         "use letters, digits, _ . and -, beginning with a letter",
@@ -44,8 +49,11 @@ _TEXTS: Mapping[str, tuple[str, str]] = {
 }
 
 
+_UNION_TAGS = {each for union in (Distribution, Signal) for each in _tags(union)}
+
+
 def input_error(error: ValidationError, layer: Layer, model: type[BaseModel]) -> InputError:
-    """The first thing wrong, in the order of the files, as an error for the user; "(and N more)" when there are more.
+    """The first thing wrong, the user's own file before its base, as one error that counts the others.
 
     Args:
         error: what pydantic raised for layer.data.
@@ -62,10 +70,11 @@ def input_error(error: ValidationError, layer: Layer, model: type[BaseModel]) ->
     return InputError(problem, file=place.file, place=place_text(place.line, path), remedy=remedy)
 
 
-def _order(detail: ErrorDetails, layer: Layer) -> tuple[bool, int, int]:
-    # A misspelt key is also a missing one, and says more; so what is missing comes last.
+def _order(detail: ErrorDetails, layer: Layer) -> tuple[int, int, int]:
+    # A misspelt key is also a missing one, and a list with a wrong entry too short: these say less and come last.
     place = layer.place(_key_path(detail["loc"], layer.data))
-    return detail["type"] == "missing", place.depth, place.line
+    missing_key = detail["type"] == "missing" and isinstance(detail["loc"][-1], str)
+    return 2 if detail["type"] == "too_short" else int(missing_key), place.depth, place.line
 
 
 def _key_path(loc: tuple[int | str, ...], data: object) -> KeyPath:
@@ -76,15 +85,15 @@ def _key_path(loc: tuple[int | str, ...], data: object) -> KeyPath:
         if isinstance(data, dict) and key in data:
             data = data[key]
         elif isinstance(data, list) and isinstance(key, int):
-            data = data[key]
-        elif key in _union_tags() or key == "[key]" or (not isinstance(data, dict | str) and not last):
+            data = data[key] if key < len(data) else None
+        elif key in _UNION_TAGS or key == "[key]" or (not isinstance(data, dict | str) and not last):
             continue
         path.append(key)
     return tuple(path)
 
 
 def _nearest_to_user(detail: ErrorDetails, layer: Layer) -> KeyPath:
-    """Key path of the value at fault; of several keys that do not fit together, the one in the user's own file."""
+    """Key path of the value at fault; of keys that do not fit together, the one in the user's own file."""
     path = _key_path(detail["loc"], layer.data)
     keys = [key for key in str(detail.get("ctx", {}).get("keys", "")).split() if (*path, key) in layer.places]
     candidates: Iterable[KeyPath] = [(*path, key) for key in keys] or [path]
@@ -106,6 +115,12 @@ def _said(detail: ErrorDetails, model: type[BaseModel]) -> tuple[str, str]:
         return f"{shown(value)} is not allowed", did_you_mean(value, map(str, known_words), "allowed")
     if kind == "value_error":
         return str(context["error"]), "see docs/reference/scenario.md"
+    if kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
+        return f"{shown(value)} is out of range", f"must be {_range_at(model, loc)}"
+    if kind == "float_type" and loc[-1] == "number":
+        return f"{shown(value)} is no number", "give a number without quotes, or a distribution"
+    if value is None and kind in ("dict_type", "model_type", "model_attributes_type"):
+        return "has nothing under it", "write `key: value` lines under it, or leave it out"
     problem, remedy = _TEXTS.get(kind, (f"{{value}}: {detail['msg']}", "see docs/reference/scenario.md"))
     facts = {"value": shown(value), **context}
     return problem.format(**facts), remedy.format(**facts)
@@ -120,8 +135,13 @@ def _wrong_kind(value: object, key: str, known: list[str], also: str) -> tuple[s
     return f"{key} {shown(value[key])} is not known", did_you_mean(value[key], known)
 
 
-def _union_tags() -> frozenset[str]:
-    return frozenset("sinusoid constant step table number normal uniform exponential choice".split())
+def _range_at(model: type[BaseModel], loc: tuple[int | str, ...]) -> str:
+    """The range that a number of the model must lie in, in words."""
+    owner = model_at(model, loc[:-1])
+    marks = owner.model_fields[str(loc[-1])].metadata if owner else []
+    bounds = (("gt", "greater than"), ("ge", "at least"), ("lt", "less than"), ("le", "at most"))
+    words = [f"{text} {getattr(mark, key):g}" for mark in marks for key, text in bounds if hasattr(mark, key)]
+    return " and ".join(words)
 
 
 def _annotation_at(model: type[BaseModel], loc: tuple[int | str, ...]) -> Any:

@@ -1,26 +1,23 @@
-"""What differs between the exemplar's revisions, as data (values with their sources: scenarios/revisions/*.yaml)."""
+"""What differs between the exemplar's revisions, as data; values with their sources: scenarios/revisions."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import Field
-
-from suave_des.scenario.distributions import Distribution, Strict
-
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-Probability = Annotated[float, Field(ge=0, lt=1)]
+from suave_des.scenario.distributions import Distribution, NotNegative, Period, Positive, Probability, Strict
 
 
 class CoordinatorRevision(Strict):
     """The mission node: how it polls, and what it writes down."""
 
-    poll_period_s: Positive
-    limit_check_period_s: Positive
+    poll_period_s: Period
+    """Period of its loop."""
+    limit_check_period_s: Period
+    """Period at which the time limit is checked."""
     search_time: Literal["poll", "detection"]
-    """"poll": the coordinator's poll that saw the detection, cut to whole seconds; "detection": its own time, cut."""
+    """Time of the poll that saw the detection, or of the detection itself; cut to whole seconds."""
     search_time_when_not_found: Literal["limit", "duration"]
+    """Search time when the pipeline is not found: the time limit, or the mission's duration."""
     maintain_motion_per_task: bool
     """Whether maintain_motion is cancelled with each task and requested anew with the next."""
 
@@ -31,17 +28,22 @@ class SpiralRevision(Strict):
     centre: Literal["origin", "activation"]
     """Where the spiral is centred: the local frame's origin, or the position at each activation."""
     restarts_on_activation: bool
+    """Whether each activation starts the spiral afresh (else it goes on from the same counter)."""
     workaround_step_m: Positive
+    """How much the commanded altitude is lowered each time that z alone is not reached."""
     workaround_cleared_on_activation: bool
+    """Whether each activation starts without what was lowered before."""
 
 
 class FollowRevision(Strict):
     """The follow function's path."""
 
     acceptance_m: Positive
-    poll_period_s: Positive
+    """A point is reached when dx and dy are both at most this."""
+    poll_period_s: Period
+    """Period at which it looks whether the point is reached."""
     restarts_on_activation: bool
-    """Whether the path starts again from its first point (else it goes on with the points not yet reached)."""
+    """Whether the path starts again from its first point (else it goes on with those not yet reached)."""
     adds_remaining_way: bool
     """Whether a deactivation adds the way from the last point to the present position to the distance."""
 
@@ -50,13 +52,16 @@ class RecoveryRevision(Strict):
     """Thruster recovery in maintain_motion."""
 
     survives_deactivation: bool
+    """Whether a recovery under way goes on when the function is deactivated."""
 
 
 class MonitorsRevision(Strict):
     """Monitors and detection mock-up."""
 
     thruster_event_times: Literal["after_previous", "after_start"]
-    visibility_publishing_period_s: Positive
+    """What the time of a thruster event counts from: the event before, or the start of the mission."""
+    visibility_publishing_period_s: Period
+    """Period at which signals are measured that give none themselves."""
     detected_point_height_m: NotNegative
     """Height above the pipeline's points at which the detection mock-up looks for them."""
 
@@ -67,17 +72,20 @@ class SetPointRevision(Strict):
     loss_probability: Probability
     """A publisher made for each call may publish before the autopilot has discovered it."""
     node_frame_offset_x_m: Distribution
+    """Steady error of one node's frame against the simulator's, east; drawn once per node and run."""
     node_frame_offset_y_m: Distribution
+    """The same, north."""
     node_frame_offset_z_m: Distribution
-    """Steady error of one node's frame against the simulator's, measured once per node and run."""
+    """The same, up."""
 
 
 class RandomRevision(Strict):
     """The random manager."""
 
     on_task_request: bool
+    """Whether it picks a mode on each task request too."""
     starts_at_launch: bool
-    """Whether its timer runs since launch, so that its phase at t = 0 is arbitrary; else it starts with the task."""
+    """Whether its timer runs since launch, with any phase at t = 0; else it starts with the task."""
 
 
 class MetacontrolRevision(Strict):
@@ -88,22 +96,33 @@ class MetacontrolRevision(Strict):
     objectives_at_launch: bool
     """Whether the first task's objectives exist from launch on."""
     waits_for_first_measurement: bool
+    """Whether it plans nothing for a measured attribute before its first measurement."""
     search_always_improves: bool
-    """Whether search objectives carry o_always_improve (rev 1.5); see search_improves_when_exceeded."""
+    """Whether search objectives carry o_always_improve (1.5); see search_improves_when_exceeded."""
     search_improves_when_exceeded: bool
-    """Whether an objective is also adapted when a measured value exceeds what its present design expects."""
+    """Whether the search is also adapted when a measured value exceeds what its present design expects."""
     ignores_diagnostics_without_objective: bool
+    """Whether diagnostics are ignored while there is no objective."""
 
 
 class Revision(Strict):
     """One revision of the exemplar's software."""
 
     name: str
+    """Name in result files."""
     coordinator: CoordinatorRevision
+    """The mission node."""
     spiral: SpiralRevision
+    """The search function."""
     follow: FollowRevision
+    """The follow function."""
     recovery: RecoveryRevision
+    """Thruster recovery."""
     monitors: MonitorsRevision
+    """Monitors and detection."""
     set_points: SetPointRevision
+    """How set-points reach the autopilot."""
     random: RandomRevision
+    """The random manager."""
     metacontrol: MetacontrolRevision
+    """The metacontrol manager."""

@@ -15,14 +15,15 @@ COLUMNS = ("t_s", "value")
 SIZE_LIMIT_BYTES = 20_000_000
 
 Table = tuple[tuple[float, ...], tuple[float, ...]]
-"""Times in s, strictly increasing, and the value from each of them on (or to be interpolated between them)."""
+"""Times in s, strictly increasing, and the value at each."""
 
 
 def read_table(path: Path) -> tuple[Table, str]:
     """Read a table: its times and values, and the SHA-256 of the file.
 
     Raises:
-        InputError: with file and line: another header, a value that is no finite number, times that do not increase, no row.
+        InputError: with file and line: another header, a value that is no finite number, times that do not
+            increase, no row.
     """
     content = read_bytes(path, SIZE_LIMIT_BYTES)
     rows = csv.reader(io.StringIO(decode(path, content), newline=""), strict=True)
@@ -31,9 +32,7 @@ def read_table(path: Path) -> tuple[Table, str]:
     try:
         header = [name.strip() for name in next(rows, [])]
         if sorted(header) != sorted(COLUMNS):
-            raise _error(
-                path, 1, f"the columns are {shown(','.join(header))}", "the first line must be t_s,value"
-            )
+            raise _error(path, 1, f"the columns are {shown(','.join(header))}", "the first line must be t_s,value")
         for row in rows:
             if not any(cell.strip() for cell in row):
                 continue
@@ -54,18 +53,14 @@ def read_table(path: Path) -> tuple[Table, str]:
 
 def _numbers(path: Path, line: int, header: list[str], row: list[str]) -> tuple[float, float]:
     if len(row) != len(COLUMNS):
-        raise _error(
-            path, line, f"has {len(row)} values", "each line has two, separated by a comma: t_s,value"
-        )
+        raise _error(path, line, f"has {len(row)} values", "each line has two, separated by a comma: t_s,value")
     cells = dict(zip(header, row, strict=True))
     numbers = []
     for column in COLUMNS:
         try:
             number = float(cells[column])
         except ValueError:
-            raise _error(
-                path, line, f"{column} {shown(cells[column])} is no number", "such as 12.5"
-            ) from None
+            raise _error(path, line, f"{column} {shown(cells[column])} is no number", "such as 12.5") from None
         if not math.isfinite(number):
             raise _error(path, line, f"{column} {shown(cells[column])} is not finite", "leave that row out")
         numbers.append(number)

@@ -1,7 +1,7 @@
 """YAML files read as plain data, with the line of every key, and nothing in them that could run or explode.
 
-Scalars follow the YAML 1.2 core schema, not PyYAML's 1.1: `1e3` is a number, `010` is ten, `1:30` and `2023-02-04` are
-text. No constructor of PyYAML is involved, so no tag can build an object.
+Scalars follow the YAML 1.2 core schema, not PyYAML's 1.1: `1e3` is a number, `010` is ten, `1:30` and
+`2023-02-04` are text. No constructor of PyYAML is involved, so no tag can build an object.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ SIZE_LIMIT_BYTES = 1_000_000
 NODE_LIMIT = 100_000
 DEPTH_LIMIT = 100
 
+_SHORTER = "write it out, with fewer values or aliases"
 _TAG = "tag:yaml.org,2002:"
 
 
@@ -57,9 +58,7 @@ class YamlDocument:
 
     def error(self, problem: str, key_path: KeyPath, remedy: str | None = None) -> InputError:
         """An error about what stands at a key path."""
-        return InputError(
-            problem, file=self.path, place=place_text(self.line(key_path), key_path), remedy=remedy
-        )
+        return InputError(problem, file=self.path, place=place_text(self.line(key_path), key_path), remedy=remedy)
 
 
 def place_text(line: int, key_path: KeyPath) -> str:
@@ -114,17 +113,15 @@ def decode(path: Path, content: bytes) -> str:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise InputError(
-            "is not UTF-8 text", file=path, place=f"line {line}", remedy="save it as UTF-8"
-        ) from None
+        raise InputError("is not UTF-8 text", file=path, place=f"line {line}", remedy="save it as UTF-8") from None
 
 
 def read_yaml(path: Path | str) -> YamlDocument:
     """Read a YAML file whose top level is a mapping.
 
     Raises:
-        InputError: the file cannot be read, is no YAML, has a tag, a duplicate key or several documents, holds itself,
-            expands to more than NODE_LIMIT values, or has another top level; with the line.
+        InputError: with the line: the file cannot be read, is no YAML, has a tag, a duplicate key or several
+            documents, holds itself, expands to more than NODE_LIMIT values, or has another top level.
     """
     path = Path(path)
     content = read_bytes(path)
@@ -138,9 +135,7 @@ def read_yaml(path: Path | str) -> YamlDocument:
     except yaml.MarkedYAMLError as error:
         raise _yaml_error(path, error) from None
     if root is None:
-        raise InputError(
-            "is empty", file=path, place="line 1", remedy="a mapping of keys to values is needed"
-        )
+        raise InputError("is empty", file=path, place="line 1", remedy="a mapping of keys to values is needed")
     if not isinstance(root, yaml.MappingNode):
         raise InputError(
             "is not a mapping at its top level",
@@ -157,17 +152,13 @@ def _yaml_error(path: Path, error: yaml.MarkedYAMLError) -> InputError:
     mark = error.problem_mark or error.context_mark
     problem = error.problem or error.context or "cannot be understood"
     if isinstance(error, _TooMuchError):
-        remedy = "write it out, with fewer values or aliases"
+        remedy = _SHORTER
     elif "but found another document" in problem:
         problem, remedy = "a second document begins here", "keep one document: remove the line ---"
     else:
         tab = "\\t" in problem
         problem = f"is not valid YAML: {problem}"
-        remedy = (
-            "indent with spaces, not tabs"
-            if tab
-            else "check indentation, colons and quotes here and just above"
-        )
+        remedy = "indent with spaces, not tabs" if tab else "check indentation, colons and quotes here and just above"
     return InputError(problem, file=path, place=f"line {mark.line + 1}" if mark else None, remedy=remedy)
 
 
@@ -204,9 +195,7 @@ class _Composer(Reader, Scanner, Parser, Composer, BaseResolver):
 
 
 def _too_much(mark: Any, *, deep: bool) -> _TooMuchError:
-    limit = (
-        f"is nested more than {DEPTH_LIMIT} deep" if deep else f"expands to more than {NODE_LIMIT:,} values"
-    )
+    limit = f"is nested more than {DEPTH_LIMIT} deep" if deep else f"expands to more than {NODE_LIMIT:,} values"
     return _TooMuchError(problem=limit, problem_mark=mark)
 
 
@@ -241,7 +230,8 @@ class _Reading:
         """Data of a node; `above` are the identities of the nodes that hold it."""
         self._count += 1
         if self._count > NODE_LIMIT or len(above) > DEPTH_LIMIT:
-            raise _yaml_error(self.path, _too_much(node.start_mark, deep=self._count <= NODE_LIMIT))
+            error = _too_much(node.start_mark, deep=self._count <= NODE_LIMIT)
+            raise self._error_at(self.lines[key_path[:1]], key_path[:1], str(error.problem), _SHORTER)
         if id(node) in above:
             raise self._error(node, key_path, "an alias stands for something that holds it", "write it out")
         kind = {yaml.ScalarNode: "", yaml.SequenceNode: "seq", yaml.MappingNode: "map"}[type(node)]
@@ -264,9 +254,7 @@ class _Reading:
             return _SCALARS[node.tag](node.value)
         except (ValueError, KeyError):
             wanted = node.tag.replace(_TAG, "!!")
-            raise self._error(
-                node, key_path, f"{shown(node.value)} is no {wanted}", "remove the tag"
-            ) from None
+            raise self._error(node, key_path, f"{shown(node.value)} is no {wanted}", "remove the tag") from None
 
     def _mapping(self, node: yaml.MappingNode, key_path: KeyPath, inside: tuple[int, ...]) -> dict[str, Any]:
         data: dict[str, Any] = {}
@@ -284,12 +272,13 @@ class _Reading:
                 )
             first_lines[key] = _line(key_node)
             if key == "<<":
-                raise self._error(
-                    key_node, key_path, "the merge key << is not supported", "write the keys out"
-                )
+                raise self._error(key_node, key_path, "the merge key << is not supported", "write the keys out")
             self.lines[(*key_path, key)] = _line(key_node)
             data[key] = self.plain(value_node, (*key_path, key), inside)
         return data
 
     def _error(self, node: yaml.Node, key_path: KeyPath, problem: str, remedy: str) -> InputError:
-        return InputError(problem, file=self.path, place=place_text(_line(node), key_path), remedy=remedy)
+        return self._error_at(_line(node), key_path, problem, remedy)
+
+    def _error_at(self, line: int, key_path: KeyPath, problem: str, remedy: str) -> InputError:
+        return InputError(problem, file=self.path, place=place_text(line, key_path), remedy=remedy)
