@@ -38,6 +38,7 @@ class Normal(Strict):
     """Normal distribution, optionally cut to [minimum, maximum] (values outside are drawn again)."""
 
     distribution: Literal["normal"]
+    """Bell-shaped."""
     mean: Number
     """Mean, before the cut."""
     std: NotNegative
@@ -80,6 +81,7 @@ class Uniform(Strict):
     """Uniform distribution over [minimum, maximum]."""
 
     distribution: Literal["uniform"]
+    """Every value between two bounds alike."""
     minimum: Number
     """Smallest value."""
     maximum: Number
@@ -100,6 +102,7 @@ class Exponential(Strict):
     """Exponential distribution: `minimum` plus a time of the given mean."""
 
     distribution: Literal["exponential"]
+    """Often small, seldom great."""
     mean: NotNegative
     """Mean of what is added to the minimum."""
     minimum: Number = 0.0
@@ -114,6 +117,7 @@ class Choice(Strict):
     """One of the given values, each with equal chance; a value given twice counts twice."""
 
     distribution: Literal["choice"]
+    """One of a list."""
     values: Annotated[tuple[Number, ...], Field(min_length=1)]
     """The values."""
 

@@ -176,7 +176,7 @@ class Battery(Strict):
 
 
 class Latencies(Strict):
-    """Mission time that software takes, drawn anew at every occurrence."""
+    """Mission time that software takes, drawn anew at every occurrence; never negative."""
 
     task_start_s: Distribution = 0.0
     """From guided mode to the request of the first task."""
