@@ -1,1 +1,1 @@
-"""Campaigns: many missions, their seeds, executors and result files."""
+"""Campaigns: many missions, their executors and result files. `run_campaign` is all that most users need."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import simpy
 
@@ -65,7 +65,10 @@ class ManagingSubsystem:
         system: what can be seen and done.
         period_s: time between calls of `adapt`; none: never called.
         starts_s: mission time of the first call of `adapt`.
+        needs_knowledge: whether missions need the knowledge base, so that it is checked before the first one.
     """
+
+    needs_knowledge: ClassVar[bool] = False
 
     def __init__(self, system: ManagedSystem) -> None:
         self.system = system

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from decimal import Decimal
+from typing import ClassVar
 
 from suave_des.clock import tick_at_or_after, until
 from suave_des.knowledge.base import KnowledgeBase
@@ -31,6 +32,8 @@ class Metacontrol(ManagingSubsystem):
     What the reasoner infers from it is never written back, so nothing has to be retracted; a status persists only as a
     transition of this state.
     """
+
+    needs_knowledge: ClassVar[bool] = True
 
     def __init__(self, system: ManagedSystem) -> None:
         super().__init__(system)

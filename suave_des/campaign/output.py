@@ -1,0 +1,110 @@
+"""Output folders and the files in them: checked before the work, written whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from suave_des.errors import InputError
+
+DECIMALS = 6
+"""Digits after the point in result files."""
+
+
+def rounded(value: float) -> float:
+    """A number as it stands in result files."""
+    return round(value, DECIMALS) + 0.0  # + 0.0: no minus before a zero
+
+
+def cell(value: object) -> object:
+    """A value as it stands in a CSV file: numbers rounded and in their shortest form, True or False, empty for none."""
+    return repr(rounded(value)) if isinstance(value, float) else value
+
+
+def csv_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    r"""A CSV file: RFC 4180 but for its line ends, which are \n, with a header."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(map(cell, row) for row in rows)
+    return buffer.getvalue()
+
+
+def json_text(content: Mapping[str, Any]) -> str:
+    """A JSON file that people read too."""
+    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+
+
+def check_output_folder(folder: Path, *, overwrite: bool) -> None:
+    """See that results can go into a folder, without changing anything.
+
+    Raises:
+        InputError: it has something in it and `overwrite` is false, is a file, or cannot be written.
+    """
+    if folder.is_dir():
+        if not overwrite and (found := next((entry.name for entry in sorted(folder.iterdir())), None)):
+            raise InputError(
+                f"the output folder is not empty: it has {found}",
+                file=folder,
+                remedy="give another folder, or --overwrite to replace the results in it",
+            )
+        place = folder
+    elif folder.exists() or folder.is_symlink():
+        raise InputError("the output folder is not a folder", file=folder, remedy="give another path")
+    else:
+        place = folder.parent
+        if not place.is_dir():
+            raise InputError(f"there is no folder {place} to make it in", file=folder, remedy="make that folder first")
+    if not os.access(place, os.W_OK | os.X_OK):
+        raise InputError("the output folder cannot be written", file=folder, remedy="give a folder that is yours")
+
+
+def make_output_folder(folder: Path) -> None:
+    """Make the folder if it is not there yet.
+
+    Raises:
+        InputError: it cannot be made.
+    """
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise _not_written(folder, error) from None
+
+
+def write_files(folder: Path, files: Mapping[str, str], *, stale: Collection[str] = ()) -> None:
+    """Write files under temporary names, and rename them when all are complete.
+
+    Args:
+        folder: an existing folder.
+        files: content by name.
+        stale: names of files of an earlier use of the folder, removed unless they are written anew.
+
+    Raises:
+        InputError: the disk is full, or the folder cannot be written; nothing half-written stays.
+    """
+    written: list[tuple[Path, Path]] = []
+    try:
+        for name, text in files.items():
+            temporary = folder / f".{name}.{os.getpid()}.part"
+            written.append((temporary, folder / name))
+            temporary.write_bytes(text.encode())
+        for temporary, final in written:
+            temporary.replace(final)
+        for name in set(stale) - set(files):
+            (folder / name).unlink(missing_ok=True)
+    except OSError as error:
+        raise _not_written(folder, error) from None
+    finally:
+        for temporary, _ in written:
+            temporary.unlink(missing_ok=True)
+
+
+def _not_written(folder: Path, error: OSError) -> InputError:
+    return InputError(
+        f"the output folder cannot be written: {error.strerror}", file=folder, remedy="give a folder that is yours"
+    )

