@@ -1,0 +1,220 @@
+"""System Modes files: the modes of each function, and each way in which a file is refused."""
+
+import pickle
+
+import pytest
+
+from suave_des.errors import InputError
+from suave_des.resources import find
+from suave_des.scenario.modes import Mode, read_modes
+
+SEARCH = """\
+/f_generate_search_path:
+  ros__parameters:
+    type: system
+    parts: f_generate_search_path_node
+    modes:
+      fd_unground: {f_generate_search_path_node: inactive}
+      fd_spiral_low: {/f_generate_search_path_node: active.low}
+      fd_spiral_high: {f_generate_search_path_node: active.high}
+      fd_plain: {f_generate_search_path_node: active}
+f_generate_search_path_node:
+  ros__parameters:
+    type: node
+    modes:
+      __DEFAULT__: {ros__parameters: {spiral_altitude: 1.5, label: deep}}
+      low: {ros__parameters: {spiral_altitude: 1}}
+      high: {ros__parameters: {spiral_altitude: 3.0, label: high, camera: true}}
+"""
+
+
+def changed(old: str, new: str) -> str:
+    assert SEARCH.count(old) == 1
+    return SEARCH.replace(old, new)
+
+
+def test_the_shipped_file_has_the_modes_of_the_exemplar():
+    table = read_modes(find("suave_modes.yaml", "scenarios"))
+    assert table.modes("f_generate_search_path") == (
+        "__DEFAULT__",
+        "fd_unground",
+        "fd_spiral_low",
+        "fd_spiral_medium",
+        "fd_spiral_high",
+    )
+    altitudes = {
+        mode: table.mode("f_generate_search_path", mode).parameters.get("spiral_altitude")
+        for mode in table.modes("f_generate_search_path")
+    }
+    assert altitudes == {
+        "__DEFAULT__": 1.0,
+        "fd_unground": None,
+        "fd_spiral_low": 1.0,
+        "fd_spiral_medium": 2.0,
+        "fd_spiral_high": 3.0,
+    }
+    active = {
+        (function, mode)
+        for function in table.functions
+        for mode in table.modes(function)
+        if table.mode(function, mode).active
+    }
+    assert active == {
+        ("f_generate_search_path", "__DEFAULT__"),
+        ("f_generate_search_path", "fd_spiral_low"),
+        ("f_generate_search_path", "fd_spiral_medium"),
+        ("f_generate_search_path", "fd_spiral_high"),
+        ("f_follow_pipeline", "fd_follow_pipeline"),
+        ("f_maintain_motion", "__DEFAULT__"),
+        ("f_maintain_motion", "fd_recover_thrusters"),
+        ("generate_recharge_path", "normal"),
+    }
+
+
+def test_modes_take_their_parameters_from_the_node_over_its_default(write):
+    table = read_modes(write("m.yaml", SEARCH))
+    assert table.functions == ("f_generate_search_path",)
+    assert table.mode("f_generate_search_path", "fd_spiral_low") == Mode(
+        "fd_spiral_low", True, {"spiral_altitude": 1.0, "label": "deep"}
+    )
+    assert table.mode("f_generate_search_path", "fd_spiral_high").parameters == {
+        "spiral_altitude": 3.0,
+        "label": "high",
+        "camera": True,
+    }
+    assert table.mode("f_generate_search_path", "fd_plain").parameters == {"spiral_altitude": 1.5, "label": "deep"}
+    assert table.mode("f_generate_search_path", "fd_unground") == Mode("fd_unground", False, {})
+
+
+def test_a_function_without_default_mode_gets_an_inactive_one(write):
+    table = read_modes(write("m.yaml", SEARCH))
+    assert table.modes("f_generate_search_path")[0] == "__DEFAULT__"
+    assert not table.mode("f_generate_search_path", "__DEFAULT__").active
+
+
+def test_a_system_of_systems_is_no_function(write):
+    group = """\
+suave:
+  ros__parameters:
+    type: system
+    parts:
+      f_generate_search_path
+    modes:
+      __DEFAULT__: {f_generate_search_path: active}
+"""
+    assert read_modes(write("m.yaml", group + SEARCH)).functions == ("f_generate_search_path",)
+
+
+def test_a_function_of_several_parts_is_active_when_one_is(write):
+    table = read_modes(
+        write(
+            "m.yaml",
+            "f:\n  ros__parameters:\n    type: system\n    parts:\n      a\n      b\n    modes:\n"
+            "      one: {a: inactive, b: active.m}\n      none: {a: inactive, b: inactive}\n"
+            "a: {ros__parameters: {type: node}}\n"
+            "b: {ros__parameters: {type: node, modes: {m: {ros__parameters: {x: 2}}}}}\n",
+        )
+    )
+    assert table.mode("f", "one") == Mode("one", True, {"x": 2.0})
+    assert not table.mode("f", "none").active
+
+
+def test_a_table_can_be_pickled(write):
+    table = read_modes(write("m.yaml", SEARCH))
+    assert pickle.loads(pickle.dumps(table)) == table
+
+
+def test_asking_for_an_unknown_mode_or_function_names_the_nearest(write):
+    table = read_modes(write("m.yaml", SEARCH))
+    with pytest.raises(
+        InputError, match=r"^m\.yaml: .* has no mode 'fd_spiral_hihg' \(did you mean 'fd_spiral_high'\?"
+    ):
+        table.mode("f_generate_search_path", "fd_spiral_hihg")
+    with pytest.raises(InputError, match=r"^m\.yaml: there is no function 'f_search' \(.*f_generate_search_path\)"):
+        table.modes("f_search")
+
+
+@pytest.mark.parametrize(
+    ("content", "place", "problem", "remedy"),
+    [
+        (
+            changed("parts: f_generate_search_path_node", "parts: f_search_node"),
+            "line 4, ",
+            "unknown part 'f_search_node'",
+            "defined",
+        ),
+        (changed("    parts: f_generate_search_path_node\n", ""), "line 2, ", "has no parts", "parts: NODE"),
+        (changed("active.low", "active.lwo"), "line 7, ", "has no mode 'lwo'", "did you mean 'low'?"),
+        (changed("active.low", "activ"), "line 7, ", "'activ' is no state", "inactive, active or active.NODE_MODE"),
+        (changed("active.low", "true"), "line 7, ", "true is no state", "inactive, active or active.NODE_MODE"),
+        (
+            changed("{f_generate_search_path_node: active}", "{f_other: active}"),
+            "line 9, ",
+            "'f_other', which is no part",
+            "its parts",
+        ),
+        (
+            changed("{f_generate_search_path_node: active}", "{}"),
+            "line 9, ",
+            "says nothing of f_generate_search_path_node",
+            "add",
+        ),
+        (
+            changed("{f_generate_search_path_node: active}", "active"),
+            "line 9, ",
+            "fd_plain of f_generate_search_path is 'active'",
+            "write",
+        ),
+        (
+            changed("spiral_altitude: 3.0", "spiral_altitude: high"),
+            "line 16, ",
+            "'high' is no number",
+            "in m, such as 2.0",
+        ),
+        (
+            changed("spiral_altitude: 3.0", "spiral_altitude: true"),
+            "line 16, ",
+            "true is no number",
+            "in m, such as 2.0",
+        ),
+        (changed("spiral_altitude: 3.0", "spiral_altitude: -3"), "line 16, ", "-3 is not above 0", "in m, such as 2.0"),
+        (changed("camera: true", "camera: [1]"), "line 16, ", "[1] is no value", "number, text, true or false"),
+        (
+            changed("low: {ros__parameters: {spiral_altitude: 1}}", "low: {spiral_altitude: 1}"),
+            "line 15, ",
+            "has no ros__parameters",
+            "write low:",
+        ),
+        (
+            changed("low: {ros__parameters: {spiral_altitude: 1}}", "low: {ros__parameters: 1}"),
+            "line 15, ",
+            "ros__parameters is 1",
+            "mapping",
+        ),
+        (changed("type: node", "type: nod"), "line 12, ", "is of type 'nod'", "type: system for a function"),
+        (changed("    type: node\n", ""), "line 11, ", "is of type nothing", "type: node for its node"),
+        (
+            changed("    type: node\n", "    type: node\n    mods: {}\n"),
+            "line 13, ",
+            "unknown key 'mods'",
+            "did you mean 'modes'?",
+        ),
+        ("f:\n  type: system\n", "line 1, f", "f has no ros__parameters", "write ros__parameters: under it"),
+        (SEARCH + "f_generate_search_path: {}\n", "line 17, ", "stands twice", "keep one entry"),
+        ("a: {ros__parameters: {type: node}}\n", "line 1", "defines no function", "type: system, parts and modes"),
+        (
+            changed("    modes:\n      fd_unground", "    mode:\n      fd_unground"),
+            "line 5, ",
+            "unknown key 'mode'",
+            "'modes'",
+        ),
+    ],
+)
+def test_a_wrong_modes_file_is_refused_with_line_and_remedy(write, content, place, problem, remedy):
+    path = write("m.yaml", content)
+    with pytest.raises(InputError) as caught:
+        read_modes(path)
+    message = str(caught.value)
+    assert message.startswith(f"m.yaml: {place}")
+    assert problem in message
+    assert remedy in (caught.value.remedy or "")

@@ -1,0 +1,180 @@
+"""YAML files: what is read, and each way in which a file is refused."""
+
+import string
+import time
+from pathlib import Path
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from suave_des.errors import InputError
+from suave_des.scenario.yamlfile import NODE_LIMIT, SIZE_LIMIT_BYTES, read_yaml
+
+
+def refused(path: Path | str) -> str:
+    with pytest.raises(InputError) as caught:
+        read_yaml(path)
+    message = str(caught.value)
+    assert message.startswith(str(path))
+    assert "\n" not in message
+    assert caught.value.remedy
+    return message
+
+
+def test_scalars_follow_the_core_schema(write):
+    document = read_yaml(
+        write(
+            "a.yaml",
+            "float: 1.5\nexponent: 1e3\nint: 2023\nzeros: 010\nclock: 1:30\ndate: 2023-02-04\nyes: yes\ntrue: true\n"
+            "none:\ntilde: ~\nquoted: '80'\nnegative: -.5\n",
+        )
+    )
+    assert document.data == {
+        "float": 1.5,
+        "exponent": 1000.0,
+        "int": 2023,
+        "zeros": 10,
+        "clock": "1:30",
+        "date": "2023-02-04",
+        "yes": "yes",
+        "true": True,
+        "none": None,
+        "tilde": None,
+        "quoted": "80",
+        "negative": -0.5,
+    }
+    assert isinstance(document.data["int"], int)
+
+
+def test_each_key_and_item_has_its_line(write):
+    document = read_yaml(write("a.yaml", "# comment\na:\n  b: 1\n  c:\n    - x\n    - {d: 2}\n"))
+    assert document.line(("a",)) == 2
+    assert document.line(("a", "b")) == 3
+    assert document.line(("a", "c", 1)) == 6
+    assert document.line(("a", "c", 1, "d")) == 6
+
+
+def test_a_path_that_is_not_there_has_the_line_of_what_would_hold_it(write):
+    assert read_yaml(write("a.yaml", "x: 1\na:\n  b: 1\n")).line(("a", "z", 3)) == 2
+
+
+def test_an_alias_gives_the_same_data_again(write):
+    assert read_yaml(write("a.yaml", "a: &x [1, 2]\nb: *x\n")).data == {"a": [1, 2], "b": [1, 2]}
+
+
+def test_a_byte_order_mark_is_dropped(write):
+    assert read_yaml(write("a.yaml", b"\xef\xbb\xbfa: 1\n")).data == {"a": 1}
+
+
+def test_a_missing_file_is_named(write):
+    assert refused("nowhere.yaml") == "nowhere.yaml: no such file (check the name)"
+
+
+def test_a_folder_is_refused(tmp_path):
+    assert "is a folder" in refused(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("content", "place", "problem"),
+    [
+        (b"a: 1\nb: \xff\n", "line 2", "is not UTF-8 text"),
+        (b"a: 1\nb: \x00\n", "line 2", r"the character '\x00', which is not allowed"),
+        ("", "line 1", "is empty"),
+        ("# only a comment\n", "line 1", "is empty"),
+        ("\n- a\n- b\n", "line 2", "not a mapping at its top level"),
+        ("just text\n", "line 1", "not a mapping at its top level"),
+        ("a: 1\nb: c: d\n", "line 2", "is not valid YAML: mapping values are not allowed here"),
+        ("a:\n\tb: 1\n", "line 2", "(indent with spaces, not tabs)"),
+        ("a: [1, 2\nb: 3\n", "line 2", "is not valid YAML"),
+        ("a: 1\n---\nb: 2\n", "line 2", "a second document begins here"),
+        ("a: *nobody\n", "line 1", "undefined alias"),
+        ("a: 1\nb: 2\na: 3\n", "line 3, a", "'a' stands twice, first in line 1"),
+        ("a:\n  b: {c: 1, c: 2}\n", "line 2, a.b.c", "'c' stands twice"),
+        ("a: 1\n'a': 2\n", "line 2, a", "stands twice"),
+        ("a: &x [1, *x]\n", "line 1, a[1]", "an alias stands for something that holds it"),
+        ("a: &x {b: {c: *x}}\n", "line 1, a.b.c", "an alias stands for something that holds it"),
+        ("[a, b]: 1\n", "line 1", "a key must be text"),
+        ("a: &x {b: 1}\nc: {<<: *x}\n", "line 2, c", "the merge key << is not supported"),
+        ("a: !!float abc\n", "line 1, a", "'abc' is no !!float"),
+    ],
+)
+def test_what_is_no_plain_mapping_is_refused_with_its_line(write, content, place, problem):
+    message = refused(write("a.yaml", content))
+    assert message.startswith(f"a.yaml: {place}: ")
+    assert problem in message
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        "!!python/object/apply:os.system ['touch made']",
+        "!!python/object:suave_des.errors.InputError {}",
+        "!!python/name:os.system",
+        "!!python/tuple [1, 2]",
+        "!!binary aGVsbG8=",
+        "!!set {a, b}",
+        "!!timestamp 2023-02-04",
+        "!own text",
+    ],
+)
+def test_a_tag_that_would_build_an_object_is_refused_and_builds_nothing(write, value):
+    message = refused(write("a.yaml", f"x: 1\na: {value}\n"))
+    assert message.startswith("a.yaml: line 2, a: the tag '!")
+    assert "use plain text, numbers, lists and mappings" in message
+    assert not Path("made").exists()
+
+
+@pytest.mark.parametrize("levels", [9, 60])
+def test_a_bomb_of_aliases_is_refused_at_once(write, levels):
+    lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x]"]
+    lines += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]" for n in range(1, levels)]
+    path = write("a.yaml", "\n".join(lines))
+    begin = time.process_time()
+    message = refused(path)
+    assert f"expands to more than {NODE_LIMIT:,} values" in message
+    assert time.process_time() - begin < 10
+
+
+def test_a_chain_of_aliases_nested_too_deep_is_refused(write):
+    lines = ["a0: &a0 [x]"] + [f"a{n}: &a{n} [*a{n - 1}]" for n in range(1, 300)]
+    assert "is nested more than 100 deep" in refused(write("a.yaml", "\n".join(lines)))
+
+
+@pytest.mark.parametrize("opening", ["[", "{a: "])
+def test_deep_brackets_are_refused(write, opening):
+    assert "is nested more than 100 deep" in refused(write("a.yaml", "a: " + opening * 20_000))
+
+
+def test_a_large_file_is_refused(write):
+    assert f"is larger than {SIZE_LIMIT_BYTES:,} bytes" in refused(
+        write("a.yaml", b"a: 1\n#" + b"x" * SIZE_LIMIT_BYTES)
+    )
+
+
+PLAIN = st.recursive(
+    st.none() | st.booleans() | st.integers(-(10**15), 10**15) | st.floats(-1e9, 1e9) | st.text(string.printable),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text("abcxyz_", min_size=1), inner, max_size=4),
+    max_leaves=15,
+)
+
+
+@given(data=st.dictionaries(st.text("abcxyz_", min_size=1), PLAIN, min_size=1, max_size=5), flow=st.booleans())
+def test_plain_data_survives_being_written_and_read(tmp_path_factory, data, flow):
+    path = tmp_path_factory.mktemp("yaml") / "a.yaml"
+    path.write_text(yaml.safe_dump(data, default_flow_style=flow, allow_unicode=True), encoding="utf-8")
+    assert read_yaml(path).data == data
+
+
+@given(content=st.binary(max_size=200) | st.text("ab: -[]{},&*!|>'\"#\n\t0.", max_size=60).map(str.encode))
+def test_any_bytes_are_read_or_refused_in_one_line(tmp_path_factory, content):
+    path = tmp_path_factory.mktemp("yaml") / "a.yaml"
+    path.write_bytes(content)
+    try:
+        document = read_yaml(path)
+    except InputError as error:
+        assert "\n" not in str(error)
+        assert error.remedy
+    else:
+        assert all(isinstance(key, str) for key in document.data)
