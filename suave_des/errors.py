@@ -58,8 +58,9 @@ class MissionError(SuaveDesError):
         self.run = run
         self.time_s = time_s
         self.cause = cause
-        super().__init__(f"manager {manager}, run {run}, mission time {time_s:.2f} s: {cause}")
+        # With all parts as arguments the error survives SimPy, which copies what a process raised by calling its class
+        # with them, and the trip from a worker process to its parent.
+        super().__init__(manager, run, time_s, cause)
 
-    def __reduce__(self) -> tuple[object, ...]:
-        """Survive the trip from a worker process to its parent with all parts."""
-        return (type(self), (self.manager, self.run, self.time_s, self.cause))
+    def __str__(self) -> str:
+        return f"manager {self.manager}, run {self.run}, mission time {self.time_s:.2f} s: {self.cause}"

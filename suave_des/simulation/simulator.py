@@ -41,7 +41,7 @@ from suave_des.simulation.signals import build_signal
 from suave_des.streams import Streams
 from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle
-from suave_des.world.pipeline import path_to_inspect, sample_points
+from suave_des.world.pipeline import SEA_BED_Z_M, SURFACE_Z_M, path_to_inspect, sample_points
 
 
 class Simulator:
@@ -194,6 +194,7 @@ class _Mission:
                 self._draw("current.z_m_per_s", current.z_m_per_s),
             ),
             time_scale=1.0 / (1.0 + loss),
+            z_limits_m=(SEA_BED_Z_M, SURFACE_Z_M),
         )
 
     # The monitors.

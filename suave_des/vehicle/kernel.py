@@ -29,7 +29,8 @@ POSITION_GAIN, SPEED_LIMIT_XY, SPEED_LIMIT_Z = 13, 14, 15
 VELOCITY_GAIN, VELOCITY_INTEGRAL_GAIN, INTEGRAL_LIMIT = 16, 17, 18
 ATTITUDE_GAIN, RATE_GAIN, HEADING_INTEGRAL_GAIN, HEADING_INTEGRAL_LIMIT = 19, 20, 21, 22
 CURRENT = 23  # three places, world frame
-PARAMETERS = 26
+FLOOR, CEILING = 26, 27  # z between which the water is, world frame
+PARAMETERS = 28
 
 
 @compiled
@@ -155,6 +156,12 @@ def advance(
         x += h * (r00 * u + r01 * v + r02 * w)
         y += h * (r10 * u + r11 * v + r12 * w)
         z += h * (r20 * u + r21 * v + r22 * w)
+        # Neither into the sea bed nor out of the water; like ArduSub's, the controller does not wind up against it.
+        if z < prm[FLOOR] or z > prm[CEILING]:
+            z = min(max(z, prm[FLOOR]), prm[CEILING])
+            through = r20 * u + r21 * v + r22 * w
+            u, v, w = u - r20 * through, v - r21 * through, w - r22 * through
+            iz = max(iz, 0.0) if z == prm[FLOOR] else min(iz, 0.0)
         dw = -qx * p - qy * q - qz * r
         dx = qw * p + qy * r - qz * q
         dy = qw * q + qz * p - qx * r

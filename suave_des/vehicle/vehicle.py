@@ -53,7 +53,12 @@ class Autopilot:
     attitude_frequency_rad_per_s: float = 3.0
 
 
-def _parameters(model: VehicleModel, autopilot: Autopilot, current_m_per_s: tuple[float, float, float]) -> Array:
+def _parameters(
+    model: VehicleModel,
+    autopilot: Autopilot,
+    current_m_per_s: tuple[float, float, float],
+    z_limits_m: tuple[float, float],
+) -> Array:
     vector = np.zeros(kernel.PARAMETERS)
     vector[kernel.MASS] = model.mass_kg
     vector[[kernel.IXX, kernel.IYY, kernel.IZZ]] = model.inertia_kg_m2
@@ -75,6 +80,7 @@ def _parameters(model: VehicleModel, autopilot: Autopilot, current_m_per_s: tupl
     vector[kernel.HEADING_INTEGRAL_GAIN] = omega**3 / 8.0
     vector[kernel.HEADING_INTEGRAL_LIMIT] = 4.0 * omega * omega
     vector[kernel.CURRENT : kernel.CURRENT + 3] = current_m_per_s
+    vector[[kernel.FLOOR, kernel.CEILING]] = z_limits_m
     return vector
 
 
@@ -93,6 +99,7 @@ class Vehicle:
         duration_s: length of the mission; nothing can be read beyond it.
         current_m_per_s: velocity of the water, world frame.
         time_scale: simulated seconds that pass in a second of mission time (the simulator's real-time factor).
+        z_limits_m: sea bed and surface, which stop the vehicle.
     """
 
     def __init__(
@@ -104,12 +111,13 @@ class Vehicle:
         *,
         current_m_per_s: tuple[float, float, float] = (0.0, 0.0, 0.0),
         time_scale: float = 1.0,
+        z_limits_m: tuple[float, float] = (-math.inf, math.inf),
     ) -> None:
         self._B = allocation_matrix(model)
         self._allocation = autopilot_allocation(model)
         self._health = np.ones(len(model.thrusters))
         self._effectiveness = self._B.copy()
-        self._parameters = _parameters(model, autopilot, current_m_per_s)
+        self._parameters = _parameters(model, autopilot, current_m_per_s, z_limits_m)
         self._altitude_error_m = autopilot.altitude_error_m
         self._step_s = STEP_S * time_scale
         self.last_row = row_at(duration_s) + 1
@@ -165,8 +173,14 @@ class Vehicle:
         return tuple(self.track[row, kernel.VELOCITY].tolist())
 
     def look_ahead(self, row: int) -> None:
-        """Fill the track up to a row as it will be if control does not change."""
+        """Fill the track up to a row as it will be if control does not change.
+
+        Raises:
+            ValueError: the row lies beyond the mission's end.
+        """
         if row > self.computed_row:
+            if row > self.last_row:  # compiled code would write past the track
+                raise ValueError(f"the vehicle's track ends at {self.last_row * STEP_S:g} s, before {row * STEP_S:g} s")
             kernel.advance(
                 self.track,
                 self.computed_row,

@@ -15,6 +15,7 @@ from suave_des.compiling import compiled
 FIELD_OF_VIEW_RAD = math.radians(60.0)
 VIEW_TANGENT = math.tan(FIELD_OF_VIEW_RAD / 2.0)
 SEA_BED_Z_M = -20.0
+SURFACE_Z_M = 0.0
 
 
 @cache
