@@ -34,7 +34,6 @@ class MissionCoordinator:
         ended: the event of the mission's end: the time limit, or the end of the path.
         search_time_s: whole seconds until the pipeline was found, as the revision counts them; none while it is not
             found.
-        detected_s: mission time of the detection; none while there is none.
         task: the task under way.
 
     Args:
@@ -78,7 +77,6 @@ class MissionCoordinator:
         self._log = log
         self.ended = env.event()
         self.search_time_s: float | None = None
-        self.detected_s: float | None = None
         self.task: Task | None = None
         shared = (MAINTAIN_MOTION,) if revision.maintain_motion_per_task else ()
         self._search = Task("search_pipeline", (*shared, SEARCH))
@@ -86,6 +84,7 @@ class MissionCoordinator:
         self.lasting_functions = () if revision.maintain_motion_per_task else (MAINTAIN_MOTION,)
         """Functions that are needed from launch to the end, and belong to no task."""
         self._limit_s = tick_at_or_after(time_limit_s, limit_phase_s, revision.limit_check_period_s)
+        detector.detected.callbacks.append(self._note_detection)
         env.process(self._coordinate())
         env.process(self._watch_limit())
 
@@ -101,17 +100,20 @@ class MissionCoordinator:
         yield self._env.timeout(self._start_delay_s)
         self._begin(self._search)
         yield self._detector.detected
-        self.detected_s = self._env.now
-        self._log("detection", "pipeline_detected", f"point {self._detector.first_point}")
         yield until(self._env, self._next_poll_s())
-        seen_s = self._env.now if self._revision.search_time == "poll" else self.detected_s
+        seen_s = float(self._env.now)
+        if self._revision.search_time == "detection" and self._detector.detected_s is not None:
+            seen_s = self._detector.detected_s
         self.search_time_s = float(math.floor(seen_s + 1e-9))
-        self._end(self._search)
+        self._end("task_done")
         self._begin(self._inspect)
         yield self._follow.finished
         yield until(self._env, self._next_poll_s())
-        self._end(self._inspect)
+        self._end("task_done")
         self._finish("the end of the path is reached")
+
+    def _note_detection(self, _: simpy.Event) -> None:
+        self._log("detection", "pipeline_detected", f"point {self._detector.first_point}")
 
     def _watch_limit(self) -> Process:
         yield until(self._env, self._limit_s)
@@ -125,13 +127,15 @@ class MissionCoordinator:
         self._log("coordinator", "task_requested", task.name)
         self._request(task)
 
-    def _end(self, task: Task) -> None:
-        self.task = None
-        self._log("coordinator", "task_done", task.name)
-        self._cancel(task)
+    def _end(self, how: str) -> None:
+        task, self.task = self.task, None
+        if task is not None:
+            self._log("coordinator", how, task.name)
+            self._cancel(task)
 
     def _finish(self, why: str) -> None:
-        # At the limit the present task is cancelled too, but the metrics are saved at once, before that has an effect.
         if not self.ended.triggered:
-            self._log("coordinator", "mission_ended", why)
+            # The metrics are saved at once, before the cancellation of the present task has an effect.
             self.ended.succeed()
+            self._end("task_cancelled")
+            self._log("coordinator", "mission_ended", why)

@@ -31,6 +31,7 @@ class PipelineDetector:
     Attributes:
         detected: the event of the first sight.
         first_point: index of the point seen, once detected.
+        detected_s: mission time of the first sight, once detected.
 
     Args:
         env: the mission's clock.
@@ -53,6 +54,7 @@ class PipelineDetector:
         self._version = 0
         self.detected = env.event()
         self.first_point: int | None = None
+        self.detected_s: float | None = None
         vehicle.on_control_change = self._look_ahead
         self._look_ahead(0)
 
@@ -75,4 +77,5 @@ class PipelineDetector:
             return
         self._vehicle.on_control_change = None
         self.first_point = point
+        self.detected_s = float(self._env.now)
         self.detected.succeed()

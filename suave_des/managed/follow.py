@@ -83,12 +83,13 @@ class FollowPipeline(FunctionNode):
                 self._send(point)
                 polls = 0
                 while not self._reached(point):
+                    if polls == POLLS_BEFORE_RESENDING:
+                        self._send(point)
+                        polls = 0
                     # The next poll is strictly later than now: polls lie on a grid that began with the activation.
                     next_poll_s = tick_at_or_after(self.env.now + period_s / 2, started_s, period_s)
                     yield until(self.env, next_poll_s)
                     polls += 1
-                    if polls % POLLS_BEFORE_RESENDING == 0:
-                        self._send(point)
                 self._arrive(point)
         except simpy.Interrupt:
             return

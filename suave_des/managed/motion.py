@@ -49,6 +49,7 @@ class MaintainMotion(FunctionNode):
         """Back to normal operation; revision 1.5 breaks a recovery off."""
         if self._process is not None and self._process.is_alive and not self._revision.survives_deactivation:
             self._process.interrupt()
+            self._process = None
 
     def _recover(self) -> Process:
         try:

@@ -52,12 +52,20 @@ class ReactionMeter:
             if diagnostic.value == FAILED and self._failure_since_s is None:
                 self._failure_since_s = self._env.now
         elif diagnostic.key == "battery_level":
-            self._battery_low = float(diagnostic.value) < self._settings.battery_limit
-            if self._battery_low and self._low_battery_since_s is None:
-                self._low_battery_since_s = self._env.now
+            self._battery(low=float(diagnostic.value) < self._settings.battery_limit)
         elif diagnostic.key == "water_visibility":
             self._expected_m = self._fitting_altitude_m(float(diagnostic.value))
             self._compare_at(self._env.now)
+
+    def _battery(self, *, low: bool) -> None:
+        if low and self._low_battery_since_s is None:
+            self._low_battery_since_s = self._env.now
+        if low and self._mismatch_since_s is not None and self._mismatch_since_s > self._env.now:
+            self._mismatch_since_s = None  # the message that would have shown it comes too late
+        if self._battery_low and not low:
+            self._battery_low = False
+            self._compare_at(self._visibility.next_message_s(self._env.now))
+        self._battery_low = low
 
     def mode_effect(self, function: str, mode: Mode) -> None:
         """Take note that a mode has taken effect."""

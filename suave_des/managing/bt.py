@@ -23,7 +23,7 @@ class BehaviourTree(ManagingSubsystem):
         self._settings = system.scenario.managers.bt
         self.period_s = self._settings.tick_period_s
         self.starts_s = system.stream("bt/phase").uniform(0.0, self.period_s)
-        self._functions: tuple[str, ...] = ()
+        self._functions = system.lasting_functions
         self._failed: set[str] = set()
         self._measured: dict[str, float] = {}
 
@@ -68,14 +68,12 @@ class BehaviourTree(ManagingSubsystem):
 class ExtendedBehaviourTree(BehaviourTree):
     """bt_extended: the same, but with a low battery the vehicle goes to recharge first, and then goes on."""
 
-    def __init__(self, system: ManagedSystem) -> None:
-        super().__init__(system)
-        self._recharging = False
-
     def _wanted(self) -> Iterator[tuple[str, str]]:
-        level = self._measured.get("battery_level", 1.0)
+        if self.system.scenario.battery is None:  # then there is no station to go to
+            yield from super()._wanted()
+            return
         # Once on its way the vehicle goes on until the level has risen: the station refills the battery at once.
-        self._recharging = level < self._settings.battery_limit
+        recharging = self._measured.get("battery_level", 1.0) < self._settings.battery_limit
         for function, mode in super()._wanted():
-            yield function, UNGROUND_MODE if self._recharging and function != MAINTAIN_MOTION else mode
-        yield RECHARGE, "normal" if self._recharging else UNGROUND_MODE
+            yield function, UNGROUND_MODE if recharging and function != MAINTAIN_MOTION else mode
+        yield RECHARGE, "normal" if recharging else UNGROUND_MODE

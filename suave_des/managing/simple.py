@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from suave_des.managed.coordinator import Task
+from suave_des.managed.coordinator import MAINTAIN_MOTION, Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
 
 
@@ -20,8 +20,8 @@ class NoManager(ManagingSubsystem):
 class RandomManager(ManagingSubsystem):
     """random: every period, each function of the task gets one of all its modes, with equal chance.
 
-    Functions without a default mode (maintain_motion) are left alone; fd_unground and __DEFAULT__ are modes like
-    others. Revision 2023 picks only on its timer, which runs since launch; revision 1.5 at each task request too.
+    maintain_motion is left alone; fd_unground and __DEFAULT__ are modes like others. Revision 2023 picks only on its
+    timer, which runs since launch; revision 1.5 at each task request too.
     """
 
     def __init__(self, system: ManagedSystem) -> None:
@@ -38,7 +38,7 @@ class RandomManager(ManagingSubsystem):
 
     def task_requested(self, task: Task) -> None:
         """Remember the task's functions."""
-        self._functions = tuple(name for name in task.functions if name in self.system.scenario.default_modes)
+        self._functions = tuple(name for name in task.functions if name != MAINTAIN_MOTION)
         if self._on_task_request:
             self.adapt()
 

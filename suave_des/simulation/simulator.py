@@ -139,7 +139,7 @@ class _Mission:
             distance_inspected_m=self.follow.distance_m,
             mean_reaction_time_s=self.reactions.mean_s,
             adaptations=self.modes.adaptations,
-            detection_time_s=self.coordinator.detected_s if found else None,
+            detection_time_s=self.detector.detected_s if found else None,
             detection_x_m=float(self.simulator.points[point, 0]) if found and point is not None else None,
             detection_y_m=float(self.simulator.points[point, 1]) if found and point is not None else None,
         )
