@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import importlib
+import sys
 from difflib import get_close_matches
+from functools import cache
 from importlib.metadata import entry_points
+from pathlib import Path
 
 from suave_des.errors import InputError
 from suave_des.managing.base import ManagingSubsystem
@@ -21,8 +24,7 @@ _BUILT_IN = {
 
 def manager_names() -> tuple[str, ...]:
     """Names that need no module:Class: built in first, then registered ones in alphabetical order."""
-    registered = sorted(point.name for point in entry_points(group=ENTRY_POINT_GROUP))
-    return (*_BUILT_IN, *(name for name in registered if name not in _BUILT_IN))
+    return (*_BUILT_IN, *(name for name in sorted(_registered()) if name not in _BUILT_IN))
 
 
 def manager_class(name: str) -> type[ManagingSubsystem]:
@@ -31,12 +33,7 @@ def manager_class(name: str) -> type[ManagingSubsystem]:
     Raises:
         InputError: there is no such manager, or what the name leads to is no subclass of ManagingSubsystem.
     """
-    target = _BUILT_IN.get(name)
-    if target is None:
-        registered = {point.name: point.value for point in entry_points(group=ENTRY_POINT_GROUP)}
-        target = registered.get(name)
-    if target is None and ":" in name:
-        target = name
+    target = name if ":" in name else _BUILT_IN.get(name) or _registered().get(name)
     if target is None:
         close = get_close_matches(name, manager_names(), n=1)
         hint = f"did you mean {close[0]}?" if close else f"known: {', '.join(manager_names())}"
@@ -44,14 +41,22 @@ def manager_class(name: str) -> type[ManagingSubsystem]:
     return _load(name, target)
 
 
+@cache
+def _registered() -> dict[str, str]:
+    return {point.name: point.value for point in entry_points(group=ENTRY_POINT_GROUP)}
+
+
 def _load(name: str, target: str) -> type[ManagingSubsystem]:
     module_name, _, attribute = target.partition(":")
+    here = str(Path.cwd())
+    if here not in sys.path:  # where `python` would find a module of one's own, but an installed command would not
+        sys.path.append(here)
     try:
         module = importlib.import_module(module_name)
-    except ModuleNotFoundError as error:
+    except Exception as error:  # whatever the module's own code raises on import
         raise InputError(
-            f"manager {name!r}: {error}",
-            remedy="the module must be importable: installed, or in a folder on PYTHONPATH or the current one",
+            f"manager {name!r}: {type(error).__name__}: {error}",
+            remedy="module must be importable: installed, or in the current folder or one on PYTHONPATH",
         ) from error
     found = getattr(module, attribute, None)
     if not (isinstance(found, type) and issubclass(found, ManagingSubsystem)):

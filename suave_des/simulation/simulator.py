@@ -11,7 +11,7 @@ import numpy as np
 import simpy
 
 from suave_des.clock import Process, until
-from suave_des.errors import MissionError, SuaveDesError
+from suave_des.errors import InputError, MissionError, SuaveDesError
 from suave_des.managed.coordinator import FOLLOW, MAINTAIN_MOTION, SEARCH, MissionCoordinator, Task
 from suave_des.managed.detection import PipelineDetector, measured_at_rows
 from suave_des.managed.follow import FollowPipeline
@@ -123,7 +123,12 @@ class _Mission:
 
     def result(self) -> MissionResult:
         """Run to the end and read the metrics."""
-        self.env.run(until=self.coordinator.ended)
+        try:
+            self.env.run(until=self.coordinator.ended)
+        except SuaveDesError:
+            raise
+        except Exception as error:  # in a process that the manager started by itself
+            raise self._mission_error(error) from error
         point = self.detector.first_point
         found = self.coordinator.search_time_s is not None
         metrics = MissionMetrics(
@@ -335,10 +340,17 @@ class _Mission:
             log=log,
             knowledge=lambda: self.simulator.knowledge,
         )
-        manager: ManagingSubsystem = self._guarded(kind, system)
+        try:
+            manager = kind(system)
+        except InputError:
+            raise  # such as an ontology that cannot be used: it concerns every mission
+        except Exception as error:
+            raise self._mission_error(error) from error
         if kind.diagnostic is not ManagingSubsystem.diagnostic:
             self.bus.subscribe(lambda diagnostic: self._guarded(manager.diagnostic, diagnostic))
         if manager.period_s is not None:
+            if not manager.period_s > 0.0:
+                raise self._mission_error(ValueError(f"period_s is {manager.period_s}; it must be above 0, or None"))
             self.env.process(self._adapt_periodically(manager, manager.period_s))
         return manager
 
@@ -361,8 +373,15 @@ class _Mission:
             yield until(self.env, due_s)
 
     def _guarded_steps(self, adaptation: Process) -> Process:
+        value = None
         try:
-            yield from adaptation
+            while True:
+                event = adaptation.send(value)
+                if not isinstance(event, simpy.Event):
+                    raise TypeError(f"adapt yielded {event!r}; it may yield events, such as system.env.timeout(1.0)")
+                value = yield event
+        except StopIteration:
+            return
         except Exception as error:
             raise self._mission_error(error) from error
 
