@@ -204,6 +204,8 @@ class Calibration(Strict):
     """Lag of the velocity behind the wanted one."""
     altitude_error_m: Distribution = 0.0
     """Steady error of the autopilot's altitude, drawn once a run: it holds its set-point plus this."""
+    altitude_deadband_m: Distribution = 0.0
+    """Distance short of its altitude set-point at which the autopilot stops, drawn once a run."""
     drift_x_m: Distribution = 0.0
     """Way east from the spawning place to where guided mode begins, the origin of the local frame."""
     drift_y_m: Distribution = 0.0
@@ -211,9 +213,9 @@ class Calibration(Strict):
     real_time_factor_loss: Distribution = 0.0
     """The simulated world runs 1 / (1 + loss) as fast as the software's clock; drawn once a run."""
 
-    @field_validator("real_time_factor_loss", mode="after")
+    @field_validator("real_time_factor_loss", "altitude_deadband_m", mode="after")
     @classmethod
-    def _never_faster(cls, value: Any) -> Any:
+    def _never_negative(cls, value: Any) -> Any:
         return _not_negative(value)
 
 

@@ -190,6 +190,7 @@ class _Mission:
                 calibration.vertical_speed_limit_m_per_s,
                 calibration.velocity_time_constant_s,
                 self._draw("calibration.altitude_error_m", calibration.altitude_error_m),
+                self._draw("calibration.altitude_deadband_m", calibration.altitude_deadband_m),
             ),
             Pose(*self.origin_m, z_m, 0.0, 0.0, heading_rad),
             self.duration_s,

@@ -30,7 +30,8 @@ VELOCITY_GAIN, VELOCITY_INTEGRAL_GAIN, INTEGRAL_LIMIT = 16, 17, 18
 ATTITUDE_GAIN, RATE_GAIN, HEADING_INTEGRAL_GAIN, HEADING_INTEGRAL_LIMIT = 19, 20, 21, 22
 CURRENT = 23  # three places, world frame
 FLOOR, CEILING = 26, 27  # z between which the water is, world frame
-PARAMETERS = 28
+ALTITUDE_DEADBAND = 28
+PARAMETERS = 29
 
 
 @compiled
@@ -77,7 +78,9 @@ def advance(
         # Guided autopilot, outer loop: position error to velocity set-point, limited in the horizontal and vertical.
         vx_sp = prm[POSITION_GAIN] * (set_point[0] - x)
         vy_sp = prm[POSITION_GAIN] * (set_point[1] - y)
-        vz_sp = prm[POSITION_GAIN] * (set_point[2] - z)
+        ez = set_point[2] - z
+        dead = prm[ALTITUDE_DEADBAND]
+        vz_sp = prm[POSITION_GAIN] * (ez - min(max(ez, -dead), dead))
         speed_sp = math.sqrt(vx_sp * vx_sp + vy_sp * vy_sp)
         if speed_sp > prm[SPEED_LIMIT_XY]:
             vx_sp *= prm[SPEED_LIMIT_XY] / speed_sp

@@ -42,6 +42,7 @@ class Autopilot:
         velocity_time_constant_s: how fast the velocity follows its demand; the integral gain makes the loop critically
             damped for a body without drag.
         altitude_error_m: steady error: the autopilot holds its altitude set-point plus this.
+        altitude_deadband_m: the autopilot stops this far short of its altitude set-point.
         attitude_frequency_rad_per_s: natural frequency of roll and heading control.
     """
 
@@ -50,6 +51,7 @@ class Autopilot:
     vertical_speed_limit_m_per_s: float
     velocity_time_constant_s: float
     altitude_error_m: float = 0.0
+    altitude_deadband_m: float = 0.0
     attitude_frequency_rad_per_s: float = 3.0
 
 
@@ -69,6 +71,7 @@ def _parameters(
     vector[kernel.POSITION_GAIN] = autopilot.position_gain_per_s
     vector[kernel.SPEED_LIMIT_XY] = autopilot.horizontal_speed_limit_m_per_s
     vector[kernel.SPEED_LIMIT_Z] = autopilot.vertical_speed_limit_m_per_s
+    vector[kernel.ALTITUDE_DEADBAND] = autopilot.altitude_deadband_m
     rate = 1.0 / autopilot.velocity_time_constant_s
     vector[kernel.VELOCITY_GAIN] = rate
     vector[kernel.VELOCITY_INTEGRAL_GAIN] = rate * rate / 4.0
