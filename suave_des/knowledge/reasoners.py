@@ -1,0 +1,106 @@
+"""Reasoners: what a state of the knowledge base entails. Two ways to run the same Pellet.
+
+An inference is a pure function of knowledge base and state; so it may be remembered.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
+from typing import Final, Protocol
+
+from suave_des.errors import InputError
+from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.model import facts_of
+from suave_des.knowledge.situation import Triple
+from suave_des.knowledge.state import Inference, KnowledgeState
+
+#: Inferences that a reasoner remembers; about 20 kB each.
+REMEMBERED: Final = 4096
+
+
+class Reasoner(Protocol):
+    """Tells what a state entails."""
+
+    name: str
+
+    def infer(self, state: KnowledgeState) -> Inference:
+        """What the reasoner adds to the state.
+
+        Raises:
+            KnowledgeError: state and ontologies contradict one another, or Pellet does not use one of the
+                rules; the message names the individual and the property, or the rule.
+        """
+        ...
+
+
+class _Remembering:
+    """A backend with a bounded memory of exact states."""
+
+    def __init__(
+        self, name: str, kb: KnowledgeBase, entailed: Callable[[tuple[Triple, ...], str], Iterable[Triple]]
+    ) -> None:
+        self.name = name
+        self._kb = kb
+        self._entailed = entailed
+        self._memory: OrderedDict[KnowledgeState, Inference] = OrderedDict()
+
+    def infer(self, state: KnowledgeState) -> Inference:
+        """What the reasoner adds to the state."""
+        known = self._memory.get(state)
+        if known is None:
+            known = self._memory[state] = self._infer(state)
+            if len(self._memory) > REMEMBERED:
+                self._memory.popitem(last=False)
+        else:
+            self._memory.move_to_end(state)
+        return known
+
+    def _infer(self, state: KnowledgeState) -> Inference:
+        situation = self._kb.situation(state)
+        asserted = self._kb.facts.union(facts_of(situation, self._kb.names))
+        entailed = facts_of(self._entailed(situation, state.describe()), self._kb.names)
+        return Inference(state, asserted, frozenset(entailed) - asserted)
+
+
+def _pellet(kb: KnowledgeBase) -> Reasoner:
+    from suave_des.knowledge.pellet import InProcessPellet
+
+    return _Remembering("pellet", kb, InProcessPellet(kb).infer)
+
+
+def _owlready2(kb: KnowledgeBase) -> Reasoner:
+    from suave_des.knowledge.pellet import InProcessPellet
+    from suave_des.knowledge.stock import StockPellet
+
+    stock = StockPellet(kb)
+    checker: list[InProcessPellet] = []
+
+    def entailed(situation: tuple[Triple, ...], describe: str) -> Iterable[Triple]:
+        # owlready2 throws Pellet's log away, and with it the only word on a rule that was dropped, or on
+        # what contradicts what. The Pellet in this process tells: once at the start, and for contradictions.
+        if not checker:
+            checker.append(InProcessPellet(kb))
+        found = stock.infer(situation)
+        return checker[0].infer(situation, describe) if found is None else found
+
+    return _Remembering("owlready2", kb, entailed)
+
+
+BACKENDS: Final[Mapping[str, Callable[[KnowledgeBase], Reasoner]]] = MappingProxyType(
+    {"owlready2": _owlready2, "pellet": _pellet}
+)
+
+
+def make_reasoner(name: str, kb: KnowledgeBase) -> Reasoner:
+    """A reasoner by name: "pellet" (kept running in this process) or "owlready2" (stock, the reference).
+
+    Raises:
+        InputError: the name is unknown, or there is no usable Java.
+        KnowledgeError: the ontologies are inconsistent by themselves, or Pellet drops a rule.
+    """
+    make = BACKENDS.get(name)
+    if make is None:
+        raise InputError(f"there is no reasoner {name!r}", remedy=f"one of {', '.join(sorted(BACKENDS))}")
+    return make(kb)

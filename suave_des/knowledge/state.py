@@ -1,0 +1,206 @@
+"""What passes through the loop: the state that is known, what is inferred from it, and the plan.
+
+Nothing here imports a reasoner, so that the rest of the simulation may use these types at no cost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from decimal import Decimal, InvalidOperation
+from functools import cached_property
+from typing import Final
+
+from suave_des.errors import KnowledgeError
+from suave_des.knowledge.vocabulary import grounding_name, objective_name
+
+Value = str | bool | Decimal
+Number = Decimal | float | int | str
+#: Beyond this power of ten (floats end at 308) a number is a mistake, and its text would fill the memory.
+MAX_EXPONENT: Final = 400
+
+
+def exact(number: Number) -> Decimal:
+    """The decimal number that the shortest text of a float denotes: 0.1 gives 0.1, not 0.1000000000000000055.
+
+    Trailing zeros are dropped, so that equal numbers are written alike.
+
+    Raises:
+        KnowledgeError: it is no finite number.
+    """
+    try:
+        value = Decimal(repr(float(number)) if isinstance(number, float) else number)
+    except (InvalidOperation, ValueError, TypeError) as error:
+        raise KnowledgeError(f"{number!r} is not a number") from error
+    if not value.is_finite() or abs(value.adjusted()) > MAX_EXPONENT:
+        raise KnowledgeError(f"{number!r} is not a finite number of ordinary size")
+    text = format(value, "f")
+    return Decimal(text.rstrip("0").rstrip(".") if "." in text else text)
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectiveState:
+    """An objective that the mission has now: the function it asks for and what the loop has noted of it."""
+
+    function: str
+    status: str | None = None
+    always_improve: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class KnowledgeState:
+    """All that changes in the knowledge base: hashable, sorted by name, and nothing inferred in it.
+
+    Attributes:
+        objectives: one for each function that the current task needs.
+        groundings: (function, function design) now in use.
+        components: (component, c_status) as diagnostics report it, for example ("c_thruster_1", "FALSE").
+        measurements: (quality attribute type, measured value).
+    """
+
+    objectives: tuple[ObjectiveState, ...] = ()
+    groundings: tuple[tuple[str, str], ...] = ()
+    components: tuple[tuple[str, str], ...] = ()
+    measurements: tuple[tuple[str, Decimal], ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        objectives: Iterable[ObjectiveState] = (),
+        *,
+        groundings: Mapping[str, str] | None = None,
+        components: Mapping[str, str] | None = None,
+        measurements: Mapping[str, Number] | None = None,
+    ) -> KnowledgeState:
+        """A state from unsorted parts; floats become exact short decimals.
+
+        Raises:
+            KnowledgeError: a measured value is no finite number, or a function has two objectives.
+        """
+        known = sorted(objectives, key=lambda objective: objective.function)
+        for one, other in zip(known, known[1:], strict=False):
+            if one.function == other.function:
+                raise KnowledgeError(f"function {one.function} has two objectives", remedy="give it one")
+        return cls(
+            objectives=tuple(known),
+            groundings=tuple(sorted((groundings or {}).items())),
+            components=tuple(sorted((components or {}).items())),
+            measurements=tuple(sorted((name, exact(value)) for name, value in (measurements or {}).items())),
+        )
+
+    def grounded(self, function: str) -> str | None:
+        """The function design now in use for a function."""
+        return next((design for name, design in self.groundings if name == function), None)
+
+    def measured(self, attribute: str) -> tuple[Decimal, ...]:
+        """The measured value of a quality attribute; empty before the first measurement."""
+        return tuple(value for name, value in self.measurements if name == attribute)
+
+    def describe(self) -> str:
+        """The state in one line, for messages."""
+        parts = [f"{objective_name(o.function)}: {o.status or 'no status'}" for o in self.objectives]
+        parts += [f"{function} grounded by {design}" for function, design in self.groundings]
+        parts += [f"{name}: {status}" for name, status in self.components]
+        parts += [f"{name}: {value}" for name, value in self.measurements]
+        return ", ".join(parts) or "nothing known"
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """One property value: names are short (the IRI's last part) where that is unambiguous, else IRIs."""
+
+    subject: str
+    property: str
+    value: Value
+
+    def __str__(self) -> str:
+        """As a rule atom would say it: fg_status(fg_spiral_high, IN_ERROR_NFR)."""
+        value = str(self.value).lower() if isinstance(self.value, bool) else self.value
+        return f"{self.property}({self.subject}, {value})"
+
+
+@dataclass(frozen=True)
+class Inference:
+    """What the reasoner adds to a state.
+
+    Attributes:
+        state: the state that was reasoned about.
+        asserted: the facts of the knowledge base and of the state.
+        facts: the inferred facts, none of which is asserted.
+    """
+
+    state: KnowledgeState
+    asserted: frozenset[Fact] = field(repr=False)
+    facts: frozenset[Fact]
+
+    @cached_property
+    def _index(self) -> dict[tuple[str, str], tuple[Value, ...]]:
+        index: dict[tuple[str, str], list[Value]] = {}
+        for fact in sorted(self.asserted | self.facts, key=lambda fact: str(fact.value)):
+            index.setdefault((fact.subject, fact.property), []).append(fact.value)
+        return {key: tuple(values) for key, values in index.items()}
+
+    def values(self, subject: str, property_name: str) -> tuple[Value, ...]:
+        """Asserted and inferred values of a property, sorted by their text."""
+        return self._index.get((subject, property_name), ())
+
+    def subjects(self, property_name: str, value: Value) -> tuple[str, ...]:
+        """What has that value of a property, asserted or inferred, sorted by name."""
+        return tuple(sorted(s for (s, p), values in self._index.items() if p == property_name and value in values))
+
+    def objective_status(self, function: str) -> str | None:
+        """Status of a function's objective, asserted or inferred; None while all is well."""
+        return self._one(objective_name(function), "o_status")
+
+    def grounding_status(self, function: str) -> str | None:
+        """Status of a function's present grounding; None while all is well or there is none."""
+        design = self.state.grounded(function)
+        return None if design is None else self._one(grounding_name(design), "fg_status")
+
+    def is_updatable(self, function: str) -> bool:
+        """Whether a better function design may have become available."""
+        return True in self.values(objective_name(function), "o_updatable")
+
+    def is_realisable(self, design: str) -> bool:
+        """Whether a function design can be grounded: true unless inferred otherwise."""
+        return False not in self.values(design, "fd_realisability")
+
+    def error_log(self, design: str) -> tuple[str, ...]:
+        """Objectives that a function design has failed."""
+        return tuple(str(value) for value in self.values(design, "fd_error_log"))
+
+    def _one(self, subject: str, property_name: str) -> str | None:
+        values = self.values(subject, property_name)
+        return str(values[0]) if values else None
+
+
+@dataclass(frozen=True, slots=True)
+class Rejection:
+    """A function design that the planner left out, and why."""
+
+    design: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What the planner chose for one function.
+
+    Attributes:
+        function: whose objective is adapted.
+        design: the function design to ground; None when none is left, and the present one is kept.
+        reason: why the objective is adapted and the design chosen.
+        rejected: the designs left out, by name.
+    """
+
+    function: str
+    design: str | None
+    reason: str
+    rejected: tuple[Rejection, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Decisions for the objectives to adapt, by function name."""
+
+    decisions: tuple[Decision, ...] = ()

@@ -1,0 +1,113 @@
+"""Stock owlready2: sync_reasoner_pellet, in a fresh world and a new Java process for each inference.
+
+Slow (about a second each) and simple: the reference that the in-process backend is compared with.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Sequence
+from decimal import Decimal
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final
+
+import owlready2
+from rdflib import Literal, URIRef
+from rdflib.namespace import OWL, RDF, RDFS
+from rdflib.term import Node
+
+from suave_des.errors import KnowledgeError
+from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.java import java_executable
+from suave_des.knowledge.model import properties_to_read
+from suave_des.knowledge.situation import Lit, Triple
+from suave_des.knowledge.triples import literal, n_triple
+from suave_des.knowledge.vocabulary import RDF_TYPE, XSD
+
+_STATE_IRI: Final = "urn:suave-des:state"
+
+
+class StockPellet:
+    """owlready2 with its own way to run Pellet."""
+
+    def __init__(self, kb: KnowledgeBase) -> None:
+        self._text = kb.content.n_triples()
+        self._properties = properties_to_read(kb.content)
+        self._classes = sorted(kb.content.head_classes())
+
+    def infer(self, situation: Sequence[Triple]) -> frozenset[Triple] | None:
+        """What holds of the properties and classes to read; None when the situation contradicts itself."""
+        owlready2.JAVA_EXE = str(java_executable())
+        world = owlready2.World()
+        try:
+            text = self._text + "".join(n_triple(triple) for triple in situation if not _is_lossy(triple[2]))
+            ontology = world.get_ontology(_STATE_IRI).load(fileobj=io.BytesIO(text.encode()), only_local=True)
+            for subject, predicate, value in situation:
+                if isinstance(value, Lit) and _is_lossy(value):
+                    # The loader makes a float of it, which it writes as 1e-05, no decimal: hand over the text.
+                    subject_id, predicate_id, datatype_id = map(world._abbreviate, (subject, predicate, value.datatype))
+                    ontology._add_data_triple_raw_spod(subject_id, predicate_id, value.text, datatype_id)
+            if not _reason(world):
+                return None
+            return frozenset(self._read(world))
+        finally:
+            world.close()
+
+    def _read(self, world: Any) -> Iterator[Triple]:
+        graph = world.as_rdflib_graph()
+        for name in self._properties:
+            for subject, _, value in graph.triples((None, URIRef(name), None)):
+                yield str(subject), name, literal(value) if isinstance(value, Literal) else str(value)
+        for name in self._classes:
+            for kind in _below(graph, name):
+                for subject in graph.subjects(RDF.type, kind):
+                    yield str(subject), RDF_TYPE, name
+
+
+def _below(graph: Any, name: str) -> set[Node]:
+    """A class with all its subclasses: the reasoner tells only the nearest classes of an individual."""
+    found: set[Node] = {URIRef(name)}
+    waiting = list(found)
+    while waiting:
+        kind = waiting.pop()
+        below = {*graph.subjects(RDFS.subClassOf, kind), *graph.subjects(OWL.equivalentClass, kind)}
+        below |= set(graph.objects(kind, OWL.equivalentClass))
+        waiting += below - found
+        found |= below
+    return found
+
+
+def _reason(world: owlready2.World) -> bool:
+    """Let owlready2 run Pellet; false when the ontology is inconsistent."""
+    try:
+        owlready2.sync_reasoner_pellet(world, infer_property_values=True, infer_data_property_values=True, debug=0)
+    except BaseException as error:
+        _remove_left_behind(error.__traceback__)
+        if isinstance(error, owlready2.OwlReadyInconsistentOntologyError):
+            return False
+        if isinstance(error, owlready2.OwlReadyJavaError):
+            reason = " ".join(str(error).split())[:400]
+            raise KnowledgeError(f"Pellet, run by owlready2, failed: {reason}") from error
+        raise
+    return True
+
+
+def _remove_left_behind(trace: TracebackType | None) -> None:
+    """Remove the temporary file that owlready2 leaves behind when its reasoner fails or is interrupted."""
+    while trace is not None:
+        if trace.tb_frame.f_code.co_name == "sync_reasoner_pellet":
+            file = trace.tb_frame.f_locals.get("tmp")
+            if file is not None:
+                file.close()
+                Path(file.name).unlink(missing_ok=True)
+        trace = trace.tb_next
+
+
+def _is_lossy(value: str | Lit) -> bool:
+    """Whether owlready2, which keeps numbers as floats, would write a decimal in another way than it was."""
+    return (
+        isinstance(value, Lit)
+        and value.datatype == XSD + "decimal"
+        and ("e" in str(float(value.text)) or Decimal(str(float(value.text))) != Decimal(value.text))
+    )
