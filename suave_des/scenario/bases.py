@@ -9,7 +9,8 @@ from suave_des.errors import InputError
 from suave_des.resources import find, shipped_folder
 from suave_des.scenario.layers import Layer, merge
 from suave_des.scenario.revision import Revision
-from suave_des.scenario.yamlfile import KeyPath, YamlDocument, did_you_mean, read_bytes, read_yaml, shown
+from suave_des.scenario.wording import KeyPath, did_you_mean, shown
+from suave_des.scenario.yamlfile import YamlDocument, read_bytes, read_yaml
 
 _ONTOLOGY_LIMIT_BYTES = 100_000_000
 _CHAIN_LIMIT = 20
@@ -86,7 +87,7 @@ def find_named(layer: Layer, key_path: KeyPath, name: object, kind: str, remedy:
     try:
         return find(name, kind, beside=layer.place(key_path).file.parent)
     except InputError as error:
-        raise layer.error(f"{error.problem}: {name}", key_path, remedy or error.remedy) from None
+        raise layer.error(f"{error.problem}: {shown(name)}", key_path, remedy or error.remedy) from None
 
 
 def _check_chain(layer: Layer, key_path: KeyPath, chain: tuple[Path, ...]) -> None:

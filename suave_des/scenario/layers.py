@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from suave_des.errors import InputError
-from suave_des.scenario.yamlfile import KeyPath, YamlDocument, place_text
+from suave_des.scenario.wording import KeyPath, place_text
+from suave_des.scenario.yamlfile import YamlDocument
 
 _KIND_KEYS = ("kind", "distribution")
 """Keys that say what a mapping is: one of another kind replaces the base's, whose keys would not fit."""

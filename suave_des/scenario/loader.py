@@ -18,7 +18,7 @@ from suave_des.scenario.models import ManagerSettings, Scenario, TableSignal
 from suave_des.scenario.modes import UNGROUND_MODE, ModeTable, modes_of
 from suave_des.scenario.problems import input_error
 from suave_des.scenario.tables import Table, read_table
-from suave_des.scenario.yamlfile import KeyPath, did_you_mean, shown
+from suave_des.scenario.wording import KeyPath, did_you_mean, shown
 
 MANAGER_GROUP = "suave_des.managers"
 """Entry point group in which packages register their managers."""

@@ -28,6 +28,7 @@ from suave_des.scenario.settings import (
     paired,
 )
 from suave_des.scenario.signals import ConstantSignal, Signal, SinusoidSignal, StepSignal, TableSignal
+from suave_des.scenario.wording import shown
 
 __all__ = [
     "Battery",
@@ -145,7 +146,7 @@ class ThrusterEvent(Strict):
         match = _EVENT_TEXT.match(value.strip())
         if match is None:
             raise wrong(
-                f"{value!r} is no thruster event",
+                f"{shown(value)} is no thruster event",
                 "write (THRUSTER,failure or recovery,TIME), as in (1,failure,35)",
             )
         parts: dict[str, Any] = match.groupdict()
@@ -156,7 +157,7 @@ class ThrusterEvent(Strict):
             try:
                 parts[key] = convert(parts[key])
             except ValueError:
-                raise wrong(f"the {key} {parts[key]!r} in {value!r} is no number", remedy) from None
+                raise wrong(f"the {key} {shown(parts[key])} in {shown(value)} is no number", remedy) from None
         return parts
 
 

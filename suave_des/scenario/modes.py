@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from suave_des.errors import InputError
-from suave_des.scenario.yamlfile import KeyPath, YamlDocument, did_you_mean, read_yaml, shown
+from suave_des.scenario.wording import KeyPath, did_you_mean, shown
+from suave_des.scenario.yamlfile import YamlDocument, read_yaml
 
 DEFAULT_MODE = "__DEFAULT__"
 UNGROUND_MODE = "fd_unground"

@@ -14,7 +14,7 @@ from suave_des.errors import InputError
 from suave_des.scenario.distributions import Distribution
 from suave_des.scenario.layers import Layer
 from suave_des.scenario.signals import Signal
-from suave_des.scenario.yamlfile import KeyPath, did_you_mean, place_text, shown
+from suave_des.scenario.wording import KeyPath, did_you_mean, place_text, shown
 
 
 def _tags(union: Any) -> list[str]:
@@ -24,6 +24,7 @@ def _tags(union: Any) -> list[str]:
 
 
 _MAPPING = "is not a mapping of keys to values"
+_BOUNDS = {"gt": "greater than", "ge": "at least", "lt": "less than", "le": "at most"}
 _TEXTS: Mapping[str, tuple[str, str]] = {
     # type of pydantic's error: (what is wrong with the value, what would be right)
     "missing": ("is missing", "add it"),
@@ -116,7 +117,7 @@ def _said(detail: ErrorDetails, model: type[BaseModel]) -> tuple[str, str]:
     if kind == "value_error":
         return str(context["error"]), "see docs/reference/scenario.md"
     if kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
-        return f"{shown(value)} is out of range", f"must be {_range_at(model, loc)}"
+        return f"{shown(value)} is out of range", f"must be {_range_at(model, loc) or _bound(context)}"
     if kind == "float_type" and loc[-1] == "number":
         return f"{shown(value)} is no number", "give a number without quotes, or a distribution"
     if value is None and kind in ("dict_type", "model_type", "model_attributes_type"):
@@ -139,9 +140,12 @@ def _range_at(model: type[BaseModel], loc: tuple[int | str, ...]) -> str:
     """The range that a number of the model must lie in, in words."""
     owner = model_at(model, loc[:-1])
     marks = owner.model_fields[str(loc[-1])].metadata if owner else []
-    bounds = (("gt", "greater than"), ("ge", "at least"), ("lt", "less than"), ("le", "at most"))
-    words = [f"{text} {getattr(mark, key):g}" for mark in marks for key, text in bounds if hasattr(mark, key)]
-    return " and ".join(words)
+    words = [_bound({key: getattr(mark, key, None) for key in _BOUNDS}) for mark in marks]
+    return " and ".join(filter(None, words))
+
+
+def _bound(context: Mapping[str, Any]) -> str:
+    return " and ".join(f"{text} {context[key]:g}" for key, text in _BOUNDS.items() if context.get(key) is not None)
 
 
 def _annotation_at(model: type[BaseModel], loc: tuple[int | str, ...]) -> Any:

@@ -9,7 +9,8 @@ import math
 from pathlib import Path
 
 from suave_des.errors import InputError
-from suave_des.scenario.yamlfile import decode, read_bytes, shown
+from suave_des.scenario.wording import shown
+from suave_des.scenario.yamlfile import decode, read_bytes
 
 COLUMNS = ("t_s", "value")
 SIZE_LIMIT_BYTES = 20_000_000

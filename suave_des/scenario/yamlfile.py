@@ -6,10 +6,9 @@ Scalars follow the YAML 1.2 core schema, not PyYAML's 1.1: `1e3` is a number, `0
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,12 +21,12 @@ from yaml.resolver import BaseResolver
 from yaml.scanner import Scanner
 
 from suave_des.errors import InputError
-
-KeyPath = tuple[str | int, ...]
+from suave_des.scenario.wording import KeyPath, place_text, shown
 
 SIZE_LIMIT_BYTES = 1_000_000
 NODE_LIMIT = 100_000
 DEPTH_LIMIT = 100
+KEY_LIMIT = 200
 
 _SHORTER = "write it out, with fewer values or aliases"
 _TAG = "tag:yaml.org,2002:"
@@ -59,26 +58,6 @@ class YamlDocument:
     def error(self, problem: str, key_path: KeyPath, remedy: str | None = None) -> InputError:
         """An error about what stands at a key path."""
         return InputError(problem, file=self.path, place=place_text(self.line(key_path), key_path), remedy=remedy)
-
-
-def place_text(line: int, key_path: KeyPath) -> str:
-    """A place for the user: "line 12, thruster_events[0].time_s"."""
-    keys = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in key_path).lstrip(".")
-    return f"line {line}, {keys}" if keys else f"line {line}"
-
-
-def shown(value: object, limit: int = 60) -> str:
-    """A value as the user wrote it, cut to a readable length and one line."""
-    text = {"None": "nothing", "True": "true", "False": "false"}.get(repr(value), repr(value))
-    return text if len(text) <= limit else text[: limit - 3] + "..."
-
-
-def did_you_mean(word: object, known: Iterable[str], what: str = "known") -> str:
-    """A remedy for a misspelt word: the nearest known one, and the list of all."""
-    names = list(known)
-    near = difflib.get_close_matches(str(word), names, n=1, cutoff=0.6)
-    listing = f"{what}: {', '.join(names)}" if names else f"{what}: none"
-    return f"did you mean {near[0]!r}? {listing}" if near else listing
 
 
 def read_bytes(path: Path, limit: int = SIZE_LIMIT_BYTES) -> bytes:
@@ -263,6 +242,10 @@ class _Reading:
             if not isinstance(key_node, yaml.ScalarNode):
                 raise self._error(key_node, key_path, "a key must be text", "write `key: value`")
             key = str(key_node.value)
+            if not key.isprintable() or len(key) > KEY_LIMIT:
+                raise self._error(
+                    key_node, key_path, f"{shown(key)} is no key", "use a short name of letters and digits"
+                )
             if key in first_lines:
                 raise self._error(
                     key_node,

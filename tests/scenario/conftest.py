@@ -3,6 +3,8 @@ from pathlib import Path
 
 import pytest
 
+from suave_des.resources import find
+
 Write = Callable[..., Path]
 
 
@@ -18,3 +20,9 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
         return path
 
     return write_file
+
+
+@pytest.fixture(scope="session")
+def shipped_modes() -> str:
+    """Text of the shipped modes file."""
+    return find("suave_modes.yaml", "scenarios").read_text(encoding="utf-8")

@@ -1,0 +1,409 @@
+"""Ways in which a scenario can be wrong: one line with file, line, key path, what is wrong, what would be right."""
+
+import shutil
+
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from suave_des.errors import InputError
+from suave_des.resources import shipped_folder
+from suave_des.scenario.loader import load_scenario
+from suave_des.scenario.yamlfile import read_yaml
+
+HEAD = "base: seams2023.yaml\n"
+VISIBILITY = HEAD + "signals:\n  water_visibility: "
+WHOLE = "revision: 2023\nsignals:\n  water_visibility: "
+EVENTS = HEAD + "thruster_events:\n  - "
+
+
+def refused(write, content: str, **options: object) -> InputError:
+    path = write("mine.yaml", content)
+    with pytest.raises(InputError) as caught:
+        load_scenario(path, **options)
+    assert "\n" not in str(caught.value)
+    assert caught.value.remedy
+    return caught.value
+
+
+@pytest.mark.parametrize(
+    ("content", "place", "problem", "remedy"),
+    [
+        # keys
+        (HEAD + "misson: {}\n", "line 2, misson", "unknown key 'misson'", "did you mean 'mission'?"),
+        (VISIBILITY + "{perod_s: 3}\n", "line 3, signals.water_visibility.perod_s", "unknown key", "mean 'period_s'?"),
+        (
+            WHOLE + "{kind: sinusoid, perod_s: 80, minimum: 1, maximum: 2}\n",
+            "line 3, signals.water_visibility.perod_s",
+            "unknown key",
+            "and 1 more",
+        ),
+        (
+            WHOLE + "{kind: sinusoid, minimum: 1, maximum: 2}\n",
+            "line 3, signals.water_visibility.period_s",
+            "is missing",
+            "add it",
+        ),
+        (HEAD + "start: {x: 1}\nfoo: 1\nbar: 2\n", "line 2, start.x", "unknown key 'x'", "and 2 more"),
+        ("signals: {}\n", "line 1, signals", "no signal named water_visibility", "add it"),
+        ("revision: 2023\n", "line 1, signals", "is missing", "add it"),
+        (
+            WHOLE + "{kind: constant, value: 2}\n  my sea: {kind: constant, value: 1}\n",
+            "line 4, ",
+            "'my sea'",
+            "letters",
+        ),
+        (HEAD + "name: my scenario\n", "line 2, name", "'my scenario' is no name", "use letters, digits"),
+        (HEAD + "name: 15\n", "line 2, name", "15 is no text", "quotes"),
+        # numbers
+        (VISIBILITY + "{period_s: -80}\n", "line 3, signals.water_visibility.period_s", "-80", "greater than 0"),
+        (VISIBILITY + "{period_s: 0}\n", "line 3, signals.water_visibility.period_s", "0 is out of", "greater than 0"),
+        (VISIBILITY + "{period_s: '80'}\n", "line 3, ", "'80' is no number", "without quotes"),
+        (VISIBILITY + "{period_s: true}\n", "line 3, ", "true is no number", "such as"),
+        (VISIBILITY + "{period_s: }\n", "line 3, ", "nothing is no number", "such as"),
+        (VISIBILITY + "{publishing_period_s: 0}\n", "line 3, ", "0 is out of range", "at least 0.001"),
+        (HEAD + "mission: {time_limit_s: 1e9}\n", "line 2, mission.time_limit_s", "out of range", "at most 100000"),
+        (HEAD + "mission: {time_limit_s: " + "9" * 400 + "}\n", "line 2, ", "inf is not finite", "finite"),
+        (HEAD + "pipeline: {points_per_piece: 2.5}\n", "line 2, pipeline.", "2.5 is no whole number", "such as 3"),
+        (HEAD + "knowledge: {values: {qa: much}}\n", "line 2, knowledge.values.qa", "'much' is no number", "such as"),
+        # minimum and maximum
+        (
+            VISIBILITY + "{minimum: 9}\n",
+            "line 3, signals.water_visibility.minimum",
+            "minimum 9 is above maximum 3.75",
+            "smaller one",
+        ),
+        (
+            VISIBILITY + "{maximum: 0}\n",
+            "line 3, signals.water_visibility.maximum",
+            "minimum 1.25 is above maximum 0",
+            "smaller one",
+        ),
+        # kinds of signals
+        (VISIBILITY + "{kind: sinus}\n", "line 3, signals.water_visibility", "'sinus'", "did you mean 'sinusoid'?"),
+        (VISIBILITY + "{kind: [sinusoid]}\n", "line 3, ", "kind ['sinusoid'] is not known", "sinusoid, constant"),
+        (VISIBILITY + "7\n", "line 3, signals.water_visibility", "7 is not a mapping", "kind: sinusoid, constant"),
+        (WHOLE + "{period_s: 80}\n", "line 3, signals.water_visibility", "kind is missing", "add kind: sinusoid"),
+        (
+            VISIBILITY + "{kind: table, file: t.csv, interpolation: spline}\n",
+            "line 3, ",
+            "'spline'",
+            "previous, linear",
+        ),
+        # distributions
+        (
+            HEAD + "start: {x_m: {distribution: gauss}}\n",
+            "line 2, start.x_m",
+            "'gauss' is not known",
+            "normal, uniform",
+        ),
+        (HEAD + "start: {x_m: {mean: 3}}\n", "line 2, start.x_m", "distribution is missing", "give a number, or"),
+        (HEAD + "start: {x_m: [3]}\n", "line 2, start.x_m", "[3] is no number", "or a distribution"),
+        (HEAD + "start: {x_m: far}\n", "line 2, start.x_m", "'far' is no number", "or a distribution"),
+        (
+            HEAD + "start:\n  x_m:\n    distribution: uniform\n    minimum: 3\n    maximum: 1\n",
+            "line 5, start.x_m.minimum",
+            "minimum 3 is above maximum 1",
+            "smaller",
+        ),
+        (
+            HEAD + "start: {x_m: {distribution: normal, mean: 0, std: -1}}\n",
+            "line 2, start.x_m.std",
+            "-1 is out",
+            "at least 0",
+        ),
+        (
+            HEAD + "start: {x_m: {distribution: normal, mean: 0, std: 1, minimum: 9}}\n",
+            "line 2, start.x_m.minimum",
+            "leaves next to nothing",
+            "move or widen",
+        ),
+        (HEAD + "start: {x_m: {distribution: choice, values: []}}\n", "line 2, start.x_m.values", "has 0 entries", "1"),
+        (HEAD + "start: {z_m: -25}\n", "line 2, start.z_m", "-25 is not in the water", "-20"),
+        (
+            HEAD + "start: {z_m: {distribution: uniform, minimum: -3, maximum: 2}}\n",
+            "line 2, start.z_m",
+            "2 is not in the water",
+            "at most 0",
+        ),
+        (HEAD + "latencies: {inference_s: -1}\n", "line 2, latencies.inference_s", "-1 is negative", "number >= 0"),
+        (
+            HEAD + "latencies: {inference_s: {distribution: normal, mean: 1, std: 1}}\n",
+            "line 2, latencies.inference_s",
+            "can become negative",
+            "minimum >= 0",
+        ),
+        # thruster events, both spellings
+        (
+            EVENTS + "{thruster: 7, event: failure, time_s: 3}\n",
+            "line 3, thruster_events[0].thruster",
+            "7",
+            "at most 6",
+        ),
+        (EVENTS + "(7,failure,35)\n", "line 3, thruster_events[0].thruster", "7 is out of range", "at most 6"),
+        (EVENTS + "(0,failure,35)\n", "line 3, thruster_events[0].thruster", "0 is out of range", "at least 1"),
+        (EVENTS + "(1.5,failure,35)\n", "line 3, thruster_events[0]", "thruster '1.5'", "a whole number from 1 to 6"),
+        (EVENTS + "{thruster: 1.5, event: failure, time_s: 3}\n", "line 3, ", "1.5 is no whole number", "such as 3"),
+        (EVENTS + "(1,failure,soon)\n", "line 3, thruster_events[0]", "the time_s 'soon'", "a time in s"),
+        (EVENTS + "{thruster: 1, event: failure, time_s: soon}\n", "line 3, ", "'soon' is no number", "a number"),
+        (EVENTS + "(1,failure,nan)\n", "line 3, thruster_events[0].time_s", "nan is not finite", "finite"),
+        (EVENTS + "(1,failed,35)\n", "line 3, thruster_events[0].event", "'failed'", "did you mean 'failure'?"),
+        (EVENTS + "{thruster: 1, event: broken, time_s: 3}\n", "line 3, ", "'broken'", "failure, recovery"),
+        (EVENTS + "(1;failure;35)\n", "line 3, thruster_events[0]", "is no thruster event", "(1,failure,35)"),
+        (EVENTS + "(1,failure)\n", "line 3, thruster_events[0]", "is no thruster event", "(1,failure,35)"),
+        (HEAD + "thruster_events: (1,failure,35)\n", "line 2, thruster_events", "is no list", "in brackets"),
+        (EVENTS + "(1,failure,35)\n  - (9,failure,35)\n", "line 4, thruster_events[1].thruster", "9", "at most 6"),
+        # other parts
+        (HEAD + "mission:\n", "line 2, mission", "has nothing under it", "or leave it out"),
+        (HEAD + "mission: 300\n", "line 2, mission", "300 is not a mapping", "or leave it out"),
+        (HEAD + "signals: {water_visibility: null}\n", "line 2, signals", "no signal named water_visibility", "add it"),
+        (HEAD + "pipeline: {vertices_m: [[1, 2, 3]]}\n", "line 2, pipeline.vertices_m", "has 1 entries", "2 needed"),
+        (HEAD + "pipeline: {vertices_m: [[1, 2], [3, 4, 5]]}\n", "line 2, pipeline.vertices_m[0][2]", "missing", "add"),
+        (
+            HEAD + "battery: {}\nsignals: {battery_level: {kind: constant, value: 1}}\n",
+            "line 2, battery",
+            "and",
+            "remove",
+        ),
+        (HEAD + "battery: {discharge_time_s: 0}\n", "line 2, battery.discharge_time_s", "0 is out", "greater than 0"),
+        (HEAD + "reaction_metric: {visibility_thresholds_m: [1, 2, 3]}\n", "line 2, ", "does not fall", "greatest"),
+        (HEAD + "managers: {bt: {search_modes: [fd_spiral_low]}}\n", "line 2, ", "search_modes 1", "as many of both"),
+        (HEAD + "managers: {random: {adaptation_period_s: 0}}\n", "line 2, managers.random.", "0 is out", "at least"),
+        (HEAD + "managers: {metacontroll: {}}\n", "line 2, managers.metacontroll", "no manager", "mean 'metacontrol'?"),
+        (HEAD + "managers: {'mine:Manager': 3}\n", "line 2, managers.mine:Manager", "3 is not a mapping", "key: value"),
+        (HEAD + "knowledge: {ontologies: suave.owl}\n", "line 2, knowledge.ontologies", "is no list", "['suave.owl']"),
+        (HEAD + "knowledge: {ontologies: []}\n", "line 2, knowledge.ontologies", "has 0 entries", "at least 1"),
+        # revisions
+        (HEAD + "revision: 2024\n", "line 2, revision", "no revision '2024'", "shipped: 1.5, 2023"),
+        (HEAD + "revision: {base: '1.6'}\n", "line 2, revision.base", "no revision '1.6'", "did you mean '1.5'?"),
+        (HEAD + "revision: [2023]\n", "line 2, revision", "[2023] is no revision", "one of 1.5, 2023"),
+        (HEAD + "revision: true\n", "line 2, revision", "true is no revision", "one of 1.5, 2023"),
+        ("revision: {follow: {acceptance_m: 1}}\n", "line 1, revision", "has no name", 'base: "2023"'),
+        (
+            HEAD + "revision: {follow: {acceptance: 1}}\n",
+            "line 2, revision.follow.acceptance",
+            "unknown key",
+            "did you mean 'acceptance_m'?",
+        ),
+        (HEAD + "revision: {base: 1.5, follow: {acceptance_m: -1}}\n", "line 2, revision.follow.", "-1", "than 0"),
+        (
+            HEAD + "revision: {spiral: {centre: here}}\n",
+            "line 2, revision.spiral.centre",
+            "'here'",
+            "origin, activation",
+        ),
+        (HEAD + "revision: {spiral: {restarts_on_activation: maybe}}\n", "line 2, ", "'maybe'", "true or false"),
+        # other files
+        ("base: nowhere.yaml\n", "line 1, base", "no such file: 'nowhere.yaml'", "seams2023.yaml"),
+        ("base: [a]\n", "line 1, base", "['a'] is no file name", "a path"),
+        ("base: .\n", "line 1, base", "is a folder", "a file in it"),
+        ("base: mine.yaml\n", "line 1, base", "mine.yaml -> mine.yaml", "its own base"),
+        (HEAD + "modes_file: nowhere.yaml\n", "line 2, modes_file", "no such file: 'nowhere.yaml'", "suave_modes.yaml"),
+        (HEAD + "modes_file: ''\n", "line 2, modes_file", "'' is too short", "at least 1"),
+        (
+            HEAD + "knowledge: {ontologies: [suav.owl]}\n",
+            "line 2, knowledge.ontologies[0]",
+            "no such file",
+            "suave.owl",
+        ),
+        (
+            VISIBILITY + "{kind: table, file: t.csv}\n",
+            "line 3, signals.water_visibility.file",
+            "no such file",
+            "t_s,value",
+        ),
+        # modes
+        (
+            HEAD + "default_modes: {f_generate_search_path: fd_spiral_lo}\n",
+            "line 2, default_modes.f_generate_search_path",
+            "has no mode 'fd_spiral_lo'",
+            "did you mean 'fd_spiral_low'?",
+        ),
+        (
+            HEAD + "default_modes: {f_search: fd_spiral_low}\n",
+            "line 2, ",
+            "no function 'f_search'",
+            "f_generate_search",
+        ),
+        (
+            HEAD + "managers: {bt: {search_modes: [fd_spiral_high, fd_spiral_low, fd_spiral_mid]}}\n",
+            "line 2, managers.bt.search_modes[2]",
+            "has no mode 'fd_spiral_mid'",
+            "fd_spiral_medium",
+        ),
+        # YAML
+        (HEAD + "description: !!python/object/apply:os.system [ls]\n", "line 2, description", "tag", "plain text"),
+        (HEAD + "name: a\nname: b\n", "line 3, name", "stands twice, first in line 2", "keep one"),
+    ],
+)
+def test_a_wrong_scenario_is_refused_with_file_place_and_remedy(write, content, place, problem, remedy):
+    error = refused(write, content)
+    assert error.file == "mine.yaml"
+    assert (error.place or "").startswith(place)
+    assert problem in error.problem
+    assert remedy in (error.remedy or "")
+
+
+def test_the_whole_message_is_one_readable_line(write):
+    assert str(refused(write, VISIBILITY + "{period_s: -80}\n")) == (
+        "mine.yaml: line 3, signals.water_visibility.period_s: -80 is out of range (must be greater than 0)"
+    )
+
+
+def test_a_long_value_is_cut(write):
+    assert len(str(refused(write, VISIBILITY + "{period_s: '" + "x" * 5000 + "'}\n"))) < 300
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        '"a\\nb": 1\n',
+        '"' + "a" * 5000 + '": 1\n',
+        'base: "a\\nb"\n',
+        HEAD + 'modes_file: "a\\nb"\n',
+        HEAD + 'revision: "a\\nb"\n',
+        HEAD + 'default_modes: {f_follow_pipeline: "a\\nb"}\n',
+        EVENTS + '"(1,failure,\\n)"\n',
+        EVENTS + "(1," + "x" * 5000 + ")\n",
+    ],
+)
+def test_line_breaks_and_long_texts_do_not_reach_the_message(write, content):
+    message = str(refused(write, content))
+    assert len(message) < 400
+
+
+def test_a_value_that_is_wrong_in_the_base_is_reported_there(write):
+    write("common/base.yaml", VISIBILITY + "{period_s: -80}\n")
+    error = refused(write, "base: common/base.yaml\nmission: {time_limit_s: 100}\n")
+    assert error.file == "common/base.yaml"
+    assert error.place == "line 3, signals.water_visibility.period_s"
+
+
+def test_a_value_that_is_wrong_over_a_sound_base_is_reported_in_the_derived_file(write):
+    write("common/base.yaml", VISIBILITY + "{period_s: 80}\n")
+    error = refused(write, "base: common/base.yaml\nsignals:\n  water_visibility:\n    period_s: -80\n")
+    assert (error.file, error.place) == ("mine.yaml", "line 4, signals.water_visibility.period_s")
+
+
+def test_of_two_wrong_files_the_users_own_comes_first(write):
+    write("base.yaml", VISIBILITY + "{period_s: -80}\n")
+    error = refused(write, "base: base.yaml\n\n\n\n\nmission: {time_limit_s: -1}\n")
+    assert error.file == "mine.yaml"
+    assert "and 1 more" in (error.remedy or "")
+
+
+def test_a_wrong_revision_file_is_reported_there(write):
+    write("own.yaml", 'base: "2023"\nfollow:\n  acceptance_m: none\n')
+    error = refused(write, HEAD + "revision: own.yaml\n")
+    assert (error.file, error.place) == ("own.yaml", "line 3, revision.follow.acceptance_m")
+
+
+def test_bases_in_a_circle_are_refused_with_the_circle(write):
+    write("a.yaml", "base: b.yaml\n")
+    write("b.yaml", "base: mine.yaml\n")
+    error = refused(write, "base: a.yaml\n")
+    assert error.file == "b.yaml"
+    assert "mine.yaml -> a.yaml -> b.yaml -> mine.yaml" in error.problem
+
+
+def test_revisions_in_a_circle_are_refused(write):
+    write("a.yaml", "base: b.yaml\n")
+    write("b.yaml", "base: a.yaml\n")
+    assert "a.yaml -> b.yaml -> a.yaml" in refused(write, HEAD + "revision: a.yaml\n").problem
+
+
+def test_a_wrong_table_is_reported_in_the_table(write):
+    write("t.csv", "t_s,value\n0,1\n0,2\n")
+    error = refused(write, VISIBILITY + "{kind: table, file: t.csv}\n")
+    assert (error.file, error.place) == ("t.csv", "line 3")
+
+
+@pytest.mark.parametrize(
+    ("lost", "problem"),
+    [
+        ("f_follow_pipeline:", "defines no function f_follow_pipeline"),
+        ("      fd_unground:\n        f_follow_pipeline_node: inactive\n", "f_follow_pipeline has no mode fd_unground"),
+    ],
+)
+def test_a_modes_file_without_what_the_mission_needs_is_refused(write, shipped_modes, lost, problem):
+    assert lost in shipped_modes
+    write("m.yaml", shipped_modes.replace(lost, "" if lost.startswith(" ") else "f_other:"))
+    error = refused(write, HEAD, modes_file="m.yaml")
+    assert error.file == "m.yaml"
+    assert problem in error.problem
+
+
+def test_a_scenario_that_does_not_exist_is_refused_with_the_shipped_ones(write):
+    write("unused", "")
+    with pytest.raises(InputError, match=r"^nowhere: no such file \(.*seams2023\.yaml.*\)$"):
+        load_scenario("nowhere")
+
+
+@pytest.mark.parametrize("name", ["x" * 5000, "a\0b", ".", ""])
+def test_a_name_that_cannot_be_a_file_is_refused(write, name):
+    write("unused", "")
+    with pytest.raises(InputError):
+        load_scenario(name)
+
+
+def test_a_missing_ontology_or_modes_file_of_the_command_line_is_named(write):
+    assert refused(write, HEAD, ontologies=["nowhere.owl"]).file == "nowhere.owl"
+    assert refused(write, HEAD, modes_file="nowhere.yaml").file == "nowhere.yaml"
+
+
+def _places(data: object, path: tuple[str | int, ...] = ()) -> list[tuple[str | int, ...]]:
+    inner = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    return [path, *(place for key, value in inner for place in _places(value, (*path, key)))]
+
+
+SHIPPED_FILES = [
+    f"{folder}/{name}"
+    for folder, name in (
+        ("scenarios", "seams2023.yaml"),
+        ("scenarios", "suave_modes.yaml"),
+        ("scenarios/revisions", "2023.yaml"),
+    )
+]
+ANYTHING = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers(-5, 400)
+    | st.floats(allow_nan=False)
+    | st.sampled_from(["", "a", "(1,x)", "active.a"]),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(st.sampled_from(["a", "kind", "distribution", "base", "minimum"]), inner)
+    ),
+    max_leaves=5,
+)
+
+
+@given(data=st.data())
+@settings(max_examples=300, deadline=None)
+def test_whatever_stands_anywhere_is_loaded_or_refused_in_one_line(tmp_path_factory, data):
+    folder = tmp_path_factory.mktemp("mutated")
+    for name in SHIPPED_FILES:
+        shutil.copy(shipped_folder("scenarios").parent / name, folder)
+    (folder / "2023.yaml").rename(folder / "own_revision.yaml")
+    scenario = (
+        (folder / "seams2023.yaml")
+        .read_text(encoding="utf-8")
+        .replace('revision: "2023"', "revision: own_revision.yaml")
+    )
+    (folder / "seams2023.yaml").write_text(scenario, encoding="utf-8")
+    path = folder / data.draw(st.sampled_from(["seams2023.yaml", "suave_modes.yaml", "own_revision.yaml"]))
+    content = read_yaml(path).data
+    place = data.draw(st.sampled_from(_places(content)[1:]))
+    part = content
+    for key in place[:-1]:
+        part = part[key]
+    part[place[-1]] = data.draw(ANYTHING)
+    path.write_text(yaml.safe_dump(content), encoding="utf-8")
+    try:
+        load_scenario(folder / "seams2023.yaml")
+    except InputError as error:
+        assert "\n" not in str(error)
+        assert error.remedy
+        assert error.file is not None
+        assert error.file.startswith(str(folder))
