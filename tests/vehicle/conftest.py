@@ -1,0 +1,30 @@
+from collections.abc import Callable
+
+import pytest
+
+from suave_des.vehicle.bluerov2 import BLUEROV2
+from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle
+
+START = Pose(0.0, 0.0, -18.0, 0.0, 0.0, 0.0)
+MakeVehicle = Callable[..., Vehicle]
+
+
+@pytest.fixture(scope="session")
+def make_vehicle() -> MakeVehicle:
+    """Makes a BlueROV2 at (0, 0, -18), at rest, unless told otherwise; `lost` thrusters give no thrust from t = 0."""
+
+    def make(
+        start: Pose = START,
+        duration_s: float = 150.0,
+        *,
+        lost: tuple[int, ...] = (),
+        altitude_error_m: float = 0.0,
+        **options: object,
+    ) -> Vehicle:
+        autopilot = Autopilot(0.48, 0.34, 0.36, 0.5, altitude_error_m)
+        vehicle = Vehicle(BLUEROV2, autopilot, start, duration_s, **options)  # type: ignore[arg-type]
+        for thruster in lost:
+            vehicle.set_thruster_health(0.0, thruster, 0.0)
+        return vehicle
+
+    return make

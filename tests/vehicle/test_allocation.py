@@ -1,0 +1,86 @@
+"""Thruster allocation: what the thrusters make together, and how the autopilot spreads a demand."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from suave_des.vehicle import kernel
+from suave_des.vehicle.bluerov2 import BLUEROV2
+from suave_des.vehicle.model import allocation_matrix, autopilot_allocation
+from suave_des.vehicle.vehicle import STEP_S, Vehicle
+
+B = allocation_matrix(BLUEROV2)
+S = np.sqrt(0.5)
+SURGE, SWAY, HEAVE, ROLL, PITCH, YAW = range(6)
+
+
+@pytest.mark.parametrize(
+    ("thruster", "wrench"),
+    [
+        # Moments worked out by hand, r x F: yaw = x Fy - y Fx for the horizontal ones, roll = y Fz for the vertical.
+        (1, (-S, -S, 0.0, 0.0, 0.0, -0.232 * S)),
+        (2, (-S, S, 0.0, 0.0, 0.0, 0.232 * S)),
+        (3, (S, -S, 0.0, 0.0, 0.0, 0.242 * S)),
+        (4, (S, S, 0.0, 0.0, 0.0, -0.242 * S)),
+        (5, (0.0, 0.0, -1.0, 0.109, 0.0, 0.0)),
+        (6, (0.0, 0.0, -1.0, -0.109, 0.0, 0.0)),
+    ],
+)
+def test_wrench_of_each_thruster(thruster: int, wrench: tuple[float, ...]) -> None:
+    assert B[:, thruster - 1] == pytest.approx(np.array(wrench))
+
+
+demands = st.tuples(*[st.floats(-20.0, 20.0)] * 6)
+
+
+@given(demands)
+def test_healthy_thrusters_give_any_demand_but_pitch(demand: tuple[float, ...]) -> None:
+    demanded = np.array(demand)
+    given_wrench = B @ (autopilot_allocation(BLUEROV2) @ demanded)
+    demanded[PITCH] = 0.0
+    assert given_wrench == pytest.approx(demanded, abs=1e-9)
+
+
+def rank_without(*lost: int) -> int:
+    kept = [column for column in range(6) if column + 1 not in lost]
+    return int(np.linalg.matrix_rank(B[np.ix_([SURGE, SWAY, YAW], kept)]))
+
+
+@pytest.mark.parametrize("lost", [1, 2, 3, 4])
+def test_three_horizontal_thrusters_still_span_surge_sway_and_yaw(lost: int) -> None:
+    assert rank_without(lost) == 3
+
+
+@pytest.mark.parametrize("lost", [(1, 3), (2, 4)], ids=["right side", "left side"])
+def test_two_horizontal_thrusters_do_not(lost: tuple[int, int]) -> None:
+    assert rank_without(*lost) == 2
+
+
+def first_wrench(vehicle: Vehicle) -> np.ndarray:
+    """What pushed the vehicle in its first step from rest: M nu' (no drag at rest)."""
+    vehicle.look_ahead(1)
+    inertia = np.array([BLUEROV2.mass_kg] * 3 + list(BLUEROV2.inertia_kg_m2))
+    return inertia * vehicle.track[1, kernel.VELOCITY] / STEP_S
+
+
+@pytest.mark.parametrize("lost", [1, 2, 3, 4, 5, 6])
+def test_autopilot_commands_a_lost_thruster_as_if_it_worked(make_vehicle, lost: int) -> None:
+    healthy, failed = make_vehicle(), make_vehicle(lost=(lost,))
+    for vehicle in (healthy, failed):
+        vehicle.command(0.0, 0.3, -0.2, -17.8)
+    net_buoyancy = np.array([0, 0, BLUEROV2.buoyancy_n - BLUEROV2.weight_n, 0, 0, 0])
+    commanded = autopilot_allocation(BLUEROV2) @ (first_wrench(healthy) - net_buoyancy)
+    commanded[lost - 1] = 0.0
+    assert first_wrench(failed) == pytest.approx(B @ commanded + net_buoyancy, abs=1e-9)
+
+
+def test_thrust_is_limited(make_vehicle) -> None:
+    vehicle = make_vehicle()
+    vehicle.track[0, kernel.VELOCITY][SURGE] = -40.0  # the velocity loop asks for far more than there is
+    vehicle.command(0.0, 10.0, 0.0, -18.0)
+    vehicle.look_ahead(1)
+    drag_alone = -40.0 / (1.0 + STEP_S * BLUEROV2.quadratic_drag[SURGE] * 40.0 / BLUEROV2.mass_kg)
+    push = 4.0 * S * BLUEROV2.thrust_limit_n / BLUEROV2.mass_kg * STEP_S
+    with_push = (-40.0 + push) / (1.0 + STEP_S * BLUEROV2.quadratic_drag[SURGE] * 40.0 / BLUEROV2.mass_kg)
+    assert drag_alone < vehicle.track[1, kernel.VELOCITY][SURGE] == pytest.approx(with_push)

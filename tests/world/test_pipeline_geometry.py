@@ -1,0 +1,115 @@
+"""The pipeline's points, and which of them a camera sees."""
+
+import math
+
+import numpy as np
+import pytest
+
+from suave_des.scenario.models import Pipeline
+from suave_des.world.pipeline import first_detection, first_point_in_view, path_to_inspect, sample_points
+
+POINTS = sample_points(Pipeline().vertices_m)
+HALF_WIDTH_AT_1_M = math.tan(math.radians(30.0))
+
+
+def above(index: int, height_m: float, dx_m: float = 0.0, dy_m: float = 0.0) -> tuple[float, float, float]:
+    x, y, z = POINTS[index]
+    return float(x) + dx_m, float(y) + dy_m, float(z) + height_m
+
+
+def test_pipeline_has_100_points() -> None:
+    assert POINTS.shape == (100, 3)
+
+
+def test_first_vertex_is_no_point() -> None:
+    assert POINTS[0].tolist() == [-15.5, 0.0, -20.0]
+
+
+@pytest.mark.parametrize(("index", "vertex"), [(19, (-25.0, 0.0)), (59, (-37.41, -1.0)), (99, (-51.56, -15.14))])
+def test_each_piece_ends_with_its_last_vertex(index: int, vertex: tuple[float, float]) -> None:
+    assert POINTS[index, :2] == pytest.approx(vertex)
+
+
+@pytest.mark.parametrize(("piece", "spacing_m"), [(0, 0.5), (1, 0.5), (2, 0.1305), (3, 0.5003), (4, 0.4999)])
+def test_spacing_within_a_piece(piece: int, spacing_m: float) -> None:
+    points = POINTS[20 * piece : 20 * piece + 20]
+    steps_m = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    assert steps_m == pytest.approx(np.full(19, spacing_m), abs=1e-4)
+
+
+def test_points_cannot_be_changed_by_one_of_their_users() -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        POINTS[0, 0] = 0.0
+
+
+def test_path_goes_on_from_the_point_seen_and_back_along_all_points() -> None:
+    path = path_to_inspect(POINTS.tolist(), 7)
+    there = [(x, y) for x, y, _ in POINTS.tolist()]
+    assert path == there[7:] + list(reversed(there))
+
+
+@pytest.mark.parametrize(
+    ("dx_m", "dy_m", "seen"),
+    [(0.999, 0.999, True), (1.001, 0.0, False), (0.0, 1.001, False), (0.0, -0.999, True)],
+    ids=["corner of the view", "outside in x", "outside in y", "other side"],
+)
+def test_view_is_a_square_of_half_width_h_tan_30(dx_m: float, dy_m: float, seen: bool) -> None:
+    end = POINTS[:1]
+    x, y, z = above(0, 2.0, 2.0 * HALF_WIDTH_AT_1_M * dx_m, 2.0 * HALF_WIDTH_AT_1_M * dy_m)
+    assert (first_point_in_view(x, y, z, 3.0, end) == 0) is seen
+
+
+@pytest.mark.parametrize(("visibility_m", "seen"), [(1.999, False), (2.0, True), (2.001, True)])
+def test_point_is_visible_up_to_the_water_visibility(visibility_m: float, seen: bool) -> None:
+    assert (first_point_in_view(*above(30, 2.0), visibility_m, POINTS) >= 0) is seen
+
+
+def test_lowest_index_of_the_points_in_view_counts() -> None:
+    # 2 m up the view reaches 1.15 m to each side: two points of the 0.5 m grid.
+    assert first_point_in_view(*above(10, 2.0), 3.0, POINTS) == 8
+
+
+def test_without_a_measurement_nothing_is_seen() -> None:
+    assert first_point_in_view(*above(30, 1.0), math.nan, POINTS) == -1
+
+
+def test_height_of_the_detected_points_narrows_the_view() -> None:
+    raised = POINTS + np.array([0.0, 0.0, 0.75])  # revision 2023: 0.25 m below a vehicle at 1 m altitude
+    camera = above(30, 1.0, dy_m=0.2)
+    assert first_point_in_view(*camera, 3.0, POINTS) >= 0
+    assert first_point_in_view(*camera, 3.0, raised) == -1
+
+
+def line_of_positions(y_m: float) -> np.ndarray:
+    """From far east of the pipeline to over its second piece, at 2 m altitude."""
+    x = np.linspace(0.0, -30.0, 301)
+    return np.column_stack([x, np.full_like(x, y_m), np.full_like(x, -18.0)])
+
+
+def test_first_detection_is_the_first_row_with_a_point_in_view() -> None:
+    track = line_of_positions(0.5)
+    visibility = np.full(len(track), 3.0)
+    expected = next(
+        (row, point)
+        for row, position in enumerate(track)
+        if (point := first_point_in_view(*position, 3.0, POINTS)) >= 0
+    )
+    assert first_detection(track, 0, len(track) - 1, visibility, POINTS) == expected
+
+
+def test_first_detection_looks_only_at_the_rows_asked_for() -> None:
+    track = line_of_positions(0.5)
+    visibility = np.full(len(track), 3.0)
+    row, _ = first_detection(track, 0, len(track) - 1, visibility, POINTS)
+    assert first_detection(track, 0, row - 1, visibility, POINTS) == (-1, -1)
+
+
+def test_first_detection_waits_for_the_visibility() -> None:
+    track = line_of_positions(0.0)
+    visibility = np.where(np.arange(len(track)) < 250, 1.0, 2.5)
+    assert first_detection(track, 0, len(track) - 1, visibility, POINTS)[0] == 250
+
+
+def test_far_beside_the_pipeline_nothing_is_detected() -> None:
+    track = line_of_positions(2.0)
+    assert first_detection(track, 0, len(track) - 1, np.full(len(track), 9.0), POINTS) == (-1, -1)
