@@ -166,7 +166,7 @@ def _open(system: ManagedSystem) -> tuple[KnowledgeBase, Reasoner]:
 def _statuses(inference: Inference, state: KnowledgeState) -> Iterator[str]:
     for objective in state.objectives:
         status = inference.objective_status(objective.function)
-        if status is not None:
+        if status is not None and status != objective.status:
             yield f"objective of {objective.function} is {status}"
         if inference.is_updatable(objective.function) and not objective.always_improve:
             yield f"objective of {objective.function} is updatable"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from decimal import Decimal
+from functools import lru_cache
+from pathlib import Path
 
 from suave_des.errors import InputError
 from suave_des.knowledge.base import KnowledgeBase
@@ -18,9 +20,8 @@ def open_knowledge(loaded: LoadedScenario) -> tuple[KnowledgeBase, Reasoner]:
         InputError: a function design of the knowledge base has no mode of its name in the modes file.
     """
     knowledge = loaded.scenario.knowledge
-    base = KnowledgeBase.load(
-        loaded.ontologies, values={name: Decimal(repr(value)) for name, value in knowledge.values.items()}
-    )
+    values = tuple((name, Decimal(repr(value))) for name, value in sorted(knowledge.values.items()))
+    base, reasoner = _open(loaded.ontologies, tuple(sorted(loaded.inputs.items())), values, knowledge.reasoner)
     base.check(MISSION_FUNCTIONS)
     for function in MISSION_FUNCTIONS:
         for design in base.designs(function):
@@ -31,4 +32,16 @@ def open_knowledge(loaded: LoadedScenario) -> tuple[KnowledgeBase, Reasoner]:
                     place=function,
                     remedy="add the mode, or remove the design from the ontology",
                 )
-    return base, make_reasoner(knowledge.reasoner, base)
+    return base, reasoner
+
+
+@lru_cache(maxsize=4)
+def _open(
+    ontologies: tuple[Path, ...],
+    hashes: tuple[tuple[str, str], ...],
+    values: tuple[tuple[str, Decimal], ...],
+    reasoner: str,
+) -> tuple[KnowledgeBase, Reasoner]:
+    """Kept between scenarios that differ in other things: what was inferred stays true while the files' hashes do."""
+    base = KnowledgeBase.load(ontologies, values=dict(values))
+    return base, make_reasoner(reasoner, base)

@@ -1,0 +1,1 @@
+"""Calibration: fits parameters of a scenario to published runs."""

@@ -1,0 +1,150 @@
+"""Fits free parameters of a scenario to published runs, and tells how sharply each is determined."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+
+from suave_des.calibration.distance import Array, energy_distance, missions_as_vectors
+from suave_des.scenario.loader import LoadedScenario
+from suave_des.scenario.overrides import with_values
+from suave_des.simulation.simulator import Simulator
+
+
+@dataclass(frozen=True, slots=True)
+class FreeParameter:
+    """A parameter to fit: key path in the scenario, bounds, and where it starts."""
+
+    path: str
+    lower: float
+    upper: float
+    start: float
+
+    def value(self, unit: float) -> float:
+        """Value for a coordinate in [0, 1]; coordinates outside are reflected into it."""
+        folded = abs(unit) % 2.0
+        return self.lower + (self.upper - self.lower) * (2.0 - folded if folded > 1.0 else folded)
+
+    @property
+    def start_unit(self) -> float:
+        """Coordinate of the start value."""
+        return (self.start - self.lower) / (self.upper - self.lower)
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """One set of values and its distances from the published runs, for each manager and their mean."""
+
+    values: tuple[float, ...]
+    distances: tuple[float, ...]
+    loss: float
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """What is fitted to what.
+
+    Attributes:
+        loaded: the scenario.
+        parameters: what is free.
+        published: missions as scaled vectors, by manager (see distance.py).
+        runs: simulated missions for each manager and evaluation.
+        seed: seed of the simulated missions; all evaluations use the same streams, so that differences between them are
+            the parameters' doing.
+    """
+
+    loaded: LoadedScenario
+    parameters: tuple[FreeParameter, ...]
+    published: Mapping[str, Array]
+    runs: int
+    seed: int
+
+
+def evaluate(problem: Problem, values: Sequence[float]) -> Evaluation:
+    """Simulate all managers with one set of parameter values, and measure how far they are from the published runs."""
+    named = {parameter.path: value for parameter, value in zip(problem.parameters, values, strict=True)}
+    simulator = Simulator(with_values(problem.loaded, named))
+    distances = []
+    for manager in sorted(problem.published):
+        published = problem.published[manager]
+        simulated = simulate(simulator, manager, problem.runs, problem.seed)[:, : published.shape[1]]
+        distances.append(energy_distance(simulated, published))
+    return Evaluation(tuple(map(float, values)), tuple(distances), float(np.mean(distances)))
+
+
+def simulate(simulator: Simulator, manager: str, runs: int, seed: int) -> Array:
+    """Missions of one manager as scaled vectors, shape (runs, 3); the detection's x is nan where there was none."""
+    metrics = [simulator.run(manager, run, seed).metrics for run in range(1, runs + 1)]
+    return missions_as_vectors(
+        np.array([each.search_time_s for each in metrics]),
+        np.array([each.distance_inspected_m for each in metrics]),
+        np.array([np.nan if each.detection_x_m is None else each.detection_x_m for each in metrics]),
+    )
+
+
+_problem: Problem | None = None
+
+
+def _set_problem(problem: Problem) -> None:
+    global _problem
+    _problem = problem
+
+
+def _evaluate_here(values: Sequence[float]) -> Evaluation:
+    assert _problem is not None  # set when the worker started
+    return evaluate(_problem, values)
+
+
+@contextmanager
+def evaluator(problem: Problem, workers: int) -> Iterator[Callable[[list[Sequence[float]]], list[Evaluation]]]:
+    """A function that evaluates several sets of values, on worker processes if there is more than one."""
+    if workers == 1:
+        yield lambda many: [evaluate(problem, values) for values in many]
+        return
+    context = multiprocessing.get_context("spawn")
+    with context.Pool(workers, initializer=_set_problem, initargs=(problem,)) as pool:
+        yield lambda many: pool.map(_evaluate_here, many, chunksize=1)
+
+
+def fit(
+    problem: Problem,
+    evaluations: int,
+    *,
+    workers: int = 2,
+    seed: int = 1,
+    on_generation: Callable[[int, Evaluation], None] | None = None,
+) -> list[Evaluation]:
+    """Search for the values with the least distance, by CMA-ES (Hansen; package cma) in the box of the bounds.
+
+    Args:
+        problem: what is fitted to what.
+        evaluations: about how many sets of values to try.
+        workers: processes.
+        seed: of the search.
+        on_generation: called with the evaluations so far and the best one.
+
+    Returns:
+        All evaluations, in order.
+    """
+    import cma
+
+    start = [parameter.start_unit for parameter in problem.parameters]
+    search = cma.CMAEvolutionStrategy(start, 0.2, {"seed": seed, "verbose": -9, "maxfevals": evaluations, "tolfun": 1e-9})
+    tried: list[Evaluation] = []
+    with evaluator(problem, workers) as evaluate_all:
+        while len(tried) < evaluations:
+            units = search.ask()
+            many = [
+                [parameter.value(float(unit)) for parameter, unit in zip(problem.parameters, candidate, strict=True)]
+                for candidate in units
+            ]
+            generation = evaluate_all(many)
+            search.tell(units, [each.loss for each in generation])
+            tried.extend(generation)
+            if on_generation is not None:
+                on_generation(len(tried), min(tried, key=lambda each: each.loss))
+    return tried
