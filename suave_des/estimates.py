@@ -36,8 +36,8 @@ class Estimate:
 def estimate(values: Sequence[float]) -> Estimate:
     """Figures of a sample.
 
-    The interval of the mean holds well for samples of twenty and more; that of the standard deviation supposes values that
-    are normally distributed, and is a rough guide where they are not.
+    The interval of the mean holds well for samples of twenty and more; that of the standard deviation supposes values
+    that are normally distributed, and is a rough guide where they are not.
     """
     n = len(values)
     if n == 0:

@@ -110,8 +110,8 @@ def run_campaign(
         managers: names, or module:Class.
         runs: missions for each manager.
         seed: of everything that is random.
-        workers: processes; with 1 the missions run in this one. With more, a script that calls this must guard itself with
-            `if __name__ == "__main__":`, because worker processes import it.
+        workers: processes; with 1 the missions run in this one. With more, a script that calls this must guard itself
+            with `if __name__ == "__main__":`, because worker processes import it.
         out: folder for runs.csv, summary.csv and manifest.json; it is made if its parent exists. None: no files.
         ontologies: files to use in place of the scenario's.
         modes_file: file to use in place of the scenario's.
@@ -161,7 +161,7 @@ def run_campaign(
 
 
 def check_knowledge(loaded: LoadedScenario, managers: Sequence[str], *, given: bool) -> None:
-    """Open the knowledge base once, if a manager uses it or the user gave ontologies, so that no mission finds it broken.
+    """Open the knowledge base, if a manager uses it or the user gave ontologies, so that no mission finds it broken.
 
     Args:
         loaded: the scenario with its files.

@@ -1,7 +1,7 @@
 """Where missions run: in this process, or in worker processes.
 
-An executor takes chunks of missions and gives their outcomes, in whatever order they finish. Everything that a worker needs
-travels to it by value.
+An executor takes chunks of missions and gives their outcomes, in whatever order they finish. Everything that a worker
+needs travels to it by value.
 """
 
 from __future__ import annotations
@@ -10,9 +10,10 @@ import multiprocessing
 import signal
 import traceback
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
 from typing import Protocol
 
 from suave_des.campaign.outcomes import MissionRunner, Outcome
@@ -72,7 +73,7 @@ class _Crash:
 class ProcessPool:
     """Runs chunks of missions in worker processes.
 
-    Workers are spawned, never forked: a forked child would hang on the Java machine and the compiled code of its parent.
+    Workers are spawned, never forked: a forked child would hang on the Java machine of its parent.
 
     Args:
         workers: number of processes.
@@ -96,8 +97,8 @@ class ProcessPool:
                 for connection in crew:
                     waiting[connection] += _hand_out(chunks, connection)
             while any(waiting.values()):
-                for connection in wait([each for each, chunks_there in waiting.items() if chunks_there]):
-                    assert isinstance(connection, Connection)
+                ready = wait([connection for connection, chunks_there in waiting.items() if chunks_there])
+                for connection in [each for each in crew if each in ready]:
                     finished = _received(connection, crew[connection])
                     waiting[connection] += _hand_out(chunks, connection) - 1
                     yield finished
@@ -109,21 +110,23 @@ def chunk_size(total: int, workers: int) -> int:
 
 
 @contextmanager
-def _crew(loaded: LoadedScenario, workers: int) -> Iterator[dict[Connection, multiprocessing.process.BaseProcess]]:
+def _crew(loaded: LoadedScenario, workers: int) -> Iterator[dict[Connection, BaseProcess]]:
     """Worker processes by the connection to each; stopped at the end, at once if it comes by an exception."""
     context = multiprocessing.get_context("spawn")
-    crew: dict[Connection, multiprocessing.process.BaseProcess] = {}
+    crew: dict[Connection, BaseProcess] = {}
     try:
         with _interrupts_held():
             for _ in range(workers):
                 ours, theirs = context.Pipe()
-                process = context.Process(target=_work, args=(theirs, loaded), daemon=True)
+                process: BaseProcess = context.Process(target=_work, args=(theirs, loaded), daemon=True)
                 process.start()
                 theirs.close()
                 crew[ours] = process
         yield crew
-        for connection, process in crew.items():
-            connection.send(None)
+        for connection in crew:
+            with suppress(BrokenPipeError):  # its work is done: no matter if it is gone already
+                connection.send(None)
+        for process in crew.values():
             process.join(_STOP_TIMEOUT_S)
     finally:
         for connection, process in crew.items():
@@ -151,14 +154,12 @@ def _hand_out(chunks: Iterator[tuple[int, Chunk]], connection: Connection) -> in
     chunk = next(chunks, None)
     if chunk is None:
         return 0
-    try:
+    with suppress(BrokenPipeError):  # the worker is gone, which receiving from it tells, with the reason
         connection.send(chunk)
-    except BrokenPipeError:
-        pass  # the worker is gone, which receiving from it tells, with the reason
     return 1
 
 
-def _received(connection: Connection, process: multiprocessing.process.BaseProcess) -> Finished:
+def _received(connection: Connection, process: BaseProcess) -> Finished:
     try:
         message: Finished | _Crash = connection.recv()
     except (EOFError, ConnectionResetError):

@@ -24,7 +24,7 @@ _cells: Callable[[MissionMetrics], Row] = attrgetter(*COLUMNS)
 
 
 def row_of(metrics: MissionMetrics) -> Row:
-    """The cells of runs.csv, with numbers rounded as they stand there: what is derived from a row follows from the file."""
+    """The cells of runs.csv, numbers rounded as they stand there: what is derived from a row follows from the file."""
     return tuple(rounded(cell) if isinstance(cell, float) else cell for cell in _cells(metrics))
 
 
@@ -44,6 +44,7 @@ class Failure(NamedTuple):
     cause: str
 
     def __str__(self) -> str:
+        """In one line, with all that is known."""
         return str(MissionError(self.manager, self.run, self.time_s, self.cause))
 
 

@@ -1,8 +1,8 @@
 """The exemplar's own results file (kas-lab/suave, revisions 2023 and 1.5), so that its users' scripts read ours.
 
-All managers are in one file, as the mission's name carries the manager's. The exemplar stamps each row with the time of day.
-Ours must be the same each time, so mission number n of the campaign bears the time n seconds after midnight of 1 January
-2000. Seconds and metres are as in runs.csv.
+All managers are in one file, as the mission's name carries the manager's. The exemplar stamps each row with the time of
+day. Ours must be the same each time, so mission number n of the campaign bears the time n seconds after midnight of
+1 January 2000. Seconds and metres are as in runs.csv.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Command line: one thin module for each command."""
+"""The command line: one thin module for each command. Heavy imports happen inside the commands."""

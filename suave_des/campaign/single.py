@@ -1,0 +1,85 @@
+"""One mission with its whole record, and the files that tell of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import astuple, fields
+from pathlib import Path
+
+from suave_des.campaign.campaign import check_knowledge
+from suave_des.campaign.outcomes import COLUMNS, row_of
+from suave_des.campaign.output import (
+    check_output_folder,
+    csv_text,
+    json_text,
+    make_output_folder,
+    write_files,
+)
+from suave_des.campaign.provenance import provenance
+from suave_des.scenario.loader import LoadedScenario, load_scenario
+from suave_des.simulation.result import Event, MissionResult, TrajectoryPoint
+from suave_des.simulation.simulator import Simulator
+
+MISSION_FILE, EVENTS_FILE, TRAJECTORY_FILE = "mission.json", "events.csv", "trajectory.csv"
+
+EVENT_COLUMNS = tuple(field.name for field in fields(Event))
+TRAJECTORY_COLUMNS = tuple(field.name for field in fields(TrajectoryPoint))
+
+
+def run_mission(
+    scenario: str | Path,
+    manager: str,
+    run: int,
+    seed: int,
+    out: str | Path | None = None,
+    *,
+    ontologies: Sequence[str | Path] = (),
+    modes_file: str | Path | None = None,
+    reasoner: str | None = None,
+    overwrite: bool = False,
+    command: Sequence[str] = (),
+) -> MissionResult:
+    """Run one mission and keep its events and trajectory.
+
+    It is the mission that a campaign with this seed has as its run of this number.
+
+    Args:
+        scenario: path of a scenario file, or name of a shipped one.
+        manager: name of the managing subsystem, or module:Class.
+        run: number of the run, from 1.
+        seed: of everything that is random.
+        out: folder for mission.json, events.csv and trajectory.csv; it is made if its parent exists. None: no files.
+        ontologies: files to use in place of the scenario's.
+        modes_file: file to use in place of the scenario's.
+        reasoner: to use in place of the scenario's.
+        overwrite: whether results in the folder may be replaced.
+        command: the command line, for mission.json.
+
+    Raises:
+        InputError: something given cannot be used; nothing is written then.
+        MissionError: the manager raised; nothing is written then.
+    """
+    folder = None if out is None else Path(out)
+    if folder is not None:
+        check_output_folder(folder, overwrite=overwrite)
+    loaded = load_scenario(scenario, ontologies=ontologies, modes_file=modes_file, reasoner=reasoner)
+    check_knowledge(loaded, [manager], given=bool(ontologies))
+    result = Simulator(loaded).run(manager, run, seed, record=True)
+    if folder is not None:
+        make_output_folder(folder)
+        write_files(folder, _files(loaded, result, command))
+    return result
+
+
+def _files(loaded: LoadedScenario, result: MissionResult, command: Sequence[str]) -> dict[str, str]:
+    mission = {
+        "metrics": dict(zip(COLUMNS, row_of(result.metrics), strict=True)),
+        "drawn": dict(sorted(result.drawn.items())),
+        "scenario": loaded.scenario.model_dump(mode="json"),
+        **provenance(loaded, command),
+    }
+    return {
+        MISSION_FILE: json_text(mission),
+        EVENTS_FILE: csv_text(EVENT_COLUMNS, map(astuple, result.events)),
+        TRAJECTORY_FILE: csv_text(TRAJECTORY_COLUMNS, map(astuple, result.trajectory)),
+    }

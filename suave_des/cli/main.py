@@ -1,0 +1,98 @@
+"""The command `suave-des`: its commands, and how errors leave it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from suave_des import __version__
+from suave_des.cli import campaign, figure, reproduce, run, scenarios, schema
+from suave_des.errors import InputError, SuaveDesError
+
+BAD_INPUT, MISSIONS_MISSING, INTERRUPTED = 2, 3, 130
+"""Exit statuses besides 0; 3: done, but missions have no row, because their manager raised or a worker was killed."""
+
+
+class _Commands(TyperGroup):
+    """Takes Ctrl-C before typer does, which would say nothing of what is kept."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as error:
+            raise typer.Exit(_tell(str(error) or "interrupted", INTERRUPTED)) from None
+
+
+def _tell(message: str, status: int) -> int:
+    print("suave-des: " + " ".join(message.splitlines()), file=sys.stderr)
+    return status
+
+
+def _usage_line(error: Any) -> str:
+    context = getattr(error, "ctx", None)
+    path = context.command_path if context is not None else "suave-des"
+    return f"{error.format_message().rstrip('.')} (see {path} --help)"
+
+
+app = typer.Typer(
+    name="suave-des",
+    cls=_Commands,
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="SUAVE, the self-adaptive underwater vehicle exemplar, as a repeatable discrete-event simulation.",
+    epilog="Exit status: 0 done; 2 bad input; 3 done, but missions failed; 130 interrupted.",
+)
+app.command("reproduce")(reproduce.reproduce)
+app.command("run")(run.run)
+app.command("campaign")(campaign.campaign)
+app.command("figure")(figure.figure)
+app.command("scenarios")(scenarios.scenarios)
+app.command("schema")(schema.schema)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"suave-des {__version__}")
+        raise typer.Exit()
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    # `--manager my_module:MyClass` finds modules in the current folder, in worker processes too.
+    folder = str(Path.cwd())
+    if folder not in sys.path:
+        sys.path.append(folder)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Entry point of the command `suave-des`: every error that is meant for the user is one line and an exit status.
+
+    Args:
+        arguments: of the command line; left out, the process's own.
+
+    Raises:
+        SystemExit: always, with the exit status.
+    """
+    command = typer.main.get_command(app)
+    try:
+        status = command.main(arguments, prog_name="suave-des", standalone_mode=False) or 0
+    except SuaveDesError as error:
+        status = _tell(str(error), BAD_INPUT if isinstance(error, InputError) else MISSIONS_MISSING)
+    except Exception as error:
+        # A wrong option or argument: a class that is private to typer, and was click's in earlier versions of it.
+        if not hasattr(error, "format_message"):
+            raise
+        # Without a message it is no error but a command without arguments, whose help is printed already.
+        status = _tell(_usage_line(error), BAD_INPUT) if error.format_message() else BAD_INPUT
+    sys.exit(status)

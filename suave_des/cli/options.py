@@ -1,0 +1,33 @@
+"""Arguments and options that several commands share."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Scenario = Annotated[str, typer.Argument(metavar="SCENARIO", help="A scenario file, or the name of a shipped one.")]
+Ontologies = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--ontology", metavar="FILE", help="Ontology in place of the scenario's; repeat it for several files."
+    ),
+]
+Modes = Annotated[
+    Path | None, typer.Option("--modes", metavar="FILE", help="System Modes file in place of the scenario's.")
+]
+Reasoner = Annotated[
+    str | None, typer.Option("--reasoner", metavar="NAME", help="pellet, or owlready2 (the reference, slow).")
+]
+Seed = Annotated[int, typer.Option("--seed", help="Seed of everything that is random.")]
+Workers = Annotated[
+    int, typer.Option("--workers", help="Processes that run missions; any number gives the same bytes.")
+]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace results that are in the output folder already.")]
+
+
+def command_line() -> list[str]:
+    """The command line as it goes into a manifest: without where the program is installed."""
+    return ["suave-des", *sys.argv[1:]]

@@ -1,0 +1,102 @@
+"""suave-des reproduce: the paper's experiment, and its table beside ours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from suave_des.cli.campaign import exit_telling_failures
+from suave_des.cli.options import Modes, Ontologies, Overwrite, Reasoner, Seed, Workers, command_line
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rich.console import Console
+    from rich.table import Table
+
+    from suave_des.report.comparison import Comparison, Figure
+
+SCENARIO = "seams2023"
+
+
+def reproduce(
+    runs: Annotated[int, typer.Option("--runs", help="Missions for each manager; the paper has 20.")] = 200,
+    workers: Workers = 2,
+    seed: Seed = 1,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for result files; left out, none are written.")
+    ] = None,
+    overwrite: Overwrite = False,
+    ontology: Ontologies = None,
+    modes: Modes = None,
+    reasoner: Reasoner = None,
+) -> None:
+    """Run the paper's experiment (SEAMS 2023) and print its table beside ours."""
+    from suave_des.campaign.campaign import run_campaign
+    from suave_des.campaign.output import write_files
+    from suave_des.cli.console import output, progress_bar
+    from suave_des.report.comparison import compare, csv_table, markdown_table
+    from suave_des.report.published import MANAGERS, published
+
+    with progress_bar("reproduce") as show:
+        result = run_campaign(
+            SCENARIO,
+            MANAGERS,
+            runs,
+            seed,
+            workers,
+            out,
+            ontologies=ontology or (),
+            modes_file=modes,
+            reasoner=reasoner,
+            overwrite=overwrite,
+            command=command_line(),
+            on_progress=show,
+        )
+    comparison = compare(result.frame(), published())
+    console = output()
+    print_comparison(console, comparison)
+    if out is None:
+        console.print("\nNo files were written; --out DIR keeps each mission's figures.", soft_wrap=True)
+    else:
+        write_files(out, {"paper_table.md": markdown_table(comparison), "paper_table.csv": csv_table(comparison)})
+        console.print(f"\nThe missions are in {out}/runs.csv, this table in {out}/paper_table.md", soft_wrap=True)
+    exit_telling_failures(result)
+
+
+def print_comparison(console: Console, comparison: Comparison) -> None:
+    """Print the paper's table beside ours, and what can be said of it."""
+    from suave_des.cli.tables import print_table
+    from suave_des.report.comparison import METRICS
+
+    for metric, title in METRICS.items():
+        print_table(console, title, _table([figure for figure in comparison.figures if figure.metric == metric]))
+        console.print()
+    for line in comparison.remarks():
+        console.print(line)
+
+
+def _table(figures: Sequence[Figure]) -> Table:
+    from suave_des.cli.tables import interval, number, plain_table
+    from suave_des.report.comparison import MARK
+
+    table = plain_table()
+    table.add_column("manager", min_width=12)
+    table.add_column("", min_width=5)
+    for heading in ("paper", "95% interval", "here", "95% interval", "difference"):
+        table.add_column(heading, justify="right", min_width=8)
+    table.add_column("")
+    for figure in figures:
+        table.add_row(
+            figure.manager,
+            figure.statistic,
+            number(figure.published),
+            interval(*figure.published_interval),
+            number(figure.ours),
+            interval(*(figure.ours_interval or (None, None))),
+            "" if figure.difference is None else f"{figure.difference:+.2f}",
+            "" if figure.is_inside else MARK,
+        )
+    return table

@@ -1,0 +1,50 @@
+"""The look of all figures: text width of a paper, small type, and colours that colour-blind readers tell apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import matplotlib
+
+WIDTH_IN = 7.0
+"""Text width of a two-column paper."""
+
+# Okabe and Ito's palette, safe for colour-blind readers.
+BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+BLUE, VERMILION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#8A8A8A"
+CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION)
+
+_SETTINGS: Any = {
+    "font.family": "sans-serif",
+    "font.size": 8.0,
+    "axes.titlesize": 8.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 8.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.7,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#E3E3E3",
+    "grid.linewidth": 0.5,
+    "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5,
+    "legend.fontsize": 7.5,
+    "legend.frameon": False,
+    "lines.linewidth": 1.2,
+    "figure.dpi": 100,
+    "savefig.dpi": 300,
+    "pdf.fonttype": 42,  # text stays text
+    "svg.fonttype": "none",
+    "svg.hashsalt": "suave-des",  # equal data give equal files
+}
+
+
+@contextmanager
+def publication() -> Iterator[None]:
+    """Figures drawn within look alike; matplotlib's own settings come back after it."""
+    with matplotlib.rc_context(_SETTINGS):
+        yield
