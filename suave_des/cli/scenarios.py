@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 def scenarios() -> None:
-    """List the shipped scenarios, modes files and ontologies."""
+    """List the shipped scenarios and other inputs."""
     from suave_des.cli.console import output
     from suave_des.cli.tables import plain_table, print_table
     from suave_des.resources import shipped_folder

@@ -26,11 +26,12 @@ def draw(path: Path) -> Figure:
     left, right = figure.subplots(1, 2, sharey=True)
     samples = {str(manager): own for manager, own in runs.groupby("manager", sort=False)}
     for axes, letter, (metric, title) in zip((left, right), "ab", METRICS.items(), strict=True):
+        end = max(1.0, float(runs[metric].max()) * 1.04)
         for place, (manager, own) in enumerate(samples.items()):
             label = f"{manager} (n = {len(own)})"
-            _draw_curve(axes, np.sort(own[metric].to_numpy()), label, style.CYCLE[place % len(style.CYCLE)])
+            _draw_curve(axes, np.sort(own[metric].to_numpy()), end, label, style.CYCLE[place % len(style.CYCLE)])
         axes.set_xlabel(title)
-        axes.set_xlim(left=0.0)
+        axes.set_xlim(0.0, end)
         axes.set_title(f"{letter}   {title.split(' (')[0].capitalize()}")
     left.set_ylabel("share of missions at or below")
     left.set_ylim(0.0, 1.02)
@@ -40,9 +41,8 @@ def draw(path: Path) -> Figure:
     return figure
 
 
-def _draw_curve(axes: Axes, values: np.ndarray, label: str, colour: str) -> None:
+def _draw_curve(axes: Axes, values: np.ndarray, end: float, label: str, colour: str) -> None:
     shares = np.arange(1, len(values) + 1) / len(values)
-    end = max(axes.get_xlim()[1], values[-1] * 1.04)
     axes.step([0.0, *values, end], [0.0, *shares, 1.0], where="post", color=colour, label=label)
     mean = float(values.mean())
     axes.plot(mean, 0.0, marker="^", color=colour, ms=5, clip_on=False, zorder=5)

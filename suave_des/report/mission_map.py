@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
-from string import ascii_uppercase as _LETTERS
+from string import ascii_uppercase
 
 import numpy as np
 import pandas
@@ -92,7 +92,7 @@ def _mode_colours(record: MissionRecord) -> dict[str, str]:
 
 def _marks(record: MissionRecord) -> Iterator[_Mark]:
     way = record.trajectory
-    for letter, (t_s, text, colour) in zip(_LETTERS, _told(record.events), strict=False):
+    for letter, (t_s, text, colour) in zip(ascii_uppercase, _told(record.events), strict=False):
         x_m, y_m = (float(np.interp(t_s, way["t_s"], way[axis])) for axis in ("x_m", "y_m"))
         yield _Mark(letter, t_s, x_m, y_m, f"{text}, {t_s:.0f} s", colour)
 
@@ -188,7 +188,17 @@ def _draw_over_time(axes: Axes, record: MissionRecord, colours: dict[str, str], 
     top = max(way["altitude_m"].max(), way["visibility_m"].max()) * 1.18
     for mark in marks:
         axes.axvline(mark.t_s, color=mark.colour, lw=0.7, ls=":")
-        axes.text(mark.t_s, top, mark.letter, color=mark.colour, weight="bold", ha="center", va="top", fontsize=8)
+        axes.text(
+            mark.t_s,
+            top,
+            mark.letter,
+            color=mark.colour,
+            weight="bold",
+            ha="center",
+            va="top",
+            fontsize=8,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
+        )
     axes.set_ylim(0.0, top)
     axes.set_xlim(0.0, way["t_s"].iloc[-1])
     axes.set_xlabel("mission time (s)")
