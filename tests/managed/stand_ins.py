@@ -1,0 +1,79 @@
+"""Stand-ins for what a function of the managed subsystem needs around it, so that each moment can be worked out."""
+
+import random
+from collections.abc import Callable
+from functools import cache
+
+import simpy
+
+from suave_des.managed.node import Frame, SetPointSender
+from suave_des.scenario.loader import load_scenario
+from suave_des.scenario.modes import Mode
+from suave_des.scenario.revision import Revision
+
+Place = tuple[float, float, float]
+START = (-17.0, 2.0, -18.5)
+
+
+class PlacedVehicle:
+    """A vehicle that is where the test puts it, and keeps what it was told.
+
+    With `obeys` it is at each set-point at once, `rise_m` above it.
+    """
+
+    def __init__(self, place: Place = START, *, obeys: bool = False, rise_m: float = 0.0) -> None:
+        self.place = place
+        self.obeys = obeys
+        self.rise_m = rise_m
+        self.commands: list[tuple[float, Place]] = []
+
+    def position(self, t_s: float) -> Place:
+        return self.place
+
+    def command(self, t_s: float, x_m: float, y_m: float, z_m: float) -> None:
+        self.commands.append((t_s, (x_m, y_m, z_m)))
+        if self.obeys:
+            self.place = (x_m, y_m, z_m + self.rise_m)
+
+    @property
+    def told(self) -> list[Place]:
+        return [place for _, place in self.commands]
+
+    @property
+    def times_s(self) -> list[float]:
+        return [round(t_s, 6) for t_s, _ in self.commands]
+
+
+class MovingVehicle(PlacedVehicle):
+    """A vehicle that goes its way over time whatever it is told."""
+
+    def __init__(self, way: Callable[[float], Place]) -> None:
+        super().__init__()
+        self._way = way
+
+    def position(self, t_s: float) -> Place:
+        return self._way(t_s)
+
+
+@cache
+def revision(name: str) -> Revision:
+    """The shipped revision "2023" or "1.5"."""
+    return load_scenario({"2023": "seams2023", "1.5": "release15"}[name]).scenario.revision
+
+
+def sender(env: simpy.Environment, vehicle: PlacedVehicle) -> SetPointSender:
+    """A way to the autopilot that loses nothing and errs in nothing."""
+    return SetPointSender(env, vehicle, Frame(), 0.0, random.Random(0))
+
+
+def spiral_at(altitude_m: float) -> Mode:
+    """An active search mode."""
+    return Mode(f"at_{altitude_m:g}", True, {"spiral_altitude": altitude_m})
+
+
+ACTIVE = Mode("active", True, {})
+INACTIVE = Mode("fd_unground", False, {})
+
+
+def silent(source: str, event: str, detail: str) -> None:
+    """A log that keeps nothing."""

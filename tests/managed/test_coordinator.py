@@ -1,0 +1,152 @@
+"""The mission coordinator: tasks, hand-over, time limit, search time."""
+
+from types import SimpleNamespace
+
+import pytest
+import simpy
+from stand_ins import revision
+
+from suave_des.managed.coordinator import MissionCoordinator, Task
+
+BOTH = pytest.mark.parametrize("name", ["2023", "1.5"])
+POLL_PHASE_S, LIMIT_PHASE_S = 0.35, 0.2
+
+
+class Mission:
+    """A coordinator with a detection and a path's end at given times; what it asks for, with the times."""
+
+    def __init__(
+        self,
+        name: str,
+        detected_s: float | None = None,
+        path_end_s: float | None = None,
+        *,
+        time_limit_s: float = 300.0,
+        start_delay_s: float = 0.0,
+    ) -> None:
+        self.env = simpy.Environment()
+        self.detector = SimpleNamespace(detected=self.env.event(), detected_s=None, first_point=3)
+        self.follow = SimpleNamespace(finished=self.env.event())
+        if detected_s is not None:
+            self.env.process(self._detect(detected_s))
+        if path_end_s is not None:
+            self.env.process(self._finish(path_end_s))
+        self.calls: list[tuple[str, float, str]] = []
+        self.tasks: list[Task] = []
+        self.logged: list[tuple[float, str]] = []
+        self.coordinator = MissionCoordinator(
+            self.env,
+            revision(name).coordinator,
+            self.detector,
+            self.follow,
+            self._request,
+            lambda task: self.calls.append(("cancel", round(self.env.now, 6), task.name)),
+            time_limit_s=time_limit_s,
+            start_delay_s=start_delay_s,
+            poll_phase_s=POLL_PHASE_S if name == "2023" else 0.035,
+            limit_phase_s=LIMIT_PHASE_S,
+            log=lambda source, event, detail: self.logged.append((self.env.now, event)),
+        )
+
+    def run(self) -> "Mission":
+        self.env.run(until=self.coordinator.ended)
+        return self
+
+    def _request(self, task: Task) -> None:
+        self.calls.append(("request", round(self.env.now, 6), task.name))
+        self.tasks.append(task)
+
+    def _detect(self, at_s: float):
+        yield self.env.timeout(at_s)
+        self.detector.detected_s = at_s
+        self.detector.detected.succeed()
+
+    def _finish(self, at_s: float):
+        yield self.env.timeout(at_s)
+        self.follow.finished.succeed()
+
+
+@BOTH
+def test_search_is_requested_when_the_mission_starts(name: str) -> None:
+    assert Mission(name, start_delay_s=2.5).run().calls[0] == ("request", 2.5, "search_pipeline")
+
+
+@pytest.mark.parametrize(("name", "poll_s"), [("2023", 74.35), ("1.5", 73.535)])
+def test_at_the_poll_that_sees_the_detection_the_search_ends_and_the_inspection_begins(
+    name: str, poll_s: float
+) -> None:
+    assert Mission(name, 73.45).run().calls[1:3] == [
+        ("cancel", poll_s, "search_pipeline"),
+        ("request", poll_s, "inspect_pipeline"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "detected_s", "search_time_s"),
+    [("2023", 73.45, 74.0), ("2023", 73.30, 73.0), ("1.5", 73.45, 73.0), ("1.5", 73.99, 73.0)],
+)
+def test_search_time(name: str, detected_s: float, search_time_s: float) -> None:
+    assert Mission(name, detected_s).run().coordinator.search_time_or_limit_s() == search_time_s
+
+
+@BOTH
+def test_search_time_is_in_whole_seconds(name: str) -> None:
+    search_time_s = Mission(name, 100.7).run().coordinator.search_time_or_limit_s()
+    assert search_time_s == int(search_time_s)
+
+
+@pytest.mark.parametrize(("name", "search_time_s"), [("2023", 100.0), ("1.5", 100.2)])
+def test_search_time_when_not_found(name: str, search_time_s: float) -> None:
+    mission = Mission(name, time_limit_s=100.0).run()
+    assert mission.coordinator.search_time_or_limit_s() == pytest.approx(search_time_s)
+
+
+def test_detection_before_the_search_was_requested_keeps_its_own_time() -> None:
+    assert Mission("1.5", 2.2, start_delay_s=5.0).run().coordinator.search_time_s == 2.0
+
+
+def test_detection_is_told_at_its_own_time() -> None:
+    assert (73.45, "pipeline_detected") in Mission("2023", 73.45).run().logged
+
+
+@pytest.mark.parametrize(("limit_s", "end_s"), [(300.0, 300.2), (100.21, 100.7), (100.7, 100.7)])
+@BOTH
+def test_the_limit_is_checked_every_half_second(name: str, limit_s: float, end_s: float) -> None:
+    assert Mission(name, time_limit_s=limit_s).run().env.now == pytest.approx(end_s)
+
+
+@pytest.mark.parametrize(("detected_s", "task"), [(None, "search_pipeline"), (150.0, "inspect_pipeline")])
+@BOTH
+def test_at_the_limit_the_present_task_is_cancelled(name: str, detected_s: float | None, task: str) -> None:
+    assert Mission(name, detected_s).run().calls[-1] == ("cancel", 300.2, task)
+
+
+def test_each_task_is_cancelled_once() -> None:
+    calls = Mission("1.5", 50.0, 200.0).run().calls
+    assert [task for what, _, task in calls if what == "cancel"] == ["search_pipeline", "inspect_pipeline"]
+
+
+@pytest.mark.parametrize(("name", "end_s"), [("2023", 201.35), ("1.5", 201.135)])
+def test_the_mission_ends_at_the_poll_after_the_end_of_the_path(name: str, end_s: float) -> None:
+    assert Mission(name, 50.0, 201.1).run().env.now == pytest.approx(end_s)
+
+
+def test_a_detection_that_no_poll_saw_before_the_limit_is_none() -> None:
+    # Detected at 300.1 s, seen only at 300.35 s; the limit is noticed at 300.2 s.
+    assert Mission("2023", 300.1).run().coordinator.search_time_s is None
+
+
+@pytest.mark.parametrize(
+    ("name", "functions"),
+    [
+        ("2023", [("f_generate_search_path",), ("f_follow_pipeline",)]),
+        ("1.5", [("f_maintain_motion", "f_generate_search_path"), ("f_maintain_motion", "f_follow_pipeline")]),
+    ],
+)
+def test_functions_that_each_task_requests_and_cancels(name: str, functions: list[tuple[str, ...]]) -> None:
+    assert [task.functions for task in Mission(name, 50.0).run().tasks] == functions
+
+
+@pytest.mark.parametrize(("name", "functions"), [("2023", ("f_maintain_motion",)), ("1.5", ())])
+def test_functions_needed_from_launch_to_the_end(name: str, functions: tuple[str, ...]) -> None:
+    assert Mission(name).coordinator.lasting_functions == functions

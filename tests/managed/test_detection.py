@@ -1,0 +1,123 @@
+"""Pipeline detection: the first sight on the vehicle's way, whoever looks at the vehicle meanwhile."""
+
+import numpy as np
+import pytest
+import simpy
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from suave_des.managed.detection import PipelineDetector, measured_at_rows
+from suave_des.monitor.monitors import Measurements
+from suave_des.scenario.models import Pipeline
+from suave_des.vehicle.bluerov2 import BLUEROV2
+from suave_des.vehicle.vehicle import STEP_S, Autopilot, Pose, Vehicle, row_at
+from suave_des.world.pipeline import first_point_in_view, sample_points
+
+POINTS = sample_points(Pipeline().vertices_m)
+DURATION_S = 120.0
+
+
+class Sight:
+    """A vehicle that is sent to places at given times, and a detector."""
+
+    def __init__(self, commands: list, visibility_m: float = 3.0, readings: tuple[float, ...] = ()) -> None:
+        self.env = simpy.Environment()
+        autopilot = Autopilot(0.48, 0.34, 0.36, 0.5)
+        self.vehicle = Vehicle(BLUEROV2, autopilot, Pose(-17.0, 4.0, -18.0, 0.0, 0.0, 0.0), DURATION_S)
+        self.visibility_m = np.full(self.vehicle.last_row + 1, visibility_m)
+        self.detector = PipelineDetector(self.env, self.vehicle, self.visibility_m, POINTS)
+        for t_s, place in commands:
+            self.env.process(self._at(t_s, lambda place=place: self.vehicle.command(self.env.now, *place)))
+        for t_s in readings:
+            self.env.process(self._at(t_s, lambda: self.vehicle.pose(self.env.now)))
+
+    def _at(self, t_s: float, action):
+        yield self.env.timeout(t_s)
+        action()
+
+    def run(self) -> tuple[float | None, int | None]:
+        self.env.run(until=DURATION_S)
+        return self.detector.detected_s, self.detector.first_point
+
+
+TO_THE_PIPELINE = [(5.0, (-17.0, -4.0, -18.0))]
+
+
+def first_sight(sight: Sight) -> tuple[float, int]:
+    """The same found by looking at every row of the finished track."""
+    track = sight.vehicle.track
+    for row in range(sight.vehicle.computed_row + 1):
+        point = first_point_in_view(*track[row, :3], sight.visibility_m[row], POINTS)
+        if point >= 0:
+            return pytest.approx(row * STEP_S), point
+    raise AssertionError("never in view")
+
+
+def test_detection_is_the_first_row_of_the_way_with_a_point_in_view() -> None:
+    sight = Sight(TO_THE_PIPELINE)
+    assert sight.run() == first_sight(sight)
+
+
+def test_vehicle_that_starts_over_the_pipeline_sees_it_at_once() -> None:
+    env = simpy.Environment()
+    vehicle = Vehicle(BLUEROV2, Autopilot(0.48, 0.34, 0.36, 0.5), Pose(-17.0, 0.0, -18.0, 0, 0, 0), 10.0)
+    detector = PipelineDetector(env, vehicle, np.full(vehicle.last_row + 1, 3.0), POINTS)
+    env.run(until=1.0)
+    assert detector.detected_s == 0.0
+
+
+def test_a_command_in_time_turns_the_vehicle_away_before_it_sees_anything() -> None:
+    sight = Sight([*TO_THE_PIPELINE, (10.0, (-17.0, 4.0, -18.0))])
+    assert sight.run() == (None, None)
+
+
+def test_without_sight_until_the_end_there_is_no_detection() -> None:
+    assert Sight(TO_THE_PIPELINE, visibility_m=1.0).run() == (None, None)
+
+
+def test_only_the_first_sight_counts() -> None:
+    there_and_back = [(0.0, (-17.0, -4.0, -18.0)), (40.0, (-22.0, 4.0, -18.0))]
+    sight = Sight(there_and_back)
+    assert sight.run() == first_sight(sight)
+
+
+commands = st.lists(
+    st.tuples(st.floats(0.0, 60.0), st.tuples(st.floats(-20, -14), st.floats(-3, 4), st.floats(-19.5, -17))),
+    min_size=1,
+    max_size=8,
+)
+
+
+@settings(max_examples=60)
+@given(commands, st.lists(st.floats(0.0, 100.0), max_size=20))
+def test_detection_does_not_depend_on_who_reads_the_vehicle(commands: list, readings: list[float]) -> None:
+    assert Sight(commands).run() == Sight(commands, readings=tuple(readings)).run()
+
+
+@settings(max_examples=60)
+@given(commands)
+def test_detection_under_many_commands_is_still_the_first_sight(commands: list) -> None:
+    sight = Sight(commands)
+    found = sight.run()
+    if found[0] is not None:
+        assert found == first_sight(sight)
+    else:
+        with pytest.raises(AssertionError, match="never in view"):
+            first_sight(sight)
+
+
+def test_visibility_counts_as_it_was_measured_last() -> None:
+    measured = Measurements("water_visibility", (0.2, 1.2, 2.2), (3.0, 2.0, 1.0), 0.2, 1.0)
+    rows = measured_at_rows(measured, row_at(3.0))
+    picked = [rows[row_at(t_s)] for t_s in (0.2, 1.15, 1.2, 2.9)]
+    assert picked == [3.0, 3.0, 2.0, 1.0]
+
+
+def test_before_the_first_measurement_there_is_none() -> None:
+    measured = Measurements("water_visibility", (0.2,), (3.0,), 0.2, 1.0)
+    assert np.isnan(measured_at_rows(measured, 10)[:4]).all()
+
+
+def test_measurements_after_the_end_are_left_out() -> None:
+    measured = Measurements("water_visibility", (0.0, 1.0, 99.0), (3.0, 2.0, 1.0), 0.0, 1.0)
+    assert measured_at_rows(measured, 40).tolist() == [3.0] * 20 + [2.0] * 20

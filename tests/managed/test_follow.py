@@ -1,0 +1,242 @@
+"""Follow pipeline: points, polls, and the distance it publishes."""
+
+import math
+
+import pytest
+import simpy
+from stand_ins import ACTIVE, INACTIVE, MovingVehicle, PlacedVehicle, revision, sender
+
+from suave_des.managed.follow import FollowPipeline
+from suave_des.vehicle.bluerov2 import BLUEROV2
+from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle
+
+BOTH = pytest.mark.parametrize("name", ["2023", "1.5"])
+LINE = [(-0.5 * n, 0.0) for n in range(21)]
+SPEED = 0.25
+
+
+def follow_of(env: simpy.Environment, name: str, vehicle: PlacedVehicle, path=LINE) -> FollowPipeline:
+    return FollowPipeline(env, vehicle, sender(env, vehicle), revision(name).follow, lambda: path)
+
+
+def along_the_line() -> MovingVehicle:
+    """At 0.25 m/s along the line's points, 2 s from each to the next."""
+    return MovingVehicle(lambda t_s: (-SPEED * t_s, 0.0, -18.75))
+
+
+@pytest.fixture
+def env() -> simpy.Environment:
+    return simpy.Environment()
+
+
+@BOTH
+def test_set_points_are_1_25_m_above_the_bed(env: simpy.Environment, name: str) -> None:
+    vehicle = PlacedVehicle()
+    follow_of(env, name, vehicle).apply(ACTIVE)
+    env.run(until=0.1)
+    assert vehicle.told == [(0.0, 0.0, -18.75)]
+
+
+@BOTH
+def test_points_are_visited_in_order(env: simpy.Environment, name: str) -> None:
+    vehicle = PlacedVehicle(obeys=True)
+    follow_of(env, name, vehicle).apply(ACTIVE)
+    env.run(until=100.0)
+    assert [(x, y) for x, y, _ in vehicle.told] == LINE
+
+
+@BOTH
+def test_points_already_reached_count_at_once(env: simpy.Environment, name: str) -> None:
+    follow = follow_of(env, name, PlacedVehicle(obeys=True))
+    follow.apply(ACTIVE)
+    env.run(until=0.01)
+    assert follow.finished.triggered
+
+
+@BOTH
+def test_distance_is_the_sum_of_the_steps_between_reached_points(env: simpy.Environment, name: str) -> None:
+    corner = [(0.0, 0.0), (0.5, 0.0), (0.5, 1.5), (0.0, 1.5)]
+    follow = follow_of(env, name, PlacedVehicle(obeys=True), corner)
+    follow.apply(ACTIVE)
+    env.run(until=1.0)
+    assert follow.distance_m == pytest.approx(2.5)
+
+
+@pytest.mark.parametrize(("name", "box_m"), [("2023", 0.4), ("1.5", 0.5)])
+@pytest.mark.parametrize(("offset_m", "reached"), [(-0.01, True), (0.01, False)], ids=["inside", "outside"])
+@pytest.mark.parametrize("axis", [0, 1], ids=["x", "y"])
+def test_box_within_which_a_point_is_reached(
+    env: simpy.Environment, name: str, box_m: float, offset_m: float, reached: bool, axis: int
+) -> None:
+    place = [0.0, 0.0, -18.75]
+    place[axis] += box_m + offset_m
+    vehicle = PlacedVehicle(tuple(place))
+    follow_of(env, name, vehicle, [(0.0, 0.0), (9.0, 9.0)]).apply(ACTIVE)
+    env.run(until=0.1)
+    assert (len(vehicle.told) == 2) is reached
+
+
+@BOTH
+def test_depth_does_not_matter_for_reaching_a_point(env: simpy.Environment, name: str) -> None:
+    vehicle = PlacedVehicle((0.0, 0.0, -15.0))
+    follow_of(env, name, vehicle, [(0.0, 0.0), (9.0, 9.0)]).apply(ACTIVE)
+    env.run(until=0.1)
+    assert len(vehicle.told) == 2
+
+
+# The box of a point 2.125 m along is entered after 6.9 s in 2023, after 6.5 s in 1.5; polls follow at 7 and at 8 s.
+@pytest.mark.parametrize(("name", "seen_s"), [("2023", 1.5 + 7.0), ("1.5", 1.5 + 8.0)])
+def test_polls_lie_on_a_grid_that_begins_with_the_activation(env: simpy.Environment, name: str, seen_s: float) -> None:
+    vehicle = MovingVehicle(lambda t_s: (-SPEED * (t_s - 1.5), 0.0, -18.75))
+    follow = follow_of(env, name, vehicle, [(-2.125, 0.0), (-99.0, 0.0)])
+    env.run(until=1.5)
+    follow.apply(ACTIVE)
+    env.run(until=15.0)
+    first_to_second = next(t_s for t_s, (x, _, _) in vehicle.commands if x == -99.0)
+    assert first_to_second == pytest.approx(seen_s)
+
+
+@pytest.mark.parametrize(("name", "again_s"), [("2023", 2.0), ("1.5", 20.0)])
+def test_a_point_not_reached_is_sent_again_after_10_polls(env: simpy.Environment, name: str, again_s: float) -> None:
+    vehicle = PlacedVehicle((50.0, 50.0, -18.75))
+    follow_of(env, name, vehicle).apply(ACTIVE)
+    env.run(until=3 * again_s - 0.1)
+    assert vehicle.commands == [(pytest.approx(n * again_s), (0.0, 0.0, -18.75)) for n in range(3)]
+
+
+def test_a_point_reached_at_the_tenth_poll_is_not_sent_again(env: simpy.Environment) -> None:
+    vehicle = MovingVehicle(lambda t_s: (0.0 if t_s > 1.9 else 50.0, 0.0, -18.75))
+    follow_of(env, "2023", vehicle, [(0.0, 0.0), (9.0, 9.0)]).apply(ACTIVE)
+    env.run(until=2.1)
+    assert [place[:2] for place in vehicle.told] == [(0.0, 0.0), (9.0, 9.0)]
+
+
+@BOTH
+def test_nothing_is_published_before_the_second_point(env: simpy.Environment, name: str) -> None:
+    follow = follow_of(env, name, PlacedVehicle((0.0, 0.0, -18.75)), [(0.0, 0.0), (9.0, 9.0)])
+    follow.apply(ACTIVE)
+    env.run(until=60.0)
+    assert follow.distance_m == 0.0
+
+
+# Deactivation and activation. The vehicle's box for -2.0 m (fifth point) is reached before 8 s in both revisions.
+
+
+def switched_off(env: simpy.Environment, name: str, at_s: float = 8.5) -> tuple[FollowPipeline, MovingVehicle]:
+    vehicle = along_the_line()
+    follow = follow_of(env, name, vehicle)
+    follow.apply(ACTIVE)
+    env.run(until=at_s)
+    follow.apply(INACTIVE)
+    env.run(until=at_s + 1.0)
+    return follow, vehicle
+
+
+def last_reached(vehicle: MovingVehicle) -> float:
+    return vehicle.told[-2][0]  # the last one sent was not reached any more
+
+
+def test_revision_2023_adds_the_way_from_the_last_point_when_switched_off(env: simpy.Environment) -> None:
+    follow, vehicle = switched_off(env, "2023")
+    assert follow.distance_m == pytest.approx(-last_reached(vehicle) + abs(-SPEED * 8.5 - last_reached(vehicle)))
+
+
+def test_revision_15_adds_nothing_when_switched_off(env: simpy.Environment) -> None:
+    follow, vehicle = switched_off(env, "1.5")
+    assert follow.distance_m == pytest.approx(-last_reached(vehicle))
+
+
+def test_revision_2023_adds_nothing_before_a_first_point(env: simpy.Environment) -> None:
+    follow = follow_of(env, "2023", PlacedVehicle((50.0, 50.0, -18.75)))
+    follow.apply(ACTIVE)
+    env.run(until=5.0)
+    follow.apply(INACTIVE)
+    assert follow.distance_m == 0.0
+
+
+def test_switched_off_it_sends_nothing(env: simpy.Environment) -> None:
+    _, vehicle = switched_off(env, "2023")
+    sent = len(vehicle.told)
+    env.run(until=50.0)
+    assert len(vehicle.told) == sent
+
+
+@BOTH
+def test_switched_on_again_it_publishes_nothing_until_there_is_a_new_distance(
+    env: simpy.Environment, name: str
+) -> None:
+    follow, vehicle = switched_off(env, name)
+    before_m = follow.distance_m
+    vehicle._way = lambda _: (90.0, 90.0, -18.75)
+    follow.apply(ACTIVE)
+    env.run(until=30.0)
+    assert follow.distance_m == before_m > 0.0
+
+
+@BOTH
+def test_switched_on_again_the_distance_counts_from_zero(env: simpy.Environment, name: str) -> None:
+    follow, vehicle = switched_off(env, name)
+    first_new = len(vehicle.told)
+    vehicle.obeys = True
+    here = [vehicle.position(env.now)]
+    vehicle._way = lambda _: here[-1]
+    command = vehicle.command
+
+    def obey(t_s: float, x_m: float, y_m: float, z_m: float) -> None:
+        command(t_s, x_m, y_m, z_m)
+        here.append((x_m, y_m, z_m))
+
+    vehicle.command = obey
+    follow.apply(ACTIVE)
+    env.run(until=30.0)
+    new = [place[:2] for place in vehicle.told[first_new:]]
+    assert follow.distance_m == pytest.approx(math.dist(new[0], new[-1]))
+
+
+def test_revision_2023_starts_the_path_again(env: simpy.Environment) -> None:
+    follow, vehicle = switched_off(env, "2023")
+    sent = len(vehicle.told)
+    follow.apply(ACTIVE)
+    env.run(until=env.now + 0.1)
+    assert vehicle.told[sent][0] == 0.0
+
+
+def test_revision_15_goes_on_with_the_point_not_reached(env: simpy.Environment) -> None:
+    follow, vehicle = switched_off(env, "1.5")
+    pending = vehicle.told[-1]
+    sent = len(vehicle.told)
+    follow.apply(ACTIVE)
+    env.run(until=env.now + 0.1)
+    assert vehicle.told[sent] == pending
+
+
+@BOTH
+def test_without_a_detection_there_is_nothing_to_follow(env: simpy.Environment, name: str) -> None:
+    vehicle = PlacedVehicle()
+    follow_of(env, name, vehicle, None).apply(ACTIVE)
+    env.run(until=60.0)
+    assert vehicle.told == []
+
+
+@BOTH
+def test_a_finished_path_is_not_followed_again(env: simpy.Environment, name: str) -> None:
+    vehicle = PlacedVehicle(obeys=True)
+    follow = follow_of(env, name, vehicle)
+    follow.apply(ACTIVE)
+    env.run(until=5.0)
+    sent = len(vehicle.told)
+    follow.apply(INACTIVE)
+    follow.apply(ACTIVE)
+    env.run(until=10.0)
+    assert len(vehicle.told) == sent
+
+
+@BOTH
+def test_the_real_vehicle_follows_a_straight_line_at_the_observed_speed(env: simpy.Environment, name: str) -> None:
+    autopilot = Autopilot(0.48, 0.34, 0.36, 0.5)
+    vehicle = Vehicle(BLUEROV2, autopilot, Pose(0.0, 0.0, -18.75, 0.0, 0.0, 0.0), 200.0)
+    path = [(-0.5 * n, 0.0) for n in range(200)]
+    follow = follow_of(env, name, vehicle, path)
+    follow.apply(ACTIVE)
+    env.run(until=100.0)
+    assert 0.21 < follow.distance_m / 100.0 < 0.30  # published runs: 0.21 to 0.30 m/s

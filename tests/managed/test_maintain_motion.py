@@ -1,0 +1,97 @@
+"""Maintain motion: recovery of the thrusters."""
+
+import pytest
+import simpy
+from stand_ins import ACTIVE, INACTIVE, revision
+
+from suave_des.managed.motion import MaintainMotion
+from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
+
+BOTH = pytest.mark.parametrize("name", ["2023", "1.5"])
+
+
+class Motion:
+    """The node with what it restores and publishes."""
+
+    def __init__(self, name: str) -> None:
+        self.env = simpy.Environment()
+        bus = DiagnosticsBus()
+        self.published: list[Diagnostic] = []
+        self.restored: list[tuple[float, int]] = []
+        bus.subscribe(self.published.append)
+        self.node = MaintainMotion(
+            self.env, bus, revision(name).recovery, lambda thruster: self.restored.append((self.env.now, thruster))
+        )
+
+
+@BOTH
+def test_thrusters_are_restored_one_by_one_four_a_second_after_10_s(name: str) -> None:
+    motion = Motion(name)
+    motion.node.apply(ACTIVE)
+    motion.env.run()
+    assert motion.restored == [(10.0 + 0.25 * n, n + 1) for n in range(6)]
+
+
+@BOTH
+def test_each_restored_thruster_is_published_as_recovered(name: str) -> None:
+    motion = Motion(name)
+    motion.node.apply(ACTIVE)
+    motion.env.run()
+    assert motion.published == [
+        Diagnostic(10.0 + 0.25 * n, Kind.COMPONENT_STATUS, f"c_thruster_{n + 1}", "RECOVERED") for n in range(6)
+    ]
+
+
+@BOTH
+def test_inactive_modes_recover_nothing(name: str) -> None:
+    motion = Motion(name)
+    motion.node.apply(INACTIVE)
+    motion.env.run()
+    assert motion.restored == []
+
+
+def interrupted(name: str, at_s: float) -> Motion:
+    motion = Motion(name)
+    motion.node.apply(ACTIVE)
+    motion.env.run(until=at_s)
+    motion.node.apply(INACTIVE)
+    return motion
+
+
+@pytest.mark.parametrize("at_s", [3.0, 10.3])
+def test_recovery_goes_on_when_deactivated_in_2023(at_s: float) -> None:
+    motion = interrupted("2023", at_s)
+    motion.env.run()
+    assert len(motion.restored) == 6
+
+
+@pytest.mark.parametrize(("at_s", "restored"), [(3.0, 0), (10.3, 2)])
+def test_recovery_is_aborted_when_deactivated_in_15(at_s: float, restored: int) -> None:
+    motion = interrupted("1.5", at_s)
+    motion.env.run()
+    assert len(motion.restored) == restored
+
+
+def test_recovery_begins_anew_after_an_abort() -> None:
+    motion = interrupted("1.5", 3.0)
+    motion.node.apply(ACTIVE)
+    motion.env.run()
+    assert motion.restored[0] == (13.0, 1) and len(motion.restored) == 6
+
+
+def test_activation_during_a_recovery_that_goes_on_starts_no_second_one() -> None:
+    motion = interrupted("2023", 3.0)
+    motion.node.apply(ACTIVE)
+    motion.env.run()
+    assert [t_s for t_s, _ in motion.restored] == [10.0 + 0.25 * n for n in range(6)]
+
+
+@BOTH
+def test_a_second_recovery_can_follow_the_first(name: str) -> None:
+    motion = Motion(name)
+    motion.node.apply(ACTIVE)
+    motion.env.run(until=20.0)
+    motion.node.apply(INACTIVE)
+    motion.node.apply(ACTIVE)
+    motion.env.run()
+    assert [t_s for t_s, thruster in motion.restored if thruster == 1] == [10.0, 30.0]

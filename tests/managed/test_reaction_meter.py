@@ -1,0 +1,194 @@
+"""Reaction times of revision 1.5, against timelines worked out by hand.
+
+Visibility messages come at 0.2, 1.2, 2.2, ... s; the altitude parameter is 2 m before any mode is set.
+"""
+
+import pytest
+import simpy
+from stand_ins import ACTIVE, INACTIVE, spiral_at
+
+from suave_des.managed.reactions import ReactionMeter
+from suave_des.monitor.diagnostics import Diagnostic, Kind
+from suave_des.monitor.monitors import Measurements
+from suave_des.scenario.models import ReactionMetric
+
+SEARCH, MOTION, RECHARGE = "f_generate_search_path", "f_maintain_motion", "generate_recharge_path"
+
+
+class Timeline:
+    """Entries in order of time, each a diagnostic or the effect of a mode."""
+
+    def __init__(self) -> None:
+        self.env = simpy.Environment()
+        visibility = Measurements("water_visibility", (0.2,), (3.0,), 0.2, 1.0)
+        self.meter = ReactionMeter(self.env, ReactionMetric(), visibility)
+
+    def _to(self, t_s: float) -> None:
+        if t_s > self.env.now:
+            self.env.run(until=t_s)
+
+    def visibility(self, t_s: float, value: float) -> "Timeline":
+        self._to(t_s)
+        self.meter.diagnostic(Diagnostic(t_s, Kind.QA_STATUS, "water_visibility", value))
+        return self
+
+    def battery(self, t_s: float, level: float) -> "Timeline":
+        self._to(t_s)
+        self.meter.diagnostic(Diagnostic(t_s, Kind.QA_STATUS, "battery_level", level))
+        return self
+
+    def thruster(self, t_s: float, status: str, number: int = 1) -> "Timeline":
+        self._to(t_s)
+        self.meter.diagnostic(Diagnostic(t_s, Kind.COMPONENT_STATUS, f"c_thruster_{number}", status))
+        return self
+
+    def altitude(self, t_s: float, altitude_m: float) -> "Timeline":
+        self._to(t_s)
+        self.meter.mode_effect(SEARCH, spiral_at(altitude_m))
+        return self
+
+    def mode(self, t_s: float, function: str, *, active: bool = True) -> "Timeline":
+        self._to(t_s)
+        self.meter.mode_effect(function, ACTIVE if active else INACTIVE)
+        return self
+
+    @property
+    def reactions(self) -> list[float]:
+        return [pytest.approx(reaction, abs=1e-9) for reaction in self.meter.reactions_s]
+
+
+def test_without_reactions_there_is_no_mean() -> None:
+    assert Timeline().meter.mean_s is None
+
+
+def test_mean_is_over_all_kinds_of_reaction() -> None:
+    timeline = Timeline().visibility(0.2, 3.75).altitude(1.2, 3.0).thruster(35.0, "FALSE").mode(38.0, MOTION)
+    assert timeline.meter.mean_s == pytest.approx((1.0 + 3.0) / 2)
+
+
+# Thrusters
+
+
+def test_failure_reported_until_maintain_motion_is_active() -> None:
+    assert Timeline().thruster(35.0, "FALSE").mode(37.5, MOTION).reactions == [2.5]
+
+
+def test_a_second_failure_before_the_answer_counts_with_the_first() -> None:
+    timeline = Timeline().thruster(35.0, "FALSE").thruster(36.0, "FALSE", 2).mode(37.5, MOTION)
+    assert timeline.reactions == [2.5]
+
+
+def test_a_second_failure_after_the_answer_is_another_reaction() -> None:
+    timeline = Timeline().thruster(35.0, "FALSE").mode(37.5, MOTION).thruster(60.0, "FALSE", 2).mode(61.0, MOTION)
+    assert timeline.reactions == [2.5, 1.0]
+
+
+def test_a_failure_never_answered_does_not_count() -> None:
+    assert Timeline().thruster(35.0, "FALSE").mode(40.0, MOTION, active=False).reactions == []
+
+
+def test_a_recovery_asks_for_no_reaction() -> None:
+    assert Timeline().thruster(35.0, "RECOVERED").mode(40.0, MOTION).reactions == []
+
+
+# Altitude
+
+
+def test_the_first_message_is_a_mismatch_already() -> None:
+    assert Timeline().visibility(0.2, 3.75).altitude(0.7, 3.0).reactions == [0.5]
+
+
+def test_unless_two_metres_fit() -> None:
+    assert Timeline().visibility(0.2, 2.5).altitude(0.7, 2.0).reactions == []
+
+
+@pytest.mark.parametrize(
+    ("visibility_m", "altitude_m"), [(3.25, 3.0), (3.24, 2.0), (2.25, 2.0), (2.24, 1.0), (1.25, 1.0)]
+)
+def test_altitude_that_fits_a_visibility(visibility_m: float, altitude_m: float) -> None:
+    timeline = Timeline().altitude(0.1, 9.0).visibility(0.2, visibility_m).altitude(0.7, altitude_m)
+    assert timeline.reactions == [0.5]
+
+
+def test_mismatch_lasts_until_the_fitting_altitude_is_set() -> None:
+    timeline = Timeline().visibility(0.2, 3.75).altitude(0.7, 3.0)
+    timeline.visibility(12.2, 3.2).altitude(14.0, 1.0).altitude(15.0, 2.0)
+    assert timeline.reactions == [0.5, 2.8]
+
+
+def test_mismatch_does_not_clear_when_the_visibility_comes_back() -> None:
+    timeline = Timeline().visibility(0.2, 3.75).altitude(0.7, 3.0)
+    timeline.visibility(12.2, 3.2).visibility(68.2, 3.3).visibility(92.2, 3.2).altitude(93.2, 2.0)
+    assert timeline.reactions == [0.5, 81.0]
+
+
+def test_nor_when_it_changes_further() -> None:
+    timeline = Timeline().visibility(0.2, 3.75).altitude(0.7, 3.0)
+    timeline.visibility(12.2, 3.2).visibility(24.2, 2.2).altitude(25.2, 1.0)
+    assert timeline.reactions == [0.5, 13.0]
+
+
+def test_a_mismatch_never_answered_does_not_count() -> None:
+    # As under the manager none: 1 m is set once, while 3 m would fit.
+    timeline = Timeline().visibility(0.2, 3.75).altitude(0.5, 1.0).visibility(40.2, 1.3).visibility(60.2, 3.3)
+    assert timeline.reactions == []
+
+
+def test_setting_an_altitude_that_does_not_fit_is_noticed_at_the_next_message_though_its_value_is_not_new() -> None:
+    timeline = Timeline().visibility(0.2, 3.75).altitude(0.7, 3.0)
+    timeline.altitude(10.5, 1.0).altitude(13.2, 3.0)
+    assert timeline.reactions == [0.5, 2.0]  # from the message at 11.2 s
+
+
+def test_an_altitude_put_right_before_the_next_message_was_no_mismatch() -> None:
+    timeline = Timeline().visibility(0.2, 3.75).altitude(0.7, 3.0)
+    timeline.altitude(10.5, 1.0).altitude(11.0, 3.0)
+    assert timeline.reactions == [0.5]
+
+
+def test_nor_one_that_the_next_message_finds_fitting() -> None:
+    timeline = Timeline().visibility(0.2, 3.75).altitude(0.7, 3.0)
+    timeline.altitude(11.5, 2.0).visibility(12.2, 3.2).altitude(13.0, 2.0)
+    assert timeline.reactions == [0.5]
+
+
+def test_below_all_thresholds_no_altitude_fits_and_none_is_asked_for() -> None:
+    timeline = Timeline().visibility(0.2, 1.0).altitude(1.2, 1.0).altitude(2.2, 2.0)
+    assert timeline.reactions == []
+
+
+def test_altitude_is_checked_while_following_too() -> None:
+    timeline = Timeline().visibility(0.2, 3.75).altitude(0.7, 3.0)
+    timeline.mode(10.0, SEARCH, active=False).mode(10.0, "f_follow_pipeline")
+    timeline.visibility(12.2, 3.2).altitude(50.2, 2.0)
+    assert timeline.reactions == [0.5, 38.0]
+
+
+# Battery
+
+
+def test_low_battery_until_the_recharge_path_is_active() -> None:
+    timeline = Timeline().battery(149.5, 0.2525).battery(150.5, 0.2475).battery(151.5, 0.2425).mode(152.0, RECHARGE)
+    assert timeline.reactions == [1.5]
+
+
+def test_a_quarter_is_not_low() -> None:
+    assert Timeline().battery(150.0, 0.25).mode(152.0, RECHARGE).reactions == []
+
+
+def test_altitude_is_not_checked_while_the_battery_is_low() -> None:
+    timeline = Timeline().visibility(0.2, 3.75).altitude(0.7, 3.0).battery(150.5, 0.2)
+    timeline.visibility(155.2, 2.5).battery(160.5, 1.0).altitude(160.8, 2.0)
+    assert timeline.reactions == [0.5]
+
+
+def test_altitude_is_checked_again_at_the_first_message_after_recharging() -> None:
+    timeline = Timeline().visibility(0.2, 3.75).altitude(0.7, 3.0).battery(150.5, 0.2)
+    timeline.visibility(155.2, 2.5).battery(160.5, 1.0).altitude(162.2, 2.0)
+    assert timeline.reactions == [0.5, 1.0]  # from the message at 161.2 s, whose value is not new
+
+
+def test_a_message_that_would_have_shown_a_mismatch_comes_too_late_for_a_low_battery() -> None:
+    timeline = Timeline().visibility(0.2, 3.75).altitude(0.7, 3.0)
+    timeline.altitude(150.3, 1.0).battery(150.5, 0.2).altitude(153.2, 3.0)
+    assert timeline.reactions == [0.5]

@@ -1,0 +1,209 @@
+"""Generate search path: the spiral's set-points, tick by tick."""
+
+import math
+
+import pytest
+import simpy
+from stand_ins import INACTIVE, START, PlacedVehicle, revision, sender, spiral_at
+
+from suave_des.managed.search import GenerateSearchPath
+
+ORIGIN = (-17.0, 2.3)
+PHASE_S = 0.25
+TURN_WIDTH_PER_M = 2.0 * math.tan(math.radians(30.0))
+BOTH = pytest.mark.parametrize("name", ["2023", "1.5"])
+
+
+class Search:
+    """A search node with its vehicle and clock; its ticks come at 0.25, 1.25, 2.25, ... s."""
+
+    def __init__(self, name: str, vehicle: PlacedVehicle) -> None:
+        self.env = simpy.Environment()
+        self.vehicle = vehicle
+        self.node = GenerateSearchPath(
+            self.env, vehicle, sender(self.env, vehicle), revision(name).spiral, ORIGIN, PHASE_S
+        )
+
+    def ticks(self, count: int) -> None:
+        """Let a number of ticks pass."""
+        self.env.run(until=self.env.now + count)
+
+    @property
+    def last(self) -> tuple[float, float, float]:
+        return self.vehicle.told[-1]
+
+    def spiral(self, centre: tuple[float, float]) -> list[tuple[float, float]]:
+        """Radius and angle of each set-point."""
+        offsets = [(x - centre[0], y - centre[1]) for x, y, _ in self.vehicle.told]
+        return [(math.hypot(dx, dy), math.atan2(dy, dx) % (2 * math.pi)) for dx, dy in offsets]
+
+
+def searching(name: str, altitude_m: float = 1.0, **vehicle: object) -> Search:
+    search = Search(name, PlacedVehicle(**vehicle))
+    search.node.apply(spiral_at(altitude_m))
+    return search
+
+
+def point(n_radius: float, n_angle: int, altitude_m: float = 1.0) -> tuple[float, float]:
+    """The spiral's radius after so many widths of a turn's share, and the angle of step n."""
+    width = TURN_WIDTH_PER_M * altitude_m
+    return pytest.approx((n_radius * width * 0.1 / (2 * math.pi), 0.1 * n_angle))
+
+
+@pytest.mark.parametrize(("name", "centre"), [("2023", ORIGIN), ("1.5", START[:2])])
+def test_first_set_point_is_that_of_step_1_around_the_revisions_centre(name: str, centre: tuple[float, float]) -> None:
+    search = searching(name)
+    search.ticks(1)
+    assert search.spiral(centre) == [point(1, 1)]
+
+
+@BOTH
+@pytest.mark.parametrize("altitude_m", [1.0, 2.0, 3.0])
+def test_set_points_are_at_the_modes_altitude_above_the_bed(name: str, altitude_m: float) -> None:
+    search = searching(name, altitude_m)
+    search.ticks(1)
+    assert search.last[2] == -20.0 + altitude_m
+
+
+def test_ticks_come_once_a_second_in_the_nodes_phase() -> None:
+    search = searching("2023", obeys=True)
+    search.ticks(3)
+    assert search.vehicle.times_s == [0.25, 1.25, 2.25]
+
+
+@pytest.mark.parametrize("altitude_m", [1.0, 3.0])
+def test_a_reached_set_point_gives_the_next_one_each_tick(altitude_m: float) -> None:
+    search = searching("2023", altitude_m, obeys=True)
+    search.ticks(40)
+    assert search.spiral(ORIGIN) == [point(n, n, altitude_m) for n in range(1, 41)]
+
+
+def test_a_change_of_altitude_skips_one_angle_step_but_no_radius() -> None:
+    search = searching("2023", obeys=True)
+    search.ticks(3)
+    search.node.apply(spiral_at(2.0))
+    search.ticks(1)
+    assert search.spiral(ORIGIN)[-1] == point(3 + 2, 5)  # at 2 m a step widens the spiral twice as much
+
+
+@BOTH
+def test_a_change_between_search_modes_is_no_new_activation(name: str) -> None:
+    search = searching(name, obeys=True)
+    search.ticks(5)
+    radius_before = search.spiral(ORIGIN if name == "2023" else START[:2])[-1][0]
+    search.node.apply(spiral_at(2.0))
+    search.ticks(1)
+    assert search.spiral(ORIGIN if name == "2023" else START[:2])[-1][0] > radius_before
+
+
+@BOTH
+@pytest.mark.parametrize(
+    ("error_m", "goes_on"),
+    [((0.39, 0.39, 0.39), True), ((0.41, 0.0, 0.0), False), ((0.0, -0.41, 0.0), False), ((0.0, 0.0, 0.41), False)],
+    ids=["in the box", "x", "y", "z"],
+)
+def test_reached_means_within_0_4_m_in_x_y_and_z(name: str, error_m: tuple[float, ...], goes_on: bool) -> None:
+    search = searching(name)
+    search.ticks(1)
+    x, y, z = search.last
+    search.vehicle.place = (x + error_m[0], y + error_m[1], z + error_m[2])
+    search.ticks(1)
+    assert (len(search.vehicle.told) == 2) is goes_on
+
+
+@BOTH
+def test_a_set_point_not_reached_is_sent_again_after_more_than_10_ticks(name: str) -> None:
+    search = searching(name)
+    search.ticks(1)
+    search.vehicle.place = (0.0, 0.0, -19.0)
+    search.ticks(30)
+    assert search.vehicle.commands[1:] == [(11.25, search.last), (22.25, search.last)]
+
+
+@pytest.mark.parametrize(("name", "step_m"), [("2023", 0.5), ("1.5", 0.25)])
+def test_when_only_z_is_missed_each_resending_asks_for_less_altitude(name: str, step_m: float) -> None:
+    search = searching(name, rise_m=0.5, obeys=True)
+    search.vehicle.rise_m = 5.0  # whatever is commanded, z is not reached
+    search.ticks(34)
+    assert [z for _, _, z in search.vehicle.told] == pytest.approx([-19.0 - step_m * times for times in range(4)])
+
+
+def test_the_work_around_frees_a_vehicle_that_stops_half_a_metre_short() -> None:
+    search = searching("2023", obeys=True, rise_m=0.5)
+    search.ticks(13)
+    assert search.vehicle.times_s == [0.25, 11.25, 12.25]
+
+
+def test_later_set_points_keep_the_lowered_command() -> None:
+    search = searching("2023", obeys=True, rise_m=0.5)
+    search.ticks(20)
+    assert {z for _, _, z in search.vehicle.told[1:]} == {-19.5}
+
+
+@pytest.mark.parametrize(("name", "z_m"), [("2023", -19.5), ("1.5", -19.0)])
+def test_offset_after_a_new_activation(name: str, z_m: float) -> None:
+    search = searching(name, obeys=True, rise_m=0.5 if name == "2023" else 0.45)
+    search.ticks(13)
+    search.node.apply(INACTIVE)
+    search.vehicle.place = (*search.last[:2], -19.0)
+    search.node.apply(spiral_at(1.0))
+    search.ticks(1)
+    assert search.last[2] == pytest.approx(z_m)
+
+
+def stalled_at_3_m() -> Search:
+    search = searching("2023", 3.0, obeys=True, rise_m=0.5)
+    search.ticks(5)
+    search.node.apply(spiral_at(1.0))
+    return search
+
+
+def test_a_set_point_sent_again_in_a_stall_has_the_new_altitude() -> None:
+    search = stalled_at_3_m()
+    search.ticks(10)
+    assert search.last == pytest.approx((*search.vehicle.told[0][:2], -19.0 - 0.5))
+
+
+def test_altitude_change_in_a_stall_locks_the_spiral_up() -> None:
+    search = stalled_at_3_m()
+    search.ticks(100)
+    assert len({place[:2] for place in search.vehicle.told}) == 1
+
+
+def test_offset_goes_on_falling_in_a_lock_up() -> None:
+    search = stalled_at_3_m()
+    search.ticks(50)
+    assert [z for _, _, z in search.vehicle.told[1:]] == [-19.5, -20.0, -20.5, -21.0]
+
+
+@BOTH
+def test_inactive_it_sends_nothing(name: str) -> None:
+    search = searching(name, obeys=True)
+    search.ticks(3)
+    search.node.apply(INACTIVE)
+    search.ticks(30)
+    assert len(search.vehicle.told) == 3
+
+
+def test_revision_2023_goes_on_with_its_spiral_when_activated_again() -> None:
+    search = searching("2023", obeys=True)
+    search.ticks(7)
+    search.node.apply(INACTIVE)
+    search.ticks(5)
+    search.node.apply(spiral_at(1.0))
+    search.ticks(1)
+    assert search.spiral(ORIGIN)[-1] == point(8, 8)
+
+
+def test_revision_15_starts_afresh_where_it_is_when_activated_again() -> None:
+    search = searching("1.5", obeys=True)
+    search.ticks(7)
+    search.node.apply(INACTIVE)
+    search.vehicle.place = (-10.0, 1.0, -19.0)
+    search.node.apply(spiral_at(1.0))
+    search.ticks(1)
+    assert search.spiral((-10.0, 1.0))[-1] == point(1, 1)
+
+
+def test_before_any_mode_the_altitude_parameter_is_2_m() -> None:
+    assert Search("1.5", PlacedVehicle()).node.altitude_m == 2.0
