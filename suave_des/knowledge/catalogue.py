@@ -69,16 +69,20 @@ def _name(iri: str) -> str:
     return Path(local_name(same_iri(iri))).stem
 
 
-def _supplier(files: Iterable[OntologyFile], iri: str) -> OntologyFile | None:
+def supplies(file: OntologyFile, iri: str, *, by_name: bool = True) -> bool:
+    """Whether a file supplies an imported ontology: by an IRI of its own, or else by name."""
+    known = (*file.iris, file.base) if file.base else file.iris
+    if same_iri(iri) in map(same_iri, known):
+        return True
+    return by_name and _name(iri) in {file.path.stem, *map(_name, file.iris)}
+
+
+def _supplier(files: Sequence[OntologyFile], iri: str) -> OntologyFile | None:
     """The file that supplies an imported ontology: by IRI, else by name."""
-    wanted = same_iri(iri)
-    files = tuple(files)
-    for file in files:
-        if wanted in {same_iri(known) for known in (*file.iris, *([file.base] if file.base else []))}:
-            return file
-    for file in files:
-        if _name(iri) in {file.path.stem, *map(_name, file.iris)}:
-            return file
+    for by_name in (False, True):
+        for file in files:
+            if supplies(file, iri, by_name=by_name):
+                return file
     return None
 
 

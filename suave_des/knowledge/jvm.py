@@ -75,7 +75,7 @@ def _capture_log() -> None:
 
     @jpype.JImplements("java.util.logging.Filter")
     class Keep:
-        @jpype.JOverride
+        @jpype.JOverride  # type: ignore[untyped-decorator]
         def isLoggable(self, record: Any) -> bool:  # noqa: N802 - the interface's name
             _warnings.append(str(record.getMessage()))
             return False  # nothing more is done with it

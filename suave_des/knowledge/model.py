@@ -34,13 +34,13 @@ _SUBCLASS: Final = RDFS + "subClassOf"
 _HAS_VALUE: Final = TOMASYS + "hasValue"
 _OPERATOR: Final = TOMASYS + "qa_comparison_operator"
 _C_STATUS: Final = TOMASYS + "c_status"
-_NUMERIC: Final = frozenset(
-    XSD + name
-    for name in (
-        "decimal integer int long short byte nonNegativeInteger positiveInteger nonPositiveInteger "
-        "negativeInteger unsignedInt unsignedLong unsignedShort unsignedByte float double"
-    ).split()
+_WHOLE: Final = (
+    *("integer", "int", "long", "short", "byte"),
+    *("nonNegativeInteger", "positiveInteger", "nonPositiveInteger", "negativeInteger"),
+    *("unsignedInt", "unsignedLong", "unsignedShort", "unsignedByte"),
 )
+_EXACT: Final = frozenset(XSD + name for name in ("decimal", *_WHOLE))
+_NUMERIC: Final = _EXACT | {XSD + "float", XSD + "double"}
 #: Comparison operators that a quality attribute type may have.
 OPERATORS: Final = ("<", "<=", ">", ">=")
 
@@ -108,7 +108,7 @@ def check_values(content: Content, sources: Sequence[OntologyFile]) -> None:
 
 
 def _is_decimal(value: str | Lit) -> bool:
-    if not isinstance(value, Lit) or value.datatype not in _NUMERIC - {XSD + "float", XSD + "double"}:
+    if not isinstance(value, Lit) or value.datatype not in _EXACT:
         return False
     try:
         return Decimal(value.text.strip()).is_finite()

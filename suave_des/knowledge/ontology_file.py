@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import urldefrag, urljoin
 from xml.parsers import expat
+from xml.sax import SAXParseException
 
 from rdflib import Graph, URIRef
 from rdflib.namespace import OWL
@@ -103,7 +104,7 @@ class _Scan:
             raise self.refuse(
                 f"entity {name} is external or a parameter entity", "only simple internal entities are read"
             )
-        if "&" in value or "%" in value and ";" in value:
+        if "&" in value or ("%" in value and ";" in value):
             raise self.refuse(f"entity {name} refers to other entities", "write its value out")
         if len(value) > MAX_ENTITY_CHARS or self.entities > MAX_ENTITIES:
             raise self.refuse(
@@ -153,7 +154,7 @@ def read_ontology(path: Path) -> OntologyFile:
         root = (scan.root or "").split(" ")[-1]
         raise KnowledgeError(f"not OWL: the root element is <{root}>", file=path, remedy=_SAVE_AS)
     graph = _parse_rdf(path, content)
-    ontologies = sorted(graph.subjects(RDF_TERMS.type, OWL.Ontology))
+    ontologies = sorted(graph.subjects(RDF_TERMS.type, OWL.Ontology), key=str)
     if not ontologies:
         raise KnowledgeError("not OWL: there is no owl:Ontology in it", file=path, remedy=_SAVE_AS)
     lines = dict(reversed(scan.imports))
@@ -208,11 +209,10 @@ def _parse_rdf(path: Path, content: bytes) -> Graph:
             # A file without xml:base gets a base that says nothing about this machine's folders.
             graph.parse(data=content, format="xml", publicID=f"http://ontology.invalid/{path.stem}")
     except Exception as error:  # the parser raises many kinds; each means that this file is not RDF/XML
-        text = getattr(error, "getMessage", lambda: str(error))()
-        line = getattr(error, "getLineNumber", lambda: None)()
-        place = None if line is None else f"line {line}"
+        text = error.getMessage() if isinstance(error, SAXParseException) else str(error)
+        place = f"line {error.getLineNumber()}" if isinstance(error, SAXParseException) else None
         raise KnowledgeError(
-            f"not RDF/XML: {' '.join(str(text).split())}", file=path, place=place, remedy=_SAVE_AS
+            f"not RDF/XML: {' '.join(text.split())}", file=path, place=place, remedy=_SAVE_AS
         ) from error
     for triple in graph:
         for term in triple:

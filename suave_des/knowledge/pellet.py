@@ -14,18 +14,29 @@ from typing import Any, Final
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge import jvm
 from suave_des.knowledge.base import KnowledgeBase
-from suave_des.knowledge.model import properties_to_read
+from suave_des.knowledge.model import facts_of, properties_to_read
 from suave_des.knowledge.rules import Rule
 from suave_des.knowledge.situation import Lit, Triple
-from suave_des.knowledge.triples import RULE_IRI
-from suave_des.knowledge.vocabulary import RDF_TYPE, XSD, local_name
+from suave_des.knowledge.triples import RULE_IRI, n_triple
+from suave_des.knowledge.vocabulary import RDF_TYPE, XSD
 
 _LITERAL: Final = re.compile(r"literal\((.*),([^,]*),([^,]*)\)", re.DOTALL)
 _RULE: Final = re.compile(re.escape(RULE_IRI) + r"(\d+)")
-_CLASH: Final = re.compile(r"Individual (\S+) has more than one value for the functional property (\S+)")
 _PELLET: Final = "org.mindswap.pellet."
 #: One inference at a time in a process: Pellet's term factory is shared by all its knowledge bases.
 _one_at_a_time: Final = threading.RLock()
+
+
+def load_n_triples(text: str, *, explain: bool = False) -> Any:
+    """A Pellet knowledge base with that content; call it with the lock held."""
+    model = jvm.java_class("com.hp.hpl.jena.rdf.model.ModelFactory").createDefaultModel()
+    model.read(jvm.java_class("java.io.StringReader")(text), None, "N-TRIPLES")
+    knowledge_base = jvm.java_class(_PELLET + "KnowledgeBase")()
+    knowledge_base.setDoExplanation(explain)
+    loader = jvm.java_class(_PELLET + "jena.graph.loader.DefaultGraphLoader")()
+    loader.setKB(knowledge_base)
+    loader.load(jvm.java_class("java.util.Collections").singleton(model.getGraph()))
+    return knowledge_base
 
 
 class InProcessPellet:
@@ -42,22 +53,21 @@ class InProcessPellet:
             self._make_term = jvm.java_class(_PELLET + "utils.ATermUtils").makeTermAppl
             self._make_literal = jvm.java_class(_PELLET + "utils.ATermUtils").makeTypedLiteral
             self._make_plain = jvm.java_class(_PELLET + "utils.ATermUtils").makePlainLiteral
-            self._base = self._load(kb.content.n_triples())
+            self._base = load_n_triples(kb.content.n_triples())
             self._terms: dict[str, Any] = {}
             self._properties = [(name, self._term(name)) for name in properties_to_read(kb.content)]
             self._classes = [(name, self._term(name)) for name in sorted(kb.content.head_classes())]
             if not self._base.isConsistent():
-                raise self.inconsistency("the ontologies contradict themselves", self._base)
+                raise contradiction(kb, ())
             # A copy, because Pellet compiles the rules of a knowledge base when it first reasons on it.
             self._base.copy().isConsistent()
             self._refuse_dropped_rules()
 
-    def infer(self, situation: Sequence[Triple], describe: str) -> frozenset[Triple]:
+    def infer(self, situation: Sequence[Triple]) -> frozenset[Triple]:
         """All values of the properties to read, and members of the classes to read, in a situation.
 
         Args:
             situation: triples added to the ontologies.
-            describe: the situation in words, for an error.
 
         Raises:
             KnowledgeError: the situation contradicts itself.
@@ -67,49 +77,16 @@ class InProcessPellet:
             for subject, predicate, value in situation:
                 self._add(copy, subject, predicate, value)
             if not copy.isConsistent():
-                raise self.inconsistency(f"contradiction in the state {describe}", copy)
+                raise contradiction(self._kb, situation)
             found = frozenset(self._read(copy))
             self._refuse_dropped_rules()
             return found
-
-    def inconsistency(self, where: str, knowledge_base: Any) -> KnowledgeError:
-        """An error that says what clashes, from Pellet's explanation."""
-        explanation = str(knowledge_base.getExplanation())
-        jvm.take_warnings()
-        clash = _CLASH.search(explanation)
-        files = ", ".join(map(str, self._kb.files))
-        if clash is None:
-            return KnowledgeError(f"{where}: {explanation}", file=files)
-        individual, name = (local_name(part) for part in clash.groups())
-        return KnowledgeError(
-            f"{where}: individual {individual} would have more than one value of the functional property {name}",
-            file=files,
-            remedy=f"no two of these may hold at once: {self._sources(name)}",
-        )
-
-    def _sources(self, name: str) -> str:
-        """What can give an individual a value of a property: the state, and rules by name."""
-        rules = sorted(
-            rule.name
-            for rule in self._kb.content.enabled_rules
-            if name in {local_name(head) for head, _ in rule.head_properties}
-        )
-        return ", ".join(["the value in the state", *(f"rule {rule}" for rule in rules)])
 
     def _term(self, iri: str) -> Any:
         term = self._terms.get(iri)
         if term is None:
             term = self._terms[iri] = self._make_term(iri)
         return term
-
-    def _load(self, text: str) -> Any:
-        model = jvm.java_class("com.hp.hpl.jena.rdf.model.ModelFactory").createDefaultModel()
-        model.read(jvm.java_class("java.io.StringReader")(text), None, "N-TRIPLES")
-        loader = jvm.java_class(_PELLET + "jena.graph.loader.DefaultGraphLoader")()
-        knowledge_base = jvm.java_class(_PELLET + "KnowledgeBase")()
-        loader.setKB(knowledge_base)
-        loader.load(jvm.java_class("java.util.Collections").singleton(model.getGraph()))
-        return knowledge_base
 
     def _add(self, knowledge_base: Any, subject: str, predicate: str, value: str | Lit) -> None:
         individual = self._term(subject)
@@ -146,6 +123,41 @@ class InProcessPellet:
                 raise KnowledgeError(f"Pellet does not take part of a rule: {warning}", file=_files(self._kb))
 
 
+def contradiction(kb: KnowledgeBase, situation: Sequence[Triple]) -> KnowledgeError:
+    """The error for a state that contradicts itself: on what, by which rules, and what in the state they need.
+
+    Loads everything once more, with Pellet's tracing switched on: it is off otherwise, for it costs time.
+    """
+    options = jvm.java_class(_PELLET + "PelletOptions")
+    options.USE_TRACING = True
+    try:
+        text = kb.content.n_triples() + "".join(map(n_triple, situation))
+        knowledge_base = load_n_triples(text, explain=True)
+        knowledge_base.isConsistent()
+        said = str(knowledge_base.getExplanation())
+        axioms = sorted(str(axiom.toString()) for axiom in knowledge_base.getExplanationSet())
+    finally:
+        options.USE_TRACING = False
+        jvm.take_warnings()
+    rules = sorted({kb.content.rules[int(n)].name for axiom in axioms for n in _RULE.findall(axiom)[:1]})
+    facts = [
+        str(fact)
+        for triple in situation
+        if any(axiom.startswith(f"prop({triple[1]},{triple[0]},") for axiom in axioms)
+        for fact in facts_of([triple], kb.names)
+    ]
+    problem = re.sub(r"https?://[^\s,()]+", lambda iri: kb.names.short(iri.group()), said)
+    if rules:
+        problem += f", by the rules {', '.join(rules)}"
+    if facts:
+        problem += f", in the state {', '.join(facts)}"
+    return KnowledgeError(
+        f"contradiction: {problem[0].lower()}{problem[1:]}",
+        file=_files(kb),
+        remedy="change a rule, so that no two of these hold at once" if rules else "correct the ontology",
+    )
+
+
 def dropped(rule: Rule, warning: str) -> KnowledgeError:
     """The error for a rule that Pellet would leave out with nothing but a line in its log."""
     reason = warning.rpartition("): ")[2] if "): " in warning else warning
@@ -168,11 +180,11 @@ def _value(text: str) -> str | Lit:
         return text
     # Pellet keeps all text as PlainLiteral, without a language as "()".
     datatype = found.group(3) if not found.group(3).endswith("PlainLiteral") else XSD + "string"
-    return Lit(_unescape(found.group(1)), datatype)
+    return Lit(unescape(found.group(1)), datatype)
 
 
-def _unescape(text: str) -> str:
-    """Undo the escapes of a term's text."""
+def unescape(text: str) -> str:
+    """Undo the escapes of text as Pellet prints it."""
     if "\\" not in text:
         return text
     from owlready2.reasoning import _unescape_pellet_str

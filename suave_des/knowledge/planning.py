@@ -134,7 +134,9 @@ def _performance(kb: KnowledgeBase, inference: Inference, design: str) -> Decima
 
 
 def _show(value: Decimal, digits: int = 2) -> str:
-    return f"{value:.{digits}f}"
+    """A number with that many digits, of which those after the second are left out where they are zero."""
+    whole, _, part = f"{value:.{digits}f}".partition(".")
+    return f"{whole}.{part[:2]}{part[2:].rstrip('0')}"
 
 
 def _show_pair(one: Decimal, other: Decimal) -> tuple[str, str]:

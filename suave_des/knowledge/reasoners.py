@@ -39,7 +39,7 @@ class _Remembering:
     """A backend with a bounded memory of exact states."""
 
     def __init__(
-        self, name: str, kb: KnowledgeBase, entailed: Callable[[tuple[Triple, ...], str], Iterable[Triple]]
+        self, name: str, kb: KnowledgeBase, entailed: Callable[[tuple[Triple, ...]], Iterable[Triple]]
     ) -> None:
         self.name = name
         self._kb = kb
@@ -60,7 +60,7 @@ class _Remembering:
     def _infer(self, state: KnowledgeState) -> Inference:
         situation = self._kb.situation(state)
         asserted = self._kb.facts.union(facts_of(situation, self._kb.names))
-        entailed = facts_of(self._entailed(situation, state.describe()), self._kb.names)
+        entailed = facts_of(self._entailed(situation), self._kb.names)
         return Inference(state, asserted, frozenset(entailed) - asserted)
 
 
@@ -77,13 +77,13 @@ def _owlready2(kb: KnowledgeBase) -> Reasoner:
     stock = StockPellet(kb)
     checker: list[InProcessPellet] = []
 
-    def entailed(situation: tuple[Triple, ...], describe: str) -> Iterable[Triple]:
+    def entailed(situation: tuple[Triple, ...]) -> Iterable[Triple]:
         # owlready2 throws Pellet's log away, and with it the only word on a rule that was dropped, or on
         # what contradicts what. The Pellet in this process tells: once at the start, and for contradictions.
         if not checker:
             checker.append(InProcessPellet(kb))
         found = stock.infer(situation)
-        return checker[0].infer(situation, describe) if found is None else found
+        return checker[0].infer(situation) if found is None else found
 
     return _Remembering("owlready2", kb, entailed)
 

@@ -90,7 +90,7 @@ def _closure(graph: Graph, start: Node) -> Iterator[RdfTriple]:
     waiting, seen = [start], {start}
     while waiting:
         node = waiting.pop()
-        for _, predicate, value in sorted(graph.triples((node, None, None)), key=lambda triple: triple[1]):
+        for _, predicate, value in sorted(graph.triples((node, None, None)), key=lambda triple: str(triple[1])):
             yield node, predicate, value
             if value not in seen and (isinstance(value, BNode) or _is_part_of_rule(graph, value)):
                 seen.add(value)

@@ -5,6 +5,7 @@ Nothing here imports a reasoner, so that the rest of the simulation may use thes
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
@@ -78,7 +79,7 @@ class KnowledgeState:
             KnowledgeError: a measured value is no finite number, or a function has two objectives.
         """
         known = sorted(objectives, key=lambda objective: objective.function)
-        for one, other in zip(known, known[1:], strict=False):
+        for one, other in itertools.pairwise(known):
             if one.function == other.function:
                 raise KnowledgeError(f"function {one.function} has two objectives", remedy="give it one")
         return cls(
@@ -95,14 +96,6 @@ class KnowledgeState:
     def measured(self, attribute: str) -> tuple[Decimal, ...]:
         """The measured value of a quality attribute; empty before the first measurement."""
         return tuple(value for name, value in self.measurements if name == attribute)
-
-    def describe(self) -> str:
-        """The state in one line, for messages."""
-        parts = [f"{objective_name(o.function)}: {o.status or 'no status'}" for o in self.objectives]
-        parts += [f"{function} grounded by {design}" for function, design in self.groundings]
-        parts += [f"{name}: {status}" for name, status in self.components]
-        parts += [f"{name}: {value}" for name, value in self.measurements]
-        return ", ".join(parts) or "nothing known"
 
 
 @dataclass(frozen=True, slots=True)

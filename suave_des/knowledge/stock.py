@@ -21,10 +21,13 @@ from suave_des.errors import KnowledgeError
 from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.java import java_executable
 from suave_des.knowledge.model import properties_to_read
+from suave_des.knowledge.pellet import unescape
 from suave_des.knowledge.situation import Lit, Triple
 from suave_des.knowledge.triples import literal, n_triple
+from suave_des.knowledge.vocabulary import RDF as RDF_IRI
 from suave_des.knowledge.vocabulary import RDF_TYPE, XSD
 
+_PLAIN: Final = RDF_IRI + "PlainLiteral"
 _STATE_IRI: Final = "urn:suave-des:state"
 
 
@@ -58,11 +61,19 @@ class StockPellet:
         graph = world.as_rdflib_graph()
         for name in self._properties:
             for subject, _, value in graph.triples((None, URIRef(name), None)):
-                yield str(subject), name, literal(value) if isinstance(value, Literal) else str(value)
+                yield str(subject), name, _value(value)
         for name in self._classes:
             for kind in _below(graph, name):
                 for subject in graph.subjects(RDF.type, kind):
                     yield str(subject), RDF_TYPE, name
+
+
+def _value(term: Node) -> str | Lit:
+    """An IRI or a literal; text that Pellet returns is PlainLiteral, with its escapes left in by owlready2."""
+    if not isinstance(term, Literal):
+        return str(term)
+    found = literal(term)
+    return Lit(unescape(found.text), XSD + "string") if found.datatype == _PLAIN else found
 
 
 def _below(graph: Any, name: str) -> set[Node]:

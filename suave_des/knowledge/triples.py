@@ -10,16 +10,18 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Final
 
-from rdflib import BNode, Graph, Literal, URIRef
+from rdflib import BNode, Literal, URIRef
 from rdflib.namespace import OWL as OWL_TERMS
 from rdflib.namespace import RDF
 from rdflib.term import Node
 
 from suave_des.errors import KnowledgeError
+from suave_des.knowledge.catalogue import supplies
 from suave_des.knowledge.ontology_file import OntologyFile
 from suave_des.knowledge.rules import RdfTriple, Rule, rules_of
 from suave_des.knowledge.situation import Lit, Triple
 from suave_des.knowledge.vocabulary import (
+    MROS,
     OWL,
     RDF_TYPE,
     RDFS,
@@ -33,7 +35,7 @@ from suave_des.knowledge.vocabulary import (
 from suave_des.resources import shipped_folder
 
 _HAS_VALUE: Final = TOMASYS + "hasValue"
-_DECLARED: Final = frozenset(OWL + kind for kind in ("ObjectProperty", "DatatypeProperty"))
+_DECLARED: Final = frozenset(OWL + kind for kind in ("ObjectProperty", "DatatypeProperty", "Class"))
 #: Names that rules get for the reasoner, which then names the rule when it complains of one.
 RULE_IRI: Final = "urn:suave-des:rule:"
 #: Words for people, which mean nothing for inference.
@@ -89,12 +91,17 @@ def merge(sources: Sequence[OntologyFile], values: Mapping[str, Decimal]) -> Con
     triples: dict[Triple, None] = {}
     structure: list[str] = []
     rules: list[Rule] = []
+    shipped = shipped_folder("ontology")
+    # The shipped tomasys.owl also has the exemplar's mros rules: a given mros ontology stands in for those.
+    given_mros = {
+        rule.name
+        for source in sources
+        if source.path.parent != shipped and supplies(source, MROS)
+        for rule in rules_of(source)
+    }
     for number, source in enumerate(sorted(sources, key=lambda source: source.content)):
         found = rules_of(source)
-        shipped = source.path.parent == shipped_folder("ontology")
-        # A given file's rule stands in for the shipped one of the same name.
-        taken = {rule.name for other in sources if other is not source for rule in rules_of(other)} if shipped else ()
-        rules += [rule for rule in found if rule.name not in taken]
+        rules += [rule for rule in found if source.path.parent != shipped or rule.name not in given_mros]
         # What is said of the ontology itself (imports, versions) is no part of its content.
         ontologies = set(source.graph.subjects(RDF.type, OWL_TERMS.Ontology))
         inside = {triple for rule in found for triple in rule.triples}
@@ -132,19 +139,19 @@ def _declares_builtin(triple: RdfTriple) -> bool:
     return triple[1] == RDF.type and triple[2] == URIRef(SWRL + "Builtin") and str(triple[0]).startswith(SWRLB)
 
 
-def _declarations(triples: Iterable[Triple], rules: Iterable[Rule]) -> list[Triple]:
-    """Declarations of properties that stand in a rule's head alone.
+def _declarations(triples: Iterable[Triple], rules: Sequence[Rule]) -> list[Triple]:
+    """Declarations of properties and classes that stand in a rule's head alone.
 
-    In-process Pellet takes such a property as it comes, stock owlready2 drops what is inferred of it: declared,
-    it means the same to both.
+    In-process Pellet takes such a term as it comes, stock owlready2 drops what is inferred of it: declared, it
+    means the same to both.
     """
     declared = {subject for subject, predicate, value in triples if predicate == RDF_TYPE and value in _DECLARED}
-    heads = {head for rule in rules for head in rule.head_properties}
-    return [
-        (name, RDF_TYPE, OWL + ("DatatypeProperty" if is_data else "ObjectProperty"))
-        for name, is_data in sorted(heads)
-        if name not in declared
-    ]
+    heads = {
+        (name, "DatatypeProperty" if is_data else "ObjectProperty")
+        for rule in rules
+        for name, is_data in rule.head_properties
+    } | {(name, "Class") for rule in rules for name in rule.head_classes}
+    return [(name, RDF_TYPE, OWL + kind) for name, kind in sorted(heads) if name not in declared]
 
 
 def literal(term: Literal) -> Lit:

@@ -1,0 +1,34 @@
+"""States of the SUAVE knowledge base in the tests' words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from suave_des.knowledge.state import KnowledgeState, Number, ObjectiveState
+
+MOTION = "f_maintain_motion"
+SEARCH = "f_generate_search_path"
+FOLLOW = "f_follow_pipeline"
+
+
+def searching(
+    design: str | None = None,
+    visibility: Number | None = None,
+    *,
+    status: str | None = None,
+    motion: str | None = None,
+    components: Mapping[str, str] | None = None,
+    always_improve: bool = False,
+) -> KnowledgeState:
+    """The search objective, with the motion objective where its grounding is given."""
+    objectives = [ObjectiveState(SEARCH, status, always_improve)]
+    groundings = {SEARCH: design} if design else {}
+    if motion:
+        objectives.append(ObjectiveState(MOTION))
+        groundings[MOTION] = motion
+    return KnowledgeState.of(
+        objectives,
+        groundings=groundings,
+        components=components,
+        measurements={} if visibility is None else {"water_visibility": visibility},
+    )

@@ -1,0 +1,216 @@
+"""Each rule of the shipped ontologies concludes what it says, and nothing where its condition does not hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from decimal import Decimal
+from pathlib import Path
+
+import pytest
+from conftest import MakeOntology
+from knowledge_states import MOTION, SEARCH, searching
+from owl_text import individual, rule
+
+from suave_des.errors import KnowledgeError
+from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.reasoners import Reasoner, make_reasoner
+from suave_des.knowledge.state import Fact, KnowledgeState, ObjectiveState
+
+
+def inferred(reasoner: Reasoner, state: KnowledgeState) -> set[str]:
+    return {str(fact) for fact in reasoner.infer(state).facts}
+
+
+def with_files(*files: Path) -> Reasoner:
+    return make_reasoner("pellet", KnowledgeBase.load(files))
+
+
+def test_all_rules_of_the_exemplar_are_there_and_enabled(kb: KnowledgeBase) -> None:
+    assert [rule.name for rule in kb.rules if rule.enabled] == sorted(
+        ["QAWaterVisibility", "QAenergy", "QAsafety", "compErrFG", "compError", "compRecov", "mros_S4"]
+        + ["S1a", "S1b", "S1c", "S2", "S3", "S4", "S5", "S6a", "S6b", "S6c", "S9", "S10", "S11"]
+    )
+
+
+@pytest.mark.parametrize(
+    ("design", "visibility", "in_error"),
+    [
+        ("fd_spiral_high", 3.2499, True),
+        ("fd_spiral_high", 3.25, False),
+        ("fd_spiral_high", 3.2501, False),
+        ("fd_spiral_medium", 2.24, True),
+        ("fd_spiral_medium", 2.25, False),
+        ("fd_spiral_low", 1.2, True),
+        ("fd_spiral_low", 1.25, False),
+    ],
+)
+def test_visibility_below_what_the_design_expects_is_an_error(
+    pellet: Reasoner, design: str, visibility: float, in_error: bool
+) -> None:
+    inference = pellet.infer(searching(design, visibility))
+    assert inference.grounding_status(SEARCH) == ("IN_ERROR_NFR" if in_error else None)
+    assert inference.objective_status(SEARCH) == ("IN_ERROR_NFR" if in_error else None)
+
+
+def test_a_grounding_without_measurement_is_not_in_error(pellet: Reasoner) -> None:
+    assert inferred(pellet, searching("fd_spiral_high")) == set()
+
+
+def test_a_failed_thruster_makes_its_design_unrealisable_and_its_grounding_an_error(pellet: Reasoner) -> None:
+    state = searching("fd_spiral_low", 2.0, motion="fd_all_thrusters", components={"c_thruster_3": "FALSE"})
+    assert inferred(pellet, state) == {
+        "fd_realisability(fd_all_thrusters, false)",
+        "fg_status(fg_all_thrusters, IN_ERROR_COMPONENT)",
+        "o_status(o_maintain_motion, IN_ERROR_COMPONENT)",
+    }
+    inference = pellet.infer(state)
+    assert not inference.is_realisable("fd_all_thrusters")
+    assert inference.is_realisable("fd_recover_thrusters")
+
+
+def test_the_recovering_design_is_not_in_error_by_a_failed_thruster(pellet: Reasoner) -> None:
+    state = searching("fd_spiral_low", 2.0, motion="fd_recover_thrusters", components={"c_thruster_3": "FALSE"})
+    assert inferred(pellet, state) == {"fd_realisability(fd_all_thrusters, false)"}
+
+
+def test_a_recovered_component_makes_every_objective_updatable(pellet: Reasoner) -> None:
+    state = searching("fd_spiral_low", 2.0, motion="fd_recover_thrusters", components={"c_thruster_1": "RECOVERED"})
+    assert inferred(pellet, state) == {
+        "o_updatable(o_generate_search_path, true)",
+        "o_updatable(o_maintain_motion, true)",
+    }
+    assert pellet.infer(state).is_updatable(MOTION)
+
+
+@pytest.mark.parametrize("attribute", ["energy", "safety"])
+@pytest.mark.parametrize(("measured", "in_error"), [(0.6, True), (0.5, False), (0.4, False)])
+def test_more_than_the_objective_requires_is_an_error_and_logged(
+    suave_copy: MakeOntology, attribute: str, measured: float, in_error: bool
+) -> None:
+    path = suave_copy(
+        individual("nfr", "QAvalue", ("isQAtype", f":mros:{attribute}"), ("hasValue", "0.5"))
+        + individual("qa_low", "QAvalue", ("isQAtype", f":mros:{attribute}"), ("hasValue", "0.9"))
+        + individual("fd_spiral_low", "FunctionDesign", ("hasQAestimation", ":qa_low"))
+        + individual("o_generate_search_path", "Objective", ("hasNFR", ":nfr"))
+    )
+    state = KnowledgeState.of(
+        [ObjectiveState(SEARCH)], groundings={SEARCH: "fd_spiral_low"}, measurements={attribute: measured}
+    )
+    inference = with_files(path).infer(state)
+    assert inference.objective_status(SEARCH) == ("IN_ERROR_FR" if in_error else None)
+    assert inference.error_log("fd_spiral_low") == (("o_generate_search_path",) if in_error else ())
+
+
+@pytest.mark.parametrize("kind", ["COMPONENT", "NFR", "FR"])
+def test_an_error_of_a_grounding_becomes_its_objectives_error(suave_copy: MakeOntology, kind: str) -> None:
+    path = suave_copy(rule("inject", f'FunctionGrounding(?g) -> fg_status(?g, "IN_ERROR_{kind}")'))
+    inference = with_files(path).infer(searching("fd_spiral_low"))
+    assert inference.objective_status(SEARCH) == f"IN_ERROR_{kind}"
+
+
+@pytest.mark.parametrize("kind", ["COMPONENT", "NFR", "FR"])
+def test_an_objectives_error_reaches_the_grounding_that_requires_it(suave_copy: MakeOntology, kind: str) -> None:
+    path = suave_copy(
+        individual("fg_spiral_low", "FunctionGrounding", ("requiresO", ":o_maintain_motion")),
+    )
+    state = KnowledgeState.of(
+        [ObjectiveState(SEARCH), ObjectiveState(MOTION, f"IN_ERROR_{kind}")], groundings={SEARCH: "fd_spiral_low"}
+    )
+    inference = with_files(path).infer(state)
+    assert inference.grounding_status(SEARCH) == f"IN_ERROR_{kind}"
+    assert inference.objective_status(SEARCH) == f"IN_ERROR_{kind}"
+
+
+def bound_thruster(status: str) -> str:
+    """A role of fd_spiral_low that a component in status takes, and whose specification has a unique class."""
+    return (
+        individual("cc_camera", "ComponentClass", ("cc_unique", "true"))
+        + individual("cs_camera", "ComponentSpecification", ("typeC", ":cc_camera"))
+        + individual("r_camera", "Role", ("roleDef", ":cs_camera"))
+        + individual("c_camera", "Component", ("typeC", ":cc_camera"), *([("c_status", status)] if status else []))
+        + individual("b_camera", "Binding", ("binding_component", ":c_camera"), ("binding_role", ":r_camera"))
+        + individual("fg_spiral_low", "FunctionGrounding", ("hasBindings", ":b_camera"))
+        + individual("fd_spiral_low", "FunctionDesign", ("roles", ":r_camera"))
+    )
+
+
+def test_the_boolean_status_of_older_models_puts_binding_and_grounding_in_error(suave_copy: MakeOntology) -> None:
+    reasoner = with_files(suave_copy(bound_thruster("false")))
+    assert inferred(reasoner, searching("fd_spiral_low")) == {
+        "b_status(b_camera, false)",  # S2
+        "fg_status(fg_spiral_low, IN_ERROR_COMPONENT)",  # S3
+        "o_status(o_generate_search_path, IN_ERROR_COMPONENT)",  # S1a
+        "cspec_availability(cs_camera, false)",  # S10
+        "cc_availability(cc_camera, false)",  # S4
+        "fd_realisability(fd_spiral_low, false)",  # S5, S11
+    }
+
+
+def test_the_reported_status_makes_the_class_unavailable_but_not_the_binding(suave_copy: MakeOntology) -> None:
+    reasoner = with_files(suave_copy(bound_thruster("")))
+    state = searching("fd_spiral_low", components={"c_camera": "FALSE"})
+    assert inferred(reasoner, state) == {
+        "cc_availability(cc_camera, false)",  # mros_S4
+        "fd_realisability(fd_spiral_low, false)",  # S5
+    }
+
+
+def test_an_unavailable_specification_makes_the_design_unrealisable(suave_copy: MakeOntology) -> None:
+    path = suave_copy(
+        individual("cs_camera", "ComponentSpecification", ("cspec_availability", "false"))
+        + individual("r_camera", "Role", ("roleDef", ":cs_camera"))
+        + individual("fd_spiral_low", "FunctionDesign", ("roles", ":r_camera"))
+    )
+    assert inferred(with_files(path), searching()) == {"fd_realisability(fd_spiral_low, false)"}
+
+
+def test_a_status_in_the_ontology_holds_until_diagnostics_report_another(suave_copy: MakeOntology) -> None:
+    reasoner = with_files(suave_copy(individual("c_thruster_1", "Component", ("c_status", "FALSE"))))
+    assert inferred(reasoner, searching()) == {"fd_realisability(fd_all_thrusters, false)"}
+    assert inferred(reasoner, searching(components={"c_thruster_1": "OK"})) == set()
+
+
+@pytest.mark.parametrize("name", ["pellet", "owlready2"])
+def test_a_disabled_rule_does_not_fire(suave_copy: MakeOntology, name: str) -> None:
+    path = suave_copy(replace={'#boolean">true</swrla:isRuleEnabled>': '#boolean">false</swrla:isRuleEnabled>'})
+    base = KnowledgeBase.load([path])
+    assert [rule.name for rule in base.rules if not rule.enabled] == ["QAWaterVisibility"]
+    assert make_reasoner(name, base).infer(searching("fd_spiral_high", 1.0)).facts == frozenset()
+
+
+def _clash(suave_copy: MakeOntology) -> Path:
+    return suave_copy(rule("alarm", 'FunctionGrounding(?g) ^ typeFD(?g, :fd_spiral_high) -> fg_status(?g, "ALARM")'))
+
+
+@pytest.mark.parametrize("name", ["pellet", "owlready2"])
+def test_clashing_rules_are_named_with_what_they_clash_on(suave_copy: MakeOntology, name: str) -> None:
+    reasoner = make_reasoner(name, KnowledgeBase.load([_clash(suave_copy)]))
+    with pytest.raises(KnowledgeError) as error:
+        reasoner.infer(searching("fd_spiral_high", 3.0))
+    message = str(error.value)
+    for part in ("fg_spiral_high", "fg_status", "alarm", "QAWaterVisibility", "hasValue(obs_water_visibility, 3)"):
+        assert part in message
+    assert "\n" not in message
+    if name == "pellet":  # and the next state is reasoned on as if nothing had happened
+        assert reasoner.infer(searching("fd_spiral_high", 4.0)).grounding_status(SEARCH) == "ALARM"
+
+
+def test_every_kind_of_conclusion_of_an_own_rule_is_read(suave_copy: MakeOntology) -> None:
+    rules: Mapping[str, str] = {
+        "number": "QAvalue(?q) ^ hasValue(?q, ?v) ^ isQAtype(?q, :water_visibility) ^ multiply(?w, ?v, 2.0)"
+        " -> tomasys:doubled(?q, ?w)",
+        "text": 'Component(?c) ^ c_status(?c, "FALSE") -> tomasys:note(?c, "it\'s 50% (no), été 🚨 C:\\new")',
+        "thing": 'Component(?c) ^ c_status(?c, "FALSE") ^ Objective(?o) -> tomasys:hinders(?c, ?o)',
+        "kind": 'Component(?c) ^ c_status(?c, "FALSE") -> tomasys:Broken(?c)',
+    }
+    data = {"tomasys:doubled", "tomasys:note"}
+    extra = "".join(rule(name, text, data=data) for name, text in rules.items())
+    base = KnowledgeBase.load([suave_copy(extra)])
+    state = searching(None, 1.7, components={"c_thruster_2": "FALSE"})
+    inference = make_reasoner("pellet", base).infer(state)
+    found = {str(fact) for fact in inference.facts}
+    assert Fact("obs_water_visibility", "doubled", Decimal("3.4")) in inference.facts
+    assert "note(c_thruster_2, it's 50% (no), été 🚨 C:\\new)" in found
+    assert "hinders(c_thruster_2, o_generate_search_path)" in found
+    assert "type(c_thruster_2, Broken)" in found
+    assert make_reasoner("owlready2", base).infer(state).facts ^ inference.facts == frozenset()
