@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.resources import find, shipped_folder
-from suave_des.scenario.distributions import Uniform
+from suave_des.scenario.distributions import Normal, Uniform
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import ConstantSignal, SinusoidSignal, TableSignal, ThrusterEvent
 
@@ -89,13 +89,12 @@ def test_a_revision_without_base_differs_from_that_of_the_base_scenario(write):
     assert (ours.revision.name, ours.revision.follow.acceptance_m) == ("1.5", 0.3)
 
 
-def test_another_revision_leaves_nothing_of_the_base_scenarios(write):
-    write(
-        "base.yaml",
-        HEAD + "revision: {set_points: {node_frame_offset_x_m: {distribution: normal, mean: 0, std: 1, minimum: 0}}}\n",
-    )
-    ours = load_scenario(write("mine.yaml", "base: base.yaml\nrevision: 1.5\n")).scenario
-    assert ours.revision == load_scenario("release15").scenario.revision
+def test_a_revision_with_its_own_base_takes_nothing_from_the_base_scenarios(write):
+    offset = "{distribution: normal, mean: 0, std: 1%s}"
+    revision = 'revision: {base: "2023", set_points: {node_frame_offset_x_m: %s}}\n'
+    write("base.yaml", HEAD + revision % (offset % ", minimum: 0"))
+    ours = load_scenario(write("mine.yaml", "base: base.yaml\n" + revision % (offset % ""))).scenario
+    assert ours.revision.set_points.node_frame_offset_x_m == Normal(distribution="normal", mean=0, std=1)
 
 
 def test_a_revision_may_be_a_file_beside_the_scenario(write):
