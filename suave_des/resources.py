@@ -8,11 +8,16 @@ from pathlib import Path
 from suave_des.errors import InputError
 
 _PACKAGE = Path(__file__).resolve().parent
-_KINDS = {"ontology": ".owl", "scenarios": ".yaml", "scenarios/revisions": ".yaml"}
+_KINDS = {
+    "ontology": ".owl",
+    "scenarios": ".yaml",
+    "scenarios/revisions": ".yaml",
+    "scenarios/published": ".csv",
+}
 
 
 def shipped_folder(kind: str) -> Path:
-    """Folder of shipped files of one kind: "ontology", "scenarios" or "scenarios/revisions"."""
+    """Folder of shipped files of one kind: "ontology", "scenarios", "scenarios/revisions" or "scenarios/published"."""
     installed = _PACKAGE / "shipped" / kind
     return installed if installed.is_dir() else _PACKAGE.parent / kind
 

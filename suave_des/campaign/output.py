@@ -76,12 +76,12 @@ def make_output_folder(folder: Path) -> None:
         raise _not_written(folder, error) from None
 
 
-def write_files(folder: Path, files: Mapping[str, str], *, stale: Collection[str] = ()) -> None:
+def write_files(folder: Path, files: Mapping[str, str | bytes], *, stale: Collection[str] = ()) -> None:
     """Write files under temporary names, and rename them when all are complete.
 
     Args:
         folder: an existing folder.
-        files: content by name.
+        files: content by name; text is written as UTF-8.
         stale: names of files of an earlier use of the folder, removed unless they are written anew.
 
     Raises:
@@ -89,10 +89,10 @@ def write_files(folder: Path, files: Mapping[str, str], *, stale: Collection[str
     """
     written: list[tuple[Path, Path]] = []
     try:
-        for name, text in files.items():
+        for name, content in files.items():
             temporary = folder / f".{name}.{os.getpid()}.part"
             written.append((temporary, folder / name))
-            temporary.write_bytes(text.encode())
+            temporary.write_bytes(content if isinstance(content, bytes) else content.encode())
         for temporary, final in written:
             temporary.replace(final)
         for name in set(stale) - set(files):

@@ -1,0 +1,1 @@
+"""Validation: simulated missions against real ones, by distributions, places of detection and conclusions."""
