@@ -1,0 +1,81 @@
+"""A managing subsystem by itself: the test calls its hooks and reads the modes that it asks for."""
+
+import random
+
+import simpy
+
+from suave_des.managed.coordinator import Task
+from suave_des.managing.base import ManagedSystem, ManagingSubsystem
+from suave_des.managing.registry import manager_class
+from suave_des.monitor.diagnostics import Diagnostic, Kind
+from suave_des.scenario.loader import load_scenario
+from suave_des.scenario.models import Battery, Scenario
+
+MOTION, SEARCH, FOLLOW = "f_maintain_motion", "f_generate_search_path", "f_follow_pipeline"
+SCENARIOS = {"2023": load_scenario("seams2023"), "1.5": load_scenario("release15")}
+MODES = SCENARIOS["1.5"].modes
+
+
+class AskedModes:
+    """Takes requests for modes as the mode manager does, and keeps them."""
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[str, str]] = []
+
+    def available_modes(self, function: str) -> tuple[str, ...]:
+        return MODES.modes(function)
+
+    def change_mode(self, function: str, mode: str) -> bool:
+        self.asked.append((function, mode))
+        return mode in MODES.modes(function)
+
+
+class AtWork:
+    """One manager in one revision."""
+
+    def __init__(self, name: str, revision: str = "1.5", *, seed: int = 1, battery: bool = False) -> None:
+        self.per_task = revision == "1.5"
+        self.modes = AskedModes()
+        scenario: Scenario = SCENARIOS[revision].scenario
+        if battery:
+            scenario = scenario.model_copy(update={"battery": Battery()})
+        system = ManagedSystem(
+            env=simpy.Environment(),
+            scenario=scenario,
+            settings={},
+            modes=self.modes,
+            lasting_functions=() if self.per_task else (MOTION,),
+            stream=lambda stream: random.Random(f"{seed}/{stream}"),
+            log=lambda event, detail: None,
+            knowledge=lambda: None,
+        )
+        self.manager: ManagingSubsystem = manager_class(name)(system)
+
+    def task(self, name: str) -> Task:
+        function = SEARCH if name == "search_pipeline" else FOLLOW
+        return Task(name, (MOTION, function) if self.per_task else (function,))
+
+    def request(self, name: str) -> list[tuple[str, str]]:
+        """What is asked for at a task's request."""
+        return self._during(lambda: self.manager.task_requested(self.task(name)))
+
+    def cancel(self, name: str) -> list[tuple[str, str]]:
+        """What is asked for at a task's cancellation."""
+        return self._during(lambda: self.manager.task_cancelled(self.task(name)))
+
+    def adapt(self) -> list[tuple[str, str]]:
+        """What is asked for at a tick."""
+        return self._during(self.manager.adapt)
+
+    def measured(self, key: str, value: float) -> None:
+        """A quality attribute is published."""
+        self.manager.diagnostic(Diagnostic(0.0, Kind.QA_STATUS, key, value))
+
+    def reported(self, thruster: int, status: str) -> None:
+        """A component's status is published."""
+        self.manager.diagnostic(Diagnostic(0.0, Kind.COMPONENT_STATUS, f"c_thruster_{thruster}", status))
+
+    def _during(self, action) -> list[tuple[str, str]]:
+        before = len(self.modes.asked)
+        action()
+        return self.modes.asked[before:]

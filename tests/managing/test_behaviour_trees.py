@@ -1,0 +1,155 @@
+"""The behaviour tree managers bt and bt_extended."""
+
+import pytest
+from managers_at_work import FOLLOW, MOTION, SEARCH, AtWork
+
+RECHARGE = "generate_recharge_path"
+BOTH_REVISIONS = pytest.mark.parametrize("revision", ["2023", "1.5"])
+BOTH_TREES = pytest.mark.parametrize("name", ["bt", "bt_extended"])
+
+
+def searching(name: str = "bt", revision: str = "1.5", **options: bool) -> AtWork:
+    at_work = AtWork(name, revision, **options)
+    at_work.request("search_pipeline")
+    return at_work
+
+
+@BOTH_TREES
+def test_the_tree_ticks_every_tenth_of_a_second(name: str) -> None:
+    manager = AtWork(name).manager
+    assert manager.period_s == 0.1 and 0.0 <= manager.starts_s < 0.1
+
+
+@BOTH_REVISIONS
+@BOTH_TREES
+@pytest.mark.parametrize(
+    ("visibility_m", "mode"),
+    [
+        (3.75, "fd_spiral_high"),
+        (3.25, "fd_spiral_high"),
+        (3.249, "fd_spiral_medium"),
+        (2.25, "fd_spiral_medium"),
+        (2.249, "fd_spiral_low"),
+        (1.25, "fd_spiral_low"),
+        (0.5, "fd_spiral_low"),
+    ],
+)
+def test_search_is_as_high_as_the_visibility_allows(name: str, revision: str, visibility_m: float, mode: str) -> None:
+    at_work = searching(name, revision)
+    at_work.measured("water_visibility", visibility_m)
+    assert (SEARCH, mode) in at_work.adapt()
+
+
+@BOTH_TREES
+def test_a_visibility_not_yet_measured_counts_as_good(name: str) -> None:
+    assert (SEARCH, "fd_spiral_high") in searching(name).adapt()
+
+
+@BOTH_REVISIONS
+@BOTH_TREES
+def test_a_failed_thruster_is_recovered(name: str, revision: str) -> None:
+    at_work = searching(name, revision)
+    at_work.reported(1, "FALSE")
+    assert (MOTION, "fd_recover_thrusters") in at_work.adapt()
+
+
+@BOTH_REVISIONS
+def test_without_failure_all_thrusters_are_used(revision: str) -> None:
+    assert (MOTION, "fd_all_thrusters") in searching("bt", revision).adapt()
+
+
+def test_recovery_goes_on_while_one_thruster_is_still_lost() -> None:
+    at_work = searching()
+    at_work.reported(1, "FALSE")
+    at_work.reported(4, "FALSE")
+    at_work.reported(1, "RECOVERED")
+    assert (MOTION, "fd_recover_thrusters") in at_work.adapt()
+
+
+def test_recovered_thrusters_are_all_used_again() -> None:
+    at_work = searching()
+    at_work.reported(4, "FALSE")
+    at_work.reported(4, "RECOVERED")
+    assert (MOTION, "fd_all_thrusters") in at_work.adapt()
+
+
+def test_a_failure_from_before_the_task_is_not_forgotten() -> None:
+    at_work = AtWork("bt")
+    at_work.reported(1, "FALSE")
+    at_work.request("search_pipeline")
+    assert (MOTION, "fd_recover_thrusters") in at_work.adapt()
+
+
+@BOTH_REVISIONS
+@BOTH_TREES
+def test_after_the_search_it_follows(name: str, revision: str) -> None:
+    at_work = searching(name, revision)
+    at_work.cancel("search_pipeline")
+    at_work.request("inspect_pipeline")
+    asked = dict(at_work.adapt())
+    assert asked[FOLLOW] == "fd_follow_pipeline" and SEARCH not in asked
+
+
+def test_before_any_task_revision_15_asks_for_nothing() -> None:
+    assert AtWork("bt", "1.5").adapt() == []
+
+
+def test_in_2023_maintain_motion_is_kept_between_tasks() -> None:
+    at_work = searching("bt", "2023")
+    at_work.cancel("search_pipeline")
+    assert at_work.adapt() == [(MOTION, "fd_all_thrusters")]
+
+
+# The extended tree
+
+
+def with_battery(level: float | None = None) -> AtWork:
+    at_work = searching("bt_extended", battery=True)
+    if level is not None:
+        at_work.measured("battery_level", level)
+    return at_work
+
+
+@pytest.mark.parametrize("level", [None, 1.0, 0.25])
+def test_with_enough_battery_it_searches(level: float | None) -> None:
+    asked = dict(with_battery(level).adapt())
+    assert (asked[SEARCH], asked[RECHARGE]) == ("fd_spiral_high", "fd_unground")
+
+
+def test_with_a_low_battery_it_goes_to_recharge() -> None:
+    asked = dict(with_battery(0.2475).adapt())
+    assert (asked[SEARCH], asked[RECHARGE]) == ("fd_unground", "normal")
+
+
+def test_recharging_still_recovers_thrusters() -> None:
+    at_work = with_battery(0.2)
+    at_work.reported(2, "FALSE")
+    assert (MOTION, "fd_recover_thrusters") in at_work.adapt()
+
+
+def test_recharged_it_goes_on() -> None:
+    at_work = with_battery(0.2)
+    at_work.adapt()
+    at_work.measured("battery_level", 1.0)
+    asked = dict(at_work.adapt())
+    assert (asked[SEARCH], asked[RECHARGE]) == ("fd_spiral_high", "fd_unground")
+
+
+def test_following_is_interrupted_by_a_low_battery_too() -> None:
+    at_work = with_battery()
+    at_work.cancel("search_pipeline")
+    at_work.request("inspect_pipeline")
+    at_work.measured("battery_level", 0.1)
+    assert (FOLLOW, "fd_unground") in at_work.adapt()
+
+
+def test_without_a_battery_there_is_no_recharging() -> None:
+    at_work = searching("bt_extended")
+    at_work.measured("battery_level", 0.1)
+    assert RECHARGE not in dict(at_work.adapt())
+
+
+def test_the_plain_tree_knows_no_battery() -> None:
+    at_work = searching("bt", battery=True)
+    at_work.measured("battery_level", 0.1)
+    assert dict(at_work.adapt())[SEARCH] == "fd_spiral_high"

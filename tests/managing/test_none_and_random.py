@@ -1,0 +1,84 @@
+"""The managers none and random."""
+
+from collections import Counter
+
+import pytest
+from managers_at_work import FOLLOW, MODES, MOTION, SEARCH, AtWork
+
+BOTH = pytest.mark.parametrize("revision", ["2023", "1.5"])
+
+
+@BOTH
+@pytest.mark.parametrize(
+    ("task", "asked"),
+    [("search_pipeline", (SEARCH, "fd_spiral_low")), ("inspect_pipeline", (FOLLOW, "fd_follow_pipeline"))],
+)
+def test_none_sets_the_default_mode_at_a_tasks_request(revision: str, task: str, asked: tuple[str, str]) -> None:
+    assert AtWork("none", revision).request(task) == [asked]
+
+
+@BOTH
+def test_none_never_adapts(revision: str) -> None:
+    assert AtWork("none", revision).manager.period_s is None
+
+
+@BOTH
+@pytest.mark.parametrize("name", ["none", "random"])
+def test_a_cancelled_tasks_functions_are_set_to_fd_unground(name: str, revision: str) -> None:
+    at_work = AtWork(name, revision)
+    at_work.request("search_pipeline")
+    functions = at_work.task("search_pipeline").functions
+    assert at_work.cancel("search_pipeline") == [(function, "fd_unground") for function in functions]
+
+
+@pytest.mark.parametrize(("revision", "period_s"), [("2023", 15.0), ("1.5", 30.0)])
+def test_random_picks_every_period(revision: str, period_s: float) -> None:
+    assert AtWork("random", revision).manager.period_s == period_s
+
+
+def test_random_of_2023_has_its_timer_from_before_the_start() -> None:
+    starts = [AtWork("random", "2023", seed=seed).manager.starts_s for seed in range(300)]
+    assert min(starts) < 1.0 and max(starts) > 14.0 and max(starts) < 15.0
+
+
+def test_random_of_15_starts_its_timer_with_the_mission() -> None:
+    assert AtWork("random", "1.5").manager.starts_s == 30.0
+
+
+@pytest.mark.parametrize(("revision", "picks"), [("2023", 0), ("1.5", 1)])
+def test_whether_random_picks_at_a_tasks_request(revision: str, picks: int) -> None:
+    assert len(AtWork("random", revision).request("search_pipeline")) == picks
+
+
+@BOTH
+@pytest.mark.parametrize(("task", "function"), [("search_pipeline", SEARCH), ("inspect_pipeline", FOLLOW)])
+def test_random_picks_among_all_modes_with_equal_chance(revision: str, task: str, function: str) -> None:
+    at_work = AtWork("random", revision)
+    at_work.request(task)
+    picks = Counter(pick for _ in range(6000) for pick in at_work.adapt())
+    share = 6000 / len(MODES.modes(function))
+    assert picks == {(function, mode): pytest.approx(share, rel=0.1) for mode in MODES.modes(function)}
+
+
+@BOTH
+def test_random_leaves_maintain_motion_alone(revision: str) -> None:
+    at_work = AtWork("random", revision)
+    at_work.request("search_pipeline")
+    assert all(function != MOTION for _ in range(100) for function, _ in at_work.adapt())
+
+
+@BOTH
+def test_random_does_nothing_between_tasks(revision: str) -> None:
+    at_work = AtWork("random", revision)
+    at_work.request("search_pipeline")
+    at_work.cancel("search_pipeline")
+    assert at_work.adapt() == []
+
+
+def test_random_draws_from_the_runs_stream() -> None:
+    def picks(seed: int) -> list[tuple[str, str]]:
+        at_work = AtWork("random", "2023", seed=seed)
+        at_work.request("search_pipeline")
+        return [pick for _ in range(30) for pick in at_work.adapt()]
+
+    assert picks(1) == picks(1) != picks(2)

@@ -1,0 +1,59 @@
+"""Managers by name."""
+
+from pathlib import Path
+
+import pytest
+
+from suave_des.errors import InputError
+from suave_des.managing.base import ManagingSubsystem
+from suave_des.managing.registry import manager_class, manager_names
+
+
+@pytest.mark.parametrize("name", ["none", "random", "metacontrol", "bt", "bt_extended"])
+def test_built_in_managers_are_named(name: str) -> None:
+    assert name in manager_names()
+
+
+@pytest.mark.parametrize("name", ["none", "random", "bt", "bt_extended"])
+def test_a_name_gives_a_managing_subsystem(name: str) -> None:
+    assert issubclass(manager_class(name), ManagingSubsystem)
+
+
+def test_module_and_class_give_ones_own() -> None:
+    assert manager_class("suave_des.managing.simple:NoManager") is manager_class("none")
+
+
+def test_module_is_found_in_the_current_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = "from suave_des.managing.base import ManagingSubsystem\nclass Mine(ManagingSubsystem):\n    pass\n"
+    (tmp_path / "manager_of_this_folder.py").write_text(source)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.path", ["/nowhere"])
+    assert manager_class("manager_of_this_folder:Mine").__name__ == "Mine"
+
+
+def test_misspelt_name_is_answered_with_the_near_one() -> None:
+    with pytest.raises(InputError, match="did you mean metacontrol"):
+        manager_class("metacontroll")
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("no.such.module:Mine", "no module named 'no'"),
+        ("suave_des.managing.simple:Nobody", "no subclass of ManagingSubsystem named 'Nobody'"),
+        ("suave_des.managing.simple:Task", "no subclass of ManagingSubsystem"),
+        ("suave_des.managing.simple:", "no subclass of ManagingSubsystem"),
+        (":Mine", "empty module name"),
+        ("zebra", "no manager 'zebra'"),
+    ],
+)
+def test_a_name_that_leads_to_no_manager_is_bad_input(name: str, words: str) -> None:
+    with pytest.raises(InputError, match=f"(?i){words}"):
+        manager_class(name)
+
+
+def test_a_module_that_fails_on_import_is_bad_input(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "broken_manager_module.py").write_text("def broken(:\n")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match="SyntaxError"):
+        manager_class("broken_manager_module:Mine")
