@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
-from statistics import median
 
 CONFIDENCE = 0.95
 
@@ -39,22 +39,17 @@ def estimate(values: Sequence[float]) -> Estimate:
     The interval of the mean holds well for samples of twenty and more; that of the standard deviation supposes values
     that are normally distributed, and is a rough guide where they are not.
     """
+    from scipy.special import chdtri, stdtrit  # scipy.stats would take a second to import
+
     n = len(values)
     if n == 0:
         return Estimate(0)
-    # Summed exactly, so that the order of the values makes no difference.
-    mean = math.fsum(values) / n
+    mean = math.fsum(values) / n  # summed exactly: the order of the values makes no difference
+    median = statistics.median(values)
     if n == 1:
-        return Estimate(1, mean, median=mean)
+        return Estimate(1, mean, median=median)
     std = math.sqrt(math.fsum((value - mean) ** 2 for value in values) / (n - 1))
-    return estimate_of(n, mean, std, median(values))
-
-
-def estimate_of(n: int, mean: float, std: float, middle: float | None = None) -> Estimate:
-    """Figures of a sample of which only size, mean, standard deviation and perhaps the median are known (n >= 2)."""
-    from scipy.special import chdtri, stdtrit  # scipy.stats would take a second to import
-
     tail = (1.0 - CONFIDENCE) / 2.0
     half = float(stdtrit(n - 1, 1.0 - tail)) * std / math.sqrt(n)
-    low, high = (std * math.sqrt((n - 1) / float(chdtri(n - 1, probability))) for probability in (tail, 1.0 - tail))
-    return Estimate(n, mean, std, middle, (mean - half, mean + half), (low, high))
+    low, high = (std * math.sqrt((n - 1) / float(chdtri(n - 1, share))) for share in (tail, 1.0 - tail))
+    return Estimate(n, mean, std, median, (mean - half, mean + half), (low, high))

@@ -41,12 +41,14 @@ def reproduce(
     from suave_des.campaign.output import write_files
     from suave_des.cli.console import output, progress_bar
     from suave_des.report.comparison import compare, csv_table, markdown_table
-    from suave_des.report.published import MANAGERS, published
+    from suave_des.report.published import published_figures
 
+    published = published_figures()
+    managers = list(dict.fromkeys(manager for manager, _ in published))
     with progress_bar("reproduce") as show:
         result = run_campaign(
             SCENARIO,
-            MANAGERS,
+            managers,
             runs,
             seed,
             workers,
@@ -58,7 +60,7 @@ def reproduce(
             command=command_line(),
             on_progress=show,
         )
-    comparison = compare(result.frame(), published())
+    comparison = compare(result.frame(), published)
     console = output()
     print_comparison(console, comparison)
     if out is None:
@@ -72,7 +74,7 @@ def reproduce(
 def print_comparison(console: Console, comparison: Comparison) -> None:
     """Print the paper's table beside ours, and what can be said of it."""
     from suave_des.cli.tables import print_table
-    from suave_des.report.comparison import METRICS
+    from suave_des.report.published import METRICS
 
     for metric, title in METRICS.items():
         print_table(console, title, _table([figure for figure in comparison.figures if figure.metric == metric]))

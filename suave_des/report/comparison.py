@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from suave_des.errors import InputError
 from suave_des.estimates import Estimate, Interval, estimate
+from suave_des.report.published import METRICS, Figures
 
 if TYPE_CHECKING:
     import pandas
 
-METRICS = {"search_time_s": "search time (s)", "distance_inspected_m": "distance inspected (m)"}
 _DECIMALS = 6
 _BETTER = {
     "search_time_s": ("finds the pipeline sooner", "does not find the pipeline sooner", -1.0),
@@ -68,8 +69,8 @@ class Comparison:
     """
 
     figures: tuple[Figure, ...]
-    published: Mapping[tuple[str, str], Estimate]
-    ours: Mapping[tuple[str, str], Estimate]
+    published: Figures
+    ours: Figures
 
     def remarks(self) -> Iterator[str]:
         """What can be said of the comparison, in sentences."""
@@ -98,12 +99,15 @@ class Comparison:
                 yield f"Unlike in the paper, metacontrol {does_not} than all others, on average."
 
 
-def compare(runs: pandas.DataFrame, published: Mapping[tuple[str, str], Estimate]) -> Comparison:
+def compare(runs: pandas.DataFrame, published: Figures) -> Comparison:
     """Compare the missions of a campaign with published figures.
 
     Args:
         runs: with the columns of runs.csv.
         published: by (manager, metric); managers that are not in it are left out.
+
+    Raises:
+        InputError: there are fewer than two published runs of a manager.
     """
     ours = {
         (manager, metric): estimate(runs.loc[runs["manager"] == manager, metric].tolist())
@@ -118,13 +122,14 @@ def compare(runs: pandas.DataFrame, published: Mapping[tuple[str, str], Estimate
 
 
 def _figures(manager: str, metric: str, known: Estimate, ours: Estimate) -> Iterator[Figure]:
-    assert known.mean is not None and known.std is not None
-    assert known.mean_interval is not None and known.std_interval is not None
+    if known.mean is None or known.std is None or known.mean_interval is None or known.std_interval is None:
+        problem = f"fewer than two published runs of {manager}"
+        raise InputError(problem, place=metric, remedy="an interval needs two or more")
     yield Figure(manager, metric, "mean", known.mean, known.mean_interval, ours.mean, ours.mean_interval)
     yield Figure(manager, metric, "std", known.std, known.std_interval, ours.std, ours.std_interval)
 
 
-def _sizes(figures: Mapping[tuple[str, str], Estimate]) -> str:
+def _sizes(figures: Figures) -> str:
     """How many missions there are of each manager."""
     sizes = {manager: found.n for (manager, _), found in figures.items()}
     if len(set(sizes.values())) == 1:

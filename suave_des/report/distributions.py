@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from suave_des.errors import InputError
 from suave_des.report import style
+from suave_des.report.published import METRICS
 from suave_des.report.runs import read_runs
-
-METRICS = {"search_time_s": "search time (s)", "distance_inspected_m": "distance inspected (m)"}
 
 
 def draw(path: Path) -> Figure:
@@ -22,6 +22,8 @@ def draw(path: Path) -> Figure:
         InputError: it is no runs.csv, or has no missions.
     """
     runs = read_runs(path, needed=("manager", *METRICS))
+    if runs.empty:
+        raise InputError("has no missions", file=path, remedy="give a runs.csv with at least one")
     figure = Figure(figsize=(style.WIDTH_IN, 2.7), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
     samples = {str(manager): own for manager, own in runs.groupby("manager", sort=False)}

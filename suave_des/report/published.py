@@ -1,34 +1,41 @@
-"""The figures of the paper's table.
-
-Source: G. Rezende Silva, J. Päßler, J. Zwanepol, E. Alberts, S. L. Tapia Tarifa, I. Gerostathopoulos, E. B. Johnsen,
-C. Hernández Corbato, "SUAVE: An Exemplar for Self-Adaptive Underwater Vehicles", SEAMS 2023 (arXiv:2303.09220): means
-and sample standard deviations of 20 runs for each manager. The runs themselves are in analysis/data/seams2023_runs.csv.
-"""
+"""The figures of the paper's table, made from the 60 published runs behind it (SEAMS 2023, arXiv:2303.09220)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
+from pathlib import Path
 
-from suave_des.estimates import Estimate, estimate_of
+from suave_des.estimates import Estimate, estimate
+from suave_des.report.runs import read_runs
+from suave_des.resources import shipped_folder
 
-MANAGERS = ("none", "random", "metacontrol")
-METRICS = ("search_time_s", "distance_inspected_m")
+METRICS = {"search_time_s": "search time (s)", "distance_inspected_m": "distance inspected (m)"}
+"""Metrics of the table, with their titles."""
 
-_RUNS = 20
-_TABLE = {
-    ("none", "search_time_s"): (187.85, 42.40),
-    ("none", "distance_inspected_m"): (31.40, 13.00),
-    ("random", "search_time_s"): (180.15, 82.05),
-    ("random", "distance_inspected_m"): (3.88, 3.19),
-    ("metacontrol", "search_time_s"): (106.95, 39.46),
-    ("metacontrol", "distance_inspected_m"): (51.15, 12.01),
-}
+_PAPER_ORDER = {"none": 0, "random": 1, "metacontrol": 2}
 
 Figures = Mapping[tuple[str, str], Estimate]
-"""What is known of a metric, by (manager, metric)."""
+"""What is known of metrics, by (manager, metric)."""
 
 
-def published() -> Figures:
-    """The table's figures by (manager, metric); medians are not in it."""
-    return MappingProxyType({cell: estimate_of(_RUNS, mean, std) for cell, (mean, std) in _TABLE.items()})
+def published_runs() -> Path:
+    """The shipped file of published runs."""
+    return shipped_folder("scenarios") / "published" / "seams2023_runs.csv"
+
+
+def published_figures(path: Path | None = None) -> Figures:
+    """Figures of published runs, managers in the order of the paper's table.
+
+    Args:
+        path: of the runs; left out, the shipped ones.
+
+    Raises:
+        InputError: the file cannot be read, or lacks a column.
+    """
+    runs = read_runs(path or published_runs(), needed=("manager", *METRICS))
+    names = sorted(runs["manager"].unique(), key=lambda name: _PAPER_ORDER.get(name, len(_PAPER_ORDER)))
+    return {
+        (name, metric): estimate(runs.loc[runs["manager"] == name, metric].tolist())
+        for name in names
+        for metric in METRICS
+    }

@@ -1,0 +1,41 @@
+"""The paper's table beside the same table of a campaign, as Markdown and CSV.
+
+    suave-des campaign seams2023 --runs 200 --out results
+    python analysis/paper_table.py results/runs.csv --out results
+
+The paper: G. Rezende Silva et al., "SUAVE: An Exemplar for Self-Adaptive Underwater Vehicles", SEAMS 2023
+(arXiv:2303.09220). Its 60 runs are shipped with the package.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from suave_des.campaign.output import write_files
+from suave_des.errors import SuaveDesError
+from suave_des.report.comparison import compare, csv_table, markdown_table
+from suave_des.report.published import published_figures, published_runs
+from suave_des.report.runs import read_runs
+
+
+def main() -> None:
+    """Compare the files that the command line names."""
+    parser = argparse.ArgumentParser(description="Compare a campaign with the paper's table.")
+    parser.add_argument("runs", type=Path, help="runs.csv of a campaign on seams2023")
+    parser.add_argument("--published", type=Path, default=published_runs(), help="published runs (default: shipped)")
+    parser.add_argument("--out", type=Path, help="folder for paper_table.md and paper_table.csv")
+    arguments = parser.parse_args()
+    try:
+        comparison = compare(read_runs(arguments.runs), published_figures(arguments.published))
+        if arguments.out is not None:
+            tables = {"paper_table.md": markdown_table(comparison), "paper_table.csv": csv_table(comparison)}
+            write_files(arguments.out, tables)
+    except SuaveDesError as error:
+        sys.exit(f"paper_table.py: {error}")
+    print(markdown_table(comparison), end="")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,185 @@
+"""What a campaign's files say, and that they say the same each time."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from suave_des.campaign.campaign import run_campaign
+
+FIRST_COLUMNS = [
+    *("scenario", "manager", "run", "seed", "initial_x_m", "initial_y_m", "mission_duration_s", "pipeline_found"),
+    *("search_time_s", "distance_inspected_m", "mean_reaction_time_s", "adaptations"),
+]
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("campaign") / "out"
+    run_campaign("seams2023", ["none", "random"], 6, 3, out=out)
+    return out
+
+
+def test_rows_are_in_order_managers_as_given_then_runs(folder: Path) -> None:
+    rows = rows_of(folder / "runs.csv")
+    assert [(row["manager"], row["run"]) for row in rows] == [
+        (manager, str(run)) for manager in ("none", "random") for run in range(1, 7)
+    ]
+    assert {row["seed"] for row in rows} == {"3"}
+    assert {row["scenario"] for row in rows} == {"seams2023"}
+
+
+def test_columns_of_runs_csv_begin_as_documented(folder: Path) -> None:
+    header = (folder / "runs.csv").read_text().splitlines()[0].split(",")
+    assert header[: len(FIRST_COLUMNS)] == FIRST_COLUMNS
+    assert header[len(FIRST_COLUMNS) :] == ["detection_time_s", "detection_x_m", "detection_y_m"]
+
+
+def test_cells_are_short_numbers_true_or_false_or_empty(folder: Path) -> None:
+    content = (folder / "runs.csv").read_bytes()
+    assert b"\r" not in content
+    for row in rows_of(folder / "runs.csv"):
+        assert row["pipeline_found"] in ("True", "False")
+        assert row["mean_reaction_time_s"] == "" or row["manager"] == "random"  # none never reacts
+        for name in ("initial_y_m", "distance_inspected_m", "search_time_s"):
+            assert row[name] == repr(round(float(row[name]), 6))
+
+
+def test_the_same_run_of_two_managers_has_the_same_sea(folder: Path) -> None:
+    rows = rows_of(folder / "runs.csv")
+    positions = {
+        manager: [row["initial_y_m"] for row in rows if row["manager"] == manager] for manager in ("none", "random")
+    }
+    assert positions["none"] == positions["random"]
+    assert len(set(positions["none"])) == 6
+
+
+def test_the_search_time_of_a_mission_without_detection_is_the_limit(tmp_path: Path) -> None:
+    scenario = tmp_path / "murky.yaml"
+    scenario.write_text("base: seams2023.yaml\nsignals: {water_visibility: {kind: constant, value: 0.1}}\n")
+    run_campaign(scenario, ["none"], 2, 1, out=tmp_path / "out")
+    for row in rows_of(tmp_path / "out" / "runs.csv"):
+        assert (row["pipeline_found"], row["search_time_s"], row["detection_time_s"]) == ("False", "300.0", "")
+        assert row["distance_inspected_m"] == "0.0"
+
+
+def test_equal_campaigns_give_equal_bytes_on_one_and_two_workers(folder: Path, tmp_path: Path) -> None:
+    for name, workers in (("again", 1), ("two", 2)):
+        run_campaign("seams2023", ["none", "random"], 6, 3, workers, tmp_path / name)
+        for file in ("runs.csv", "summary.csv"):
+            assert (tmp_path / name / file).read_bytes() == (folder / file).read_bytes()
+
+
+def test_metacontrol_gives_equal_bytes_on_one_and_two_workers(tmp_path: Path) -> None:
+    for name, workers in (("one", 1), ("two", 2)):
+        run_campaign("seams2023", ["metacontrol"], 3, 5, workers, tmp_path / name)
+    one, two = ((tmp_path / name / "runs.csv").read_bytes() for name in ("one", "two"))
+    assert one == two
+    assert one.count(b"\n") == 4
+
+
+def test_a_manager_more_or_a_run_more_changes_no_other_row(folder: Path, tmp_path: Path) -> None:
+    run_campaign("seams2023", ["random"], 8, 3, out=tmp_path / "out")
+    more = (tmp_path / "out" / "runs.csv").read_text().splitlines()
+    assert more[1:7] == (folder / "runs.csv").read_text().splitlines()[7:13]
+
+
+def test_another_seed_gives_other_rows(folder: Path, tmp_path: Path) -> None:
+    run_campaign("seams2023", ["none"], 6, 4, out=tmp_path / "out")
+    assert [row["initial_y_m"] for row in rows_of(tmp_path / "out" / "runs.csv")] != [
+        row["initial_y_m"] for row in rows_of(folder / "runs.csv")[:6]
+    ]
+
+
+def test_summary_follows_from_runs(folder: Path) -> None:
+    rows = rows_of(folder / "runs.csv")
+    summary = rows_of(folder / "summary.csv")
+    assert [row["manager"] for row in summary] == ["none", "random"]
+    for line in summary:
+        for metric in ("search_time_s", "distance_inspected_m"):
+            values = [float(row[metric]) for row in rows if row["manager"] == line["manager"]]
+            mean = sum(values) / 6
+            std = (sum((value - mean) ** 2 for value in values) / 5) ** 0.5
+            half = 2.570582 * std / 6**0.5  # Student's t, 5 degrees of freedom, 97.5%: any statistics table
+            assert line["n"] == "6"
+            assert float(line[f"{metric}_mean"]) == pytest.approx(mean, abs=1e-5)
+            assert float(line[f"{metric}_std"]) == pytest.approx(std, abs=1e-5)
+            assert float(line[f"{metric}_median"]) == pytest.approx(sum(sorted(values)[2:4]) / 2, abs=1e-5)
+            assert float(line[f"{metric}_ci95_low"]) == pytest.approx(mean - half, abs=1e-3)
+            assert float(line[f"{metric}_ci95_high"]) == pytest.approx(mean + half, abs=1e-3)
+
+
+def test_one_mission_has_no_spread_and_no_interval(tmp_path: Path) -> None:
+    run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out")
+    (line,) = rows_of(tmp_path / "out" / "summary.csv")
+    assert line["search_time_s_mean"] == line["search_time_s_median"] != ""
+    assert line["search_time_s_std"] == line["search_time_s_ci95_low"] == line["search_time_s_ci95_high"] == ""
+
+
+def test_the_manifest_names_versions_inputs_and_what_was_asked(folder: Path) -> None:
+    manifest = json.loads((folder / "manifest.json").read_text())
+    assert (manifest["managers"], manifest["runs"], manifest["seed"]) == (["none", "random"], 6, 3)
+    assert manifest["missions"] == {"planned": 12, "done": 12, "failed": 0, "left_out": 0}
+    assert {"suave-des", "python", "numpy", "owlready2"} <= manifest["versions"].keys()
+    assert {"shipped/scenarios/seams2023.yaml", "shipped/ontology/suave.owl"} <= manifest["inputs_sha256"].keys()
+    assert all(len(digest) == 64 for digest in manifest["inputs_sha256"].values())
+
+
+def test_the_manifest_names_imported_ontologies_too(tmp_path: Path) -> None:
+    run_campaign("seams2023", ["metacontrol"], 1, 1, out=tmp_path / "out")
+    inputs = json.loads((tmp_path / "out" / "manifest.json").read_text())["inputs_sha256"]
+    assert {"shipped/ontology/suave.owl", "shipped/ontology/tomasys.owl"} <= inputs.keys()
+
+
+def test_a_campaign_without_a_folder_gives_a_typed_frame() -> None:
+    frame = run_campaign("seams2023", ["none", "random"], 2, 1).frame()
+    assert list(frame["manager"]) == ["none", "none", "random", "random"]
+    assert frame["pipeline_found"].dtype == bool
+    assert frame["mean_reaction_time_s"].dtype == float
+    assert frame["run"].dtype.kind == "i"
+
+
+class TestSuaveFormat:
+    def test_revision_2023(self, tmp_path: Path) -> None:
+        scenario = tmp_path / "short.yaml"
+        scenario.write_text("base: seams2023.yaml\nmission: {time_limit_s: 150}\n")
+        run_campaign(scenario, ["none", "random"], 4, 1, out=tmp_path / "out", suave_format=True)
+        theirs = rows_of(tmp_path / "out" / "suave_results.csv")
+        ours = rows_of(tmp_path / "out" / "runs.csv")
+        assert list(theirs[0]) == [
+            *("mission_name", "datetime", "initial pos (x,y)", "time budget (s)", "time search (s)"),
+            "distance inspected (m)",
+        ]
+        assert theirs[0]["mission_name"] == "time constrained none"
+        assert theirs[4]["mission_name"] == "time constrained random"
+        assert {row["pipeline_found"] for row in ours} == {"True", "False"}  # or the next lines show nothing
+        for their, our in zip(theirs, ours, strict=True):
+            found = our["pipeline_found"] == "True"
+            assert their["time search (s)"] == (f"{float(our['search_time_s']):.0f}" if found else "-1")
+            assert their["distance inspected (m)"] == our["distance_inspected_m"]
+            assert their["time budget (s)"] == "150"
+        x_m, y_m = float(ours[0]["initial_x_m"]), float(ours[0]["initial_y_m"])
+        assert theirs[0]["initial pos (x,y)"] == f"({x_m:.1f}, {round(y_m, 2)})"
+        stamps = [row["datetime"] for row in theirs]
+        assert stamps[0] == "Jan-01-2000-00-00-01"
+        assert len(set(stamps)) == 8
+
+    def test_revision_1_5(self, tmp_path: Path) -> None:
+        run_campaign("release15", ["none"], 2, 1, out=tmp_path / "out", suave_format=True)
+        theirs = rows_of(tmp_path / "out" / "suave_results.csv")
+        assert list(theirs[0]) == [
+            *("mission name", "datetime", "initial pos (x,y)", "mission duration (s)", "pipeline found"),
+            *("time searching pipeline (s)", "distance inspected (m)", "mean reaction time (s)"),
+        ]
+        assert theirs[0]["mission name"] == "suave none"
+        assert theirs[1]["datetime"] == "01-Jan-2000-00-00-02"
+        assert theirs[0]["pipeline found"] in ("True", "False")
+        assert theirs[0]["mean reaction time (s)"] == "0.0"  # none never reacts

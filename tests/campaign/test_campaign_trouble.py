@@ -1,0 +1,166 @@
+"""What a campaign does when something goes wrong: what is kept, and what is told."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+from pathlib import Path
+
+import pytest
+
+from suave_des.campaign.campaign import CampaignInterrupted, run_campaign
+from suave_des.campaign.executors import WorkerError
+from suave_des.errors import InputError
+
+RUNS = 12
+
+
+def rows_of(folder: Path) -> list[dict[str, str]]:
+    with (folder / "runs.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_manager_that_raises_costs_its_own_mission_only(workers: int, tmp_path: Path) -> None:
+    manager = "awkward_managers:RaisesInHalf"
+    result = run_campaign("seams2023", [manager, "none"], RUNS, 1, workers, tmp_path / "out")
+    failed = [failure.run for failure in result.failures]
+    assert 0 < len(failed) < RUNS
+    assert failed == sorted(failed)
+    for failure in result.failures:
+        line = f"manager {manager}, run {failure.run}, mission time 50.00 s: ValueError: I do not know what to do"
+        assert str(failure) == line
+    rows = rows_of(tmp_path / "out")
+    assert [int(row["run"]) for row in rows if row["manager"] == manager] == [
+        run for run in range(1, RUNS + 1) if run not in failed
+    ]
+    assert sum(row["manager"] == "none" for row in rows) == RUNS
+    manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
+    assert [failure["run"] for failure in manifest["failures"]] == failed
+    assert manifest["missions"]["failed"] == len(failed)
+
+
+def test_when_all_missions_fail_there_are_no_rows(tmp_path: Path) -> None:
+    result = run_campaign("seams2023", ["awkward_managers:RaisesAlways"], 2, 1, out=tmp_path / "out")
+    assert len(result.failures) == 2
+    assert rows_of(tmp_path / "out") == []
+    assert (tmp_path / "out" / "summary.csv").read_text().splitlines()[1].startswith("awkward_managers:RaisesAlways,0,")
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_interrupted_finished_missions_are_kept(
+    workers: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("AWKWARD_TARGET", "self" if workers == 1 else "parent")
+    managers = ["none", "awkward_managers:InterruptsInSome"]
+    with pytest.raises(CampaignInterrupted, match=r"\d+ of 200 missions are done, and kept in ") as stopped:
+        run_campaign("seams2023", managers, 100, 1, workers, tmp_path / "out")
+    assert isinstance(stopped.value, KeyboardInterrupt)
+    kept = rows_of(tmp_path / "out")
+    assert 0 < len(kept) < 200
+    whole = {row["run"]: row for row in _rows_without_trouble(tmp_path)}
+    for row in kept:
+        if row["manager"] == "none":
+            assert row == whole[row["run"]]
+    left_out = json.loads((tmp_path / "out" / "manifest.json").read_text())["missions"]["left_out"]
+    assert left_out == 200 - len(kept)
+
+
+def _rows_without_trouble(tmp_path: Path) -> list[dict[str, str]]:
+    run_campaign("seams2023", ["none"], 100, 1, out=tmp_path / "whole")
+    return rows_of(tmp_path / "whole")
+
+
+def test_a_worker_that_is_killed_ends_the_campaign_with_what_is_there(tmp_path: Path) -> None:
+    managers = ["none", "awkward_managers:DiesInSome"]
+    with pytest.raises(WorkerError, match=r"status -9 .* \d+ of 200 missions are done, and kept in "):
+        run_campaign("seams2023", managers, 100, 1, 2, tmp_path / "out")
+    assert len(rows_of(tmp_path / "out")) > 0
+
+
+def test_missions_run_in_as_many_processes_as_asked_for() -> None:
+    manager = "awkward_managers:TellsItsProcess"
+    alone = run_campaign("seams2023", [manager], 2, 1)
+    assert {failure.cause for failure in alone.failures} == {f"RuntimeError: process {os.getpid()}"}
+    shared = run_campaign("seams2023", [manager], 40, 1, 2)
+    processes = {re.sub(r"\D", "", failure.cause) for failure in shared.failures}
+    assert str(os.getpid()) not in processes
+    assert 1 <= len(processes) <= 2
+
+
+class TestRefusedBeforeAnythingIsWritten:
+    @pytest.mark.parametrize(
+        ("change", "words"),
+        [
+            ({"managers": []}, "no managers are given"),
+            ({"managers": ["metacontrl"]}, "there is no manager 'metacontrl' (did you mean metacontrol?"),
+            ({"managers": ["none", "none"]}, "'none' is given twice"),
+            ({"managers": ["no_such_module:Manager"]}, "no_such_module"),
+            ({"managers": ["awkward_managers:NoSuchClass"]}, "NoSuchClass"),
+            ({"runs": 0}, "runs: 0 is out of range"),
+            ({"runs": -5}, "runs: -5"),
+            ({"workers": 0}, "workers: 0 is out of range"),
+            ({"workers": 10_000}, "workers: 10000 is out of range"),
+            ({"scenario": "no_such_scenario"}, "no_such_scenario"),
+            ({"reasoner": "hermit", "managers": ["metacontrol"]}, "hermit"),
+            ({"ontologies": ["no_such.owl"]}, "no_such.owl"),
+            ({"modes_file": "no_such.yaml"}, "no_such.yaml"),
+        ],
+    )
+    def test_bad_input(self, change: dict[str, object], words: str, tmp_path: Path) -> None:
+        asked: dict[str, object] = {"scenario": "seams2023", "managers": ["none"], "runs": 1, "workers": 1} | change
+        with pytest.raises(InputError, match=re.escape(words)):
+            run_campaign(seed=1, out=tmp_path / "out", **asked)  # type: ignore[arg-type]
+        assert not (tmp_path / "out").exists()
+
+    def test_an_ontology_that_is_given_is_checked_even_if_no_manager_uses_it(self, tmp_path: Path) -> None:
+        (tmp_path / "broken.owl").write_text("<rdf")
+        with pytest.raises(InputError, match=r"broken\.owl"):
+            run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out", ontologies=[tmp_path / "broken.owl"])
+        assert not (tmp_path / "out").exists()
+
+    def test_a_folder_with_results(self, tmp_path: Path) -> None:
+        run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out", suave_format=True)
+        before = (tmp_path / "out" / "runs.csv").read_bytes()
+        with pytest.raises(InputError, match=r"out: the output folder is not empty: .*--overwrite"):
+            run_campaign("seams2023", ["none"], 2, 1, out=tmp_path / "out")
+        assert (tmp_path / "out" / "runs.csv").read_bytes() == before
+
+    def test_overwriting_replaces_results_and_leaves_other_files(self, tmp_path: Path) -> None:
+        run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out", suave_format=True)
+        (tmp_path / "out" / "notes.txt").write_text("mine")
+        run_campaign("seams2023", ["none"], 2, 1, out=tmp_path / "out", overwrite=True)
+        assert len(rows_of(tmp_path / "out")) == 2
+        assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+            *("manifest.json", "notes.txt", "runs.csv", "summary.csv"),
+        ]
+
+    def test_a_file_in_place_of_the_folder(self, tmp_path: Path) -> None:
+        (tmp_path / "out").write_text("")
+        with pytest.raises(InputError, match="out: the output folder is not a folder"):
+            run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out")
+
+    def test_a_folder_whose_parent_is_missing(self, tmp_path: Path) -> None:
+        with pytest.raises(InputError, match=r"there is no folder .*nowhere"):
+            run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "nowhere" / "out")
+
+    def test_a_place_where_nothing_can_be_written(self) -> None:
+        with pytest.raises(InputError, match="the output folder cannot be written"):
+            run_campaign("seams2023", ["none"], 1, 1, out="/proc/suave-des")
+
+
+def test_a_disk_that_fills_up_leaves_nothing_half_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = Path.write_bytes
+
+    def full(path: Path, content: bytes) -> int:
+        if "summary.csv" in path.name:
+            real(path, content[:10])
+            raise OSError(28, "No space left on device")
+        return real(path, content)
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(InputError, match="No space left on device"):
+        run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out")
+    assert list((tmp_path / "out").iterdir()) == []
