@@ -29,7 +29,6 @@ Number = Annotated[float, Field(strict=True)]
 """A number written as one: "80" in quotes and true are none."""
 Positive = Annotated[float, Field(gt=0, strict=True)]
 NotNegative = Annotated[float, Field(ge=0, strict=True)]
-Probability = Annotated[float, Field(ge=0, lt=1, strict=True)]
 Period = Annotated[float, Field(ge=0.001, strict=True)]
 """Period of something that happens in mission time, in s; the limit keeps a slip from stopping the clock."""
 
@@ -187,6 +186,22 @@ def stated(distribution: float | Normal | Uniform | Exponential | Choice) -> tup
             return distribution.values
         case number:
             return (float(number),)
+
+
+def upper_bound(distribution: float | Normal | Uniform | Exponential | Choice) -> float:
+    """The greatest value that a distribution can give (inf for an exponential one, or a normal one without maximum)."""
+    match distribution:
+        case Normal():
+            high = distribution.mean if distribution.std == 0 else float("inf")
+            return high if distribution.maximum is None else distribution.maximum
+        case Uniform():
+            return distribution.maximum
+        case Exponential():
+            return distribution.minimum if distribution.mean == 0 else float("inf")
+        case Choice():
+            return max(distribution.values)
+        case number:
+            return float(number)
 
 
 def lower_bound(distribution: float | Normal | Uniform | Exponential | Choice) -> float:

@@ -10,8 +10,10 @@ from typing import Any
 from pydantic import ValidationError
 
 from suave_des.errors import InputError
+from suave_des.scenario.layers import Layer, Place
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import Scenario
+from suave_des.scenario.problems import input_error
 
 
 def with_values(loaded: LoadedScenario, values: Mapping[str, Any]) -> LoadedScenario:
@@ -32,9 +34,7 @@ def with_values(loaded: LoadedScenario, values: Mapping[str, Any]) -> LoadedScen
     try:
         scenario = Scenario.model_validate(data)
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise InputError(f"{place}: {first['msg']}", file=loaded.path, remedy="see the scenario reference") from None
+        raise input_error(error, Layer(data, {(): Place(0, 1, loaded.path)}), Scenario) from None
     return replace(loaded, scenario=scenario)
 
 

@@ -2,9 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
-from suave_des.scenario.distributions import Distribution, NotNegative, Period, Positive, Probability, Strict
+from pydantic import field_validator
+
+from suave_des.scenario.distributions import (
+    Distribution,
+    NotNegative,
+    Period,
+    Positive,
+    Strict,
+    lower_bound,
+    upper_bound,
+    wrong,
+)
 
 
 class CoordinatorRevision(Strict):
@@ -69,14 +80,21 @@ class MonitorsRevision(Strict):
 class SetPointRevision(Strict):
     """How functions hand set-points to the autopilot."""
 
-    loss_probability: Probability
-    """A publisher made for each call may publish before the autopilot has discovered it."""
+    loss_probability: Distribution
+    """Chance that a set-point is lost, drawn once a run: a publisher made for each call may publish undiscovered."""
     node_frame_offset_x_m: Distribution
     """Steady error of one node's frame against the simulator's, east; drawn once per node and run."""
     node_frame_offset_y_m: Distribution
     """The same, north."""
     node_frame_offset_z_m: Distribution
     """The same, up."""
+
+    @field_validator("loss_probability", mode="after")
+    @classmethod
+    def _is_probability(cls, value: Any) -> Any:
+        if lower_bound(value) < 0 or upper_bound(value) >= 1:
+            raise wrong("is no probability", "give a number >= 0 and < 1, or a distribution with such bounds")
+        return value
 
 
 class RandomRevision(Strict):

@@ -270,10 +270,13 @@ class _Mission:
             self._draw(f"revision.set_points.node_frame_offset_z_m/{node}", set_points.node_frame_offset_z_m),
         )
         stream = self.streams.stream(f"set_points/{node}")
-        return SetPointSender(self.env, self.vehicle, frame, set_points.loss_probability, stream)
+        return SetPointSender(self.env, self.vehicle, frame, self.loss_probability, stream)
 
     def _make_functions(self) -> tuple[FollowPipeline, dict[str, FunctionNode]]:
         env, vehicle, revision = self.env, self.vehicle, self.revision
+        self.loss_probability = self._draw(
+            "revision.set_points.loss_probability", revision.set_points.loss_probability
+        )
         follow = FollowPipeline(env, vehicle, self._sender(FOLLOW), revision.follow, self._path)
         nodes: dict[str, FunctionNode] = {
             MAINTAIN_MOTION: MaintainMotion(env, self.bus, revision.recovery, self._restore_thruster),
