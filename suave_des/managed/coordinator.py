@@ -34,6 +34,7 @@ class MissionCoordinator:
         ended: the event of the mission's end: the time limit, or the end of the path.
         search_time_s: whole seconds until the pipeline was found, as the revision counts them; none while it is not
             found.
+        distance_inspected_m: distance inspected, as it was published last before the mission's end.
         task: the task under way.
 
     Args:
@@ -77,6 +78,7 @@ class MissionCoordinator:
         self._log = log
         self.ended = env.event()
         self.search_time_s: float | None = None
+        self.distance_inspected_m = 0.0
         self.task: Task | None = None
         shared = (MAINTAIN_MOTION,) if revision.maintain_motion_per_task else ()
         self._search = Task("search_pipeline", (*shared, SEARCH))
@@ -135,7 +137,8 @@ class MissionCoordinator:
 
     def _finish(self, why: str) -> None:
         if not self.ended.triggered:
-            # The metrics are saved at once, before the cancellation of the present task has an effect.
-            self.ended.succeed()
+            # What the cancellation of the present task brings about comes too late for the metric.
+            self.distance_inspected_m = self._follow.distance_m
             self._end("task_cancelled")
             self._log("coordinator", "mission_ended", why)
+            self.ended.succeed()

@@ -141,7 +141,7 @@ class _Mission:
             mission_duration_s=float(self.env.now),
             pipeline_found=found,
             search_time_s=self.coordinator.search_time_or_limit_s(),
-            distance_inspected_m=self.follow.distance_m,
+            distance_inspected_m=self.coordinator.distance_inspected_m,
             mean_reaction_time_s=self.reactions.mean_s,
             adaptations=self.modes.adaptations,
             detection_time_s=self.detector.detected_s if found else None,

@@ -1,5 +1,6 @@
 """The mission coordinator: tasks, hand-over, time limit, search time."""
 
+from collections.abc import Callable
 from types import SimpleNamespace
 
 import pytest
@@ -26,13 +27,14 @@ class Mission:
     ) -> None:
         self.env = simpy.Environment()
         self.detector = SimpleNamespace(detected=self.env.event(), detected_s=None, first_point=3)
-        self.follow = SimpleNamespace(finished=self.env.event())
+        self.follow = SimpleNamespace(finished=self.env.event(), distance_m=12.5)
         if detected_s is not None:
             self.env.process(self._detect(detected_s))
         if path_end_s is not None:
             self.env.process(self._finish(path_end_s))
         self.calls: list[tuple[str, float, str]] = []
         self.tasks: list[Task] = []
+        self.on_cancel: Callable[[], None] = lambda: None
         self.logged: list[tuple[float, str]] = []
         self.coordinator = MissionCoordinator(
             self.env,
@@ -40,7 +42,7 @@ class Mission:
             self.detector,
             self.follow,
             self._request,
-            lambda task: self.calls.append(("cancel", round(self.env.now, 6), task.name)),
+            self._cancel,
             time_limit_s=time_limit_s,
             start_delay_s=start_delay_s,
             poll_phase_s=POLL_PHASE_S if name == "2023" else 0.035,
@@ -55,6 +57,11 @@ class Mission:
     def _request(self, task: Task) -> None:
         self.calls.append(("request", round(self.env.now, 6), task.name))
         self.tasks.append(task)
+
+    def _cancel(self, task: Task) -> None:
+        self.calls.append(("cancel", round(self.env.now, 6), task.name))
+        if task.name == "inspect_pipeline":
+            self.on_cancel()
 
     def _detect(self, at_s: float):
         yield self.env.timeout(at_s)
@@ -119,6 +126,12 @@ def test_the_limit_is_checked_every_half_second(name: str, limit_s: float, end_s
 @BOTH
 def test_at_the_limit_the_present_task_is_cancelled(name: str, detected_s: float | None, task: str) -> None:
     assert Mission(name, detected_s).run().calls[-1] == ("cancel", 300.2, task)
+
+
+def test_distance_is_the_one_published_before_the_cancellation_at_the_limit() -> None:
+    mission = Mission("2023", 150.0)
+    mission.on_cancel = lambda: setattr(mission.follow, "distance_m", 99.0)
+    assert mission.run().coordinator.distance_inspected_m == 12.5
 
 
 def test_each_task_is_cancelled_once() -> None:

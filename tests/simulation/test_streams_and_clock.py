@@ -1,0 +1,64 @@
+"""Named random streams, and the clock's ticks."""
+
+import pytest
+import simpy
+from hypothesis import given
+from hypothesis import strategies as st
+
+from suave_des.clock import call_at, tick_at_or_after, until
+from suave_des.streams import Streams
+
+names = st.text(min_size=1, max_size=20)
+
+
+def draws(streams: Streams, name: str) -> list[float]:
+    stream = streams.stream(name)
+    return [stream.random() for _ in range(5)]
+
+
+@given(st.integers(0, 2**64), st.integers(0, 10**6), names)
+def test_a_stream_depends_on_seed_run_and_name(seed: int, run: int, name: str) -> None:
+    assert draws(Streams(seed, run), name) == draws(Streams(seed, run), name)
+
+
+@given(names, st.lists(names, max_size=5))
+def test_a_stream_does_not_depend_on_which_others_exist(name: str, others: list[str]) -> None:
+    streams = Streams(1, 1)
+    for other in others:
+        draws(streams, other)
+    assert draws(streams, name) == draws(Streams(1, 1), name)
+
+
+@pytest.mark.parametrize(("seed", "run", "name"), [(2, 1, "a"), (1, 2, "a"), (1, 1, "b")], ids=["seed", "run", "name"])
+def test_another_seed_run_or_name_is_another_stream(seed: int, run: int, name: str) -> None:
+    assert draws(Streams(seed, run), name) != draws(Streams(1, 1), "a")
+
+
+def test_streams_are_the_same_on_every_machine() -> None:
+    assert draws(Streams(1, 1), "start.y_m")[0] == 0.6140368914426398
+
+
+@pytest.mark.parametrize(
+    ("t_s", "tick_s"), [(0.0, 0.3), (0.3, 0.3), (0.31, 1.3), (1.3, 1.3), (1.3 + 1e-12, 1.3), (7.2, 7.3), (-4.0, 0.3)]
+)
+def test_first_tick_not_before_a_time(t_s: float, tick_s: float) -> None:
+    assert tick_at_or_after(t_s, 0.3, 1.0) == pytest.approx(tick_s)
+
+
+@given(st.floats(0.0, 1000.0), st.floats(0.0, 10.0), st.sampled_from([0.1, 0.2, 0.5, 1.0, 2.0, 15.0]))
+def test_the_next_tick_is_within_a_period(t_s: float, phase_s: float, period_s: float) -> None:
+    tick_s = tick_at_or_after(t_s, phase_s, period_s)
+    assert -1e-6 <= tick_s - t_s <= max(period_s, phase_s - t_s) + 1e-6
+
+
+def test_waiting_for_a_time_that_has_passed_takes_no_time() -> None:
+    env = simpy.Environment(initial_time=5.0)
+    env.run(until=until(env, 3.0))
+    assert env.now == 5.0
+
+
+def test_callback_comes_at_its_time_with_its_value() -> None:
+    env, called = simpy.Environment(), []
+    call_at(env, 4.0, lambda value: called.append((env.now, value)), "value")
+    env.run()
+    assert called == [(4.0, "value")]
