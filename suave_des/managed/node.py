@@ -48,12 +48,10 @@ class SetPointSender:
         self._frame = frame
         self._loss_probability = loss_probability
         self._stream = stream
-        self.lost = 0
 
     def send(self, x_m: float, y_m: float, z_m: float) -> None:
         """Send a set-point, world frame; whether it arrived nobody is told."""
         if self._loss_probability and self._stream.random() < self._loss_probability:
-            self.lost += 1
             return
         self._vehicle.command(self._env.now, x_m + self._frame.x_m, y_m + self._frame.y_m, z_m + self._frame.z_m)
 
