@@ -11,6 +11,8 @@ from suave_des.cli.campaign import exit_telling_failures
 from suave_des.cli.options import Modes, Ontologies, Overwrite, Reasoner, Seed, Workers, command_line
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import pandas
 
     from suave_des.campaign.campaign import CampaignResult
@@ -76,6 +78,7 @@ def validate(
 
     campaign: CampaignResult | None = None
     if runs_file is not None:
+        _check_unused({"--ontology": ontology, "--modes": modes, "--reasoner": reasoner})
         simulated, sources = _recorded(runs_file, chosen, scenario, out, overwrite=overwrite)
     else:
         from suave_des.campaign.campaign import run_campaign
@@ -98,7 +101,7 @@ def validate(
                 on_progress=show,
             )
         simulated, sources = campaign.frame(), {"scenario": campaign.loaded.scenario.name, "runs": runs}
-        exit_if_none_is_left(campaign)
+        _exit_if_one_has_none(campaign)
     validation = compare(published.frame, simulated, chosen, shares=shares, seed=seed)
     console = output()
     print_validation(console, validation)
@@ -112,6 +115,15 @@ def validate(
         exit_telling_failures(campaign)
     if strict and not validation.all_met:
         raise typer.Exit(TARGETS_NOT_MET)
+
+
+def _check_unused(options: Mapping[str, object]) -> None:
+    """See that nothing is given that only a simulation could use."""
+    from suave_des.errors import InputError
+
+    for option, value in options.items():
+        if value:
+            raise InputError(f"{option} has no use with --runs-file", remedy="leave one of them out")
 
 
 def _recorded(
@@ -148,7 +160,7 @@ def _check_known(published: Runs, chosen: tuple[str, ...]) -> None:
             raise published.error(published.managers[name], error.problem, remedy or "") from None
 
 
-def exit_if_none_is_left(campaign: CampaignResult) -> None:
+def _exit_if_one_has_none(campaign: CampaignResult) -> None:
     """End here when a manager has no finished mission, so that nothing can be compared."""
     done = {str(manager) for manager in campaign.frame()["manager"]}
     if not set(campaign.managers) <= done:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from suave_des.cli.tables import METRIC_TITLES, number, plain_table
+from suave_des.cli.tables import METRIC_TITLES, number, plain_table, print_table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
     from rich.console import Console
     from rich.table import Table
@@ -18,34 +18,25 @@ if TYPE_CHECKING:
     from suave_des.validation.validation import Validation
 
 _VERDICTS = {True: "met", False: "[bold red]NOT MET[/]", None: "not judged"}
-_KINDS = {
-    "mean": "mean in the published mean's 95% t interval",
-    "std": "std in the published std's 95% chi-square interval",
-    "ks": "Kolmogorov-Smirnov p",
-    "conclusion": "subsamples that conclude as published",
-}
+_KINDS = {"mean": "mean", "std": "std", "ks": "KS p", "conclusion": "agreeing conclusions"}
 
 
 def print_validation(console: Console, validation: Validation) -> None:
     """Print every table, then the targets and how many are met."""
-    for table in _tables(validation):
+    for title, make in _TABLES.items():
+        table = make(validation)
         if table.row_count:
-            console.print(table)
+            print_table(console, title, table)
             console.print()
     for line in _remarks(validation):
         console.print(line, soft_wrap=True)
 
 
-def _tables(validation: Validation) -> Iterator[Table]:
-    yield _samples(validation)
-    yield _differences(validation)
-    yield _pairs(validation)
-    yield _shares(validation)
-    yield _positions(validation)
-    yield _targets(validation)
-
-
 def _remarks(validation: Validation) -> Iterator[str]:
+    yield (
+        "Means must lie in the published mean's 95% t interval, standard deviations in the published one's 95% chi-square"
+        " interval."
+    )
     met = [target.met for target in validation.targets]
     yield f"{met.count(True)} of {len(met)} targets are met, {met.count(False)} are not met."
     if None in met:
@@ -55,8 +46,8 @@ def _remarks(validation: Validation) -> Iterator[str]:
         )
 
 
-def _table(title: str, left: tuple[str, ...], right: tuple[str, ...]) -> Table:
-    table = plain_table(title)
+def _table(left: tuple[str, ...], right: tuple[str, ...]) -> Table:
+    table = plain_table()
     for heading in left:
         table.add_column(heading)
     for heading in right:
@@ -66,7 +57,7 @@ def _table(title: str, left: tuple[str, ...], right: tuple[str, ...]) -> Table:
 
 def _samples(validation: Validation) -> Table:
     side = ("n", "mean", "std", "median")
-    table = _table("Samples: published | simulated", ("metric", "manager"), (*side, *side))
+    table = _table(("metric", "manager"), (*side, *side))
     for cell in validation.cells:
         row = METRIC_TITLES[cell.metric], cell.manager, *_figures(cell.published), *_figures(cell.simulated)
         table.add_row(*row)
@@ -79,7 +70,7 @@ def _figures(found: Estimate) -> tuple[str, ...]:
 
 def _differences(validation: Validation) -> Table:
     headings = ("means differ by", "95% interval", "std ratio", "95% interval", "KS p", "AD p")
-    table = _table("Simulated against published", ("metric", "manager"), headings)
+    table = _table(("metric", "manager"), headings)
     for cell in validation.cells:
         table.add_row(
             METRIC_TITLES[cell.metric],
@@ -95,9 +86,8 @@ def _differences(validation: Validation) -> Table:
 
 
 def _pairs(validation: Validation) -> Table:
-    title = "Probability that the first is better, and one-sided Mann-Whitney tests of samples as large as published"
     headings = ("published", "simulated", "published: better", "simulated agrees")
-    table = _table(title, ("metric", "first, second"), headings)
+    table = _table(("metric", "first, second"), headings)
     for pair in validation.pairs:
         table.add_row(
             METRIC_TITLES[pair.metric],
@@ -112,7 +102,7 @@ def _pairs(validation: Validation) -> Table:
 
 def _shares(validation: Validation) -> Table:
     headings = ("published", "95% interval", "simulated", "")
-    table = _table("Shares of runs; * outside the published share's interval", ("manager", "share"), headings)
+    table = _table(("manager", "share"), headings)
     for each in validation.shares:
         interval, share = each.published.interval, each.simulated.share
         outside = interval is not None and share is not None and not interval[0] <= share <= interval[1]
@@ -129,18 +119,18 @@ def _shares(validation: Validation) -> Table:
 
 def _positions(validation: Validation) -> Table:
     """Places of detection down, managers across."""
-    table = _table("Detections by x of the point seen first: published | simulated", (), ("x, m",))
+    table = _table((), ("x, m",))
     known = {}
     for position in validation.positions:
         known[position.manager, position.detection_x_m] = position
     for manager in validation.managers:
         table.add_column(manager, justify="right")
-        table.add_column("", justify="right")
+        table.add_column("simulated", justify="right")
     for x_m in sorted({x_m for _, x_m in known}):
         row = [f"{x_m:.1f}"]
         for manager in validation.managers:
-            position = known.get((manager, x_m))
-            row += ["", ""] if position is None else [_count(position.published), _percent(position.simulated.share)]
+            found = known.get((manager, x_m))
+            row += ["", ""] if found is None else [_count(found.published), _percent(found.simulated.share)]
         table.add_row(*row)
     return table
 
@@ -150,7 +140,7 @@ def _count(counted: Counted) -> str:
 
 
 def _targets(validation: Validation) -> Table:
-    table = _table("Targets", ("of", "what"), ("simulated", "must be"))
+    table = _table(("of", "what"), ("simulated", "must be"))
     table.add_column("")
     for target in validation.targets:
         what = f"{METRIC_TITLES[target.what]}: {_KINDS[target.kind]}" if target.kind in _KINDS else target.what
@@ -183,3 +173,13 @@ def _counted(counted: Counted) -> str:
 
 def _p(p: float) -> str:
     return f"{p:.3f}" if p >= 0.001 else f"{p:.0e}"
+
+
+_TABLES: Mapping[str, Callable[[Validation], Table]] = {
+    "Samples: published, then simulated": _samples,
+    "Simulated against published": _differences,
+    "Pairs: probability that the first is better; Mann-Whitney tests of samples of the published size": _pairs,
+    "Shares of missions (* the simulated one is outside the published one's 95% interval)": _shares,
+    "Places of detection, by x of the point seen first: published number, simulated share": _positions,
+    "Targets": _targets,
+}

@@ -1,0 +1,45 @@
+import csv
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import pandas
+import pytest
+
+Write = Callable[..., Path]
+Missions = Callable[..., pandas.DataFrame]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    """Writes a file in a fresh folder."""
+
+    def write_file(name: str, content: str) -> Path:
+        path = tmp_path / name
+        path.write_text(content, encoding="utf-8")
+        return path
+
+    return write_file
+
+
+@pytest.fixture
+def write_csv(write: Write) -> Write:
+    """Writes a CSV file from a header and rows."""
+
+    def write_rows(name: str, header: Sequence[str], rows: Sequence[Sequence[object]]) -> Path:
+        path = write(name, "")
+        with path.open("w", newline="", encoding="utf-8") as stream:
+            csv.writer(stream).writerows([header, *rows])
+        return path
+
+    return write_rows
+
+
+@pytest.fixture
+def missions() -> Missions:
+    """Makes a frame of missions from search times, distances and places of detection by manager."""
+
+    def frame(by_manager: Mapping[str, Sequence[tuple[float, float, float]]]) -> pandas.DataFrame:
+        rows = [(manager, *values) for manager, all_values in by_manager.items() for values in all_values]
+        return pandas.DataFrame(rows, columns=["manager", "search_time_s", "distance_inspected_m", "detection_x_m"])
+
+    return frame

@@ -1,0 +1,136 @@
+"""Missions are read from every kind of file in which they come; a file that is wrong is named with its line."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from suave_des.errors import InputError
+from suave_des.resources import shipped_folder
+from suave_des.validation.runs import (
+    check_one_scenario,
+    check_same_managers,
+    choose_managers,
+    read_runs,
+)
+
+OWN = "manager,search_time_s,distance_inspected_m"
+
+
+def test_the_published_runs_give_the_figures_of_the_papers_table():
+    frame = read_runs(shipped_folder("scenarios/published") / "seams2023_runs.csv").frame
+    table = frame.groupby("manager")[["search_time_s", "distance_inspected_m"]].agg(["mean", "std"]).round(2)
+    assert table.loc["none"].tolist() == [187.85, 42.40, 31.40, 13.00]
+    assert table.loc["random"].tolist() == [180.15, 82.05, 3.88, 3.19]
+    assert table.loc["metacontrol"].tolist() == [106.95, 39.46, 51.15, 12.01]
+
+
+def test_places_of_detection_are_known_for_19_missions_of_none_and_17_of_metacontrol():
+    frame = read_runs(shipped_folder("scenarios/published") / "seams2023_runs.csv").frame
+    assert frame.groupby("manager")["detection_x_m"].count().to_dict() == {"none": 19, "random": 0, "metacontrol": 17}
+
+
+def test_a_campaigns_file_is_read_with_its_places_and_scenario(write):
+    path = write("runs.csv", f"scenario,{OWN},detection_x_m\nsea,none,120,3.5,-17.5\nsea,none,300,0,\n")
+    runs = read_runs(path)
+    assert runs.frame["detection_x_m"].tolist()[0] == -17.5
+    assert math.isnan(runs.frame["detection_x_m"].tolist()[1])
+    assert runs.scenarios == {"sea": 2}
+    assert runs.managers == {"none": 2}
+
+
+def test_the_exemplars_2023_file_is_read_and_its_minus_one_is_the_time_limit(write):
+    header = 'mission_name,datetime,"initial pos (x,y)",time budget (s),time search (s),distance inspected (m)'
+    row = 'time constrained {},Feb-04-2023-00-56-36,"(-17.0, 2.57)",300,{},{}'
+    path = write("results.csv", "\n".join([header, row.format("none", -1, 0.0), row.format("metacontrol", 83, 51.5)]))
+    frame = read_runs(path).frame
+    assert frame["manager"].tolist() == ["none", "metacontrol"]
+    assert frame["search_time_s"].tolist() == [300.0, 83.0]
+    assert frame["distance_inspected_m"].tolist() == [0.0, 51.5]
+
+
+def test_the_exemplars_1_5_file_is_read(write):
+    header = "mission name,datetime,mission duration (s),pipeline found,time searching pipeline (s),distance inspected (m)"
+    path = write("results.csv", f"{header}\nsuave bt,01-Jul-2025-00-43-53,300.5,True,87,40.25\n")
+    frame = read_runs(path).frame
+    assert frame.iloc[0].tolist()[:3] == ["bt", 87.0, 40.25]
+
+
+def test_blank_lines_and_a_byte_order_mark_do_no_harm(write):
+    path = write("runs.csv", f"\ufeff{OWN}\n\nnone,120,3\n\n")
+    assert len(read_runs(path).frame) == 1
+
+
+@pytest.mark.parametrize(
+    ("content", "line", "problem"),
+    [
+        ("", 1, "has no column 'manager'"),
+        ("manager,search_time_s\nnone,1\n", 1, "has no column 'distance_inspected_m'"),
+        (f"{OWN},manager\nnone,1,2,none\n", 1, "has column 'manager' twice"),
+        (f"{OWN}\n", 1, "has no mission"),
+        (f"{OWN}\nnone,120,3\nnone,soon,3\n", 3, "search_time_s 'soon' is no number"),
+        (f"{OWN}\nnone,120,\n", 2, "distance_inspected_m '' is no number"),
+        (f"{OWN}\nnone,nan,3\n", 2, "search_time_s 'nan' is out of range"),
+        (f"{OWN}\nnone,-1,3\n", 2, "search_time_s '-1' is out of range"),
+        (f"{OWN}\nnone,120,-3\n", 2, "distance_inspected_m '-3' is out of range"),
+        (f"{OWN}\nnone,120\n", 2, "has 2 values, but the header has 3"),
+        (f"{OWN}\n ,120,3\n", 2, "names no manager"),
+        (f"{OWN}\nmy manager,120,3\n", 2, "names no manager"),
+        (f"{OWN},detection_x_m\nnone,120,3,west\n", 2, "detection_x_m 'west' is no number"),
+        (f'{OWN}\n"none,120,3\n', 2, "is not valid CSV"),
+    ],
+)
+def test_a_wrong_file_is_named_with_its_line_and_what_would_be_right(write, content, line, problem):
+    path = write("runs.csv", content)
+    with pytest.raises(InputError) as caught:
+        read_runs(path)
+    assert caught.value.file == str(path)
+    assert caught.value.place == f"line {line}"
+    assert problem in caught.value.problem
+    assert caught.value.remedy
+
+
+@pytest.mark.parametrize("name", ["missing.csv", "."])
+def test_a_file_that_is_missing_or_a_folder_is_named(tmp_path: Path, name):
+    with pytest.raises(InputError, match="no such file|is a folder"):
+        read_runs(tmp_path / name)
+
+
+def test_a_binary_file_is_refused_with_its_line(tmp_path: Path):
+    path = tmp_path / "runs.csv"
+    path.write_bytes(OWN.encode() + b"\n\xff\xfe\n")
+    with pytest.raises(InputError, match="line 2: is not UTF-8"):
+        read_runs(path)
+
+
+def test_managers_come_in_the_order_of_the_file_unless_chosen(write):
+    runs = read_runs(write("runs.csv", f"{OWN}\nrandom,1,2\nnone,1,2\nrandom,1,2\n"))
+    assert choose_managers(runs, None) == ("random", "none")
+    assert choose_managers(runs, ["none"]) == ("none",)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "problem"), [(["nonw"], "no mission of manager 'nonw'"), ([], "no managers"), (["none", "none"], "twice")]
+)
+def test_managers_without_missions_or_named_twice_are_refused(write, wanted, problem):
+    runs = read_runs(write("runs.csv", f"{OWN}\nnone,1,2\n"))
+    with pytest.raises(InputError, match=problem):
+        choose_managers(runs, wanted)
+
+
+def test_a_simulated_file_must_have_each_manager(write):
+    runs = read_runs(write("runs.csv", f"{OWN}\nnone,1,2\n"))
+    check_same_managers(runs, ["none"])
+    with pytest.raises(InputError, match="no mission of manager 'bt'"):
+        check_same_managers(runs, ["none", "bt"])
+
+
+def test_a_simulated_file_must_be_of_one_scenario_and_of_the_one_named(write):
+    runs = read_runs(write("runs.csv", f"scenario,{OWN}\nsea,none,1,2\n"))
+    check_one_scenario(runs, "sea")
+    check_one_scenario(runs, None)
+    with pytest.raises(InputError, match="line 2: has missions of scenario sea, not of lake"):
+        check_one_scenario(runs, "lake")
+    mixed = read_runs(write("mixed.csv", f"scenario,{OWN}\nsea,none,1,2\nlake,none,1,2\n"))
+    with pytest.raises(InputError, match="line 3: has missions of several scenarios: sea and lake"):
+        check_one_scenario(mixed, None)

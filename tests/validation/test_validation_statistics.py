@@ -1,0 +1,172 @@
+"""Statistics agree with worked examples and with scipy's own, and repeat with their seed."""
+
+import warnings
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from suave_des.validation.statistics import (
+    agreement,
+    anderson_darling,
+    bootstrap,
+    conclude,
+    kolmogorov_smirnov,
+    share_interval,
+    superiority,
+)
+
+
+def rng(seed: int = 1) -> np.random.Generator:
+    return np.random.default_rng(seed)
+
+
+def normal(mean: float, std: float, n: int, seed: int) -> np.ndarray:
+    return rng(seed).normal(mean, std, n)
+
+
+class TestBootstrap:
+    def test_the_interval_of_the_difference_is_near_welchs_for_normal_samples(self):
+        published, simulated = normal(100, 15, 60, 1), normal(104, 10, 400, 2)
+        welch = stats.ttest_ind(simulated, published, equal_var=False).confidence_interval()
+        low, high = bootstrap(published, simulated, rng()).difference_interval
+        assert low == pytest.approx(welch.low, abs=0.6)
+        assert high == pytest.approx(welch.high, abs=0.6)
+
+    def test_the_interval_of_the_ratio_is_near_scipys_percentile_bootstrap(self):
+        published, simulated = normal(0, 2, 40, 3), normal(0, 3, 200, 4)
+        reference = stats.bootstrap(
+            (simulated, published),
+            lambda x, y, axis: x.std(axis=axis, ddof=1) / y.std(axis=axis, ddof=1),
+            method="percentile",
+            n_resamples=5_000,
+            random_state=5,
+        ).confidence_interval
+        low, high = bootstrap(published, simulated, rng()).ratio_interval
+        assert low == pytest.approx(reference.low, rel=0.03)
+        assert high == pytest.approx(reference.high, rel=0.03)
+
+    def test_it_repeats_with_its_seed_and_changes_with_it(self):
+        published, simulated = normal(0, 1, 20, 1), normal(0, 1, 50, 2)
+        assert bootstrap(published, simulated, rng(7)) == bootstrap(published, simulated, rng(7))
+        assert bootstrap(published, simulated, rng(7)) != bootstrap(published, simulated, rng(8))
+
+    def test_a_planted_difference_is_outside_nought_and_a_planted_ratio_outside_one(self):
+        found = bootstrap(normal(100, 10, 20, 1), normal(130, 30, 500, 2), rng())
+        assert found.difference_interval[0] > 0
+        assert found.ratio_interval[0] > 1
+
+    def test_values_all_equal_have_a_difference_but_no_ratio(self):
+        found = bootstrap(np.full(5, 0.1), np.full(7, 0.3), rng())
+        assert found.difference_interval == pytest.approx((0.2, 0.2))
+        assert found.ratio_interval is None
+
+    def test_one_value_has_no_interval(self):
+        assert bootstrap(np.array([1.0]), np.array([1.0, 2.0]), rng()).difference_interval is None
+
+
+class TestDistributions:
+    def test_kolmogorov_smirnov_of_a_worked_example(self):
+        # 1 2 | 3 4: at 2 all of the one are below and none of the other; of the 6 ways to deal, 2 are as far apart.
+        found = kolmogorov_smirnov(np.array([1.0, 2.0]), np.array([3.0, 4.0]))
+        assert found.distance == 1.0
+        assert found.p == pytest.approx(2 / 6)
+
+    @pytest.mark.parametrize("sizes", [(20, 200), (200, 20), (7, 5)])
+    @pytest.mark.parametrize("ties", [False, True])
+    def test_the_anderson_darling_statistic_is_scipys(self, sizes, ties):
+        published, simulated = normal(0, 3, sizes[0], 1), normal(1, 4, sizes[1], 2)
+        if ties:
+            published, simulated = published.round(), simulated.round()
+        ours, scipys = [], []
+        for shift in (0.0, 1.0, 3.0):
+            ours.append(anderson_darling(published + shift, simulated, rng(), permutations=10).statistic)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # about its p, which is not compared here
+                scipys.append(stats.anderson_ksamp([published + shift, simulated]).statistic)
+        # scipy's is standardised: less its mean, which is 1, by a standard deviation that depends on the sizes alone.
+        std = (ours[1] - ours[0]) / (scipys[1] - scipys[0])
+        assert ours == pytest.approx([1.0 + std * each for each in scipys])
+
+    def test_the_anderson_darling_p_of_a_worked_example(self):
+        # Of the 6 ways to deal 1 2 3 4 out in twos, {1 2} and {3 4} are the most unlike.
+        found = anderson_darling(np.array([1.0, 2.0]), np.array([3.0, 4.0]), rng(), permutations=50_000)
+        assert found.p == pytest.approx(1 / 3, abs=0.01)
+
+    def test_the_anderson_darling_p_is_near_scipys_permutation_p(self):
+        published, simulated = normal(0, 1, 20, 3).round(1), normal(0.55, 1, 60, 4).round(1)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            method = stats.PermutationMethod(n_resamples=1_000, random_state=np.random.default_rng(6))
+            reference = stats.anderson_ksamp([published, simulated], method=method).pvalue
+        assert anderson_darling(published, simulated, rng()).p == pytest.approx(reference, abs=0.03)
+
+    def test_planted_differences_are_found_and_planted_equality_passes(self):
+        same, shifted, wider = normal(100, 10, 2_000, 1), normal(120, 10, 2_000, 2), normal(100, 30, 2_000, 2)
+        published = normal(100, 10, 20, 3)
+        assert kolmogorov_smirnov(published, same).p > 0.05
+        assert anderson_darling(published, same, rng()).p > 0.05
+        assert kolmogorov_smirnov(published, shifted).p < 0.001
+        assert anderson_darling(published, shifted, rng()).p < 0.001
+        assert anderson_darling(published, wider, rng()).p < 0.05
+
+    def test_the_permutation_p_of_equal_distributions_is_uniform(self):
+        p = [anderson_darling(normal(0, 1, 8, s).round(1), normal(0, 1, 30, s + 999), rng(s), 99).p for s in range(200)]
+        assert stats.kstest(p, "uniform").pvalue > 0.001
+
+    def test_all_values_equal_are_no_evidence(self):
+        assert anderson_darling(np.ones(3), np.ones(9), rng()).p == 1.0
+
+
+class TestManagers:
+    def test_superiority_of_a_worked_example(self):
+        # Of 6 pairs the first is lower in 4 and equal in 1.
+        first, second = np.array([1.0, 2.0]), np.array([2.0, 3.0, 0.0])
+        assert superiority(first, second, lower_is_better=True) == pytest.approx((3 + 0.5) / 6)
+        assert superiority(first, second, lower_is_better=False) == pytest.approx((2 + 0.5) / 6)
+
+    def test_superiority_is_u_by_the_product_of_the_sizes(self):
+        first, second = normal(0, 1, 30, 1).round(1), normal(0.5, 1, 40, 2).round(1)
+        u = stats.mannwhitneyu(first, second).statistic
+        assert superiority(first, second, lower_is_better=False) == pytest.approx(u / 1_200)
+
+    def test_the_conclusion_has_scipys_p_and_names_the_better_one(self):
+        first, second = normal(100, 20, 20, 1), normal(140, 20, 20, 2)
+        found = conclude(first, second, lower_is_better=True)
+        assert found.first_better_p == pytest.approx(stats.mannwhitneyu(first, second, alternative="less").pvalue)
+        assert found.second_better_p == pytest.approx(stats.mannwhitneyu(first, second, alternative="greater").pvalue)
+        assert found.sign == 1
+        assert conclude(first, second, lower_is_better=False).sign == -1
+        assert conclude(first, first, lower_is_better=True).sign == 0
+
+    def test_values_all_equal_lead_to_no_conclusion(self):
+        assert conclude(np.ones(5), np.ones(5), lower_is_better=True).sign == 0
+
+    def test_subsamples_agree_with_a_clear_conclusion_and_not_with_its_opposite(self):
+        samples = normal(100, 20, 400, 1), normal(200, 20, 400, 2)
+        shares = [agreement(sign, samples, (20, 20), rng(), lower_is_better=True) for sign in (1, 0, -1)]
+        assert shares == [1.0, 0.0, 0.0]
+
+    def test_equal_managers_are_told_apart_by_chance_in_one_of_twenty_each_way(self):
+        samples = normal(100, 20, 4_000, 1), normal(100, 20, 4_000, 2)
+        shares = [agreement(sign, samples, (20, 20), rng(), lower_is_better=True) for sign in (1, 0, -1)]
+        assert sum(shares) == pytest.approx(1.0)
+        assert shares[1] == pytest.approx(0.9, abs=0.03)
+
+    def test_with_as_many_missions_as_published_there_is_one_subsample(self):
+        samples = normal(100, 20, 20, 1), normal(110, 20, 20, 2)
+        sign = conclude(*samples, lower_is_better=True).sign
+        assert agreement(sign, samples, (20, 20), rng(), lower_is_better=True, subsamples=50) == 1.0
+
+    def test_too_few_missions_give_no_share(self):
+        assert agreement(0, (np.ones(19), np.ones(20)), (20, 20), rng(), lower_is_better=True) is None
+
+
+@pytest.mark.parametrize(("count", "n"), [(0, 20), (9, 20), (20, 20), (1, 7)])
+def test_the_interval_of_a_share_is_scipys_exact_one(count, n):
+    reference = stats.binomtest(count, n).proportion_ci(method="exact")
+    assert share_interval(count, n) == pytest.approx((reference.low, reference.high))
+
+
+def test_no_trials_have_no_interval():
+    assert share_interval(0, 0) is None
