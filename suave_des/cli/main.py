@@ -11,7 +11,8 @@ import typer
 from typer.core import TyperGroup
 
 from suave_des import __version__
-from suave_des.cli import campaign, figure, reproduce, run, scenarios, schema
+from suave_des.cli import campaign, figure, reproduce, run, scenarios, schema, validate
+from suave_des.cli.options import remember_command_line
 from suave_des.errors import InputError, SuaveDesError
 
 BAD_INPUT, MISSIONS_MISSING, INTERRUPTED = 2, 3, 130
@@ -43,7 +44,6 @@ def _usage_line(error: Any) -> str:
 app = typer.Typer(
     name="suave-des",
     cls=_Commands,
-    no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -53,6 +53,7 @@ app = typer.Typer(
 app.command("reproduce")(reproduce.reproduce)
 app.command("run")(run.run)
 app.command("campaign")(campaign.campaign)
+app.command("validate")(validate.validate)
 app.command("figure")(figure.figure)
 app.command("scenarios")(scenarios.scenarios)
 app.command("schema")(schema.schema)
@@ -80,11 +81,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Entry point of the command `suave-des`: every error that is meant for the user is one line and an exit status.
 
     Args:
-        arguments: of the command line; left out, the process's own.
+        arguments: of the command line; left out, the process's own. None at all: the help is printed.
 
     Raises:
         SystemExit: always, with the exit status.
     """
+    arguments = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
+    remember_command_line(arguments)
     command = typer.main.get_command(app)
     try:
         status = command.main(arguments, prog_name="suave-des", standalone_mode=False) or 0
@@ -94,6 +97,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
         # A wrong option or argument: a class that is private to typer, and was click's in earlier versions of it.
         if not hasattr(error, "format_message"):
             raise
-        # Without a message it is no error but a command without arguments, whose help is printed already.
-        status = _tell(_usage_line(error), BAD_INPUT) if error.format_message() else BAD_INPUT
+        status = _tell(_usage_line(error), BAD_INPUT)
     sys.exit(status)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -28,6 +28,14 @@ Workers = Annotated[
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace results that are in the output folder already.")]
 
 
+_arguments: list[str] = []
+
+
+def remember_command_line(arguments: Sequence[str]) -> None:
+    """Keep the arguments that the command was called with."""
+    _arguments[:] = arguments
+
+
 def command_line() -> list[str]:
     """The command line as it goes into a manifest: without where the program is installed."""
-    return ["suave-des", *sys.argv[1:]]
+    return ["suave-des", *_arguments]

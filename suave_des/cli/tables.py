@@ -23,8 +23,13 @@ def plain_table() -> Table:
 
 
 def print_table(console: Console, title: str, table: Table) -> None:
-    """Print a table under its title, without the blanks that would fill its lines."""
+    """Print a table under its title."""
     console.print(Text(title, "bold"))
+    print_trimmed(console, table)
+
+
+def print_trimmed(console: Console, table: Table) -> None:
+    """Print a table without the blanks that would fill its lines."""
     with console.capture() as lines:
         console.print(table)
     for line in lines.get().splitlines():

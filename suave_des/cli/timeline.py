@@ -8,6 +8,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from suave_des.cli.tables import print_trimmed
+
 if TYPE_CHECKING:
     from suave_des.simulation.result import Event, MissionMetrics, MissionResult
 
@@ -42,7 +44,7 @@ def print_timeline(console: Console, result: MissionResult) -> None:
     for event in result.events:
         console.print(_line(event, sources, names), soft_wrap=True)
     console.print()
-    console.print(_metrics(metrics))
+    print_trimmed(console, _metrics(metrics))
 
 
 def _line(event: Event, sources: int, names: int) -> Text:

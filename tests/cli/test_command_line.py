@@ -1,0 +1,292 @@
+"""The command line: exit statuses, one line for an error, and what each command prints and writes."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from command import suave_des_command
+
+from suave_des.cli.main import main
+
+
+@dataclass(frozen=True)
+class Ended:
+    status: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def command(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Runs the command line in this process, in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+
+    def run(*arguments: str) -> Ended:
+        with pytest.raises(SystemExit) as ended:
+            main(arguments)
+        captured = capsys.readouterr()
+        assert isinstance(ended.value.code, int)
+        return Ended(ended.value.code, captured.out, captured.err)
+
+    return run
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+MANAGER = """
+from suave_des.managing.simple import NoManager
+
+class Mine(NoManager):
+    def task_requested(self, task):
+        self.system.log("thinking", f"about {task.name}")
+        super().task_requested(task)
+
+class Raises(NoManager):
+    def task_requested(self, task):
+        if task.name == "inspect_pipeline":
+            raise RuntimeError("never seen a pipeline before")
+        super().task_requested(task)
+"""
+
+
+class TestHelp:
+    def test_names_every_command(self, command) -> None:
+        ended = command("--help")
+        assert ended.status == 0
+        for name in ("run", "campaign", "reproduce", "figure", "scenarios", "schema"):
+            assert f"  {name} " in ended.out
+
+    def test_imports_nothing_heavy(self) -> None:
+        code = (
+            "import sys\n"
+            "from suave_des.cli.main import main\n"
+            "try:\n    main(['--help'])\nexcept SystemExit:\n    pass\n"
+            "heavy = {'numpy', 'numba', 'pandas', 'scipy', 'matplotlib', 'simpy', 'pydantic_core', 'yaml',"
+            " 'owlready2', 'rdflib', 'jpype', 'multiprocessing'}\n"
+            "print(sorted(heavy & set(sys.modules)), file=sys.stderr)\n"
+        )
+        ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        assert ended.stderr.strip() == "[]"
+
+    def test_without_arguments_it_prints_the_help(self, command) -> None:
+        ended = command()
+        assert (ended.status, ended.err) == (0, "")
+        assert ended.out.startswith("Usage: suave-des")
+
+    def test_version(self, command) -> None:
+        from suave_des import __version__
+
+        assert command("--version").out == f"suave-des {__version__}\n"
+
+
+class TestRun:
+    def test_tells_the_mission_as_a_timeline(self, command) -> None:
+        ended = command("run", "seams2023", "--manager", "none", "--seed", "1")
+        assert ended.status == 0
+        assert ended.err == ""
+        assert "seams2023, manager none, run 1, seed 1" in ended.out
+        told: dict[str, float] = {}  # when something was told first
+        for line in ended.out.splitlines():
+            if line.split() and line.split()[0].replace(".", "").isdigit():
+                told.setdefault(line.split("  ")[-1].strip(), float(line.split()[0]))
+        assert told["search_pipeline"] <= told["f_generate_search_path = fd_spiral_low"]
+        assert 35.0 <= told["c_thruster_1 FALSE"] < 36.0
+        assert any(text.startswith("falls below 3.25 m") for text in told)
+        assert told["time limit"] >= 300.0
+        for metric in ("search time", "distance inspected", "mean reaction time", "adaptations"):
+            assert f"\n{metric} " in ended.out
+        assert "\x1b" not in ended.out  # plain text, as this is no terminal
+        assert all(line == line.rstrip() for line in ended.out.splitlines())
+
+    def test_writes_mission_events_and_trajectory(self, command, tmp_path: Path) -> None:
+        assert command("run", "seams2023", "--manager", "random", "--seed", "7", "--out", "out").status == 0
+        out = tmp_path / "out"
+        assert sorted(path.name for path in out.iterdir()) == ["events.csv", "mission.json", "trajectory.csv"]
+        events = rows_of(out / "events.csv")
+        assert list(events[0]) == ["t_s", "source", "event", "detail"]
+        times = [float(event["t_s"]) for event in events]
+        assert times == sorted(times)
+        trajectory = rows_of(out / "trajectory.csv")
+        columns = "t_s,x_m,y_m,z_m,roll_rad,pitch_rad,yaw_rad,mode,visibility_m"
+        assert ",".join(trajectory[0]) == columns
+        assert float(trajectory[-1]["t_s"]) >= 300.0
+        mission = json.loads((out / "mission.json").read_text())
+        assert mission["metrics"]["manager"] == "random"
+        assert mission["metrics"]["seed"] == 7
+        assert mission["drawn"]["start.y_m"] == pytest.approx(mission["metrics"]["initial_y_m"], abs=1e-6)
+        assert mission["scenario"]["mission"]["time_limit_s"] == 300.0
+        assert mission["command"][:3] == ["suave-des", "run", "seams2023"]
+
+    def test_is_the_campaigns_mission_of_that_run_and_seed(self, command, tmp_path: Path) -> None:
+        command("campaign", "seams2023", "--managers", "random", "--runs", "3", "--seed", "5", "--workers", "1", *OUT)
+        command("run", "seams2023", "--manager", "random", "--seed", "5", "--run", "3", "--out", "mission")
+        row = rows_of(tmp_path / "out" / "runs.csv")[2]
+        metrics = json.loads((tmp_path / "mission" / "mission.json").read_text())["metrics"]
+        assert {name: "" if value is None else str(value) for name, value in metrics.items()} == row
+
+    def test_twice_gives_the_same_bytes(self, command, tmp_path: Path) -> None:
+        for name in ("a", "b"):
+            command("run", "seams2023", "--manager", "none", "--out", name)
+        for file in ("events.csv", "trajectory.csv"):
+            assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
+
+    def test_refuses_a_folder_with_results(self, command, tmp_path: Path) -> None:
+        command("run", "seams2023", "--manager", "none", "--out", "out")
+        again = command("run", "seams2023", "--manager", "none", "--out", "out")
+        assert (again.status, again.out) == (2, "")
+        assert again.err.startswith("suave-des: out: the output folder is not empty")
+        assert command("run", "seams2023", "--manager", "none", "--out", "out", "--overwrite").status == 0
+
+    def test_a_manager_of_ones_own_from_the_current_folder(self, command, tmp_path: Path) -> None:
+        (tmp_path / "my_manager.py").write_text(MANAGER)
+        ended = command("run", "seams2023", "--manager", "my_manager:Mine")
+        assert ended.status == 0
+        assert "about search_pipeline" in ended.out
+
+    def test_a_manager_that_raises_ends_with_status_3_and_one_line(self, command, tmp_path: Path) -> None:
+        (tmp_path / "clumsy.py").write_text(MANAGER)
+        ended = command("run", "seams2023", "--manager", "clumsy:Raises", "--out", "out")
+        assert ended.status == 3
+        line = r"suave-des: manager clumsy:Raises, run 1, mission time \d+\.\d\d s: RuntimeError: never seen a pipeline"
+        assert _matches(ended.err, line)
+        assert not (tmp_path / "out").exists()
+
+
+OUT = ("--out", "out")
+
+
+def _matches(text: str, pattern: str) -> bool:
+    import re
+
+    assert text.count("\n") == 1, text
+    return re.match(pattern, text) is not None
+
+
+class TestBadInput:
+    """Each is one line on the error stream, exit status 2, and no folder."""
+
+    @pytest.mark.parametrize(
+        ("arguments", "words"),
+        [
+            (["run", "nowhere.yaml", *OUT], "nowhere.yaml: no such file"),
+            (["run", "seams2023", "--manager", "rondom", *OUT], "did you mean random?"),
+            (["run", "seams2023", "--manager", "os:path", *OUT], "os"),
+            (["run", "seams2023", "--run", "0", *OUT], "--run"),
+            (["run", "seams2023", "--seed", "seven", *OUT], "--seed"),
+            (["run", "seams2023", "--reasoner", "hermit", *OUT], "hermit"),
+            (["run", "seams2023", "--manager", "none", "--ontology", "no.owl", *OUT], "no.owl"),
+            (["run", "seams2023", "--manager", "none", "--modes", "no.yaml", *OUT], "no.yaml"),
+            (["campaign", "seams2023"], "--out"),
+            (["campaign", "seams2023", "--managers", "", *OUT], "no managers are given"),
+            (["campaign", "seams2023", "--managers", "none,nome", *OUT], "'nome' (did you mean none?"),
+            (["campaign", "seams2023", "--managers", "none,none", *OUT], "twice"),
+            (["campaign", "seams2023", "--workers", "0", *OUT], "workers: 0 is out of range"),
+            (["campaign", "seams2023", "--workers", "10000", *OUT], "workers: 10000 is out of range"),
+            (["campaign", "seams2023", "--runs", "0", *OUT], "runs: 0 is out of range"),
+            (["campaign", "seams2023", "--runs", "many", *OUT], "--runs"),
+            (["campaign", "seams2023", "--format", "excel", *OUT], "--format"),
+            (["campaign", "seams2023", "--managers", "none", "--out", "no/where"], "no/where: there is no folder no"),
+            (["campaign", "seams2023", "--managers", "none", "--out", "/proc/x"], "cannot be written"),
+            (["reproduce", "--runs", "0", *OUT], "runs: 0"),
+            (["figure", "nothing", "--out", "map.png"], "nothing: has neither trajectory.csv nor runs.csv"),
+            (["figure", ".", "--out", "map.xyz"], ".xyz is no kind of picture"),
+            (["campain"], "Did you mean 'campaign'?"),
+            (["run", "seams2023", "--mangager", "none"], "--mangager"),
+        ],
+    )
+    def test_is_told_in_one_line(self, arguments: list[str], words: str, command, tmp_path: Path) -> None:
+        ended = command(*arguments)
+        assert ended.status == 2
+        assert ended.err.startswith("suave-des: ")
+        assert ended.err.count("\n") == 1
+        assert words in ended.err
+        assert ended.out == ""
+        assert list(tmp_path.iterdir()) == []
+
+    def test_in_a_scenario_it_names_the_file_and_the_line(self, command, tmp_path: Path) -> None:
+        (tmp_path / "mine.yaml").write_text("base: seams2023.yaml\nmission:\n  time_limit_m: 300\n")
+        ended = command("run", "mine.yaml", *OUT)
+        assert ended.status == 2
+        assert _matches(ended.err, r"suave-des: mine\.yaml: line 3, .*time_limit_m.*did you mean '?time_limit_s")
+        assert not (tmp_path / "out").exists()
+
+
+class TestCampaign:
+    def test_prints_a_summary_and_no_progress_bar(self, command, tmp_path: Path) -> None:
+        ended = command("campaign", "seams2023", "--managers", "none,random", "--runs", "2", "--workers", "1", *OUT)
+        assert (ended.status, ended.err) == (0, "")
+        assert "\x1b" not in ended.out
+        assert "4 missions are in out/runs.csv" in ended.out
+        assert len(rows_of(tmp_path / "out" / "runs.csv")) == 4
+
+    def test_lists_failures_keeps_the_others_and_ends_with_status_3(self, tmp_path: Path) -> None:
+        (tmp_path / "clumsy.py").write_text(MANAGER)
+        managers = "clumsy:Raises,none"
+        arguments = ("--managers", managers, "--runs", "2", "--workers", "2", *OUT)
+        ended = suave_des_command("campaign", "seams2023", *arguments, cwd=tmp_path)
+        assert ended.returncode == 3
+        lines = ended.stderr.splitlines()
+        assert lines[0].startswith("suave-des: failed: manager clumsy:Raises, run 1, mission time ")
+        assert lines[-1] == f"suave-des: {len(lines) - 1} of 4 missions failed; the others are kept"
+        rows = rows_of(tmp_path / "out" / "runs.csv")
+        assert [row["run"] for row in rows if row["manager"] == "none"] == ["1", "2"]
+        assert len(rows) == 4 - (len(lines) - 1)
+
+    def test_interrupted_it_ends_with_status_130_and_says_what_is_kept(self, tmp_path: Path) -> None:
+        manager = (
+            "import os, signal\n"
+            "from suave_des.managing.simple import NoManager\n"
+            "class CtrlC(NoManager):\n"
+            "    def task_requested(self, task):\n"
+            "        if self.system.stream('stop').random() < 0.2:\n"
+            "            os.kill(os.getppid(), signal.SIGINT)\n"
+            "        super().task_requested(task)\n"
+        )
+        (tmp_path / "impatient.py").write_text(manager)
+        arguments = ("--managers", "none,impatient:CtrlC", "--runs", "100", *OUT)
+        ended = suave_des_command("campaign", "seams2023", *arguments, cwd=tmp_path)
+        assert ended.returncode == 130
+        assert _matches(ended.stderr, r"suave-des: interrupted; \d+ of 200 missions are done, and kept in out")
+        assert (tmp_path / "out" / "runs.csv").is_file()
+
+
+class TestReproduce:
+    def test_prints_the_papers_table_beside_ours_and_writes_it(self, tmp_path: Path) -> None:
+        ended = suave_des_command("reproduce", "--runs", "2", "--seed", "1", *OUT, cwd=tmp_path)
+        assert (ended.returncode, ended.stderr) == (0, "")
+        for figure in ("187.85", "42.40", "31.40", "13.00", "180.15", "82.05", "3.88", "3.19"):
+            assert figure in ended.stdout
+        for figure in ("106.95", "39.46", "51.15", "12.01"):
+            assert figure in ended.stdout
+        assert "Paper: 20 missions for each manager. Here: 2 missions for each manager." in ended.stdout
+        assert max(map(len, ended.stdout.splitlines())) <= 100
+        rows = rows_of(tmp_path / "out" / "runs.csv")
+        assert [row["manager"] for row in rows] == ["none"] * 2 + ["random"] * 2 + ["metacontrol"] * 2
+        table = rows_of(tmp_path / "out" / "paper_table.csv")
+        assert len(table) == 12
+        mean = sum(float(row["search_time_s"]) for row in rows[:2]) / 2
+        assert float(table[0]["ours"]) == pytest.approx(mean)
+        assert float(table[0]["difference"]) == pytest.approx(mean - 187.85)
+
+
+def test_scenarios_lists_what_is_shipped(command) -> None:
+    ended = command("scenarios")
+    assert ended.status == 0
+    for name in ("seams2023", "release15", "paper_table_values", "suave_modes.yaml", "suave.owl"):
+        assert name in ended.out
+
+
+def test_schema_is_the_json_schema_of_scenarios(command) -> None:
+    from suave_des.scenario.schema import scenario_schema
+
+    assert json.loads(command("schema").out) == scenario_schema()

@@ -1,0 +1,160 @@
+"""The paper's table beside ours."""
+
+from __future__ import annotations
+
+import csv
+import io
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas
+import pytest
+
+from suave_des.errors import InputError
+from suave_des.estimates import estimate
+from suave_des.report.comparison import compare, csv_table, markdown_table
+from suave_des.report.published import published_figures
+from suave_des.report.runs import read_runs
+
+# Means and sample standard deviations as printed in the paper (SEAMS 2023, arXiv:2303.09220).
+PAPER = {
+    ("none", "search_time_s"): (187.85, 42.40),
+    ("none", "distance_inspected_m"): (31.40, 13.00),
+    ("random", "search_time_s"): (180.15, 82.05),
+    ("random", "distance_inspected_m"): (3.88, 3.19),
+    ("metacontrol", "search_time_s"): (106.95, 39.46),
+    ("metacontrol", "distance_inspected_m"): (51.15, 12.01),
+}
+
+
+def frame(**search_times_s: list[float]) -> pandas.DataFrame:
+    """Missions with given search times, and the distance that is left at 0.25 m/s until 300 s."""
+    return pandas.DataFrame(
+        [
+            {"manager": manager, "search_time_s": time_s, "distance_inspected_m": (300 - time_s) / 4}
+            for manager, times_s in search_times_s.items()
+            for time_s in times_s
+        ]
+    )
+
+
+def test_published_runs_give_the_figures_that_the_paper_prints() -> None:
+    figures = published_figures()
+    assert list(figures) == list(PAPER)
+    for cell, (mean, std) in PAPER.items():
+        assert figures[cell].n == 20
+        assert figures[cell].mean == pytest.approx(mean, abs=0.005)
+        assert figures[cell].std == pytest.approx(std, abs=0.005)
+
+
+def test_difference_is_ours_less_the_published_figure() -> None:
+    comparison = compare(frame(none=[100.0, 200.0, 300.0], random=[50.0], metacontrol=[]), published_figures())
+    figures = {(figure.manager, figure.metric, figure.statistic): figure for figure in comparison.figures}
+    assert len(figures) == 12
+    none = figures["none", "search_time_s", "mean"]
+    assert none.ours == 200.0
+    assert none.difference == pytest.approx(200.0 - 187.85)
+    assert none.is_inside  # the paper's interval is 168.0 to 207.7
+    assert not figures["none", "search_time_s", "std"].is_inside  # 100 against 32.2 to 61.9
+    assert figures["random", "search_time_s", "std"].ours is None
+    assert figures["metacontrol", "search_time_s", "mean"].difference is None
+
+
+@pytest.mark.parametrize(
+    ("metacontrol", "sooner"), [([90.0, 110.0], "As in the paper"), ([290.0, 295.0], "Unlike in the paper")]
+)
+def test_says_whether_metacontrol_is_better_than_all_others(metacontrol: list[float], sooner: str) -> None:
+    runs = frame(none=[180.0, 190.0], random=[170.0, 200.0], metacontrol=metacontrol)
+    remarks = list(compare(runs, published_figures()).remarks())
+    assert remarks[-2].startswith(f"{sooner}, metacontrol ")
+    assert "the pipeline sooner" in remarks[-2]
+    assert "inspect" in remarks[-1]
+
+
+def test_markdown_has_a_row_for_each_figure_and_marks_those_outside() -> None:
+    runs = frame(none=[187.0, 188.0], random=[100.0, 260.0], metacontrol=[107.0, 106.0])
+    comparison = compare(runs, published_figures())
+    lines = markdown_table(comparison).splitlines()
+    rows = [line for line in lines if line.startswith("| ") and "---" not in line][1:]
+    assert len(rows) == 12
+    assert len({line.count("|") for line in lines if line.startswith("|")}) == 1
+    assert [row.endswith("\\* |") for row in rows] == [not figure.is_inside for figure in comparison.figures]
+
+
+def test_csv_has_the_same_figures() -> None:
+    comparison = compare(frame(none=[150.0, 250.0], random=[], metacontrol=[]), published_figures())
+    rows = list(csv.DictReader(io.StringIO(csv_table(comparison))))
+    assert rows[0]["ours"] == "200.0"
+    assert (rows[4]["ours"], rows[4]["difference"], rows[4]["inside_published_ci95"]) == ("", "", "False")
+
+
+class TestEstimates:
+    def test_intervals_of_a_textbook_sample(self) -> None:
+        # n = 5, mean 3, s^2 = 2.5; t(4, 97.5%) = 2.776445, chi-square(4) 2.5% and 97.5%: 0.484419, 11.143287 (tables).
+        found = estimate([1.0, 2.0, 3.0, 4.0, 5.0])
+        assert (found.n, found.mean, found.median) == (5, 3.0, 3.0)
+        assert found.std == pytest.approx(2.5**0.5)
+        half = 2.776445 * (2.5 / 5) ** 0.5
+        assert found.mean_interval == pytest.approx((3 - half, 3 + half), rel=1e-5)
+        assert found.std_interval == pytest.approx(((10 / 11.143287) ** 0.5, (10 / 0.484419) ** 0.5), rel=1e-5)
+
+    def test_small_samples_leave_out_what_they_cannot_tell(self) -> None:
+        assert estimate([]).mean is None
+        alone = estimate([7.0])
+        assert (alone.mean, alone.median, alone.std, alone.mean_interval) == (7.0, 7.0, None, None)
+
+    def test_the_order_of_values_makes_no_difference(self) -> None:
+        values = [0.1, 1e9, -1e9, 0.2, 0.3]
+        assert estimate(values) == estimate(values[::-1])
+
+
+class TestReadingRuns:
+    def test_a_missing_file_is_named(self, tmp_path: Path) -> None:
+        with pytest.raises(InputError, match=r"runs\.csv: no such file"):
+            read_runs(tmp_path / "runs.csv")
+
+    def test_a_missing_column_is_named(self, tmp_path: Path) -> None:
+        (tmp_path / "runs.csv").write_text("scenario,manager\nseams2023,none\n")
+        with pytest.raises(InputError, match=r"runs\.csv: has no column search_time_s"):
+            read_runs(tmp_path / "runs.csv", needed=("manager", "search_time_s"))
+
+    def test_a_word_in_place_of_a_number_is_refused(self, tmp_path: Path) -> None:
+        (tmp_path / "runs.csv").write_text("manager,search_time_s\nnone,soon\n")
+        with pytest.raises(InputError, match=r"runs\.csv: holds a value of the wrong kind: .*soon"):
+            read_runs(tmp_path / "runs.csv", needed=("manager", "search_time_s"))
+
+    def test_an_empty_file_is_refused(self, tmp_path: Path) -> None:
+        (tmp_path / "runs.csv").write_text("")
+        with pytest.raises(InputError, match=r"runs\.csv: cannot be read"):
+            read_runs(tmp_path / "runs.csv")
+
+    def test_the_manager_named_none_is_no_missing_value(self, tmp_path: Path) -> None:
+        (tmp_path / "runs.csv").write_text("manager,mean_reaction_time_s\nnone,\n")
+        runs = read_runs(tmp_path / "runs.csv", needed=("manager",))
+        assert list(runs["manager"]) == ["none"]
+        assert runs["mean_reaction_time_s"].isna().all()
+
+
+def test_the_analysis_script_makes_the_table_from_a_runs_csv(tmp_path: Path) -> None:
+    runs = frame(none=[180.0, 190.0], random=[170.0, 200.0], metacontrol=[90.0, 110.0])
+    for column, value in (("scenario", "seams2023"), ("pipeline_found", True)):
+        runs[column] = value
+    for column in ("run", "seed", "adaptations"):
+        runs[column] = 1
+    for column in ("initial_x_m", "initial_y_m", "mission_duration_s", "mean_reaction_time_s"):
+        runs[column] = 1.0
+    for column in ("detection_time_s", "detection_x_m", "detection_y_m"):
+        runs[column] = 1.0
+    runs.to_csv(tmp_path / "runs.csv", index=False)
+    script = Path(__file__).parents[2] / "analysis" / "paper_table.py"
+    ended = subprocess.run(
+        [sys.executable, str(script), str(tmp_path / "runs.csv"), "--out", str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert (tmp_path / "paper_table.md").read_text() == ended.stdout
+    assert "| none | search time (s) | mean | 187.85 |" in ended.stdout
+    assert "| 185.00 |" in ended.stdout
+    assert (tmp_path / "paper_table.csv").is_file()
