@@ -143,6 +143,12 @@ def test_what_the_time_of_a_second_event_counts_from(
     assert [each.time_s for each in listener.heard] == times_s
 
 
+def test_in_2023_time_counts_from_when_the_event_before_happened(listener: Listener) -> None:
+    # Due at 10 s, it happened at 10.25 s: 30.1 s later is past the look at 40.25 s.
+    publish_faults(listener, ThrusterFault(1, True, 10.0), ThrusterFault(2, True, 30.1), after_previous=True)
+    assert listener.heard[1].time_s == 41.25
+
+
 def test_several_due_come_one_a_second_in_list_order(listener: Listener) -> None:
     faults = [ThrusterFault(thruster, True, 5.0) for thruster in (4, 2, 6)]
     publish_faults(listener, *faults, after_previous=False)

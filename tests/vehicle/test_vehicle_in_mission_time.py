@@ -41,13 +41,13 @@ def test_reading_at_any_times_changes_no_bit(make_vehicle, plan: list, readings:
 @given(st.lists(commands | faults, max_size=5), st.integers(0, 800))
 def test_looking_ahead_does_not_bind_the_future(make_vehicle, plan: list, ahead: int) -> None:
     foresighted = make_vehicle(duration_s=DURATION_S)
-    foresighted.on_control_change = lambda row: foresighted.look_ahead(min(row + ahead, foresighted.last_row))
+    foresighted.control_listeners.append(lambda row: foresighted.look_ahead(min(row + ahead, foresighted.last_row)))
     assert np.array_equal(carry_out(make_vehicle(duration_s=DURATION_S), plan, []), carry_out(foresighted, plan, []))
 
 
 def test_change_of_control_is_told_with_the_row_of_its_time(make_vehicle) -> None:
     vehicle, rows = make_vehicle(), []
-    vehicle.on_control_change = rows.append
+    vehicle.control_listeners.append(rows.append)
     vehicle.command(3.0, 1.0, 0.0, -18.0)
     vehicle.set_thruster_health(4.5, 2, 0.0)
     assert rows == [row_at(3.0), row_at(4.5)]

@@ -210,6 +210,25 @@ def test_a_wild_spin_dies_out(make_vehicle, nu: tuple[float, ...]) -> None:
     assert vehicle.position(120.0) == pytest.approx(PLACE_M, abs=0.05)
 
 
+def test_turning_about_two_axes_turns_it_about_the_third(make_vehicle) -> None:
+    vehicle, omega = make_vehicle(lost=ALL), np.array([3.0, -4.0, 2.0])
+    vehicle.track[0, kernel.VELOCITY][3:] = omega
+    inertia, drag = np.array(BLUEROV2.inertia_kg_m2), np.array(BLUEROV2.quadratic_drag[3:])
+    # Euler's equations: I omega' = -omega x (I omega) - drag, the drag taken at the end of the step.
+    turned = omega - STEP_S * np.cross(omega, inertia * omega) / inertia
+    expected = turned / (1.0 + STEP_S * drag * np.abs(omega) / inertia)
+    assert vehicle.nu(STEP_S)[3:] == pytest.approx(expected)
+
+
+def test_moving_while_turning_feels_the_coriolis_force(make_vehicle) -> None:
+    vehicle, v, omega = make_vehicle(lost=ALL), np.array([0.3, 0.2, -0.1]), np.array([0.5, -0.4, 1.0])
+    vehicle.track[0, kernel.VELOCITY] = (*v, *omega)
+    mass, drag = BLUEROV2.mass_kg, np.array(BLUEROV2.quadratic_drag[:3])
+    net_buoyancy = np.array([0.0, 0.0, BLUEROV2.buoyancy_n - BLUEROV2.weight_n])
+    pushed = v + STEP_S * (net_buoyancy / mass - np.cross(omega, v))
+    assert vehicle.nu(STEP_S)[:3] == pytest.approx(pushed / (1.0 + STEP_S * drag * np.abs(v) / mass))
+
+
 def test_attitude_stays_a_unit_quaternion(make_vehicle) -> None:
     vehicle = make_vehicle(lost=(1, 3))
     time_to_go_s(vehicle, 90)
