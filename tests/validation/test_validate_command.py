@@ -1,0 +1,163 @@
+"""suave-des validate: what it prints, writes and refuses."""
+
+import csv
+import json
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from suave_des.cli.main import main
+from suave_des.resources import shipped_folder
+
+DATA = shipped_folder("scenarios/published") / "seams2023_runs.csv"
+HEADER = "manager,search_time_s,distance_inspected_m"
+
+
+@dataclass(frozen=True)
+class Ended:
+    status: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def validate(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Runs `suave-des validate ARGUMENTS` in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+
+    def run(*arguments: str) -> Ended:
+        with pytest.raises(SystemExit) as ended:
+            main(("validate", *arguments))
+        captured = capsys.readouterr()
+        return Ended(int(ended.value.code or 0), captured.out, captured.err)
+
+    return run
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_three_missions_of_each_manager_are_simulated_and_compared(validate, tmp_path):
+    ended = validate("seams2023", "--runs", "3", "--workers", "1", "--out", "out")
+    assert (ended.status, ended.err) == (0, "")
+    assert "targets are met" in ended.out
+    assert "cannot be judged: too few missions" in ended.out
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "runs.csv",
+        "summary.csv",
+        "manifest.json",
+        "validation.csv",
+        "validation_pairs.csv",
+        "validation_shares.csv",
+        "validation_positions.csv",
+        "validation_targets.csv",
+        "validation.json",
+        "distributions.png",
+        "detections.png",
+    }
+    cells = rows(tmp_path / "out" / "validation.csv")
+    assert [(cell["manager"], cell["published_n"], cell["simulated_n"]) for cell in cells[:3]] == [
+        ("none", "20", "3"),
+        ("metacontrol", "20", "3"),
+        ("random", "20", "3"),
+    ]
+    sources = json.loads((tmp_path / "out" / "validation.json").read_text())["provenance"]
+    assert (sources["scenario"], sources["runs"], sources["data"]["file"]) == (
+        "seams2023",
+        3,
+        "shipped/seams2023_runs.csv",
+    )
+
+
+def test_the_campaigns_own_file_gives_the_same_tables_without_simulating(validate, tmp_path):
+    options = ("--managers", "none,random")
+    validate("seams2023", "--runs", "3", "--workers", "1", "--out", "simulated", *options)
+    ended = validate("--runs-file", "simulated/runs.csv", "--out", "recorded", *options)
+    assert ended.status == 0
+    assert not (tmp_path / "recorded" / "runs.csv").exists()
+    for name in ("validation.csv", "validation_pairs.csv", "validation_shares.csv", "detections.png"):
+        assert (tmp_path / "recorded" / name).read_bytes() == (tmp_path / "simulated" / name).read_bytes()
+
+
+def test_the_published_runs_against_themselves_meet_every_target(validate):
+    ended = validate("--runs-file", str(DATA), "--strict")
+    assert ended.status == 0
+    assert "28 of 28 targets are met, 0 are not met." in ended.out
+    assert "NOT MET" not in ended.out
+
+
+def test_a_target_that_is_not_met_is_told_and_counts_only_when_strict(validate, tmp_path):
+    text = DATA.read_text(encoding="utf-8").replace("none,", "x,").replace("random,", "none,").replace("x,", "random,")
+    (tmp_path / "swapped.csv").write_text(text, encoding="utf-8")
+    ended = validate("--runs-file", "swapped.csv")
+    assert ended.status == 0
+    assert "NOT MET" in ended.out
+    assert validate("--runs-file", "swapped.csv", "--strict").status == 1
+
+
+def test_other_data_without_a_file_of_shares_has_no_cluster_targets(validate, tmp_path):
+    (tmp_path / "real.csv").write_text(DATA.read_text(encoding="utf-8"), encoding="utf-8")
+    ended = validate("--data", "real.csv", "--runs-file", "real.csv")
+    assert "24 of 24 targets are met" in ended.out
+    assert "found at" not in ended.out
+    with_shares = validate(
+        "--data", "real.csv", "--runs-file", "real.csv", "--targets", str(DATA.with_suffix(".targets.yaml"))
+    )
+    assert "28 of 28 targets are met" in with_shares.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--data", "missing.csv"], "missing.csv: no such file (give a path, or one of the shipped files: seams2023_runs"),
+        (["--data", "unknown.csv"], "unknown.csv: line 2: there is no manager 'magic'"),
+        (["--data", "columns.csv"], "columns.csv: line 1: has no column"),
+        (["--data", "empty.csv"], "empty.csv: line 1: has no mission"),
+        (["--data", "words.csv"], "words.csv: line 2: search_time_s 'soon' is no number"),
+        (["--managers", "nobody"], "has no mission of manager 'nobody'"),
+        (["--managers", ","], "no managers are given"),
+        (["--runs", "0"], "runs: 0 is out of range"),
+        (["--targets", "missing.yaml"], "missing.yaml: no such file"),
+        (["--runs-file", "missing.csv"], "missing.csv: no such file"),
+        (["--runs-file", "other.csv"], "other.csv: has no mission of manager 'none'"),
+        (["release15", "--runs-file", "scenario.csv"], "scenario.csv: line 2: has missions of scenario seams2023"),
+        (["--runs-file", "scenario.csv", "--reasoner", "pellet"], "--reasoner has no use with --runs-file"),
+        (["no_such_scenario"], "no_such_scenario"),
+        (["--runs-file", str(DATA), "--out", "full"], "full: the output folder is not empty"),
+        (["--runs", "1", "--out", "full"], "full: the output folder is not empty"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2_and_writes_nothing(validate, tmp_path, arguments, told):
+    files = {
+        "unknown.csv": f"{HEADER}\nmagic,1,2\n",
+        "columns.csv": "a,b\n1,2\n",
+        "empty.csv": f"{HEADER}\n",
+        "words.csv": f"{HEADER}\nnone,soon,2\n",
+        "other.csv": f"{HEADER}\nbt,1,2\n",
+        "scenario.csv": f"scenario,{HEADER}\nseams2023,none,1,2\n",
+        "full/results.txt": "mine",
+    }
+    (tmp_path / "full").mkdir()
+    for name, content in files.items():
+        (tmp_path / name).write_text(content, encoding="utf-8")
+    ended = validate(*arguments)
+    assert ended.status == 2
+    assert ended.out == ""
+    assert ended.err.count("\n") == 1
+    assert ended.err.startswith("suave-des: ")
+    assert told in ended.err
+    assert [path.name for path in (tmp_path / "full").iterdir()] == ["results.txt"]
+
+
+def test_overwrite_replaces_the_validation_and_keeps_what_is_not_its_own(validate, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "notes.txt").write_text("mine", encoding="utf-8")
+    (tmp_path / "out" / "validation.csv").write_text("old", encoding="utf-8")
+    assert validate("--runs-file", str(DATA), "--out", "out", "--overwrite").status == 0
+    assert (tmp_path / "out" / "notes.txt").read_text(encoding="utf-8") == "mine"
+    assert len(rows(tmp_path / "out" / "validation.csv")) == 6
