@@ -12,7 +12,7 @@ from rich.console import Console
 if TYPE_CHECKING:
     from suave_des.campaign.campaign import Progress
 
-_PLAIN_WIDTH = 100
+_PLAIN_WIDTH = 120
 
 
 def output() -> Console:
