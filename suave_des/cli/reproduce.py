@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from suave_des.report.comparison import Comparison, Figure
 
 SCENARIO = "seams2023"
+_TEXT_WIDTH = 95
 
 
 def reproduce(
@@ -80,7 +81,7 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
         print_table(console, title, _table([figure for figure in comparison.figures if figure.metric == metric]))
         console.print()
     for line in comparison.remarks():
-        console.print(line)
+        console.print(line, width=min(console.width, _TEXT_WIDTH))
 
 
 def _table(figures: Sequence[Figure]) -> Table:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import cycle, groupby
 from pathlib import Path
 from string import ascii_uppercase
 
@@ -83,11 +83,12 @@ def _legend(colours: dict[str, str], marks: list[_Mark]) -> list[Line2D]:
 
 
 def _mode_colours(record: MissionRecord) -> dict[str, str]:
-    """A colour for each mode in the order of appearance; what does not move the vehicle is grey."""
+    """A colour for each mode, in the order of appearance; what does not move the vehicle is grey."""
     modes = list(dict.fromkeys(record.trajectory["mode"]))
-    moving = [mode for mode in modes if mode not in _IDLE_MODES]
-    own = {mode: style.CYCLE[place % len(style.CYCLE)] for place, mode in enumerate(moving)}
-    return {mode: own.get(mode, style.GREY) for mode in modes}
+    known = style.MODE_COLOURS | dict.fromkeys(_IDLE_MODES, style.GREY)
+    others = zip([mode for mode in modes if mode not in known], cycle(style.OTHER_MODES), strict=False)
+    colours = known | dict(others)
+    return {mode: colours[mode] for mode in modes}
 
 
 def _marks(record: MissionRecord) -> Iterator[_Mark]:
@@ -175,9 +176,12 @@ def _draw_zoom(axes: Axes, record: MissionRecord, colours: dict[str, str], marks
 
 
 def _search_frame(record: MissionRecord) -> Bbox:
-    """Where the vehicle was until the pipeline was found, with a margin."""
+    """Where the vehicle was until the pipeline was found, and the point of it that was seen, with a margin."""
     way = record.trajectory
     search = way.loc[way["t_s"] <= record.metrics["search_time_s"], ["x_m", "y_m"]].to_numpy()
+    if record.metrics["pipeline_found"]:
+        seen = [record.metrics["detection_x_m"], record.metrics["detection_y_m"]]
+        search = np.vstack([search, seen])
     return Bbox([search.min(axis=0) - _ZOOM_MARGIN_M, search.max(axis=0) + _ZOOM_MARGIN_M])
 
 
@@ -202,4 +206,4 @@ def _draw_over_time(axes: Axes, record: MissionRecord, colours: dict[str, str], 
     axes.set_ylim(0.0, top)
     axes.set_xlim(0.0, way["t_s"].iloc[-1])
     axes.set_xlabel("mission time (s)")
-    axes.set_ylabel("above the sea bed; visibility (m)")
+    axes.set_ylabel("altitude; visibility (m)")

@@ -15,6 +15,17 @@ WIDTH_IN = 7.0
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 BLUE, VERMILION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#8A8A8A"
 CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION)
+"""For what has no colour of its own, in this order."""
+
+MODE_COLOURS = {
+    "fd_spiral_low": "#7FB8DA",
+    "fd_spiral_medium": "#2F7FBC",
+    "fd_spiral_high": "#0B3C73",
+    "fd_follow_pipeline": ORANGE,
+    "__DEFAULT__": PURPLE,
+}
+"""The shipped modes: the higher the search, the darker the blue. A mode of one's own gets one of OTHER_MODES."""
+OTHER_MODES = (GREEN, VERMILION, "#6A3D9A", "#B8860B")
 
 _SETTINGS: Any = {
     "font.family": "sans-serif",
