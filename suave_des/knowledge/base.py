@@ -10,7 +10,8 @@ from pathlib import Path
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.catalogue import collect
-from suave_des.knowledge.model import Names, build_model, check_values, expectations, facts_of
+from suave_des.knowledge.checks import check_rules, check_values
+from suave_des.knowledge.model import Names, build_model, expectations, facts_of
 from suave_des.knowledge.ontology_file import OntologyFile
 from suave_des.knowledge.rules import Rule
 from suave_des.knowledge.situation import Model, Triple
@@ -60,6 +61,7 @@ class KnowledgeBase:
         content = merge(sources, dict(values or {}))
         names = Names(content)
         check_values(content, sources)
+        check_rules(content)
         model, content = build_model(content, names, sources)
         expected = expectations(content, model)
         designs: dict[str, list[str]] = {name: [] for name in model.functions}

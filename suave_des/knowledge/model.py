@@ -32,17 +32,15 @@ from suave_des.knowledge.vocabulary import (
 
 _SUBCLASS: Final = RDFS + "subClassOf"
 _HAS_VALUE: Final = TOMASYS + "hasValue"
-_OPERATOR: Final = TOMASYS + "qa_comparison_operator"
 _C_STATUS: Final = TOMASYS + "c_status"
 _WHOLE: Final = (
     *("integer", "int", "long", "short", "byte"),
     *("nonNegativeInteger", "positiveInteger", "nonPositiveInteger", "negativeInteger"),
     *("unsignedInt", "unsignedLong", "unsignedShort", "unsignedByte"),
 )
-_EXACT: Final = frozenset(XSD + name for name in ("decimal", *_WHOLE))
-_NUMERIC: Final = _EXACT | {XSD + "float", XSD + "double"}
-#: Comparison operators that a quality attribute type may have.
-OPERATORS: Final = ("<", "<=", ">", ">=")
+#: Datatypes of exact numbers.
+EXACT: Final = frozenset(XSD + name for name in ("decimal", *_WHOLE))
+_NUMERIC: Final = EXACT | {XSD + "float", XSD + "double"}
 
 
 def value_of(value: str | Lit, names: Names) -> Value:
@@ -92,31 +90,8 @@ def facts_of(triples: Iterable[Triple], names: Names) -> Iterator[Fact]:
             yield Fact(names.short(subject), name, value_of(value, names))
 
 
-def check_values(content: Content, sources: Sequence[OntologyFile]) -> None:
-    """See that numbers are decimals and operators are known, which a reasoner would not explain.
-
-    Raises:
-        KnowledgeError: with the file and line of the individual.
-    """
-    for subject, predicate, value in content.triples:
-        if predicate == _HAS_VALUE and not _is_decimal(value):
-            shown = value.text if isinstance(value, Lit) else value
-            raise _at(subject, sources, f"hasValue {shown!r} is not an xsd:decimal", "a number such as 2.25")
-        if predicate == _OPERATOR and (not isinstance(value, Lit) or value.text not in OPERATORS):
-            shown = value.text if isinstance(value, Lit) else value
-            raise _at(subject, sources, f"qa_comparison_operator {shown!r} is unknown", f"one of {' '.join(OPERATORS)}")
-
-
-def _is_decimal(value: str | Lit) -> bool:
-    if not isinstance(value, Lit) or value.datatype not in _EXACT:
-        return False
-    try:
-        return Decimal(value.text.strip()).is_finite()
-    except InvalidOperation:
-        return False
-
-
-def _at(subject: str, sources: Sequence[OntologyFile], problem: str, remedy: str) -> KnowledgeError:
+def wrong_in(subject: str, sources: Sequence[OntologyFile], problem: str, remedy: str) -> KnowledgeError:
+    """An error on an individual, with the file and line where it is described."""
     name = local_name(subject)
     for source in sources:
         place = source.line_of(name)
@@ -143,7 +118,7 @@ class _Individuals:
         for iri in sorted(set(iris)):
             other = found.setdefault(local_name(iri), iri)
             if other != iri:
-                raise _at(iri, self.sources, f"two {what} have this name: {other} and {iri}", "rename one of them")
+                raise wrong_in(iri, self.sources, f"two {what} have this name: {other} and {iri}", "rename one of them")
         return dict(sorted(found.items()))
 
     def of_class(self, name: str) -> set[str]:
@@ -184,17 +159,13 @@ def build_model(content: Content, names: Names, sources: Sequence[OntologyFile])
     )
     existing = {local_name(iri): iri for iri in sorted(find.subjects, reverse=True)}
 
-    def individual(iri: str, name: str) -> Individual:
-        found = existing.get(name)
-        if found is None:
-            return Individual(namespace(iri) + name)
-        own = (t for t in content.triples if t[0] == found and t[1] not in STATE_PROPERTIES)
-        return Individual(found, tuple(t for t in own if _is_fact(t)))
+    def iri_in_states(iri: str, name: str) -> str:
+        return existing.get(name, namespace(iri) + name)
 
-    objectives = {name: individual(iri, objective_name(name)) for name, iri in functions.items()}
-    groundings = {name: individual(iri, grounding_name(name)) for name, iri in designs.items()}
-    measurements = {name: individual(iri, measurement_name(name)) for name, iri in attributes.items()}
-    in_states = {i.iri for group in (objectives, groundings, measurements) for i in group.values()}
+    objectives = {name: iri_in_states(iri, objective_name(name)) for name, iri in functions.items()}
+    groundings = {name: iri_in_states(iri, grounding_name(name)) for name, iri in designs.items()}
+    measurements = {name: iri_in_states(iri, measurement_name(name)) for name, iri in attributes.items()}
+    in_states = {*objectives.values(), *groundings.values(), *measurements.values()}
     if len(in_states) < len(objectives) + len(groundings) + len(measurements):
         raise KnowledgeError(
             "two functions, function designs or quality attribute types differ in their prefix only",
@@ -206,9 +177,9 @@ def build_model(content: Content, names: Names, sources: Sequence[OntologyFile])
         designs=designs,
         components=components,
         attributes=attributes,
-        objectives=objectives,
-        groundings=groundings,
-        measurements=measurements,
+        objectives=_with_own(objectives, content, in_states),
+        groundings=_with_own(groundings, content, in_states),
+        measurements=_with_own(measurements, content, in_states),
         estimated=_estimated(content, designs, attributes),
         initial={
             name: tuple(t for t in content.triples if t[0] == iri and t[1] == _C_STATUS)
@@ -221,6 +192,17 @@ def build_model(content: Content, names: Names, sources: Sequence[OntologyFile])
         if triple[0] not in in_states and triple[2] not in in_states and triple[1] != _C_STATUS
     )
     return model, replace(content, triples=kept)
+
+
+def _with_own(iris: dict[str, str], content: Content, in_states: set[str]) -> dict[str, Individual]:
+    """Individuals of states with what the ontologies say of them, or of other things with reference to them."""
+    own: dict[str, list[Triple]] = {}
+    for triple in content.triples:
+        subject, predicate, value = triple
+        holder = subject if subject in in_states else value
+        if holder in in_states and isinstance(holder, str) and predicate not in STATE_PROPERTIES and _is_fact(triple):
+            own.setdefault(holder, []).append(triple)
+    return {name: Individual(iri, tuple(own.get(iri, ()))) for name, iri in iris.items()}
 
 
 def _estimated(content: Content, designs: dict[str, str], attributes: dict[str, str]) -> dict[str, frozenset[str]]:

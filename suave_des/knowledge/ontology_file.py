@@ -16,6 +16,7 @@ from urllib.parse import urldefrag, urljoin
 from xml.parsers import expat
 from xml.sax import SAXParseException
 
+import rdflib
 from rdflib import Graph, URIRef
 from rdflib.namespace import OWL
 from rdflib.namespace import RDF as RDF_TERMS
@@ -191,21 +192,26 @@ def _read_bytes(path: Path) -> bytes:
 
 
 @contextmanager
-def _quiet(name: str) -> Iterator[None]:
-    """Keep a library's own log lines off the terminal while what they say is checked here."""
-    logger = logging.getLogger(name)
-    level = logger.level
+def _literally() -> Iterator[None]:
+    """Let rdflib take literals as they are written, and keep its log lines on odd ones off the terminal.
+
+    It would otherwise write the ill-formed decimal 1e3 as 1000. What it logs is checked after parsing.
+    """
+    logger = logging.getLogger("rdflib.term")
+    before = logger.level, rdflib.NORMALIZE_LITERALS
     logger.setLevel(logging.CRITICAL)
+    rdflib.NORMALIZE_LITERALS = False
     try:
         yield
     finally:
-        logger.setLevel(level)
+        logger.setLevel(before[0])
+        rdflib.NORMALIZE_LITERALS = before[1]
 
 
 def _parse_rdf(path: Path, content: bytes) -> Graph:
     graph = Graph()
     try:
-        with _quiet("rdflib.term"):
+        with _literally():
             # A file without xml:base gets a base that says nothing about this machine's folders.
             graph.parse(data=content, format="xml", publicID=f"http://ontology.invalid/{path.stem}")
     except Exception as error:  # the parser raises many kinds; each means that this file is not RDF/XML

@@ -114,13 +114,14 @@ class InProcessPellet:
                 yield str(individual.toString()), RDF_TYPE, name
 
     def _refuse_dropped_rules(self) -> None:
-        for warning in jvm.take_warnings():
+        """Raise if Pellet said that it leaves out a rule; warnings that name the rule come first."""
+        warnings = sorted(jvm.take_warnings(), key=lambda warning: _RULE.search(warning) is None)
+        for warning in warnings:
             named = _RULE.search(warning)
             if named is not None:
-                rule = self._kb.content.rules[int(named.group(1))]
-                raise dropped(rule, warning)
+                raise _dropped(self._kb.content.rules[int(named.group(1))], warning)
             if "SWRL" in warning or "rule" in warning.lower():
-                raise KnowledgeError(f"Pellet does not take part of a rule: {warning}", file=_files(self._kb))
+                raise KnowledgeError(f"Pellet does not use part of a rule: {warning}", file=_files(self._kb))
 
 
 def contradiction(kb: KnowledgeBase, situation: Sequence[Triple]) -> KnowledgeError:
@@ -158,7 +159,7 @@ def contradiction(kb: KnowledgeBase, situation: Sequence[Triple]) -> KnowledgeEr
     )
 
 
-def dropped(rule: Rule, warning: str) -> KnowledgeError:
+def _dropped(rule: Rule, warning: str) -> KnowledgeError:
     """The error for a rule that Pellet would leave out with nothing but a line in its log."""
     reason = warning.rpartition("): ")[2] if "): " in warning else warning
     return KnowledgeError(

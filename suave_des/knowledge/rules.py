@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -36,6 +36,7 @@ class Rule:
         enabled: false when swrla:isRuleEnabled says so; Pellet itself ignores that mark.
         node: its node in the graph.
         triples: all triples that make it up.
+        properties: (property, whether it is used as a data property) of all its atoms.
         head_properties: (property, whether its values are data) that the head asserts.
         head_classes: classes that the head asserts membership in.
     """
@@ -46,6 +47,7 @@ class Rule:
     enabled: bool
     node: Node = field(repr=False)
     triples: tuple[RdfTriple, ...] = field(repr=False)
+    properties: frozenset[tuple[str, bool]] = field(repr=False)
     head_properties: frozenset[tuple[str, bool]]
     head_classes: frozenset[str]
 
@@ -72,17 +74,20 @@ def rules_of(file: OntologyFile) -> tuple[Rule, ...]:
                 enabled=str(graph.value(node, _ENABLED)).strip().lower() not in ("false", "0"),
                 node=node,
                 triples=tuple(_closure(graph, node)),
-                head_properties=frozenset(
-                    (str(term), (atom, RDF.type, _DATA_ATOM) in graph)
-                    for atom in head
-                    for term in graph.objects(atom, _PROPERTY)
-                ),
+                properties=_properties(graph, (*head, *_items(graph, graph.value(node, URIRef(SWRL + "body"))))),
+                head_properties=_properties(graph, head),
                 head_classes=frozenset(
                     str(term) for atom in head for term in graph.objects(atom, _CLASS) if isinstance(term, URIRef)
                 ),
             )
         )
     return tuple(sorted(rules, key=lambda rule: (rule.name, rule.text)))
+
+
+def _properties(graph: Graph, atoms: Iterable[Node]) -> frozenset[tuple[str, bool]]:
+    return frozenset(
+        (str(term), (atom, RDF.type, _DATA_ATOM) in graph) for atom in atoms for term in graph.objects(atom, _PROPERTY)
+    )
 
 
 def _closure(graph: Graph, start: Node) -> Iterator[RdfTriple]:

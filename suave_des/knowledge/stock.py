@@ -44,16 +44,14 @@ class StockPellet:
         owlready2.JAVA_EXE = str(java_executable())
         world = owlready2.World()
         try:
-            text = self._text + "".join(n_triple(triple) for triple in situation if not _is_lossy(triple[2]))
+            lossy = [triple for triple in situation if _is_lossy(triple[2])]
+            text = self._text + "".join(n_triple(triple) for triple in situation if triple not in lossy)
             ontology = world.get_ontology(_STATE_IRI).load(fileobj=io.BytesIO(text.encode()), only_local=True)
-            for subject, predicate, value in situation:
-                if isinstance(value, Lit) and _is_lossy(value):
-                    # The loader makes a float of it, which it writes as 1e-05, no decimal: hand over the text.
-                    subject_id, predicate_id, datatype_id = map(world._abbreviate, (subject, predicate, value.datatype))
-                    ontology._add_data_triple_raw_spod(subject_id, predicate_id, value.text, datatype_id)
+            for triple in lossy:
+                _add_exactly(world, ontology, triple)
             if not _reason(world):
                 return None
-            return frozenset(self._read(world))
+            return frozenset(self._read(world)) - {_as_float(triple) for triple in lossy}
         finally:
             world.close()
 
@@ -113,6 +111,21 @@ def _remove_left_behind(trace: TracebackType | None) -> None:
                 file.close()
                 Path(file.name).unlink(missing_ok=True)
         trace = trace.tb_next
+
+
+def _add_exactly(world: owlready2.World, ontology: owlready2.Ontology, triple: Triple) -> None:
+    """Assert a decimal as it was written: the loader would make a float of it, written as 1e-05, no decimal."""
+    subject, predicate, value = triple
+    assert isinstance(value, Lit)
+    subject_id, predicate_id, datatype_id = map(world._abbreviate, (subject, predicate, value.datatype))
+    ontology._add_data_triple_raw_spod(subject_id, predicate_id, value.text, datatype_id)
+
+
+def _as_float(triple: Triple) -> Triple:
+    """What owlready2 makes of such a decimal when Pellet returns it: no second value, only a rounded echo."""
+    subject, predicate, value = triple
+    assert isinstance(value, Lit)
+    return subject, predicate, Lit(str(float(value.text)), value.datatype)
 
 
 def _is_lossy(value: str | Lit) -> bool:

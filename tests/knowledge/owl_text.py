@@ -91,12 +91,16 @@ def _element(tag: str, text: str) -> str:
 def _atom(text: str, data: frozenset[str] | set[str]) -> str:
     found = re.fullmatch(r"([\w:]+)\((.*)\)", text)
     assert found is not None, text
-    name, arguments = found.group(1), [part.strip() for part in re.findall(r'\s*"[^"]*"|[^,]+', found.group(2)) if part.strip()]
+    name, arguments = (
+        found.group(1),
+        [part.strip() for part in re.findall(r'\s*"[^"]*"|[^,]+', found.group(2)) if part.strip()],
+    )
     if name in BUILTINS:
         items = f'<rdf:rest rdf:resource="{RDF}nil"/>'
         for argument in reversed(arguments):
             first = _element("rdf:first", argument)
-            items = f'<rdf:rest><rdf:Description><rdf:type rdf:resource="{RDF}List"/>{first}{items}</rdf:Description></rdf:rest>'
+            node = f'<rdf:Description><rdf:type rdf:resource="{RDF}List"/>{first}{items}</rdf:Description>'
+            items = f"<rdf:rest>{node}</rdf:rest>"
         items = items.removeprefix("<rdf:rest>").removesuffix("</rdf:rest>")
         return (
             f'<rdf:Description><rdf:type rdf:resource="{SWRL}BuiltinAtom"/>'

@@ -30,7 +30,9 @@ def test_what_is_no_ordinary_number_is_refused(number: float | str) -> None:
 def test_the_order_in_which_a_state_is_given_does_not_matter() -> None:
     objectives = [ObjectiveState("f_b"), ObjectiveState("f_a", "UNGROUNDED")]
     one = KnowledgeState.of(objectives, measurements={"x": 1.0, "w": 2}, components={"c2": "FALSE", "c1": "OK"})
-    other = KnowledgeState.of(reversed(objectives), measurements={"w": 2.0, "x": 1}, components={"c1": "OK", "c2": "FALSE"})
+    other = KnowledgeState.of(
+        reversed(objectives), measurements={"w": 2.0, "x": 1}, components={"c1": "OK", "c2": "FALSE"}
+    )
     assert one == other
     assert hash(one) == hash(other)
 

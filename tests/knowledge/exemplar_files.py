@@ -1,0 +1,78 @@
+"""Three ontology files split the exemplar's way, made from the shipped two: tomasys.owl, mros.owl, suave.owl.
+
+In the exemplar the terms and rules for robots have a file of their own, which suave.owl imports; the oldest rules
+speak of INTERNAL_ERROR, and a recovered component gives its objectives the status UPDATABLE.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rdflib import BNode, Graph, Literal, URIRef
+from rdflib.namespace import OWL, RDF, RDFS
+from rdflib.term import Node
+
+MROS_IMPORT = "https://raw.githubusercontent.com/meta-control/mros_ontology/main/owl/mros.owl"
+TOMASYS_IMPORT = "http://raw.githubusercontent.com/meta-control/mc_mdl_tomasys/ros2/owl/tomasys.owl"
+SWRL = "http://www.w3.org/2003/11/swrl#"
+TOMASYS = "http://metacontrol.org/tomasys#"
+MROS = "http://ros/mros#"
+MROS_RULES = {"compError", "compErrFG", "compRecov", "QAenergy", "QAsafety", "mros_S4", "S1a", "S1b", "S1c"}
+OLDEST_STATUS = {"IN_ERROR_NFR": "INTERNAL_ERROR", "IN_ERROR_COMPONENT": "INTERNAL_ERROR"}
+
+
+def _parts(graph: Graph, start: Node) -> set[Node]:
+    found, waiting = {start}, [start]
+    while waiting:
+        for value in graph.objects(waiting.pop(), None):
+            if isinstance(value, BNode) and value not in found:
+                found.add(value)
+                waiting.append(value)
+    return found
+
+
+def _move(source: Graph, target: Graph, nodes: set[Node]) -> None:
+    for node in nodes:
+        for triple in list(source.triples((node, None, None))):
+            source.remove(triple)
+            target.add(triple)
+
+
+def _oldest_forms(graph: Graph) -> None:
+    """o_status UPDATABLE instead of o_updatable, INTERNAL_ERROR instead of the IN_ERROR statuses."""
+    for subject, predicate, value in list(graph):
+        if isinstance(value, Literal) and str(value) in OLDEST_STATUS:
+            graph.remove((subject, predicate, value))
+            graph.add((subject, predicate, Literal(OLDEST_STATUS[str(value)])))
+    for atom in list(graph.subjects(URIRef(SWRL + "propertyPredicate"), URIRef(TOMASYS + "o_updatable"))):
+        graph.set((atom, URIRef(SWRL + "propertyPredicate"), URIRef(TOMASYS + "o_status")))
+        graph.set((atom, URIRef(SWRL + "argument2"), Literal("UPDATABLE")))
+
+
+def write_exemplar_files(shipped: Path, folder: Path, *, oldest: bool = False) -> dict[str, Path]:
+    """Write the three files; returns them by stem."""
+    tomasys, mros, suave = Graph(), Graph(), Graph()
+    tomasys.parse(shipped / "tomasys.owl", format="xml")
+    suave.parse(shipped / "suave.owl", format="xml")
+    rules = {str(label): rule for rule, label in tomasys.subject_objects(RDFS.label) if isinstance(rule, BNode)}
+    for name in MROS_RULES:
+        _move(tomasys, mros, _parts(tomasys, rules[name]))
+    _move(tomasys, mros, {s for s in tomasys.subjects() if str(s).startswith(MROS)})
+    for variable in tomasys.subjects(RDF.type, URIRef(SWRL + "Variable")):
+        mros.add((variable, RDF.type, URIRef(SWRL + "Variable")))
+    for ontology, iri, imports in (
+        (tomasys, "http://metacontrol.org/tomasys", []),
+        (mros, "http://ros/mros", [TOMASYS_IMPORT]),
+        (suave, "http://www.metacontrol.org/suave", [TOMASYS_IMPORT, MROS_IMPORT]),
+    ):
+        ontology.remove((None, OWL.imports, None))
+        ontology.add((URIRef(iri), RDF.type, OWL.Ontology))
+        for imported in imports:
+            ontology.add((URIRef(iri), OWL.imports, URIRef(imported)))
+        if oldest:
+            _oldest_forms(ontology)
+    folder.mkdir(parents=True, exist_ok=True)
+    files = {"tomasys": tomasys, "mros": mros, "suave": suave}
+    for name, graph in files.items():
+        graph.serialize(folder / f"{name}.owl", format="xml")
+    return {name: folder / f"{name}.owl" for name in files}

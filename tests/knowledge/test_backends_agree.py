@@ -1,0 +1,85 @@
+"""The kept-alive Pellet infers what stock owlready2 infers, state by state."""
+
+from __future__ import annotations
+
+import random
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from knowledge_states import FOLLOW, MOTION, SEARCH, searching
+
+from suave_des.errors import KnowledgeError
+from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.planning import plan
+from suave_des.knowledge.reasoners import Reasoner, make_reasoner
+from suave_des.knowledge.state import Inference, KnowledgeState, ObjectiveState
+
+THRESHOLDS = ("1.25", "2.25", "3.25")
+#: Just below, on and just above each threshold, and numbers that binary floats write with an exponent.
+VISIBILITIES = [
+    *(f"{float(t) + step:.9f}" for t in THRESHOLDS for step in (-1e-9, 0.0, 1e-9)),
+    *("0.00001", "2.71828182845904523536", "12345678901234567890"),
+]
+
+
+def random_state(draw: random.Random) -> KnowledgeState:
+    designs = {
+        SEARCH: ["fd_spiral_high", "fd_spiral_medium", "fd_spiral_low"],
+        MOTION: ["fd_all_thrusters", "fd_recover_thrusters"],
+        FOLLOW: ["fd_follow_pipeline"],
+    }
+    functions = draw.sample(sorted(designs), draw.randint(1, 3))
+    grounded = {name: draw.choice(designs[name]) for name in functions if draw.random() < 0.8}
+    statuses = {
+        name: draw.choice([None, "UNGROUNDED", "IN_ERROR_NFR", "IN_ERROR_FR"]) if name not in grounded else None
+        for name in functions
+    }
+    hit = draw.sample(range(1, 7), draw.choice([0, 0, 1, 2]))
+    measured = {"water_visibility": draw.choice(VISIBILITIES)} if draw.random() < 0.9 else {}
+    if draw.random() < 0.5:
+        measured["battery_level"] = f"{draw.random():.6f}"
+    return KnowledgeState.of(
+        [ObjectiveState(name, statuses[name], draw.random() < 0.3) for name in functions],
+        groundings=grounded,
+        components={f"c_thruster_{n}": draw.choice(["FALSE", "RECOVERED", "OK"]) for n in hit},
+        measurements=measured,
+    )
+
+
+def outcome(reasoner: Reasoner, state: KnowledgeState) -> Inference | str:
+    try:
+        return reasoner.infer(state)
+    except KnowledgeError as error:
+        return str(error)
+
+
+def test_both_backends_infer_the_same_on_random_states(
+    kb: KnowledgeBase, pellet: Reasoner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # For Java processes that live a second: less compiling, one thread less. It changes nothing else.
+    monkeypatch.setenv("JAVA_TOOL_OPTIONS", "-XX:TieredStopAtLevel=1 -XX:+UseSerialGC")
+    draw = random.Random(20230515)
+    states = [random_state(draw) for _ in range(52)]
+    # A grounding in error cannot belong to an objective that is said to be ungrounded.
+    states += [searching("fd_spiral_high", 1.0, status="UNGROUNDED"), KnowledgeState()]
+    assert len(set(states)) >= 50
+    stock = make_reasoner("owlready2", kb)
+    with ThreadPoolExecutor(max_workers=2) as pool:  # each call waits for a Java process of its own
+        reference = list(pool.map(lambda state: outcome(stock, state), states))
+    found = [outcome(pellet, state) for state in states]
+    assert found == reference
+    consistent = [one for one in found if isinstance(one, Inference)]
+    assert any(isinstance(one, str) for one in found)
+    assert len({one.facts for one in consistent}) >= 10  # the states do differ in what follows from them
+    for one in consistent:
+        assert plan(kb, one.state, one) == plan(kb, one.state, stock.infer(one.state))
+
+
+def test_an_inference_does_not_depend_on_those_before_it(kb: KnowledgeBase) -> None:
+    draw = random.Random(7)
+    states = [random_state(draw) for _ in range(150)]
+    forth = make_reasoner("pellet", kb)
+    back = make_reasoner("pellet", kb)
+    one = [outcome(forth, state) for state in states]
+    other = [outcome(back, state) for state in reversed(states)]
+    assert one == other[::-1]

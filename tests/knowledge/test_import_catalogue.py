@@ -1,0 +1,168 @@
+"""Imports resolve to local files, whichever files were given and in whichever order; nothing is fetched."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import pytest
+from conftest import MakeOntology
+from exemplar_files import MROS_IMPORT, write_exemplar_files
+from knowledge_states import MOTION, SEARCH, searching
+
+from suave_des.errors import KnowledgeError
+from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.planning import plan
+from suave_des.knowledge.reasoners import Reasoner, make_reasoner
+
+IMPORT = "https://raw.githubusercontent.com/meta-control/mc_mdl_tomasys/ros2/owl/tomasys.owl"
+STORY = [
+    searching(None, 2.3, status="UNGROUNDED"),
+    searching("fd_spiral_high", 3.3),
+    searching("fd_spiral_high", 1.3),
+    searching("fd_spiral_low", 1.0),
+    searching("fd_spiral_low", 1.5, motion="fd_all_thrusters", components={"c_thruster_1": "FALSE"}),
+    searching("fd_spiral_low", 1.5, motion="fd_recover_thrusters", components={"c_thruster_1": "FALSE"}),
+    searching("fd_spiral_low", 1.5, motion="fd_recover_thrusters", components={"c_thruster_1": "RECOVERED"}),
+]
+
+
+def decisions(base: KnowledgeBase, reasoner: Reasoner) -> list[dict[str, str | None]]:
+    plans = [plan(base, state, reasoner.infer(state)) for state in STORY]
+    return [{d.function: d.design for d in one.decisions} for one in plans]
+
+
+@pytest.mark.parametrize("oldest", [False, True])
+def test_the_exemplars_three_files_decide_as_the_shipped_two(
+    kb: KnowledgeBase, pellet: Reasoner, shipped: Path, tmp_path: Path, oldest: bool
+) -> None:
+    files = write_exemplar_files(shipped, tmp_path / "owl", oldest=oldest)
+    base = KnowledgeBase.load(list(files.values()))
+    assert set(base.files) == set(files.values())
+    assert len(base.rules) == len(kb.rules)
+    found = decisions(base, make_reasoner("pellet", base))
+    assert found == decisions(kb, pellet)
+    assert found[4] == {MOTION: "fd_recover_thrusters"}
+    assert found[6] == {MOTION: "fd_all_thrusters", SEARCH: "fd_spiral_low"}
+
+
+def test_the_order_of_files_does_not_matter_and_those_beside_are_found(shipped: Path, tmp_path: Path) -> None:
+    files = write_exemplar_files(shipped, tmp_path / "owl")
+    given = [*itertools.permutations(files.values()), (files["suave"],), (files["suave"], files["tomasys"])]
+    bases = [KnowledgeBase.load(one) for one in given]
+    assert {base.files for base in bases} == {tuple(sorted(files.values()))}
+    assert len({base.content_hash for base in bases}) == 1
+
+
+def test_files_in_different_folders_and_under_other_names_are_matched_by_iri(shipped: Path, tmp_path: Path) -> None:
+    files = write_exemplar_files(shipped, tmp_path / "owl")
+    moved = []
+    for number, file in enumerate(files.values()):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        moved.append(file.rename(folder / f"mine_{number}.owl"))
+    assert set(KnowledgeBase.load(moved).files) == set(moved)
+
+
+def test_a_file_beside_under_another_name_is_matched_by_its_iri(suave_copy: MakeOntology, shipped: Path) -> None:
+    path = suave_copy(replace={IMPORT: "http://metacontrol.org/tomasys#"})
+    beside = path.with_name("vocabulary.owl")
+    beside.write_bytes((shipped / "tomasys.owl").read_bytes() + b"<!-- mine -->")
+    path.with_name("broken.owl").write_text("tomasys, but no XML")
+    assert set(KnowledgeBase.load([path]).files) == {path, beside}
+
+
+def test_a_given_file_wins_over_the_one_beside_and_that_over_the_shipped(
+    suave_copy: MakeOntology, shipped: Path, tmp_path: Path
+) -> None:
+    path = suave_copy()
+    assert set(KnowledgeBase.load([path]).files) == {path, shipped / "tomasys.owl"}
+    beside = path.with_name("tomasys.owl")
+    beside.write_bytes((shipped / "tomasys.owl").read_bytes() + b"<!-- beside -->")
+    assert set(KnowledgeBase.load([path]).files) == {path, beside}
+    given = tmp_path / "elsewhere" / "tomasys.owl"
+    given.parent.mkdir()
+    given.write_bytes((shipped / "tomasys.owl").read_bytes() + b"<!-- given -->")
+    assert set(KnowledgeBase.load([path, given]).files) == {path, given}
+
+
+@pytest.mark.parametrize(
+    "iri",
+    ["http://metacontrol.org/tomasys", "http://metacontrol.org/tomasys#", MROS_IMPORT, "http://ros/mros#"],
+)
+def test_known_iris_resolve_to_the_shipped_files(suave_copy: MakeOntology, shipped: Path, iri: str) -> None:
+    path = suave_copy(replace={IMPORT: iri})
+    assert set(KnowledgeBase.load([path]).files) == {path, shipped / "tomasys.owl"}
+
+
+def test_an_edited_copy_of_the_shipped_tomasys_also_supplies_the_robots_terms(
+    suave_copy: MakeOntology, shipped: Path, kb: KnowledgeBase
+) -> None:
+    path = suave_copy(replace={IMPORT: MROS_IMPORT})
+    copy = path.with_name("tomasys_mine.owl")
+    copy.write_bytes((shipped / "tomasys.owl").read_bytes() + b"<!-- mine -->")
+    base = KnowledgeBase.load([path, copy])
+    assert set(base.files) == {path, copy}
+    assert len(base.rules) == len(kb.rules)
+
+
+def test_a_given_mros_file_stands_in_for_the_shipped_rules_of_that_part(
+    shipped: Path, tmp_path: Path, kb: KnowledgeBase
+) -> None:
+    files = write_exemplar_files(shipped, tmp_path / "owl")
+    files["tomasys"].unlink()
+    base = KnowledgeBase.load([files["mros"], files["suave"]])
+    assert shipped / "tomasys.owl" in base.files
+    assert sorted(rule.name for rule in base.rules) == sorted(rule.name for rule in kb.rules)
+
+
+def test_a_given_tomasys_is_not_mixed_with_the_shipped_one(shipped: Path, tmp_path: Path) -> None:
+    files = write_exemplar_files(shipped, tmp_path / "owl")
+    files["mros"].unlink()
+    with pytest.raises(KnowledgeError) as error:
+        KnowledgeBase.load([files["tomasys"], files["suave"]])
+    assert f"import {MROS_IMPORT} does not resolve" in str(error.value)
+    assert str(files["suave"]) in str(error.value)
+
+
+def test_an_unknown_import_is_an_error_with_file_and_line(suave_copy: MakeOntology) -> None:
+    path = suave_copy(replace={IMPORT: "http://example.org/wind.owl"})
+    with pytest.raises(KnowledgeError) as error:
+        KnowledgeBase.load([path])
+    assert str(error.value).startswith(f"{path}: line 15: import http://example.org/wind.owl does not resolve")
+
+
+def test_import_cycles_end(suave_copy: MakeOntology, shipped: Path, kb: KnowledgeBase) -> None:
+    path = suave_copy()
+    text = (shipped / "tomasys.owl").read_text(encoding="utf-8")
+    ontology = '<owl:Ontology rdf:about="http://metacontrol.org/tomasys">'
+    assert ontology in text
+    cycle = ontology + '<owl:imports rdf:resource="http://www.metacontrol.org/suave"/>'
+    path.with_name("tomasys.owl").write_text(text.replace(ontology, cycle), encoding="utf-8")
+    for name in ("suave.owl", "tomasys.owl"):
+        assert len(KnowledgeBase.load([path.with_name(name)]).rules) == len(kb.rules)
+
+
+def test_a_file_given_twice_counts_once_and_two_versions_of_one_ontology_are_refused(
+    suave_copy: MakeOntology, shipped: Path
+) -> None:
+    path = suave_copy("<!-- mine -->")
+    assert set(KnowledgeBase.load([path, path, path.parent / "." / path.name]).files) >= {path}
+    with pytest.raises(KnowledgeError, match="supplies the ontology"):
+        KnowledgeBase.load([path, shipped / "suave.owl"])
+
+
+def test_an_ontology_of_ones_own_may_add_to_the_shipped_ones(tmp_path: Path, shipped: Path) -> None:
+    path = tmp_path / "mine.owl"
+    path.write_text(
+        '<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#" '
+        'xmlns:owl="http://www.w3.org/2002/07/owl#" xmlns:tomasys="http://metacontrol.org/tomasys#" '
+        'xml:base="http://example.org/mine"><owl:Ontology rdf:about="">'
+        '<owl:imports rdf:resource="http://www.metacontrol.org/suave"/></owl:Ontology>'
+        '<tomasys:FunctionDesign rdf:ID="fd_zigzag"><tomasys:solvesF '
+        'rdf:resource="http://www.metacontrol.org/suave#f_generate_search_path"/></tomasys:FunctionDesign></rdf:RDF>'
+    )
+    base = KnowledgeBase.load([path])
+    assert "fd_zigzag" in base.designs(SEARCH)
+    assert set(base.files) == {path, shipped / "suave.owl", shipped / "tomasys.owl"}
+    assert make_reasoner("pellet", base).infer(searching("fd_zigzag")).facts == frozenset()

@@ -1,0 +1,238 @@
+"""The loop's semantics: which objectives are adapted, which designs are left out and why, which one is chosen."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+from pathlib import Path
+
+import pytest
+from conftest import MakeOntology
+from knowledge_states import FOLLOW, MOTION, SEARCH, searching
+from owl_text import individual
+
+from suave_des.errors import KnowledgeError
+from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.planning import plan
+from suave_des.knowledge.reasoners import Reasoner, make_reasoner
+from suave_des.knowledge.state import Decision, KnowledgeState, ObjectiveState
+
+
+def decide(kb: KnowledgeBase, reasoner: Reasoner, state: KnowledgeState, **options: list[str]) -> dict[str, Decision]:
+    decisions = plan(kb, state, reasoner.infer(state), **options).decisions
+    assert [d.function for d in decisions] == sorted(d.function for d in decisions)
+    return {decision.function: decision for decision in decisions}
+
+
+def decide_with(file: Path, state: KnowledgeState) -> Decision:
+    base = KnowledgeBase.load([file])
+    return decide(base, make_reasoner("pellet", base), state)[SEARCH]
+
+
+@pytest.mark.parametrize(
+    ("visibility", "design"),
+    [
+        (None, "fd_spiral_high"),
+        (3.25, "fd_spiral_high"),
+        (3.249999, "fd_spiral_medium"),
+        (2.25, "fd_spiral_medium"),
+        (2.2, "fd_spiral_low"),
+        (1.25, "fd_spiral_low"),
+        (1.0, None),
+    ],
+)
+def test_an_ungrounded_search_gets_the_highest_altitude_that_visibility_allows(
+    kb: KnowledgeBase, pellet: Reasoner, visibility: float | None, design: str | None
+) -> None:
+    decision = decide(kb, pellet, searching(None, visibility, status="UNGROUNDED"))[SEARCH]
+    assert decision.design == design
+
+
+def test_each_design_left_out_has_its_numbers(kb: KnowledgeBase, pellet: Reasoner) -> None:
+    decision = decide(kb, pellet, searching("fd_spiral_high", 1.8))[SEARCH]
+    assert decision.design == "fd_spiral_low"
+    assert [(rejection.design, rejection.reason) for rejection in decision.rejected] == [
+        ("fd_spiral_high", "water_visibility 1.80 measured < 3.25 expected"),
+        ("fd_spiral_medium", "water_visibility 1.80 measured < 2.25 expected"),
+    ]
+    assert decision.reason == "o_status IN_ERROR_NFR: highest performance, 0.25, of 1 left among 3"
+
+
+def test_numbers_that_look_alike_are_shown_with_more_digits(kb: KnowledgeBase, pellet: Reasoner) -> None:
+    decision = decide(kb, pellet, searching("fd_spiral_medium", "2.2499999"))[SEARCH]
+    assert "water_visibility 2.2499999 measured < 2.25 expected" in [r.reason for r in decision.rejected]
+
+
+def test_with_no_design_left_the_present_one_is_kept_and_it_is_said(kb: KnowledgeBase, pellet: Reasoner) -> None:
+    decision = decide(kb, pellet, searching("fd_spiral_low", 1.0))[SEARCH]
+    assert decision.design is None
+    assert decision.reason == "o_status IN_ERROR_NFR: no function design is left, fd_spiral_low is kept"
+    assert len(decision.rejected) == 3
+
+
+def test_an_objective_that_is_well_is_left_alone(kb: KnowledgeBase, pellet: Reasoner) -> None:
+    assert decide(kb, pellet, searching("fd_spiral_low", 3.5)) == {}
+
+
+def test_an_objective_is_adapted_on_request_or_when_always_to_be_improved(kb: KnowledgeBase, pellet: Reasoner) -> None:
+    asked = decide(kb, pellet, searching("fd_spiral_low", 3.5), to_adapt=[SEARCH])
+    assert asked[SEARCH].design == "fd_spiral_high"
+    always = decide(kb, pellet, searching("fd_spiral_low", 3.5, always_improve=True))
+    assert always[SEARCH].design == "fd_spiral_high"
+    assert decide(kb, pellet, searching("fd_spiral_low", 3.5), to_adapt=[FOLLOW]) == {}
+
+
+@pytest.mark.parametrize(
+    "status",
+    ["UNGROUNDED", "IN_ERROR_FR", "IN_ERROR_COMPONENT", "IN_ERROR_OF_MINE", "INTERNAL_ERROR", "EXTERNAL_ERROR"],
+)
+def test_statuses_of_either_family_call_for_adaptation(kb: KnowledgeBase, pellet: Reasoner, status: str) -> None:
+    assert SEARCH in decide(kb, pellet, searching(None, 3.5, status=status))
+
+
+def test_the_older_updatable_status_calls_for_adaptation(kb: KnowledgeBase, pellet: Reasoner) -> None:
+    assert SEARCH in decide(kb, pellet, searching("fd_spiral_low", 3.5, status="UPDATABLE"))
+
+
+def test_other_statuses_do_not(kb: KnowledgeBase, pellet: Reasoner) -> None:
+    assert decide(kb, pellet, searching(None, 3.5, status="OK")) == {}
+
+
+def test_a_failed_thruster_is_recovered_and_then_all_thrusters_used_again(kb: KnowledgeBase, pellet: Reasoner) -> None:
+    failed = {"c_thruster_1": "FALSE"}
+    state = searching("fd_spiral_high", 3.5, motion="fd_all_thrusters", components=failed)
+    decision = decide(kb, pellet, state)
+    assert set(decision) == {MOTION}
+    assert decision[MOTION].design == "fd_recover_thrusters"
+    assert decision[MOTION].rejected[0].reason == "not realisable"
+
+    recovering = searching("fd_spiral_high", 3.5, motion="fd_recover_thrusters", components=failed)
+    assert decide(kb, pellet, recovering) == {}
+
+    recovered = {"c_thruster_1": "RECOVERED"}
+    state = searching("fd_spiral_high", 3.5, motion="fd_recover_thrusters", components=recovered)
+    decision = decide(kb, pellet, state)
+    assert decision[MOTION].design == "fd_all_thrusters"
+    assert decision[MOTION].reason.startswith("updatable")
+    assert decision[SEARCH].design == "fd_spiral_high"
+
+    # With a second thruster failed, the recovery of the first makes nothing realisable.
+    both = {"c_thruster_1": "RECOVERED", "c_thruster_2": "FALSE"}
+    state = searching("fd_spiral_high", 3.5, motion="fd_recover_thrusters", components=both)
+    assert decide(kb, pellet, state)[MOTION].design == "fd_recover_thrusters"
+
+
+def test_a_fourth_altitude_in_the_ontology_alone_is_chosen(suave_copy: MakeOntology) -> None:
+    path = suave_copy(
+        individual("qa_water_visibility_very_high", "QAvalue", ("isQAtype", ":water_visibility"), ("hasValue", "4.25"))
+        + individual("qa_performance_very_high", "QAvalue", ("isQAtype", ":mros:performance"), ("hasValue", "1.5"))
+        + individual(
+            "fd_spiral_very_high",
+            "FunctionDesign",
+            ("solvesF", ":f_generate_search_path"),
+            ("hasQAestimation", ":qa_water_visibility_very_high"),
+            ("hasQAestimation", ":qa_performance_very_high"),
+        )
+    )
+    assert decide_with(path, searching(None, 4.5, status="UNGROUNDED")).design == "fd_spiral_very_high"
+    assert decide_with(path, searching("fd_spiral_very_high", 4.2)).design == "fd_spiral_high"
+
+
+def test_a_design_in_the_error_log_is_left_out(suave_copy: MakeOntology) -> None:
+    path = suave_copy(individual("fd_spiral_high", "FunctionDesign", ("fd_error_log", ":o_generate_search_path")))
+    decision = decide_with(path, searching(None, 3.5, status="UNGROUNDED"))
+    assert decision.design == "fd_spiral_medium"
+    assert decision.rejected[0].reason == "o_generate_search_path is in its error log"
+
+
+def test_a_design_that_the_ontology_calls_unrealisable_is_left_out(suave_copy: MakeOntology) -> None:
+    path = suave_copy(individual("fd_spiral_high", "FunctionDesign", ("fd_realisability", "false")))
+    assert decide_with(path, searching(None, 3.5, status="UNGROUNDED")).design == "fd_spiral_medium"
+
+
+def test_a_value_that_the_objective_requires_is_compared_with_the_expected_one(suave_copy: MakeOntology) -> None:
+    path = suave_copy(
+        individual("nfr", "QAvalue", ("isQAtype", ":mros:energy"), ("hasValue", "0.6"))
+        + individual("o_generate_search_path", "Objective", ("hasNFR", ":nfr"))
+        + individual("qa_energy_high", "QAvalue", ("isQAtype", ":mros:energy"), ("hasValue", "0.9"))
+        + individual("fd_spiral_high", "FunctionDesign", ("hasQAestimation", ":qa_energy_high"))
+        + individual("qa_energy_medium", "QAvalue", ("isQAtype", ":mros:energy"), ("hasValue", "0.6"))
+        + individual("fd_spiral_medium", "FunctionDesign", ("hasQAestimation", ":qa_energy_medium"))
+    )
+    decision = decide_with(path, searching(None, 3.5, status="UNGROUNDED"))
+    assert decision.design == "fd_spiral_medium"
+    assert [r.reason for r in decision.rejected] == ["energy 0.90 expected > 0.60 required"]
+
+
+def test_a_required_performance_counts_designs_that_tell_none_as_bad(suave_copy: MakeOntology) -> None:
+    path = suave_copy(
+        individual("nfr", "QAvalue", ("isQAtype", ":mros:performance"), ("hasValue", "0.5"))
+        + individual("o_generate_search_path", "Objective", ("hasNFR", ":nfr"))
+        + individual("fd_drift", "FunctionDesign", ("solvesF", ":f_generate_search_path"))
+    )
+    decision = decide_with(path, searching(None, 2.5, status="UNGROUNDED"))
+    assert decision.design == "fd_spiral_medium"
+    assert {r.design for r in decision.rejected} == {"fd_drift", "fd_spiral_low", "fd_spiral_high"}
+
+
+def test_a_required_value_without_operator_is_an_error(suave_copy: MakeOntology) -> None:
+    path = suave_copy(
+        individual("noise", "QualityAttributeType")
+        + individual("nfr", "QAvalue", ("isQAtype", ":noise"), ("hasValue", "0.5"))
+        + individual("o_generate_search_path", "Objective", ("hasNFR", ":nfr"))
+    )
+    with pytest.raises(KnowledgeError, match="requires a value of noise, which has no qa_comparison_operator"):
+        decide_with(path, searching(None, 2.5, status="UNGROUNDED"))
+
+
+@pytest.mark.parametrize(
+    ("operator", "allowed"),
+    [("<", [0.5, 0.6]), ("<=", [0.6]), (">", [0.4, 0.5]), (">=", [0.4])],
+)
+def test_the_operator_of_the_attribute_decides_what_is_bad(
+    suave_copy: MakeOntology, operator: str, allowed: list[float]
+) -> None:
+    path = suave_copy(
+        individual("current", "QualityAttributeType", ("qa_comparison_operator", operator))
+        + individual("qa_current", "QAvalue", ("isQAtype", ":current"), ("hasValue", "0.5"))
+        + individual("fd_spiral_high", "FunctionDesign", ("hasQAestimation", ":qa_current"))
+    )
+    base = KnowledgeBase.load([path])
+    reasoner = make_reasoner("pellet", base)
+
+    def chosen(current: float) -> str | None:
+        state = KnowledgeState.of([ObjectiveState(SEARCH, "UNGROUNDED")], measurements={"current": current})
+        return decide(base, reasoner, state)[SEARCH].design
+
+    assert [value for value in (0.4, 0.5, 0.6) if chosen(value) == "fd_spiral_high"] == allowed
+
+
+def test_a_design_without_performance_counts_little_and_ties_go_by_name(suave_copy: MakeOntology) -> None:
+    silent = individual("fd_a", "FunctionDesign", ("solvesF", ":f_generate_search_path"))
+    path = suave_copy(silent)
+    assert decide_with(path, searching(None, 2.5, status="UNGROUNDED")).design == "fd_spiral_medium"
+    assert decide_with(path, searching(None, 0.5, status="UNGROUNDED")).design == "fd_a"
+    path = suave_copy(silent + individual("fd_0", "FunctionDesign", ("solvesF", ":f_generate_search_path")))
+    assert decide_with(path, searching(None, 0.5, status="UNGROUNDED")).design == "fd_0"
+
+
+def test_overridden_values_decide_and_show_in_the_hash(kb: KnowledgeBase) -> None:
+    values = {"qa_water_visibility_high": Decimal(2), "qa_water_visibility_medium": Decimal(1)}
+    base = KnowledgeBase.load(values=values)
+    assert base.expected("fd_spiral_high")["water_visibility"] == 2
+    state = searching(None, 2.0, status="UNGROUNDED")
+    assert decide(base, make_reasoner("pellet", base), state)[SEARCH].design == "fd_spiral_high"
+    assert base.content_hash != kb.content_hash
+
+
+def test_a_state_with_an_unknown_design_or_function_is_refused(pellet: Reasoner) -> None:
+    with pytest.raises(KnowledgeError, match="no function design fd_spiral_hgih"):
+        pellet.infer(searching("fd_spiral_hgih"))
+    with pytest.raises(KnowledgeError, match="no function f_dance"):
+        pellet.infer(KnowledgeState.of([ObjectiveState("f_dance")]))
+
+
+def test_what_monitors_report_beyond_the_model_has_no_effect(pellet: Reasoner) -> None:
+    state = KnowledgeState.of(
+        [ObjectiveState(SEARCH)], components={"c_sonar": "FALSE"}, measurements={"salinity": 35.0}
+    )
+    assert pellet.infer(state).facts == frozenset()
