@@ -34,8 +34,8 @@ def print_validation(console: Console, validation: Validation) -> None:
 
 def _remarks(validation: Validation) -> Iterator[str]:
     yield (
-        "Means must lie in the published mean's 95% t interval, standard deviations in the published one's 95% chi-square"
-        " interval."
+        "Means must lie in the published mean's 95% t interval, standard deviations in the published one's"
+        " 95% chi-square interval."
     )
     met = [target.met for target in validation.targets]
     yield f"{met.count(True)} of {len(met)} targets are met, {met.count(False)} are not met."

@@ -114,7 +114,10 @@ def test_other_data_without_a_file_of_shares_has_no_cluster_targets(validate, tm
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--data", "missing.csv"], "missing.csv: no such file (give a path, or one of the shipped files: seams2023_runs"),
+        (
+            ["--data", "missing.csv"],
+            "missing.csv: no such file (give a path, or one of the shipped files: seams2023_",
+        ),
         (["--data", "unknown.csv"], "unknown.csv: line 2: there is no manager 'magic'"),
         (["--data", "columns.csv"], "columns.csv: line 1: has no column"),
         (["--data", "empty.csv"], "empty.csv: line 1: has no mission"),

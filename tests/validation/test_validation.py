@@ -9,8 +9,8 @@ import pandas
 import pytest
 
 from suave_des.resources import shipped_folder
-from suave_des.validation.files import CELLS_FILE, JSON_FILE, PAIRS_FILE, TARGETS_FILE, texts
 from suave_des.validation.figures import detections_png, distributions_png
+from suave_des.validation.files import CELLS_FILE, JSON_FILE, PAIRS_FILE, TARGETS_FILE, texts
 from suave_des.validation.runs import read_runs
 from suave_des.validation.shares import Share, read_shares, shares_beside
 from suave_des.validation.split import split_check
@@ -76,7 +76,9 @@ def test_a_shifted_manager_fails_in_its_own_cell_alone(published, like_published
     found = validate(published, shifted, MANAGERS)
     assert ("mean", "none", "search_time_s") in missed(found)
     assert ("ks", "none", "search_time_s") in missed(found)
-    assert {(subject, what) for kind, subject, what in missed(found) if kind != "conclusion"} == {("none", "search_time_s")}
+    assert {(subject, what) for kind, subject, what in missed(found) if kind != "conclusion"} == {
+        ("none", "search_time_s")
+    }
 
 
 def test_a_wider_manager_fails_in_its_spread(published, like_published):

@@ -7,7 +7,15 @@ import pytest
 from suave_des.errors import InputError
 from suave_des.resources import shipped_folder
 from suave_des.validation.runs import read_runs
-from suave_des.validation.shares import Counted, Share, compare_positions, compare_shares, count, read_shares, shares_beside
+from suave_des.validation.shares import (
+    Counted,
+    Share,
+    compare_positions,
+    compare_shares,
+    count,
+    read_shares,
+    shares_beside,
+)
 
 UNKNOWN = math.nan
 
