@@ -180,9 +180,9 @@ def check_knowledge(loaded: LoadedScenario, managers: Sequence[str], *, given: b
         from suave_des.knowledge.state import KnowledgeState
         from suave_des.simulation.knowledge import open_knowledge
 
-        base, reasoner = open_knowledge(loaded)
-        reasoner.infer(KnowledgeState())
-        for path in base.files:
+        knowledge = open_knowledge(loaded)
+        knowledge.conclude(KnowledgeState())
+        for path in knowledge.base.files:
             files.ontology(path)
     return {**loaded.inputs, **files.inputs}
 

@@ -55,7 +55,7 @@ class PipelineDetector:
         self.detected = env.event()
         self.first_point: int | None = None
         self.detected_s: float | None = None
-        vehicle.on_control_change = self._look_ahead
+        vehicle.control_listeners.append(self._look_ahead)
         self._look_ahead(0)
 
     def _look_ahead(self, row: int) -> None:
@@ -75,7 +75,7 @@ class PipelineDetector:
         if point < 0:
             self._look_ahead(last)
             return
-        self._vehicle.on_control_change = None
+        self._vehicle.control_listeners.remove(self._look_ahead)
         self.first_point = point
         self.detected_s = float(self._env.now)
         self.detected.succeed()

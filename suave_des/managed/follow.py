@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 
 import simpy
 
-from suave_des.clock import Process, tick_at_or_after, until
+from suave_des.clock import Process, until
 from suave_des.managed.node import FunctionNode, SetPointSender
 from suave_des.scenario.revision import FollowRevision
-from suave_des.vehicle.vehicle import Vehicle
+from suave_des.vehicle.vehicle import Vehicle, row_at
 from suave_des.world.pipeline import SEA_BED_Z_M
 
 ALTITUDE_M = 1.25
 POLLS_BEFORE_RESENDING = 10
+
+_CONTROL_CHANGE = "control change"
 
 Path = Sequence[tuple[float, float]]
 
@@ -53,6 +55,8 @@ class FollowPipeline(FunctionNode):
         self._travelled_m = 0.0
         self.distance_m = 0.0
         self.finished = env.event()
+        self._asleep = False
+        vehicle.control_listeners.append(self._control_changed)
 
     def activated(self) -> None:
         """Set off; the distance counts from zero again, though the published value stays until there is a new one."""
@@ -76,30 +80,63 @@ class FollowPipeline(FunctionNode):
             self.distance_m = self._travelled_m
 
     def _follow(self, path: Path) -> Process:
-        started_s, period_s = self.env.now, self._revision.poll_period_s
+        started_s = self.env.now
         try:
             while self._next < len(path):
                 point = path[self._next]
                 self._send(point)
-                polls = 0
-                while not self._reached(point):
-                    if polls == POLLS_BEFORE_RESENDING:
-                        self._send(point)
-                        polls = 0
-                    # The next poll is strictly later than now: polls lie on a grid that began with the activation.
-                    next_poll_s = tick_at_or_after(self.env.now + period_s / 2, started_s, period_s)
-                    yield until(self.env, next_poll_s)
-                    polls += 1
+                yield from self._wait_until_reached(point, started_s)
                 self._arrive(point)
         except simpy.Interrupt:
             return
         self.finished.succeed()
 
+    def _wait_until_reached(self, point: tuple[float, float], started_s: float) -> Process:
+        """Wait for the poll that finds the point reached, sending it again whenever ten polls did not.
+
+        Polls lie on a grid that began with the activation. Instead of stopping at each, the vehicle is asked where it
+        will be at the coming ones; should its control change meanwhile, it is asked anew.
+        """
+        period_s = self._revision.poll_period_s
+        poll = _polls_until(self.env.now, started_s, period_s) + 1
+        last = poll + POLLS_BEFORE_RESENDING - 1
+        reached = self._reached(point, self.env.now)
+        while not reached:
+            coming = range(poll, last + 1)
+            wake = next((each for each in coming if self._reached(point, started_s + each * period_s)), last)
+            if (yield from self._sleep_until(started_s + wake * period_s)):
+                poll = max(poll, _polls_until(self.env.now, started_s, period_s))
+                continue
+            reached = self._reached(point, self.env.now)
+            if not reached:
+                self._send(point)
+                poll, last = wake + 1, wake + POLLS_BEFORE_RESENDING
+
+    def _sleep_until(self, t_s: float) -> Generator[simpy.Event, None, bool]:
+        """Wait until a mission time; returns at once, and true, if the vehicle's control changes."""
+        self._asleep = True
+        try:
+            yield until(self.env, t_s)
+        except simpy.Interrupt as interrupt:
+            if interrupt.cause is not _CONTROL_CHANGE:
+                raise
+            return True
+        finally:
+            self._asleep = False
+        return False
+
+    def _control_changed(self, row: int) -> None:
+        if self._asleep and self._process is not None:
+            self._asleep = False  # one waking is enough
+            self._process.interrupt(_CONTROL_CHANGE)
+
     def _send(self, point: tuple[float, float]) -> None:
         self._sender.send(point[0], point[1], SEA_BED_Z_M + ALTITUDE_M)
 
-    def _reached(self, point: tuple[float, float]) -> bool:
-        x, y, _ = self._vehicle.position(self.env.now)
+    def _reached(self, point: tuple[float, float], t_s: float) -> bool:
+        if row_at(t_s) > self._vehicle.last_row:
+            return False  # after the mission's end
+        x, y, _ = self._vehicle.position(t_s)
         box = self._revision.acceptance_m
         return abs(x - point[0]) <= box and abs(y - point[1]) <= box
 
@@ -109,3 +146,8 @@ class FollowPipeline(FunctionNode):
             self._travelled_m += math.dist(self._last_point, point)
             self.distance_m = self._travelled_m
         self._last_point = point
+
+
+def _polls_until(t_s: float, started_s: float, period_s: float) -> int:
+    """Number of the first poll that is not before t; a rounding error counts as on time."""
+    return math.ceil((t_s - started_s) / period_s - 1e-9)

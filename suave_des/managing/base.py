@@ -34,7 +34,7 @@ class ManagedSystem:
         lasting_functions: functions that are needed all the time and belong to no task.
         stream: makes a named random stream of this run, the same for every manager.
         log: takes an event and its detail for the mission's record.
-        knowledge: the knowledge base and a reasoner, opened on the first call.
+        knowledge: gives the knowledge base with its reasoner (a Deliberation), opened on the first call.
     """
 
     env: simpy.Environment

@@ -7,15 +7,13 @@ name.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from decimal import Decimal
 from typing import ClassVar
 
 from suave_des.clock import tick_at_or_after, until
-from suave_des.knowledge.base import KnowledgeBase
-from suave_des.knowledge.planning import plan
-from suave_des.knowledge.reasoners import Reasoner
-from suave_des.knowledge.state import Decision, Inference, KnowledgeState, ObjectiveState, Plan
+from suave_des.knowledge.deliberation import Deliberation
+from suave_des.knowledge.state import Decision, KnowledgeState, ObjectiveState, Plan
 from suave_des.managed.coordinator import SEARCH, Task
 from suave_des.managing.base import AdaptationProcess, ManagedSystem, ManagingSubsystem
 from suave_des.monitor.diagnostics import Diagnostic, Kind
@@ -38,7 +36,8 @@ class Metacontrol(ManagingSubsystem):
     def __init__(self, system: ManagedSystem) -> None:
         super().__init__(system)
         self._revision = system.scenario.revision.metacontrol
-        self._knowledge_base, self._reasoner = _open(system)
+        self._deliberation: Deliberation = system.knowledge()
+        self._awaited = self._attributes_to_await()
         self._objectives: dict[str, str | None] = {}
         self._groundings: dict[str, str] = {}
         self._components: dict[str, str] = {}
@@ -74,12 +73,12 @@ class Metacontrol(ManagingSubsystem):
         """Analyze and plan on the state as it is now; execute when the reasoner has taken its time."""
         if not self._objectives or self._waits_for_measurement():
             return
-        state = self._state()
-        inference = self._reasoner.infer(state)
-        decided = plan(self._knowledge_base, state, inference, to_adapt=self._improvable())
+        conclusion = self._deliberation.conclude(
+            self._state(), improve_exceeded=self._revision.search_improves_when_exceeded
+        )
         yield self.system.env.timeout(draw(self.system.scenario.latencies.inference_s, self._latency_stream))
-        self._tell_inferred(inference, state)
-        self._execute(decided)
+        self._tell(conclusion.statuses)
+        self._execute(conclusion.plan)
 
     def _over_the_bridge(self, task: Task, *, requested: bool) -> AdaptationProcess:
         period_s = self._revision.task_bridge_period_s
@@ -112,27 +111,21 @@ class Metacontrol(ManagingSubsystem):
             measurements=self._measurements,
         )
 
-    def _waits_for_measurement(self) -> bool:
+    def _attributes_to_await(self) -> frozenset[str]:
+        """Attributes that some function design expects a value of and that this mission measures."""
         if not self._revision.waits_for_first_measurement:
-            return False
-        base = self._knowledge_base
+            return frozenset()
+        base = self._deliberation.base
         expected = {
             attribute
-            for function in self._objectives
+            for function in base.functions
             for design in base.designs(function)
             for attribute in base.expected(design)
         }
-        # Only attributes that this mission measures can be waited for.
-        return any(attribute in self.system.scenario.signals for attribute in expected - self._measurements.keys())
+        return frozenset(expected.intersection(self.system.scenario.signals))
 
-    def _improvable(self) -> list[str]:
-        if not self._revision.search_improves_when_exceeded:
-            return []
-        return [function for function, design in self._groundings.items() if self._exceeds(design)]
-
-    def _exceeds(self, design: str) -> bool:
-        expected = self._knowledge_base.expected(design)
-        return any(self._measurements.get(name, value) > value for name, value in expected.items())
+    def _waits_for_measurement(self) -> bool:
+        return not self._awaited <= self._measurements.keys()
 
     def _execute(self, decided: Plan) -> None:
         for decision in decided.decisions:
@@ -151,26 +144,7 @@ class Metacontrol(ManagingSubsystem):
             self._groundings[function] = design
             self._objectives[function] = None
 
-    def _tell_inferred(self, inference: Inference, state: KnowledgeState) -> None:
-        told = frozenset(_statuses(inference, state))
-        for line in sorted(told - self._told):
+    def _tell(self, statuses: frozenset[str]) -> None:
+        for line in sorted(statuses - self._told):
             self.system.log("inferred", line)
-        self._told = told
-
-
-def _open(system: ManagedSystem) -> tuple[KnowledgeBase, Reasoner]:
-    knowledge_base, reasoner = system.knowledge()
-    return knowledge_base, reasoner
-
-
-def _statuses(inference: Inference, state: KnowledgeState) -> Iterator[str]:
-    for objective in state.objectives:
-        status = inference.objective_status(objective.function)
-        if status is not None and status != objective.status:
-            yield f"objective of {objective.function} is {status}"
-        if inference.is_updatable(objective.function) and not objective.always_improve:
-            yield f"objective of {objective.function} is updatable"
-    for function, design in state.groundings:
-        status = inference.grounding_status(function)
-        if status is not None:
-            yield f"grounding of {design} is {status}"
+        self._told = statuses

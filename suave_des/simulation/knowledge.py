@@ -8,12 +8,13 @@ from pathlib import Path
 
 from suave_des.errors import InputError
 from suave_des.knowledge.base import KnowledgeBase
-from suave_des.knowledge.reasoners import Reasoner, make_reasoner
+from suave_des.knowledge.deliberation import Deliberation
+from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.scenario.loader import MISSION_FUNCTIONS, LoadedScenario
 
 
-def open_knowledge(loaded: LoadedScenario) -> tuple[KnowledgeBase, Reasoner]:
-    """The scenario's knowledge base, and the reasoner that the scenario names.
+def open_knowledge(loaded: LoadedScenario) -> Deliberation:
+    """The scenario's knowledge base with the reasoner that the scenario names.
 
     Raises:
         KnowledgeError: the ontologies cannot be read, or lack a design for a function of the mission.
@@ -21,7 +22,8 @@ def open_knowledge(loaded: LoadedScenario) -> tuple[KnowledgeBase, Reasoner]:
     """
     knowledge = loaded.scenario.knowledge
     values = tuple((name, Decimal(repr(value))) for name, value in sorted(knowledge.values.items()))
-    base, reasoner = _open(loaded.ontologies, tuple(sorted(loaded.inputs.items())), values, knowledge.reasoner)
+    deliberation = _open(loaded.ontologies, tuple(sorted(loaded.inputs.items())), values, knowledge.reasoner)
+    base = deliberation.base
     base.check(MISSION_FUNCTIONS)
     for function in MISSION_FUNCTIONS:
         for design in base.designs(function):
@@ -32,7 +34,7 @@ def open_knowledge(loaded: LoadedScenario) -> tuple[KnowledgeBase, Reasoner]:
                     place=function,
                     remedy="add the mode, or remove the design from the ontology",
                 )
-    return base, reasoner
+    return deliberation
 
 
 @lru_cache(maxsize=4)
@@ -41,7 +43,7 @@ def _open(
     hashes: tuple[tuple[str, str], ...],
     values: tuple[tuple[str, Decimal], ...],
     reasoner: str,
-) -> tuple[KnowledgeBase, Reasoner]:
+) -> Deliberation:
     """Kept between scenarios that differ in other things: what was inferred stays true while the files' hashes do."""
     base = KnowledgeBase.load(ontologies, values=dict(values))
-    return base, make_reasoner(reasoner, base)
+    return Deliberation(base, make_reasoner(reasoner, base))

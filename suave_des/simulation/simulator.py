@@ -59,8 +59,8 @@ class Simulator:
         self.detection_points = self.points + np.array([0.0, 0.0, height])
 
     @cached_property
-    def knowledge(self) -> tuple[Any, Any]:
-        """The scenario's knowledge base and its reasoner, opened and checked against the modes on first use."""
+    def knowledge(self) -> Any:
+        """The scenario's knowledge base with its reasoner (a Deliberation), opened and checked against the modes on first use."""
         from suave_des.simulation.knowledge import (
             open_knowledge,
         )  # owlready2 and numpy's friends load only when needed
@@ -274,9 +274,7 @@ class _Mission:
 
     def _make_functions(self) -> tuple[FollowPipeline, dict[str, FunctionNode]]:
         env, vehicle, revision = self.env, self.vehicle, self.revision
-        self.loss_probability = self._draw(
-            "revision.set_points.loss_probability", revision.set_points.loss_probability
-        )
+        self.loss_probability = self._draw("revision.set_points.loss_probability", revision.set_points.loss_probability)
         follow = FollowPipeline(env, vehicle, self._sender(FOLLOW), revision.follow, self._path)
         nodes: dict[str, FunctionNode] = {
             MAINTAIN_MOTION: MaintainMotion(env, self.bus, revision.recovery, self._restore_thruster),

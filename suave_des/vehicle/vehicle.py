@@ -130,8 +130,8 @@ class Vehicle:
         self.track[0, kernel.ATTITUDE] = quaternion(start.roll_rad, start.pitch_rad, start.yaw_rad)
         self.computed_row = 0
         self._set_point = np.array([start.x_m, start.y_m, start.z_m, 0.0])
-        self.on_control_change: Callable[[int], None] | None = None
-        """Called with the row from which on the future is another one."""
+        self.control_listeners: list[Callable[[int], None]] = []
+        """Each is called with the row from which on the future is another one."""
 
     def command(self, t_s: float, x_m: float, y_m: float, z_m: float) -> None:
         """Give the autopilot a new position set-point; it replaces the one before."""
@@ -201,8 +201,8 @@ class Vehicle:
         self.computed_row = row
 
     def _tell(self, t_s: float) -> None:
-        if self.on_control_change is not None:
-            self.on_control_change(row_at(t_s))
+        for listener in self.control_listeners:
+            listener(row_at(t_s))
 
 
 def row_at(t_s: float) -> int:

@@ -22,10 +22,23 @@ class PlacedVehicle:
     """
 
     def __init__(self, place: Place = START, *, obeys: bool = False, rise_m: float = 0.0) -> None:
-        self.place = place
+        self.control_listeners: list[Callable[[int], None]] = []
+        self.last_row = 1_000_000
+        self._place = place
         self.obeys = obeys
         self.rise_m = rise_m
         self.commands: list[tuple[float, Place]] = []
+
+    @property
+    def place(self) -> Place:
+        return self._place
+
+    @place.setter
+    def place(self, place: Place) -> None:
+        """Put it elsewhere: as for a change of control, what was foreseen of its way is no longer true."""
+        self._place = place
+        for listener in self.control_listeners:
+            listener(0)
 
     def position(self, t_s: float) -> Place:
         return self.place
