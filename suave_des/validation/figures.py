@@ -116,9 +116,8 @@ def detections_png(validation: Validation, published: pandas.DataFrame, simulate
             unplaced = theirs.loc[theirs["detection_x_m"].isna(), "search_time_s"]
             axis.plot(unplaced, np.ones(len(unplaced)), transform=axis.get_xaxis_transform(), **_TICK)
             axis.set_title(manager, pad=9)
-            axis.set_xlabel(_TITLES["search_time_s"])
-            without = f"simulated, no detection: {ours['detection_x_m'].isna().mean():.1%}"
-            axis.text(0.03, 0.05, without, transform=axis.transAxes, fontsize=7.0)
+            without = f"simulated without detection: {ours['detection_x_m'].isna().mean():.1%}"
+            axis.set_xlabel(f"{_TITLES['search_time_s']}\n{without}")
         axes[0, 0].set_ylabel("x of the point seen first (m)")
         axes[0, 0].margins(0.06, 0.12)
         _legend(figure, *_marker_legend())
