@@ -37,13 +37,10 @@ def start() -> None:
     Raises:
         InputError: there is no usable Java, or this process was forked from one where it ran.
     """
+    if _is_running():  # asked before the lock is taken, which a forked process could find locked for ever
+        return
     with _lock:
-        if _started_in:
-            if _started_in[0] != os.getpid():
-                raise InputError(
-                    "Java was started before this process was forked, and cannot be used in it",
-                    remedy='start worker processes with the "spawn" method',
-                )
+        if _is_running():
             return
         jars = sorted(Path(owlready2.__file__).with_name("pellet").glob("*.jar"))
         if jpype.isJVMStarted():
@@ -55,6 +52,16 @@ def start() -> None:
         options = jpype.JClass("org.mindswap.pellet.PelletOptions")
         options.USE_CLASSIFICATION_MONITOR = jpype.JClass("org.mindswap.pellet.PelletOptions$MonitorType").NONE
         _started_in.append(os.getpid())
+
+
+def _is_running() -> bool:
+    """Whether Java runs in this process; an error when it was started in the process that this was forked from."""
+    if _started_in and _started_in[0] != os.getpid():
+        raise InputError(
+            "Java was started before this process was forked, and cannot be used in it",
+            remedy='start worker processes with the "spawn" method',
+        )
+    return bool(_started_in)
 
 
 def java_class(name: str) -> Any:

@@ -72,6 +72,7 @@ class InProcessPellet:
         Raises:
             KnowledgeError: the situation contradicts itself.
         """
+        jvm.start()  # it runs; but not in a process that was forked since
         with _one_at_a_time:
             copy = self._base.copy()
             for subject, predicate, value in situation:

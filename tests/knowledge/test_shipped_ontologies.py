@@ -1,0 +1,108 @@
+"""The shipped ontologies hold the exemplar's vocabulary and model under its names, as Protégé writes them."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from rdflib import Graph, URIRef
+from rdflib.namespace import OWL, RDF, RDFS
+
+from suave_des.knowledge.base import KnowledgeBase
+
+TOMASYS = "http://metacontrol.org/tomasys#"
+MROS = "http://ros/mros#"
+SWRL = "http://www.w3.org/2003/11/swrl#"
+CLASSES = (
+    "Component ComponentState ComponentSpecification ComponentClass Role Binding Function FunctionDesign Objective "
+    "FunctionGrounding QualityAttributeType QAvalue"
+)
+OBJECT_PROPERTIES = {
+    "solvesF": ("FunctionDesign", "Function"),
+    "typeF": ("Objective", "Function"),
+    "typeFD": ("FunctionGrounding", "FunctionDesign"),
+    "solvesO": ("FunctionGrounding", "Objective"),
+    "requiresO": ("FunctionGrounding", "Objective"),
+    "hasNFR": ("Objective", "QAvalue"),
+    "hasQAestimation": ("FunctionDesign", "QAvalue"),
+    "hasQAvalue": ("FunctionGrounding", "QAvalue"),
+    "isQAtype": ("QAvalue", "QualityAttributeType"),
+    "fd_error_log": ("FunctionDesign", "Objective"),
+}
+DATA_PROPERTIES = (
+    "c_status fg_status o_status fd_realisability o_updatable o_always_improve hasValue qa_comparison_operator "
+    "qa_critical fd_efficacy b_status cc_unique cc_availability cspec_availability"
+)
+FUNCTIONAL = (
+    "solvesF typeF typeFD solvesO isQAtype c_status fg_status o_status fd_realisability hasValue qa_comparison_operator"
+)
+
+
+@pytest.fixture(scope="module")
+def tomasys(shipped: Path) -> Graph:
+    return Graph().parse(shipped / "tomasys.owl", format="xml")
+
+
+def names(graph: Graph, kind: URIRef) -> set[str]:
+    return {str(term).removeprefix(TOMASYS) for term in graph.subjects(RDF.type, kind)}
+
+
+def test_the_vocabulary_is_complete(tomasys: Graph) -> None:
+    assert names(tomasys, OWL.Class) == set(CLASSES.split())
+    others = {"roles", "roleDef", "typeC", "hasBindings", "binding_role", "binding_component", MROS + "requiredBy"}
+    assert names(tomasys, OWL.ObjectProperty) == others | set(OBJECT_PROPERTIES)
+    assert names(tomasys, OWL.DatatypeProperty) == set(DATA_PROPERTIES.split())
+    assert names(tomasys, OWL.FunctionalProperty) == set(FUNCTIONAL.split())
+    for name, (domain, value_range) in OBJECT_PROPERTIES.items():
+        assert tomasys.value(URIRef(TOMASYS + name), RDFS.domain) == URIRef(TOMASYS + domain)
+        assert tomasys.value(URIRef(TOMASYS + name), RDFS.range) == URIRef(TOMASYS + value_range)
+
+
+def test_every_term_and_every_rule_has_a_label_and_a_comment(shipped: Path) -> None:
+    for path in shipped.glob("*.owl"):
+        graph = Graph().parse(path, format="xml")
+        kinds = [OWL.Class, OWL.ObjectProperty, OWL.DatatypeProperty, OWL.NamedIndividual, URIRef(SWRL + "Imp")]
+        terms = {term for kind in kinds for term in graph.subjects(RDF.type, kind)}
+        assert terms
+        for term in terms:
+            assert graph.value(term, RDFS.label), term
+            assert graph.value(term, RDFS.comment), term
+
+
+def test_the_model_has_the_exemplars_names_and_deployed_values(kb: KnowledgeBase) -> None:
+    assert kb.functions == ("f_follow_pipeline", "f_generate_search_path", "f_maintain_motion")
+    assert kb.components == tuple(f"c_thruster_{n}" for n in range(1, 7))
+    assert set(kb.quality_attributes) == {"water_visibility", "battery_level", "performance", "energy", "safety"}
+    visibility = {d: kb.expected(d)["water_visibility"] for d in kb.designs("f_generate_search_path")}
+    assert visibility == {
+        "fd_spiral_high": Decimal("3.25"),
+        "fd_spiral_low": Decimal("1.25"),
+        "fd_spiral_medium": Decimal("2.25"),
+    }
+    performance = {d: kb.expected(d)["performance"] for f in kb.functions for d in kb.designs(f)}
+    assert performance == {
+        "fd_all_thrusters": Decimal(1),
+        "fd_recover_thrusters": Decimal("0.75"),
+        "fd_spiral_low": Decimal("0.25"),
+        "fd_spiral_medium": Decimal("0.5"),
+        "fd_spiral_high": Decimal(1),
+        "fd_follow_pipeline": Decimal(1),
+    }
+    kb.check(kb.functions)
+
+
+def test_each_rules_variables_are_declared(shipped: Path) -> None:
+    for path in shipped.glob("*.owl"):
+        graph = Graph().parse(path, format="xml")
+        used = {term for triple in graph for term in triple if str(term).startswith("urn:swrl:var#")}
+        assert used == set(graph.subjects(RDF.type, URIRef(SWRL + "Variable")))
+
+
+def test_proteges_catalogue_leads_each_import_to_a_shipped_file(shipped: Path) -> None:
+    catalogue = ElementTree.parse(shipped / "catalog-v001.xml").getroot()
+    leads = {entry.attrib["name"]: entry.attrib["uri"] for entry in catalogue}
+    for path in shipped.glob("*.owl"):
+        for imported in Graph().parse(path, format="xml").objects(None, OWL.imports):
+            assert (shipped / leads[str(imported)]).is_file()
