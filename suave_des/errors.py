@@ -63,4 +63,5 @@ class MissionError(SuaveDesError):
         super().__init__(manager, run, time_s, cause)
 
     def __str__(self) -> str:
+        """The one line that the user sees."""
         return f"manager {self.manager}, run {self.run}, mission time {self.time_s:.2f} s: {self.cause}"

@@ -4,6 +4,8 @@ import math
 
 import pytest
 import simpy
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from stand_ins import ACTIVE, INACTIVE, MovingVehicle, PlacedVehicle, revision, sender
 
 from suave_des.managed.follow import FollowPipeline
@@ -240,3 +242,69 @@ def test_the_real_vehicle_follows_a_straight_line_at_the_observed_speed(env: sim
     follow.apply(ACTIVE)
     env.run(until=100.0)
     assert 0.21 < follow.distance_m / 100.0 < 0.30  # published runs: 0.21 to 0.30 m/s
+
+
+# Foreseeing polls is the same as looking at each of them
+
+
+def real_follow(name: str, disturbances: list, *, polling: bool) -> tuple[list, float]:
+    """Set-points that a disturbed vehicle gets, and the distance; by the node or by plain polling."""
+    env = simpy.Environment()
+    autopilot = Autopilot(0.48, 0.34, 0.36, 0.5)
+    vehicle = Vehicle(BLUEROV2, autopilot, Pose(1.0, 0.3, -18.75, 0.0, 0.0, 0.0), 80.0)
+    told: list[tuple[float, float]] = []
+    command = vehicle.command
+
+    def note(t_s: float, x_m: float, y_m: float, z_m: float) -> None:
+        told.append((round(t_s, 6), x_m))
+        command(t_s, x_m, y_m, z_m)
+
+    vehicle.command = note
+    way = [0.0]
+    rules = revision(name).follow
+
+    def near(point: tuple[float, float]) -> bool:
+        x, y, _ = vehicle.position(env.now)
+        return abs(x - point[0]) <= rules.acceptance_m and abs(y - point[1]) <= rules.acceptance_m
+
+    def poll_plainly():
+        before = None
+        for point in LINE:
+            note(env.now, *point, -18.75)
+            polls = 0
+            while not near(point):
+                if polls == 10:
+                    note(env.now, *point, -18.75)
+                    polls = 0
+                yield env.timeout(rules.poll_period_s)
+                polls += 1
+            way[0] += 0.0 if before is None else math.dist(before, point)
+            before = point
+
+    def disturb(t_s: float, what: int):
+        yield env.timeout(t_s + 0.013)  # never at the very time of a poll
+        if what < 6:
+            vehicle.set_thruster_health(env.now, what + 1, 0.0)
+        else:
+            command(env.now, 3.0, 1.0, -18.0)
+
+    follow = follow_of(env, name, vehicle)
+    if polling:
+        env.process(poll_plainly())
+    else:
+        follow.apply(ACTIVE)
+    for t_s, what in disturbances:
+        env.process(disturb(t_s, what))
+    env.run(until=75.0)
+    return told, way[0] if polling else follow.distance_m
+
+
+@BOTH
+@settings(max_examples=30)
+@given(
+    disturbances=st.lists(st.tuples(st.integers(0, 60), st.integers(0, 9)), max_size=4, unique_by=lambda each: each[0])
+)
+def test_foreseeing_polls_is_the_same_as_looking_at_each(name: str, disturbances: list) -> None:
+    foreseen, distance_m = real_follow(name, disturbances, polling=False)
+    polled, way_m = real_follow(name, disturbances, polling=True)
+    assert (foreseen, distance_m) == (polled, pytest.approx(way_m))
