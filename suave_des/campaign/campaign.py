@@ -142,6 +142,8 @@ def run_campaign(
         make_output_folder(folder)
     try:
         finished, stopped = _run(campaign, workers, on_progress)
+        if stopped is not None and not finished:
+            raise stopped
     except BaseException:
         if made and folder is not None:
             with suppress(OSError):  # not ours to remove any more, if something else is in it

@@ -26,6 +26,7 @@ Finished = tuple[int, list[Outcome]]
 
 _AHEAD = 2
 """Chunks at a worker at any time: one under way, one waiting, so that it is never idle."""
+_LARGEST_CHUNK = 10
 _STOP_TIMEOUT_S = 5.0
 
 
@@ -105,8 +106,8 @@ class ProcessPool:
 
 
 def chunk_size(total: int, workers: int) -> int:
-    """Missions to a chunk: few messages, but enough chunks that all workers finish at about the same time."""
-    return max(1, min(100, total // (workers * 10)))
+    """Missions to a chunk: small, as chunks under way are lost when a campaign is stopped, and workers end together."""
+    return max(1, min(_LARGEST_CHUNK, total // (workers * 10)))
 
 
 @contextmanager

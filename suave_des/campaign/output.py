@@ -46,21 +46,23 @@ def check_output_folder(folder: Path, *, overwrite: bool) -> None:
     Raises:
         InputError: it has something in it and `overwrite` is false, is a file, or cannot be written.
     """
-    if folder.is_dir():
-        if not overwrite and (found := next((entry.name for entry in sorted(folder.iterdir())), None)):
-            raise InputError(
-                f"the output folder is not empty: it has {found}",
-                file=folder,
-                remedy="give another folder, or --overwrite to replace the results in it",
-            )
-        place = folder
-    elif folder.exists() or folder.is_symlink():
+    try:
+        found = min((entry.name for entry in folder.iterdir()), default=None) if folder.is_dir() else None
+        is_there, has_parent = folder.exists() or folder.is_symlink(), folder.parent.is_dir()
+    except OSError as error:
+        raise _not_written(folder, error) from None
+    if found is not None and not overwrite:
+        raise InputError(
+            f"the output folder is not empty: it has {found}",
+            file=folder,
+            remedy="give another folder, or --overwrite to replace the results in it",
+        )
+    if is_there and not folder.is_dir():
         raise InputError("the output folder is not a folder", file=folder, remedy="give another path")
-    else:
-        place = folder.parent
-        if not place.is_dir():
-            raise InputError(f"there is no folder {place} to make it in", file=folder, remedy="make that folder first")
-    if not os.access(place, os.W_OK | os.X_OK):
+    if not is_there and not has_parent:
+        problem = f"there is no folder {folder.parent} to make it in"
+        raise InputError(problem, file=folder, remedy="make that folder first")
+    if not os.access(folder if is_there else folder.parent, os.W_OK | os.X_OK):
         raise InputError("the output folder cannot be written", file=folder, remedy="give a folder that is yours")
 
 

@@ -16,6 +16,7 @@ from suave_des.campaign.output import (
     write_files,
 )
 from suave_des.campaign.provenance import provenance
+from suave_des.errors import InputError
 from suave_des.scenario.loader import LoadedScenario, load_scenario
 from suave_des.simulation.result import Event, MissionResult, TrajectoryPoint
 from suave_des.simulation.simulator import Simulator
@@ -62,6 +63,8 @@ def run_mission(
     folder = None if out is None else Path(out)
     if folder is not None:
         check_output_folder(folder, overwrite=overwrite)
+    if run < 1:
+        raise InputError(f"run: {run} is out of range", remedy="runs count from 1")
     loaded = load_scenario(scenario, ontologies=ontologies, modes_file=modes_file, reasoner=reasoner)
     inputs = check_knowledge(loaded, [manager], given=bool(ontologies))
     result = Simulator(loaded).run(manager, run, seed, record=True)

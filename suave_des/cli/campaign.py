@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from suave_des.campaign.campaign import CampaignResult
 
 
+_FAILURES_TOLD = 20
+
+
 class Format(StrEnum):
     """Result files to write besides our own."""
 
@@ -73,7 +76,12 @@ def exit_telling_failures(result: CampaignResult) -> None:
     if not result.failures:
         return
     console = errors()
-    for failure in result.failures:
-        console.print(f"suave-des: failed: {failure}", soft_wrap=True, markup=False)
+    for failure in result.failures[:_FAILURES_TOLD]:
+        line = " ".join(str(failure).split())
+        console.print(f"suave-des: failed: {line}", soft_wrap=True, markup=False)
+    more = len(result.failures) - _FAILURES_TOLD
+    if more > 0:
+        where = "" if result.folder is None else f", all of them in {result.folder}/manifest.json"
+        console.print(f"suave-des: failed: {more} more{where}", soft_wrap=True, markup=False)
     console.print(f"suave-des: {len(result.failures)} of {result.planned} missions failed; the others are kept")
     raise typer.Exit(3)

@@ -42,15 +42,14 @@ def progress_bar(label: str) -> Iterator[Callable[[Progress], None] | None]:
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn("missions,"),
         TimeRemainingColumn(),
-        TextColumn("left{task.fields[failed]}"),
+        TextColumn("{task.fields[note]}"),
     )
     with Bar(*columns, console=console, transient=True) as bar:
-        task = bar.add_task(label, total=None, failed="")
+        task = bar.add_task(label, total=None, note="starting")
 
         def show(progress: Progress) -> None:
-            failed = f", {progress.failed} failed" if progress.failed else ""
-            bar.update(task, total=progress.total, completed=progress.done, failed=failed)
+            note = f"{progress.failed} failed" if progress.failed else ""
+            bar.update(task, total=progress.total, completed=progress.done, note=note)
 
         yield show

@@ -17,7 +17,7 @@ def run(
     ] = "metacontrol",
     seed: Seed = 1,
     run_number: Annotated[
-        int, typer.Option("--run", min=1, metavar="K", help="Run of a campaign with this seed: the same mission again.")
+        int, typer.Option("--run", metavar="K", help="Run of a campaign with this seed: the same mission again.")
     ] = 1,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder for mission.json, events.csv, trajectory.csv.")

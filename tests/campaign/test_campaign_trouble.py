@@ -12,6 +12,7 @@ import pytest
 
 from suave_des.campaign.campaign import CampaignInterrupted, run_campaign
 from suave_des.campaign.executors import WorkerError
+from suave_des.campaign.outcomes import MissionRunner
 from suave_des.errors import InputError
 
 RUNS = 12
@@ -69,6 +70,18 @@ def test_interrupted_finished_missions_are_kept(workers: int, tmp_path: Path, mo
 def _rows_without_trouble(tmp_path: Path) -> list[dict[str, str]]:
     run_campaign("seams2023", ["none"], 100, 1, out=tmp_path / "whole")
     return rows_of(tmp_path / "whole")
+
+
+def test_interrupted_before_the_first_mission_is_done_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def ctrl_c(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(MissionRunner, "run", ctrl_c)
+    with pytest.raises(KeyboardInterrupt):
+        run_campaign("seams2023", ["none"], 2, 1, out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_worker_that_is_killed_ends_the_campaign_with_what_is_there(tmp_path: Path) -> None:
@@ -143,6 +156,10 @@ class TestRefusedBeforeAnythingIsWritten:
     def test_a_folder_whose_parent_is_missing(self, tmp_path: Path) -> None:
         with pytest.raises(InputError, match=r"there is no folder .*nowhere"):
             run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "nowhere" / "out")
+
+    def test_a_name_that_is_too_long(self, tmp_path: Path) -> None:
+        with pytest.raises(InputError, match="the output folder cannot be written: File name too long"):
+            run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / ("x" * 300))
 
     def test_a_place_where_nothing_can_be_written(self) -> None:
         with pytest.raises(InputError, match="the output folder cannot be written"):

@@ -181,7 +181,7 @@ class TestBadInput:
             (["run", "nowhere.yaml", *OUT], "nowhere.yaml: no such file"),
             (["run", "seams2023", "--manager", "rondom", *OUT], "did you mean random?"),
             (["run", "seams2023", "--manager", "os:path", *OUT], "os"),
-            (["run", "seams2023", "--run", "0", *OUT], "--run"),
+            (["run", "seams2023", "--manager", "none", "--run", "0", *OUT], "run: 0 is out of range"),
             (["run", "seams2023", "--seed", "seven", *OUT], "--seed"),
             (["run", "seams2023", "--reasoner", "hermit", *OUT], "hermit"),
             (["run", "seams2023", "--manager", "none", "--ontology", "no.owl", *OUT], "no.owl"),
