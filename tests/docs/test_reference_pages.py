@@ -1,0 +1,136 @@
+"""What reference pages and README say of files, names and links is so."""
+
+import importlib
+import re
+import tomllib
+
+import make_cli_reference
+import pytest
+from doc_blocks import ROOT
+
+from suave_des import __version__
+from suave_des.campaign.outcomes import COLUMNS
+from suave_des.campaign.single import EVENT_COLUMNS, TRAJECTORY_COLUMNS, run_mission
+from suave_des.campaign.suave_format import suave_text
+from suave_des.campaign.summary import SUMMARY_COLUMNS
+
+PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
+CSV_PAGE = ROOT / "docs" / "reference" / "csv.md"
+UNITS = {"_s": "s", "_m": "m", "_rad": "rad"}
+
+
+def section(page, heading):
+    parts = re.split(r"^## (.*)\n", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    return parts[parts.index(heading) + 1]
+
+
+def tables(text):
+    """Cells of each table's rows, without its head."""
+    found = re.findall(r"(?:^\|.*\n)+", text, flags=re.MULTILINE)
+    return [[[cell.strip() for cell in row.split("|")[1:-1]] for row in each.splitlines()[2:]] for each in found]
+
+
+def columns(text):
+    """Column and unit of each row of the first table."""
+    return [(cells[0].strip("`"), cells[1]) for cells in tables(text)[0]]
+
+
+def unit(column):
+    metric = re.sub(r"_(mean|std|median|ci95_low|ci95_high)$", "", column)
+    return next((text for ending, text in UNITS.items() if metric.endswith(ending)), "")
+
+
+@pytest.mark.parametrize(
+    ("page", "heading", "names"),
+    [
+        (ROOT / "README.md", "Result files", COLUMNS),
+        (CSV_PAGE, "runs.csv", COLUMNS),
+        (CSV_PAGE, "summary.csv", SUMMARY_COLUMNS),
+        (CSV_PAGE, "events.csv", EVENT_COLUMNS),
+        (CSV_PAGE, "trajectory.csv", TRAJECTORY_COLUMNS),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_columns_are_those_of_the_file(page, heading, names):
+    assert columns(section(page, heading)) == [(column, unit(column)) for column in names]
+
+
+@pytest.mark.parametrize(("revision", "place"), [("2023", 0), ("1.5", 1)])
+def test_columns_of_the_exemplar_s_file_are_those_of_its_revision(revision, place):
+    cells = [row[place].strip("`") for row in tables(section(CSV_PAGE, "suave_results.csv"))[0]]
+    header = suave_text(revision, [], 300.0).splitlines()[0].replace('"', "").replace("(x,y)", "(x;y)")
+    assert [cell for cell in cells if cell] == [name.replace("(x;y)", "(x,y)") for name in header.split(",")]
+
+
+@pytest.mark.parametrize("scenario", ["seams2023", "release15"])
+def test_every_event_of_a_mission_is_in_the_list(scenario):
+    rows = tables(section(CSV_PAGE, "events.csv"))[1]
+    listed = {(name.strip("`"), source) for names, source, _ in rows for name in names.split(", ")}
+    events = run_mission(scenario, "metacontrol", run=1, seed=1).events
+    assert {(event.event, event.source) for event in events} <= listed
+
+
+def test_keys_of_the_manifest_and_of_a_mission_are_in_the_list(tmp_path):
+    import json
+
+    from suave_des.campaign.campaign import run_campaign
+
+    run_campaign("seams2023", ["none"], runs=1, seed=1, out=tmp_path / "campaign")
+    manifest = json.loads((tmp_path / "campaign" / "manifest.json").read_text(encoding="utf-8"))
+    rows = tables(section(CSV_PAGE, "manifest.json"))[0]
+    listed = [name.strip("`") for names, _ in rows for name in names.split(", ")]
+    assert sorted(listed) == sorted(manifest)
+
+    run_mission("seams2023", "none", run=1, seed=1, out=tmp_path / "mission")
+    mission = json.loads((tmp_path / "mission" / "mission.json").read_text(encoding="utf-8"))
+    told = section(CSV_PAGE, "mission.json")
+    assert set(mission) - set(listed) == set(re.findall(r"`(metrics|drawn|scenario)`:", told)) - set(listed)
+
+
+def test_the_command_line_s_page_is_the_one_that_the_commands_give():
+    page = (ROOT / "docs" / "reference" / "cli.md").read_text(encoding="utf-8")
+    assert page == make_cli_reference.page(), "run python docs/make_cli_reference.py"
+
+
+def test_python_names_exist():
+    rows = tables((ROOT / "docs" / "reference" / "python-api.md").read_text(encoding="utf-8"))[0]
+    for dotted, _ in rows:
+        module, _, name = dotted.strip("`").rpartition(".")
+        assert hasattr(importlib.import_module(module), name), dotted
+
+
+def anchors(page):
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    return {re.sub(r"[^a-z0-9 _-]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page):
+    for target in re.findall(r"\]\(([^)]+)\)", page.read_text(encoding="utf-8")):
+        if "://" in target:
+            continue
+        path, _, anchor = target.partition("#")
+        linked = (page.parent / path).resolve() if path else page
+        assert linked.is_file(), target
+        assert not anchor or anchor in anchors(linked), target
+
+
+def test_every_page_can_be_reached_from_the_index():
+    index = ROOT / "docs" / "index.md"
+    linked = {
+        (index.parent / target.partition("#")[0]).resolve()
+        for target in re.findall(r"\]\(([^)]+)\)", index.read_text(encoding="utf-8"))
+    }
+    assert set((ROOT / "docs").rglob("*.md")) - {index} <= linked
+
+
+def test_the_change_log_has_this_version():
+    assert f"## [{__version__}]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_dependencies_are_explained():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    page = (ROOT / "docs" / "background" / "dependencies.md").read_text(encoding="utf-8")
+    for requirement in project["dependencies"]:
+        name = re.match(r"[\w-]+", requirement)[0]
+        assert f"| {name} |" in page, name
