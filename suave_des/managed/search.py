@@ -31,6 +31,7 @@ class GenerateSearchPath(FunctionNode):
         revision: how the exemplar's revision behaves.
         origin_m: origin of the local frame in x and y, where revision 2023 centres the spiral.
         phase_s: mission time of a tick of the node's timer.
+        ready_s: mission time before which the node does not tick, whatever its mode.
     """
 
     def __init__(
@@ -41,12 +42,14 @@ class GenerateSearchPath(FunctionNode):
         revision: SpiralRevision,
         origin_m: tuple[float, float],
         phase_s: float,
+        ready_s: float = 0.0,
     ) -> None:
         super().__init__(env)
         self._vehicle = vehicle
         self._sender = sender
         self._revision = revision
         self._phase_s = phase_s
+        self._ready_s = ready_s
         self._centre_m = origin_m
         self._process: simpy.Process | None = None
         self.altitude_m = INITIAL_ALTITUDE_M
@@ -84,7 +87,7 @@ class GenerateSearchPath(FunctionNode):
 
     def _tick_while_active(self) -> Process:
         try:
-            yield until(self.env, tick_at_or_after(self.env.now, self._phase_s, TICK_PERIOD_S))
+            yield until(self.env, tick_at_or_after(max(self.env.now, self._ready_s), self._phase_s, TICK_PERIOD_S))
             while True:
                 self._tick()
                 yield self.env.timeout(TICK_PERIOD_S)

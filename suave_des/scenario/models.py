@@ -181,6 +181,8 @@ class Latencies(Strict):
 
     task_start_s: Distribution = 0.0
     """From guided mode to the request of the first task."""
+    guided_start_s: Distribution = 0.0
+    """From guided mode to the moment at which the search node has noticed it and sends set-points."""
     mode_change_s: Distribution = 0.0
     """From the mode manager's answer to the mode's effect."""
     inference_s: Distribution = 1.0

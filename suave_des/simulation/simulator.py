@@ -285,6 +285,7 @@ class _Mission:
                 revision.spiral,
                 self.origin_m,
                 self._phase(SEARCH, 1.0),
+                self._draw("latencies.guided_start_s", self.scenario.latencies.guided_start_s),
             ),
             FOLLOW: follow,
         }

@@ -98,9 +98,13 @@ def advance(
         fx = mass * (prm[VELOCITY_GAIN] * ex + ix)
         fy = mass * (prm[VELOCITY_GAIN] * ey + iy)
         fz = mass * (prm[VELOCITY_GAIN] * ez + iz)
-        d0 = r00 * fx + r10 * fy + r20 * fz
-        d1 = r01 * fx + r11 * fy + r21 * fz
-        d2 = r02 * fx + r12 * fy + r22 * fz
+        # Fed forward: the thrust that holds the wanted velocity in still water, so that the loop corrects the rest only.
+        u_sp = r00 * vx_sp + r10 * vy_sp + r20 * vz_sp
+        v_sp = r01 * vx_sp + r11 * vy_sp + r21 * vz_sp
+        w_sp = r02 * vx_sp + r12 * vy_sp + r22 * vz_sp
+        d0 = r00 * fx + r10 * fy + r20 * fz + prm[DRAG] * abs(u_sp) * u_sp
+        d1 = r01 * fx + r11 * fy + r21 * fz + prm[DRAG + 1] * abs(v_sp) * v_sp
+        d2 = r02 * fx + r12 * fy + r22 * fz + prm[DRAG + 2] * abs(w_sp) * w_sp
 
         # Attitude: the vector part of conj(q) * q_heading is half the turn that is left, in the body frame.
         ew = qw * heading_w + qz * heading_z
