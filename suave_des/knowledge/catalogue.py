@@ -94,11 +94,11 @@ def _beside(file: OntologyFile, iri: str) -> OntologyFile | None:
         if (folder / name).is_file() and (folder / name).resolve() != file.path.resolve():
             return read_ontology(folder / name)
     for path in sorted(entry for entry in folder.iterdir() if entry.suffix in _ENDINGS[:2] and entry.is_file()):
-        if local_name(same_iri(iri)).encode() not in path.read_bytes():
-            continue
         try:
+            if _name(iri).encode() not in path.read_bytes():
+                continue
             candidate = read_ontology(path)
-        except KnowledgeError:
+        except (KnowledgeError, OSError):
             continue  # a stranger that happens to lie in the same folder: nobody asked for it
         if same_iri(iri) in map(same_iri, candidate.iris):
             return candidate

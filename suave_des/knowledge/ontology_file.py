@@ -7,6 +7,7 @@ other files or blow up. Simple internal entities, as Protégé writes them, are 
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -57,8 +58,10 @@ class OntologyFile:
 
     def line_of(self, name: str) -> str | None:
         """Place of the first line that describes the thing of that name, as "line 12"."""
+        # about="...#name", about="&suave;name" or ID="name"
+        described = re.compile(rf"""(?:about|ID)=["'](?:[^"']*[#;/])?{re.escape(name)}["']""")
         for number, line in enumerate(self.content.decode("utf-8", "replace").splitlines(), start=1):
-            if ("about=" in line or "ID=" in line) and any(mark in line for mark in (f"#{name}{q}" for q in "\"'")):
+            if described.search(line):
                 return f"line {number}"
         return None
 

@@ -61,6 +61,9 @@ class InProcessPellet:
                 raise contradiction(kb, ())
             # A copy, because Pellet compiles the rules of a knowledge base when it first reasons on it.
             self._base.copy().isConsistent()
+            # What follows from the ontologies alone follows in every state: entailment is monotonic.
+            self._known = self._collections(self._base)
+            self._always = frozenset(self._read(self._base))
             self._refuse_dropped_rules()
 
     def infer(self, situation: Sequence[Triple]) -> frozenset[Triple]:
@@ -79,7 +82,7 @@ class InProcessPellet:
                 self._add(copy, subject, predicate, value)
             if not copy.isConsistent():
                 raise contradiction(self._kb, situation)
-            found = frozenset(self._read(copy))
+            found = self._always.union(self._read(copy, self._known))
             self._refuse_dropped_rules()
             return found
 
@@ -104,15 +107,27 @@ class InProcessPellet:
             knowledge_base.addIndividual(self._term(value))
             knowledge_base.addPropertyValue(self._term(predicate), individual, self._term(value))
 
-    def _read(self, knowledge_base: Any) -> Iterator[Triple]:
-        for name, term in self._properties:
-            for entry in knowledge_base.getPropertyValues(term).entrySet():
-                subject = str(entry.getKey().toString())
-                for value in entry.getValue():
-                    yield subject, name, _value(str(value.toString()))
-        for name, term in self._classes:
-            for individual in knowledge_base.getInstances(term):
-                yield str(individual.toString()), RDF_TYPE, name
+    def _read(self, knowledge_base: Any, known: Sequence[Any] | None = None) -> Iterator[Triple]:
+        """Values and members, without those in known: the collections of a knowledge base that has less in it."""
+        for number, (collection, (name, _)) in enumerate(
+            zip(self._collections(knowledge_base), [*self._properties, *self._classes], strict=True)
+        ):
+            if known is not None:
+                collection.removeAll(known[number])  # in Java: most is as in the ontologies, and is not carried over
+            for item in collection:
+                if number >= len(self._properties):
+                    yield str(item.toString()), RDF_TYPE, name
+                else:
+                    subject = str(item.getKey().toString())
+                    for value in item.getValue():
+                        yield subject, name, _value(str(value.toString()))
+
+    def _collections(self, knowledge_base: Any) -> list[Any]:
+        """For each property to read the (subject, values) entries, for each class its members."""
+        return [
+            *(knowledge_base.getPropertyValues(term).entrySet() for _, term in self._properties),
+            *(jvm.java_class("java.util.HashSet")(knowledge_base.getInstances(term)) for _, term in self._classes),
+        ]
 
     def _refuse_dropped_rules(self) -> None:
         """Raise if Pellet said that it leaves out a rule; warnings that name the rule come first."""
