@@ -21,6 +21,14 @@ Modes = Annotated[
 Reasoner = Annotated[
     str | None, typer.Option("--reasoner", metavar="NAME", help="pellet, or owlready2 (the reference, slow).")
 ]
+RuleFiles = Annotated[
+    list[Path] | None,
+    typer.Option("--rules", metavar="FILE", help="Rules as text besides the ontologies; repeat it for several files."),
+]
+DisabledRules = Annotated[
+    list[str] | None,
+    typer.Option("--disable-rule", metavar="NAME", help="Switch a rule off for this time; repeat it for several."),
+]
 Seed = Annotated[int, typer.Option("--seed", help="Seed of everything that is random.")]
 Workers = Annotated[
     int, typer.Option("--workers", help="Processes that run missions; any number gives the same bytes.")

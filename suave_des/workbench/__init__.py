@@ -1,0 +1,1 @@
+"""The knowledge workbench: checks and edits rules, and tells what they do."""
