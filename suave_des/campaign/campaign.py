@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,7 @@ from suave_des.managing.registry import manager_class
 from suave_des.scenario.bases import Files
 from suave_des.scenario.loader import LoadedScenario, load_scenario
 from suave_des.scenario.models import Mission
+from suave_des.simulation.result import MissionMetrics
 
 if TYPE_CHECKING:
     import pandas
@@ -69,8 +70,8 @@ class CampaignResult:
         """The rows as a data frame with the columns of runs.csv; what is empty there is nan here."""
         import pandas
 
-        kinds = {"mean_reaction_time_s": "float64", "detection_time_s": "float64"}
-        kinds |= {"detection_x_m": "float64", "detection_y_m": "float64"}
+        # Without a value in any row, a column would not be known to hold numbers.
+        kinds = {field.name: "float64" for field in fields(MissionMetrics) if "float" in str(field.type)}
         return pandas.DataFrame.from_records(self.rows, columns=list(COLUMNS)).astype(kinds)
 
 

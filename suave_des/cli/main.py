@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -72,10 +71,7 @@ def _options(
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
-    # `--manager my_module:MyClass` finds modules in the current folder, in worker processes too.
-    folder = str(Path.cwd())
-    if folder not in sys.path:
-        sys.path.append(folder)
+    """Options of the command itself."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

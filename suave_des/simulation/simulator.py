@@ -43,6 +43,9 @@ from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle
 from suave_des.world.pipeline import SEA_BED_Z_M, SURFACE_Z_M, path_to_inspect, sample_points
 
+_RAISED = (Exception, SystemExit)
+"""What a manager may raise: one that calls sys.exit must not end a campaign, or a mission as if all were well."""
+
 
 class Simulator:
     """Runs missions of one scenario in this process; what does not change between missions is made once.
@@ -60,7 +63,7 @@ class Simulator:
 
     @cached_property
     def knowledge(self) -> Any:
-        """The scenario's knowledge base with its reasoner (a Deliberation), opened and checked against the modes on first use."""
+        """The scenario's knowledge base with its reasoner (a Deliberation), opened and checked on first use."""
         from suave_des.simulation.knowledge import (
             open_knowledge,
         )  # owlready2 and numpy's friends load only when needed
@@ -127,7 +130,7 @@ class _Mission:
             self.env.run(until=self.coordinator.ended)
         except SuaveDesError:
             raise
-        except Exception as error:  # in a process that the manager started by itself
+        except _RAISED as error:  # in a process that the manager started by itself
             raise self._mission_error(error) from error
         point = self.detector.first_point
         found = self.coordinator.search_time_s is not None
@@ -347,7 +350,7 @@ class _Mission:
             manager = kind(system)
         except InputError:
             raise  # such as an ontology that cannot be used: it concerns every mission
-        except Exception as error:
+        except _RAISED as error:
             raise self._mission_error(error) from error
         if kind.diagnostic is not ManagingSubsystem.diagnostic:
             self.bus.subscribe(lambda diagnostic: self._guarded(manager.diagnostic, diagnostic))
@@ -385,16 +388,16 @@ class _Mission:
                 value = yield event
         except StopIteration:
             return
-        except Exception as error:
+        except _RAISED as error:
             raise self._mission_error(error) from error
 
     def _guarded(self, hook: Callable[..., Any], *arguments: Any) -> Any:
         try:
             return hook(*arguments)
-        except Exception as error:
+        except _RAISED as error:
             raise self._mission_error(error) from error
 
-    def _mission_error(self, error: Exception) -> SuaveDesError:
+    def _mission_error(self, error: BaseException) -> SuaveDesError:
         if isinstance(error, MissionError):
             return error
         cause = str(error) if isinstance(error, SuaveDesError) else f"{type(error).__name__}: {error}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 
 from suave_des.managed.coordinator import Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
@@ -26,6 +27,13 @@ class RaisesInHalf(_InRun):
     def adapt(self) -> None:
         if self.draw < 0.5:
             raise ValueError("I do not know what to do")
+
+
+class Quits(NoManager):
+    """Calls sys.exit, as a script would."""
+
+    def task_requested(self, task: Task) -> None:
+        sys.exit("no more")
 
 
 class RaisesAlways(ManagingSubsystem):

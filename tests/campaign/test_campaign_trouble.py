@@ -43,6 +43,12 @@ def test_a_manager_that_raises_costs_its_own_mission_only(workers: int, tmp_path
     assert manifest["missions"]["failed"] == len(failed)
 
 
+def test_a_manager_that_calls_exit_is_a_manager_that_raises() -> None:
+    result = run_campaign("seams2023", ["awkward_managers:Quits", "none"], 1, 1)
+    assert [failure.cause for failure in result.failures] == ["SystemExit: no more"]
+    assert len(result.rows) == 1
+
+
 def test_when_all_missions_fail_there_are_no_rows(tmp_path: Path) -> None:
     result = run_campaign("seams2023", ["awkward_managers:RaisesAlways"], 2, 1, out=tmp_path / "out")
     assert len(result.failures) == 2
