@@ -16,7 +16,7 @@ from suave_des.knowledge.deliberation import Deliberation
 from suave_des.knowledge.state import Decision, KnowledgeState, ObjectiveState, Plan
 from suave_des.managed.coordinator import SEARCH, Task
 from suave_des.managing.base import AdaptationProcess, ManagedSystem, ManagingSubsystem
-from suave_des.monitor.diagnostics import Diagnostic, Kind
+from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, Kind
 from suave_des.scenario.distributions import draw
 from suave_des.scenario.modes import UNGROUND_MODE
 
@@ -42,6 +42,7 @@ class Metacontrol(ManagingSubsystem):
         self._groundings: dict[str, str] = {}
         self._components: dict[str, str] = {}
         self._measurements: dict[str, Decimal] = {}
+        self._cancelled: set[str] = set()
         self._told: frozenset[str] = frozenset()
         self._latency_stream = system.stream("metacontrol/inference")
         self.period_s = system.scenario.managers.metacontrol.reasoning_period_s
@@ -73,12 +74,15 @@ class Metacontrol(ManagingSubsystem):
         """Analyze and plan on the state as it is now; execute when the reasoner has taken its time."""
         if not self._objectives or self._waits_for_measurement():
             return
+        state = self._state()
+        self._cancelled.clear()
         conclusion = self._deliberation.conclude(
-            self._state(), improve_exceeded=self._revision.search_improves_when_exceeded
+            state, improve_exceeded=self._revision.search_improves_when_exceeded
         )
         yield self.system.env.timeout(draw(self.system.scenario.latencies.inference_s, self._latency_stream))
         self._tell(conclusion.statuses)
         self._execute(conclusion.plan)
+        self._settle(state)
 
     def _over_the_bridge(self, task: Task, *, requested: bool) -> AdaptationProcess:
         period_s = self._revision.task_bridge_period_s
@@ -91,6 +95,7 @@ class Metacontrol(ManagingSubsystem):
         for function in task.functions:
             self._objectives.pop(function, None)
             self._groundings.pop(function, None)
+            self._cancelled.add(function)
             self.system.change_mode(function, UNGROUND_MODE)
 
     def _add_objectives(self, functions: Iterable[str]) -> None:
@@ -129,8 +134,18 @@ class Metacontrol(ManagingSubsystem):
 
     def _execute(self, decided: Plan) -> None:
         for decision in decided.decisions:
-            if decision.function in self._objectives:
+            if decision.function in self._objectives and decision.function not in self._cancelled:
                 self._carry_out(decision)
+
+    def _settle(self, state: KnowledgeState) -> None:
+        """A recovery is news once: it has been reasoned about, and from now on the component is as if never failed.
+
+        Kept, it would make every objective updatable for ever, and in the exemplar's oldest files, where the status
+        says so, contradict the UNGROUNDED of each objective to come.
+        """
+        for component, status in state.components:
+            if status == RECOVERED and self._components.get(component) == RECOVERED:
+                del self._components[component]
 
     def _carry_out(self, decision: Decision) -> None:
         function, design = decision.function, decision.design

@@ -21,7 +21,7 @@ class RandomManager(ManagingSubsystem):
     """random: every period, each function of the task gets one of all its modes, with equal chance.
 
     maintain_motion is left alone; fd_unground and __DEFAULT__ are modes like others. Revision 2023 picks only on its
-    timer, which runs since launch; revision 1.5 at each task request too.
+    timer; revision 1.5 at each task request too.
     """
 
     def __init__(self, system: ManagedSystem) -> None:
@@ -30,10 +30,8 @@ class RandomManager(ManagingSubsystem):
         self.period_s = system.scenario.managers.random.adaptation_period_s
         self._stream = system.stream("random_manager/picks")
         self._on_task_request = revision.on_task_request
-        if revision.starts_at_launch:
-            self.starts_s = system.stream("random_manager/phase").uniform(0.0, self.period_s)
-        else:
-            self.starts_s = self.period_s
+        # Timers of nodes run since launch: the phase at t = 0 is another one in each run.
+        self.starts_s = system.stream("random_manager/phase").uniform(0.0, self.period_s)
         self._functions: tuple[str, ...] = ()
 
     def task_requested(self, task: Task) -> None:

@@ -102,8 +102,6 @@ class RandomRevision(Strict):
 
     on_task_request: bool
     """Whether it picks a mode on each task request too."""
-    starts_at_launch: bool
-    """Whether its timer runs since launch, with any phase at t = 0; else it starts with the task."""
 
 
 class MetacontrolRevision(Strict):

@@ -1,0 +1,246 @@
+"""Metacontrol by what it does in mission time, with the shipped knowledge base and with others."""
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from suave_des.errors import InputError, MissionError
+from suave_des.resources import shipped_folder
+from suave_des.scenario.loader import load_scenario
+from suave_des.scenario.overrides import with_values
+from suave_des.simulation.result import MissionResult
+from suave_des.simulation.simulator import Simulator
+
+sys.path.append(str(Path(__file__).parents[1] / "knowledge"))
+from exemplar_files import write_exemplar_files  # noqa: E402
+
+MOTION, SEARCH, FOLLOW = "f_maintain_motion", "f_generate_search_path", "f_follow_pipeline"
+REASONED_AT_ONCE = {"latencies.inference_s": 0.0, "latencies.mode_change_s": 0.0}
+
+
+def visibility(value: float) -> dict[str, Any]:
+    return {"signals.water_visibility": {"kind": "constant", "value": value}}
+
+
+def steps(before: float, after: float, time_s: float) -> dict[str, Any]:
+    return {"signals.water_visibility": {"kind": "step", "time_s": time_s, "before": before, "after": after}}
+
+
+def mission(
+    values: Mapping[str, Any], *, name: str = "seams2023", run: int = 1, limit_s: float = 60.0, **given: Any
+) -> MissionResult:
+    loaded = load_scenario(name, **given)
+    return Simulator(with_values(loaded, {"mission.time_limit_s": limit_s, **values})).run(
+        "metacontrol", run, 1, record=True
+    )
+
+
+def modes(result: MissionResult, function: str) -> list[tuple[float, str]]:
+    """Modes asked for, with the times."""
+    asked = [(event.t_s, event.detail.split(" -> ")) for event in result.events if event.event == "mode_requested"]
+    return [(t_s, mode) for t_s, (name, mode) in asked if name == function]
+
+
+def told(result: MissionResult, event: str) -> list[str]:
+    return [each.detail for each in result.events if each.event == event]
+
+
+BOTH = pytest.mark.parametrize("name", ["seams2023", "release15"])
+
+
+@BOTH
+@pytest.mark.parametrize(
+    ("value", "design"),
+    [
+        (1.0, None),
+        (1.25, "fd_spiral_low"),
+        (2.24, "fd_spiral_low"),
+        (2.25, "fd_spiral_medium"),
+        (3.24, "fd_spiral_medium"),
+        (3.25, "fd_spiral_high"),
+    ],
+)
+def test_the_search_is_as_high_as_the_measured_visibility_allows(name: str, value: float, design: str | None) -> None:
+    found = mission(visibility(value), name=name, limit_s=10.0)
+    chosen = [mode for t_s, mode in modes(found, SEARCH) if t_s < 10.0]  # at the limit the task is cancelled
+    assert chosen[-1:] == ([design] if design else [])
+    if design is None:
+        assert "no function design is left" in told(found, "no_design_left")[0]
+
+
+@BOTH
+def test_a_lost_thruster_is_recovered_and_all_thrusters_are_used_again(name: str) -> None:
+    found = mission({**visibility(1.5), **REASONED_AT_ONCE}, name=name)
+    (_, first), (recover_s, recover), (back_s, back) = modes(found, MOTION)[:3]
+    assert (first, recover, back) == ("fd_all_thrusters", "fd_recover_thrusters", "fd_all_thrusters")
+    period_s = {"seams2023": 2.0, "release15": 1.5}[name]
+    assert 35.0 <= recover_s <= 36.0 + period_s
+    assert recover_s + 10.0 <= back_s <= recover_s + 11.5 + period_s
+
+
+def test_a_recovery_is_reasoned_about_once() -> None:
+    found = mission(visibility(1.5))
+    assert told(found, "inferred").count("objective of f_maintain_motion is updatable") == 1
+    assert [mode for _, mode in modes(found, MOTION)] == ["fd_all_thrusters", "fd_recover_thrusters", "fd_all_thrusters"]
+
+
+@pytest.mark.parametrize("latency_s", [0.0, 0.7])
+def test_a_plan_comes_as_much_later_as_the_inference_takes(latency_s: float) -> None:
+    """The change of visibility is measured at once; reasoning begins at a tick of 2 s, and ends later."""
+    at_once = mission({**steps(3.5, 1.5, 20.0), "latencies.inference_s": 0.0})
+    later = mission({**steps(3.5, 1.5, 20.0), "latencies.inference_s": latency_s})
+    assert [mode for _, mode in modes(later, SEARCH)] == ["fd_spiral_high", "fd_spiral_low"]
+    assert modes(later, SEARCH)[1][0] == pytest.approx(modes(at_once, SEARCH)[1][0] + latency_s)
+
+
+@BOTH
+@pytest.mark.parametrize("run", [1, 2, 3, 4])
+def test_it_reacts_within_a_reasoning_period(name: str, run: int) -> None:
+    found = mission({**steps(3.5, 2.5, 20.0), **REASONED_AT_ONCE}, name=name, run=run)
+    period_s = {"seams2023": 2.0, "release15": 1.5}[name]
+    publishing_s = {"seams2023": 0.2, "release15": 1.0}[name]
+    changed_s = modes(found, SEARCH)[1][0]
+    assert 20.0 <= changed_s <= 20.0 + period_s + publishing_s + 1e-6
+
+
+@BOTH
+def test_the_search_rises_when_the_water_clears(name: str) -> None:
+    assert [mode for _, mode in modes(mission(steps(1.5, 3.5, 20.0), name=name), SEARCH)][:2] == [
+        "fd_spiral_low",
+        "fd_spiral_high",
+    ]
+
+
+def test_revision_15_waits_for_the_first_measurement() -> None:
+    late = {"signals.water_visibility": {"kind": "constant", "value": 1.5, "publishing_period_s": 30.0}}
+    first_message_s = next(
+        event.t_s for event in mission(late, name="release15").events if event.event == "first_measurement"
+    )
+    assert first_message_s > 2.0
+    assert modes(mission(late, name="release15"), SEARCH)[0][0] >= first_message_s
+    # Revision 2023 filters nothing out before it.
+    assert modes(mission(late), SEARCH)[0] == (pytest.approx(1.5, abs=1.5), "fd_spiral_high")
+
+
+def found_pipeline(name: str) -> MissionResult:
+    return mission({}, name=name, limit_s=300.0, run=next(iter(_runs_that_find(name))))
+
+
+def _runs_that_find(name: str) -> list[int]:
+    simulator = Simulator(load_scenario(name))
+    return [run for run in range(1, 9) if simulator.run("metacontrol", run, 1).metrics.pipeline_found]
+
+
+def test_in_2023_the_search_ends_at_a_tick_of_the_bridge_and_following_waits_for_a_cycle() -> None:
+    found = found_pipeline("seams2023")
+    requested_s = next(event.t_s for event in found.events if event.detail == "inspect_pipeline")
+    ended_s = next(t_s for t_s, mode in modes(found, SEARCH) if mode == "fd_unground")
+    followed_s = modes(found, FOLLOW)[0][0]
+    assert requested_s < ended_s <= requested_s + 2.0
+    assert ended_s + 1.0 <= followed_s <= ended_s + 3.0
+    assert "fd_unground" not in [mode for _, mode in modes(found, MOTION)]
+
+
+def test_in_15_the_tasks_end_and_begin_at_once_and_maintain_motion_with_them() -> None:
+    found = found_pipeline("release15")
+    requested_s = next(event.t_s for event in found.events if event.detail == "inspect_pipeline")
+    assert (requested_s, "fd_unground") in modes(found, SEARCH)
+    assert (requested_s, "fd_unground") in modes(found, MOTION)
+    assert 1.0 <= modes(found, FOLLOW)[0][0] - requested_s <= 2.5
+
+
+NEW_DESIGN = """
+  <owl:NamedIndividual rdf:about="http://www.metacontrol.org/suave#fd_spiral_very_high">
+    <rdf:type rdf:resource="http://metacontrol.org/tomasys#FunctionDesign"/>
+    <tomasys:solvesF rdf:resource="http://www.metacontrol.org/suave#f_generate_search_path"/>
+    <tomasys:hasQAestimation rdf:resource="http://www.metacontrol.org/suave#qa_water_visibility_very_high"/>
+    <tomasys:hasQAestimation rdf:resource="http://www.metacontrol.org/suave#qa_performance_very_high"/>
+  </owl:NamedIndividual>
+  <owl:NamedIndividual rdf:about="http://www.metacontrol.org/suave#qa_water_visibility_very_high">
+    <rdf:type rdf:resource="http://metacontrol.org/tomasys#QAvalue"/>
+    <tomasys:isQAtype rdf:resource="http://www.metacontrol.org/suave#water_visibility"/>
+    <tomasys:hasValue rdf:datatype="http://www.w3.org/2001/XMLSchema#decimal">4.25</tomasys:hasValue>
+  </owl:NamedIndividual>
+  <owl:NamedIndividual rdf:about="http://www.metacontrol.org/suave#qa_performance_very_high">
+    <rdf:type rdf:resource="http://metacontrol.org/tomasys#QAvalue"/>
+    <tomasys:isQAtype rdf:resource="http://ros/mros#performance"/>
+    <tomasys:hasValue rdf:datatype="http://www.w3.org/2001/XMLSchema#decimal">1.5</tomasys:hasValue>
+  </owl:NamedIndividual>
+"""
+
+CLASHING_RULE = """
+  <swrl:Variable rdf:about="urn:swrl:var#grounding"/>
+  <swrl:Imp rdf:about="http://www.metacontrol.org/suave#everything_is_in_error">
+    <rdfs:label>everything_is_in_error</rdfs:label>
+    <swrl:body><swrl:AtomList>
+      <rdf:first><swrl:ClassAtom>
+        <swrl:classPredicate rdf:resource="http://metacontrol.org/tomasys#FunctionGrounding"/>
+        <swrl:argument1 rdf:resource="urn:swrl:var#grounding"/>
+      </swrl:ClassAtom></rdf:first>
+      <rdf:rest rdf:resource="http://www.w3.org/1999/02/22-rdf-syntax-ns#nil"/>
+    </swrl:AtomList></swrl:body>
+    <swrl:head><swrl:AtomList>
+      <rdf:first><swrl:DatavaluedPropertyAtom>
+        <swrl:propertyPredicate rdf:resource="http://metacontrol.org/tomasys#fg_status"/>
+        <swrl:argument1 rdf:resource="urn:swrl:var#grounding"/>
+        <swrl:argument2>IN_ERROR_FR</swrl:argument2>
+      </swrl:DatavaluedPropertyAtom></rdf:first>
+      <rdf:rest rdf:resource="http://www.w3.org/1999/02/22-rdf-syntax-ns#nil"/>
+    </swrl:AtomList></swrl:head>
+  </swrl:Imp>
+"""
+
+
+def suave_with(folder: Path, addition: str) -> Path:
+    """A copy of the shipped suave.owl with something added."""
+    text = (shipped_folder("ontology") / "suave.owl").read_text()
+    copy = folder / "suave.owl"
+    copy.write_text(text.replace("</rdf:RDF>", addition + "</rdf:RDF>"))
+    return copy
+
+
+def modes_with_a_fourth_altitude(folder: Path) -> Path:
+    text = (shipped_folder("scenarios") / "suave_modes.yaml").read_text()
+    system = "        f_generate_search_path_node: active.fd_spiral_high\n"
+    node = "          spiral_altitude: 3.0\n"
+    assert system in text and node in text
+    text = text.replace(system, system + "      fd_spiral_very_high:\n" + system.replace("_high", "_very_high"))
+    text = text.replace(
+        node, node + "      fd_spiral_very_high:\n        ros__parameters:\n" + node.replace("3.0", "4.0")
+    )
+    copy = folder / "modes.yaml"
+    copy.write_text(text)
+    return copy
+
+
+def test_a_fourth_search_altitude_needs_no_python(tmp_path: Path) -> None:
+    given = {"ontologies": [suave_with(tmp_path, NEW_DESIGN)], "modes_file": modes_with_a_fourth_altitude(tmp_path)}
+    found = mission(steps(4.5, 3.5, 30.0), **given)
+    assert [mode for _, mode in modes(found, SEARCH)][:2] == ["fd_spiral_very_high", "fd_spiral_high"]
+    highest_m = max(point.z_m for point in mission(visibility(4.5), **given).trajectory)
+    assert highest_m > max(point.z_m for point in mission(visibility(4.5)).trajectory) + 0.7
+
+
+def test_a_design_without_a_mode_is_bad_input(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"suave_modes.yaml.*fd_spiral_very_high"):
+        mission({}, ontologies=[suave_with(tmp_path, NEW_DESIGN)])
+
+
+def test_a_rule_that_contradicts_another_ends_the_mission_with_both_named(tmp_path: Path) -> None:
+    """They clash when the water has become too murky for the present design, not before."""
+    with pytest.raises(MissionError) as raised:
+        mission(steps(3.5, 1.5, 20.0), ontologies=[suave_with(tmp_path, CLASHING_RULE)])
+    assert raised.value.manager == "metacontrol" and 20.0 <= raised.value.time_s <= 23.0
+    assert "everything_is_in_error" in str(raised.value) and "QAWaterVisibility" in str(raised.value)
+
+
+@pytest.mark.parametrize("oldest", [False, True])
+def test_the_exemplars_three_files_give_the_same_missions(tmp_path: Path, oldest: bool) -> None:
+    files = write_exemplar_files(shipped_folder("ontology"), tmp_path, oldest=oldest)
+    theirs = Simulator(load_scenario("seams2023", ontologies=list(files.values())))
+    ours = Simulator(load_scenario("seams2023"))
+    for run in range(1, 9):
+        assert theirs.run("metacontrol", run, 1).metrics == ours.run("metacontrol", run, 1).metrics
