@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -81,7 +82,7 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
         print_table(console, title, _table([figure for figure in comparison.figures if figure.metric == metric]))
         console.print()
     for line in comparison.remarks():
-        console.print(line, width=min(console.width, _TEXT_WIDTH))
+        console.print(fill(line, min(console.width, _TEXT_WIDTH)))
 
 
 def _table(figures: Sequence[Figure]) -> Table:
