@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import random
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import simpy
 
-from suave_des.clock import Process, until
-from suave_des.errors import InputError, MissionError, SuaveDesError
-from suave_des.managed.coordinator import FOLLOW, MAINTAIN_MOTION, SEARCH, MissionCoordinator, Task
+from suave_des.clock import Process
+from suave_des.errors import SuaveDesError
+from suave_des.managed.coordinator import FOLLOW, MAINTAIN_MOTION, SEARCH, MissionCoordinator
 from suave_des.managed.detection import PipelineDetector, measured_at_rows
 from suave_des.managed.follow import FollowPipeline
 from suave_des.managed.mode_manager import ModeManager
@@ -21,8 +20,7 @@ from suave_des.managed.node import Frame, FunctionNode, SetPointSender
 from suave_des.managed.reactions import ReactionMeter
 from suave_des.managed.recharge import RECHARGE, GenerateRechargePath
 from suave_des.managed.search import GenerateSearchPath
-from suave_des.managing.base import ManagedSystem, ManagingSubsystem
-from suave_des.managing.registry import manager_class
+from suave_des.managing.base import ManagedSystem
 from suave_des.monitor.diagnostics import DiagnosticsBus
 from suave_des.monitor.monitors import (
     Measurements,
@@ -32,19 +30,16 @@ from suave_des.monitor.monitors import (
     signal_monitor,
     thruster_monitor,
 )
-from suave_des.scenario.distributions import Distribution, draw
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import Battery
+from suave_des.simulation.chance import Chance
+from suave_des.simulation.host import RAISED, ManagerHost
 from suave_des.simulation.recording import Recorder
 from suave_des.simulation.result import MissionMetrics, MissionResult
 from suave_des.simulation.signals import build_signal
-from suave_des.streams import Streams
 from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle
 from suave_des.world.pipeline import SEA_BED_Z_M, SURFACE_Z_M, path_to_inspect, sample_points
-
-_RAISED = (Exception, SystemExit)
-"""What a manager may raise: one that calls sys.exit must not end a campaign, or a mission as if all were well."""
 
 
 class Simulator:
@@ -64,9 +59,7 @@ class Simulator:
     @cached_property
     def knowledge(self) -> Any:
         """The scenario's knowledge base with its reasoner (a Deliberation), opened and checked on first use."""
-        from suave_des.simulation.knowledge import (
-            open_knowledge,
-        )  # owlready2 and numpy's friends load only when needed
+        from suave_des.simulation.knowledge import open_knowledge  # owlready2 is loaded only when it is needed
 
         return open_knowledge(self.loaded)
 
@@ -94,9 +87,8 @@ class _Mission:
         self.scenario = simulator.loaded.scenario
         self.revision = self.scenario.revision
         self.manager_name, self.run, self.seed = manager, run, seed
-        self.streams = Streams(seed, run)
+        self.chance = Chance(seed, run)
         self.env = simpy.Environment()
-        self.drawn: dict[str, float] = {}
         self.recorder = Recorder(self.env, enabled=record)
         self.bus = DiagnosticsBus()
         self.duration_s = self.scenario.mission.time_limit_s + self.revision.coordinator.limit_check_period_s
@@ -113,7 +105,7 @@ class _Mission:
             self.env,
             simulator.loaded.modes,
             nodes,
-            self._sampler("latencies.mode_change_s", self.scenario.latencies.mode_change_s),
+            self.chance.sampler("latencies.mode_change_s", self.scenario.latencies.mode_change_s),
             self.recorder.log,
         )
         self.reactions = ReactionMeter(self.env, self.scenario.reaction_metric, self.visibility)
@@ -122,7 +114,7 @@ class _Mission:
         self.modes.on_effect(self.reactions.mode_effect)
         self.modes.on_effect(self.recorder.mode_effect)
         self.coordinator = self._make_coordinator()
-        self.manager = self._start_manager()
+        self.host = self._make_host()
 
     def result(self) -> MissionResult:
         """Run to the end and read the metrics."""
@@ -130,8 +122,8 @@ class _Mission:
             self.env.run(until=self.coordinator.ended)
         except SuaveDesError:
             raise
-        except _RAISED as error:  # in a process that the manager started by itself
-            raise self._mission_error(error) from error
+        except RAISED as error:  # in a process that the manager started by itself
+            raise self.host.mission_error(error) from error
         point = self.detector.first_point
         found = self.coordinator.search_time_s is not None
         metrics = MissionMetrics(
@@ -139,8 +131,8 @@ class _Mission:
             manager=self.manager_name,
             run=self.run,
             seed=self.seed,
-            initial_x_m=self.drawn["start.x_m"],
-            initial_y_m=self.drawn["start.y_m"],
+            initial_x_m=self.chance.drawn["start.x_m"],
+            initial_y_m=self.chance.drawn["start.y_m"],
             mission_duration_s=float(self.env.now),
             pipeline_found=found,
             search_time_s=self.coordinator.search_time_or_limit_s(),
@@ -152,39 +144,22 @@ class _Mission:
             detection_y_m=float(self.simulator.points[point, 1]) if found and point is not None else None,
         )
         trajectory = self.recorder.trajectory(self.vehicle, self.visibility)
-        return MissionResult(metrics, tuple(self.recorder.events), trajectory, self.drawn)
-
-    # Chance: every use has a stream of its own, named after the scenario's key.
-
-    def _draw(self, key: str, distribution: Distribution) -> float:
-        value = draw(distribution, self.streams.stream(key)) if not isinstance(distribution, float) else distribution
-        self.drawn[key] = value
-        return value
-
-    def _sampler(self, key: str, distribution: Distribution) -> Callable[[], float]:
-        if isinstance(distribution, float):
-            return lambda: distribution
-        stream = self.streams.stream(key)
-        return lambda: draw(distribution, stream)
-
-    def _phase(self, timer: str, period_s: float) -> float:
-        """Phase of a timer: arbitrary per node, another one in each run."""
-        return self.streams.stream(f"phase/{timer}").random() * period_s
+        return MissionResult(metrics, tuple(self.recorder.events), trajectory, self.chance.drawn)
 
     # The world and the vehicle.
 
     def _make_vehicle(self) -> Vehicle:
         start, current, calibration = self.scenario.start, self.scenario.current, self.scenario.calibration
-        x_m, y_m = self._draw("start.x_m", start.x_m), self._draw("start.y_m", start.y_m)
+        x_m, y_m = self.chance.draw("start.x_m", start.x_m), self.chance.draw("start.y_m", start.y_m)
         self.origin_m = (
-            x_m + self._draw("calibration.drift_x_m", calibration.drift_x_m),
-            y_m + self._draw("calibration.drift_y_m", calibration.drift_y_m),
+            x_m + self.chance.draw("calibration.drift_x_m", calibration.drift_x_m),
+            y_m + self.chance.draw("calibration.drift_y_m", calibration.drift_y_m),
         )
         z_m, heading_rad = (
-            self._draw("start.z_m", start.z_m),
-            self._draw("start.heading_rad", start.heading_rad),
+            self.chance.draw("start.z_m", start.z_m),
+            self.chance.draw("start.heading_rad", start.heading_rad),
         )
-        loss = self._draw("calibration.real_time_factor_loss", calibration.real_time_factor_loss)
+        loss = self.chance.draw("calibration.real_time_factor_loss", calibration.real_time_factor_loss)
         return Vehicle(
             BLUEROV2,
             Autopilot(
@@ -192,15 +167,15 @@ class _Mission:
                 calibration.horizontal_speed_limit_m_per_s,
                 calibration.vertical_speed_limit_m_per_s,
                 calibration.velocity_time_constant_s,
-                self._draw("calibration.altitude_error_m", calibration.altitude_error_m),
-                self._draw("calibration.altitude_deadband_m", calibration.altitude_deadband_m),
+                self.chance.draw("calibration.altitude_error_m", calibration.altitude_error_m),
+                self.chance.draw("calibration.altitude_deadband_m", calibration.altitude_deadband_m),
             ),
             Pose(*self.origin_m, z_m, 0.0, 0.0, heading_rad),
             self.duration_s,
             current_m_per_s=(
-                self._draw("current.x_m_per_s", current.x_m_per_s),
-                self._draw("current.y_m_per_s", current.y_m_per_s),
-                self._draw("current.z_m_per_s", current.z_m_per_s),
+                self.chance.draw("current.x_m_per_s", current.x_m_per_s),
+                self.chance.draw("current.y_m_per_s", current.y_m_per_s),
+                self.chance.draw("current.z_m_per_s", current.z_m_per_s),
             ),
             time_scale=1.0 / (1.0 + loss),
             z_limits_m=(SEA_BED_Z_M, SURFACE_Z_M),
@@ -216,7 +191,7 @@ class _Mission:
             ThrusterFault(
                 event.thruster,
                 event.event == "failure",
-                self._draw(f"thruster_events.{place}.time_s", event.time_s),
+                self.chance.draw(f"thruster_events.{place}.time_s", event.time_s),
             )
             for place, event in enumerate(self.scenario.thruster_events)
         ]
@@ -226,7 +201,7 @@ class _Mission:
                 self.bus,
                 faults,
                 lambda thruster, health: self.vehicle.set_thruster_health(self.env.now, thruster, health),
-                phase_s=self._phase("thruster_monitor", 1.0),
+                phase_s=self.chance.phase("thruster_monitor", 1.0),
                 after_previous=self.revision.monitors.thruster_event_times == "after_previous",
             )
         )
@@ -240,12 +215,12 @@ class _Mission:
         noisy = signal.noise != 0.0
         return measure(
             name,
-            build_signal(name, signal, self.simulator.loaded.tables, self._draw),
+            build_signal(name, signal, self.simulator.loaded.tables, self.chance.draw),
             self.duration_s,
             period_s=period_s,
-            phase_s=self._phase(f"signals.{name}", period_s),
+            phase_s=self.chance.phase(f"signals.{name}", period_s),
             time_step_s=signal.time_step_s,
-            noise=self._sampler(f"signals.{name}.noise", signal.noise) if noisy else None,
+            noise=self.chance.sampler(f"signals.{name}.noise", signal.noise) if noisy else None,
         )
 
     def _battery(self, battery: Battery) -> Process:
@@ -260,7 +235,7 @@ class _Mission:
             is_at_station,
             discharge_time_s=battery.discharge_time_s,
             period_s=battery.publishing_period_s,
-            phase_s=self._phase("battery_monitor", battery.publishing_period_s),
+            phase_s=self.chance.phase("battery_monitor", battery.publishing_period_s),
         )
 
     # The managed subsystem.
@@ -268,16 +243,18 @@ class _Mission:
     def _sender(self, node: str) -> SetPointSender:
         set_points = self.revision.set_points
         frame = Frame(
-            self._draw(f"revision.set_points.node_frame_offset_x_m/{node}", set_points.node_frame_offset_x_m),
-            self._draw(f"revision.set_points.node_frame_offset_y_m/{node}", set_points.node_frame_offset_y_m),
-            self._draw(f"revision.set_points.node_frame_offset_z_m/{node}", set_points.node_frame_offset_z_m),
+            self.chance.draw(f"revision.set_points.node_frame_offset_x_m/{node}", set_points.node_frame_offset_x_m),
+            self.chance.draw(f"revision.set_points.node_frame_offset_y_m/{node}", set_points.node_frame_offset_y_m),
+            self.chance.draw(f"revision.set_points.node_frame_offset_z_m/{node}", set_points.node_frame_offset_z_m),
         )
-        stream = self.streams.stream(f"set_points/{node}")
+        stream = self.chance.stream(f"set_points/{node}")
         return SetPointSender(self.env, self.vehicle, frame, self.loss_probability, stream)
 
     def _make_functions(self) -> tuple[FollowPipeline, dict[str, FunctionNode]]:
         env, vehicle, revision = self.env, self.vehicle, self.revision
-        self.loss_probability = self._draw("revision.set_points.loss_probability", revision.set_points.loss_probability)
+        self.loss_probability = self.chance.draw(
+            "revision.set_points.loss_probability", revision.set_points.loss_probability
+        )
         follow = FollowPipeline(env, vehicle, self._sender(FOLLOW), revision.follow, self._path)
         nodes: dict[str, FunctionNode] = {
             MAINTAIN_MOTION: MaintainMotion(env, self.bus, revision.recovery, self._restore_thruster),
@@ -287,8 +264,8 @@ class _Mission:
                 self._sender(SEARCH),
                 revision.spiral,
                 self.origin_m,
-                self._phase(SEARCH, 1.0),
-                self._draw("latencies.guided_start_s", self.scenario.latencies.guided_start_s),
+                self.chance.phase(SEARCH, 1.0),
+                self.chance.draw("latencies.guided_start_s", self.scenario.latencies.guided_start_s),
             ),
             FOLLOW: follow,
         }
@@ -312,93 +289,28 @@ class _Mission:
             settings,
             self.detector,
             self.follow,
-            self._request,
-            self._cancel,
+            lambda task: self.host.request(task),
+            lambda task: self.host.cancel(task),
             time_limit_s=self.scenario.mission.time_limit_s,
-            start_delay_s=self._draw("latencies.task_start_s", self.scenario.latencies.task_start_s),
-            poll_phase_s=self._phase("coordinator", settings.poll_period_s),
-            limit_phase_s=self._phase("limit", settings.limit_check_period_s),
+            start_delay_s=self.chance.draw("latencies.task_start_s", self.scenario.latencies.task_start_s),
+            poll_phase_s=self.chance.phase("coordinator", settings.poll_period_s),
+            limit_phase_s=self.chance.phase("limit", settings.limit_check_period_s),
             log=self.recorder.log,
         )
 
-    # The managing subsystem: what it raises is the mission's end, named after the manager, and nobody else's.
+    # The managing subsystem.
 
-    def _start_manager(self) -> ManagingSubsystem:
-        kind = manager_class(self.manager_name)
-        settings: Mapping[str, Any] = {}
-        extra = (self.scenario.managers.model_extra or {}).get(self.manager_name)
-        if isinstance(extra, Mapping):
-            settings = extra
-
-        def log(event: str, detail: str) -> None:
-            self.recorder.log(self.manager_name, event, detail)
-
-        def stream(name: str) -> random.Random:
-            return self.streams.stream(f"manager/{name}")
-
+    def _make_host(self) -> ManagerHost:
+        name = self.manager_name
+        settings = (self.scenario.managers.model_extra or {}).get(name)
         system = ManagedSystem(
             env=self.env,
             scenario=self.scenario,
-            settings=settings,
+            settings=settings if isinstance(settings, Mapping) else {},
             modes=self.modes,
             lasting_functions=self.coordinator.lasting_functions,
-            stream=stream,
-            log=log,
+            stream=lambda stream: self.chance.stream(f"manager/{stream}"),
+            log=lambda event, detail: self.recorder.log(name, event, detail),
             knowledge=lambda: self.simulator.knowledge,
         )
-        try:
-            manager = kind(system)
-        except InputError:
-            raise  # such as an ontology that cannot be used: it concerns every mission
-        except _RAISED as error:
-            raise self._mission_error(error) from error
-        if kind.diagnostic is not ManagingSubsystem.diagnostic:
-            self.bus.subscribe(lambda diagnostic: self._guarded(manager.diagnostic, diagnostic))
-        if manager.period_s is not None:
-            if not manager.period_s > 0.0:
-                raise self._mission_error(ValueError(f"period_s is {manager.period_s}; it must be above 0, or None"))
-            self.env.process(self._adapt_periodically(manager, manager.period_s))
-        return manager
-
-    def _request(self, task: Task) -> None:
-        self._guarded(self.manager.task_requested, task)
-
-    def _cancel(self, task: Task) -> None:
-        self.modes.task_over(task.functions)
-        self._guarded(self.manager.task_cancelled, task)
-
-    def _adapt_periodically(self, manager: ManagingSubsystem, period_s: float) -> Process:
-        yield until(self.env, manager.starts_s)
-        due_s = self.env.now
-        while True:
-            adaptation = self._guarded(manager.adapt)
-            if adaptation is not None:
-                yield from self._guarded_steps(adaptation)
-            while due_s <= self.env.now:
-                due_s += period_s
-            yield until(self.env, due_s)
-
-    def _guarded_steps(self, adaptation: Process) -> Process:
-        value = None
-        try:
-            while True:
-                event = adaptation.send(value)
-                if not isinstance(event, simpy.Event):
-                    raise TypeError(f"adapt yielded {event!r}; it may yield events, such as system.env.timeout(1.0)")
-                value = yield event
-        except StopIteration:
-            return
-        except _RAISED as error:
-            raise self._mission_error(error) from error
-
-    def _guarded(self, hook: Callable[..., Any], *arguments: Any) -> Any:
-        try:
-            return hook(*arguments)
-        except _RAISED as error:
-            raise self._mission_error(error) from error
-
-    def _mission_error(self, error: BaseException) -> SuaveDesError:
-        if isinstance(error, MissionError):
-            return error
-        cause = str(error) if isinstance(error, SuaveDesError) else f"{type(error).__name__}: {error}"
-        return MissionError(self.manager_name, self.run, float(self.env.now), cause)
+        return ManagerHost(name, self.run, system, self.bus)
