@@ -30,10 +30,18 @@ Results go to standard output; errors and the progress bar, which is there on a 
 
 def page() -> str:
     """The whole page."""
-    return HEAD + "".join(section(each.name, each.callback) for each in app.registered_commands)
+    return HEAD + "".join(section(name, command) for name, command in commands_of(app))
 
 
-def section(name: str | None, command: Any) -> str:
+def commands_of(group: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Name and function of each command, those of groups within after the group's own."""
+    for each in group.registered_commands:
+        yield prefix + (each.name or each.callback.__name__), each.callback
+    for each in group.registered_groups:
+        yield from commands_of(each.typer_instance, f"{prefix}{each.name} ")
+
+
+def section(name: str, command: Any) -> str:
     """One command: what it does, how it is written, and its options."""
     parameters = [Parameter(each) for each in inspect.signature(command, eval_str=True).parameters.values()]
     needed = [each.written for each in parameters if each.needed]
@@ -41,7 +49,7 @@ def section(name: str | None, command: Any) -> str:
     lines = [
         f"\n## suave-des {name}\n",
         inspect.cleandoc(command.__doc__),
-        f"\n`{' '.join(['suave-des', str(name), *needed, *rest])}`",
+        f"\n`{' '.join(['suave-des', name, *needed, *rest])}`",
     ]
     if parameters:
         lines += ["\n| | default | meaning |", "| --- | --- | --- |", *(each.row for each in parameters)]
