@@ -13,6 +13,7 @@ _KINDS = {
     "scenarios": ".yaml",
     "scenarios/revisions": ".yaml",
     "scenarios/published": ".csv",
+    "scenarios/calibration": ".yaml",
 }
 
 

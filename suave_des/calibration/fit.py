@@ -100,7 +100,7 @@ def _evaluate_here(values: Sequence[float]) -> Evaluation:
 
 
 @contextmanager
-def evaluator(problem: Problem, workers: int) -> Iterator[Callable[[list[Sequence[float]]], list[Evaluation]]]:
+def evaluator(problem: Problem, workers: int) -> Iterator[Callable[[Sequence[Sequence[float]]], list[Evaluation]]]:
     """A function that evaluates several sets of values, on worker processes if there is more than one."""
     if workers == 1:
         yield lambda many: [evaluate(problem, values) for values in many]
@@ -133,7 +133,8 @@ def fit(
     import cma
 
     start = [parameter.start_unit for parameter in problem.parameters]
-    search = cma.CMAEvolutionStrategy(start, 0.2, {"seed": seed, "verbose": -9, "maxfevals": evaluations, "tolfun": 1e-9})
+    settings = {"seed": seed, "verbose": -9, "maxfevals": evaluations, "tolfun": 1e-9}
+    search = cma.CMAEvolutionStrategy(start, 0.2, settings)
     tried: list[Evaluation] = []
     with evaluator(problem, workers) as evaluate_all:
         while len(tried) < evaluations:

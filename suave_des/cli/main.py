@@ -10,7 +10,7 @@ import typer
 from typer.core import TyperGroup
 
 from suave_des import __version__
-from suave_des.cli import campaign, figure, kb, reproduce, run, scenarios, schema, validate
+from suave_des.cli import calibrate, campaign, figure, kb, reproduce, run, scenarios, schema, validate
 from suave_des.cli.options import remember_command_line
 from suave_des.errors import InputError, SuaveDesError
 
@@ -53,6 +53,7 @@ app.command("reproduce")(reproduce.reproduce)
 app.command("run")(run.run)
 app.command("campaign")(campaign.campaign)
 app.command("validate")(validate.validate)
+app.command("calibrate")(calibrate.calibrate)
 app.add_typer(kb.app, name="kb")
 app.command("figure")(figure.figure)
 app.command("scenarios")(scenarios.scenarios)

@@ -38,6 +38,20 @@ def with_values(loaded: LoadedScenario, values: Mapping[str, Any]) -> LoadedScen
     return replace(loaded, scenario=scenario)
 
 
+def value_at(loaded: LoadedScenario, path: str) -> Any:
+    """The value at a key path, as plain data.
+
+    Raises:
+        InputError: the path leads nowhere.
+    """
+    here: Any = loaded.scenario.model_dump(mode="json")
+    for part in path.split("."):
+        if not isinstance(here, dict | list):
+            raise InputError(f"{path}: {part} is below a plain value", remedy="leave the rest out")
+        here = _step(here, part, path)
+    return here
+
+
 def _set(data: dict[str, Any], path: str, value: Any) -> None:
     *parents, last = path.split(".")
     here: Any = data

@@ -1,0 +1,127 @@
+"""What a calibration writes: the fitted scenario, tables, and a figure of the profiles."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import yaml
+
+from suave_des.calibration.fit import Evaluation, FreeParameter, Problem
+from suave_des.calibration.profile import Profile
+from suave_des.scenario.overrides import value_at, with_values
+
+SCENARIO, TABLE, RECORD, FIGURE = "fitted.yaml", "parameters.csv", "calibration.json", "profiles.png"
+FILES = (SCENARIO, TABLE, RECORD, FIGURE)
+
+
+def fitted_values(parameters: Sequence[FreeParameter], best: Evaluation, digits: int = 3) -> dict[str, float]:
+    """Fitted values by key path, rounded to what the data can tell."""
+    return {parameter.path: round(value, digits) for parameter, value in zip(parameters, best.values, strict=True)}
+
+
+def fitted_scenario(problem: Problem, base: str, values: Mapping[str, float]) -> str:
+    """A scenario file: the one that was fitted, with the fitted values."""
+    fitted = with_values(problem.loaded, values)
+    tops = {path.rsplit(".", 1)[0] if _is_below_distribution(fitted, path) else path for path in values}
+    data: dict[str, Any] = {}
+    for path in sorted(tops):
+        here = data
+        *parents, last = path.split(".")
+        for part in parents:
+            here = here.setdefault(part, {})
+        value = value_at(fitted, path)
+        if isinstance(value, dict):
+            value = {key: each for key, each in value.items() if each is not None}
+        here[last] = value
+    if "revision" in data:
+        data["revision"] = {"base": fitted.scenario.revision.name, **data["revision"]}
+    text = yaml.safe_dump({"base": base, **data}, sort_keys=False, allow_unicode=True)
+    return f"# Fitted by `suave-des calibrate`; the report beside this file says how.\n{text}"
+
+
+def _is_below_distribution(loaded: Any, path: str) -> bool:
+    parent, _, _ = path.rpartition(".")
+    above = value_at(loaded, parent) if parent else None
+    return isinstance(above, dict) and "distribution" in above
+
+
+def table(found: Sequence[Profile]) -> str:
+    """The parameters as CSV: bounds, start, fitted value, and the interval that the data admit."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(["path", "lower_bound", "upper_bound", "start", "fitted", "admitted_low", "admitted_high"])
+    for profile in found:
+        free = profile.parameter
+        numbers = (free.lower, free.upper, free.start, profile.best, profile.low, profile.high)
+        writer.writerow([free.path, *(f"{number:.4g}" for number in numbers)])
+    return buffer.getvalue()
+
+
+def record(
+    problem: Problem,
+    tried: Sequence[Evaluation],
+    best: Evaluation,
+    fresh: Evaluation,
+    spread: float,
+    found: Sequence[Profile],
+    provenance: Mapping[str, Any],
+) -> str:
+    """Everything about the fit, as JSON."""
+    managers = sorted(problem.published)
+    content = {
+        **provenance,
+        "distance": "mean over managers of the energy distance between missions as vectors (search time / 40 s, "
+        "distance inspected / 12 m, x of detection / 1.5 m)",
+        "managers": managers,
+        "published_runs": {name: len(problem.published[name]) for name in managers},
+        "runs": problem.runs,
+        "seed": problem.seed,
+        "evaluations": len(tried),
+        "best": _evaluation(best, managers),
+        "best_on_fresh_streams": _evaluation(fresh, managers),
+        "spread_of_loss_over_resampled_published_runs": round(spread, 5),
+        "fitted": {each.parameter.path: each.best for each in found},
+        "profiles": {
+            each.parameter.path: {"values": each.values, "losses": each.losses, "admitted": [each.low, each.high]}
+            for each in found
+        },
+        "history": [round(each.loss, 5) for each in tried],
+    }
+    return json.dumps(content, indent=2) + "\n"
+
+
+def _evaluation(evaluation: Evaluation, managers: Sequence[str]) -> dict[str, Any]:
+    by_manager = zip(managers, evaluation.distances, strict=True)
+    return {"loss": round(evaluation.loss, 5), **{name: round(distance, 5) for name, distance in by_manager}}
+
+
+def profiles_png(found: Sequence[Profile], best: Evaluation, threshold: float) -> bytes:
+    """The loss along each parameter, one panel each, with the interval that the data admit."""
+    from matplotlib.figure import Figure
+
+    columns = 4
+    rows = -(-len(found) // columns)
+    figure = Figure(figsize=(2.6 * columns, 2.1 * rows), layout="constrained")
+    panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
+    top = threshold + 4.0 * (threshold - best.loss)
+    for panel, profile in zip(panels, found, strict=False):
+        panel.axvspan(profile.low, profile.high, color="#cfe3f3", lw=0)
+        panel.axhline(threshold, color="0.6", lw=0.8, ls="--")
+        points = sorted([*zip(profile.values, profile.losses, strict=True), (profile.best, best.loss)])
+        panel.plot([x for x, _ in points], [y for _, y in points], color="#1f5f99", lw=1.2, marker=".", ms=4)
+        panel.plot([profile.best], [best.loss], marker="o", color="#c0392b", ms=5)
+        panel.set_xlim(profile.parameter.lower, profile.parameter.upper)
+        panel.set_ylim(0.0, top)
+        panel.set_title(profile.parameter.path.replace("calibration.", "").replace("latencies.", ""), fontsize=7.5)
+        panel.tick_params(labelsize=7)
+    for panel in panels[len(found) :]:
+        panel.set_visible(False)
+    for row in range(rows):
+        panels[row * columns].set_ylabel("distance to the published runs", fontsize=7)
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=160, metadata={"Software": None})
+    return buffer.getvalue()
