@@ -59,19 +59,19 @@ class Deliberation:
         known = self._memory.get(key)
         if known is None:
             inference = self.reasoner.infer(state)
-            to_adapt = tuple(self._exceeded(state)) if improve_exceeded else ()
+            to_adapt = dict(self._exceeded(state)) if improve_exceeded else {}
             decided = plan(self.base, state, inference, to_adapt=to_adapt)
             known = self._memory[key] = Conclusion(inference, decided, frozenset(_statuses(inference)))
             if len(self._memory) > REMEMBERED:
                 self._memory.popitem(last=False)
         return known
 
-    def _exceeded(self, state: KnowledgeState) -> Iterator[str]:
+    def _exceeded(self, state: KnowledgeState) -> Iterator[tuple[str, str]]:
         measured = dict(state.measurements)
         for function, design in state.groundings:
-            expected = self.base.expected(design)
-            if any(name in measured and measured[name] > value for name, value in expected.items()):
-                yield function
+            for name, value in sorted(self.base.expected(design).items()):
+                if name in measured and measured[name] > value:
+                    yield function, f"{name} {measured[name]:.2f} exceeds what {design} expects"
 
 
 def _statuses(inference: Inference) -> Iterator[str]:

@@ -8,7 +8,7 @@ required values counts.
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from decimal import Decimal
 from types import MappingProxyType
 from typing import Final
@@ -27,21 +27,23 @@ _COMPARE: Final[Mapping[str, Callable[[Decimal, Decimal], bool]]] = MappingProxy
 )
 
 
-def plan(kb: KnowledgeBase, state: KnowledgeState, inference: Inference, *, to_adapt: Collection[str] = ()) -> Plan:
+def plan(
+    kb: KnowledgeBase, state: KnowledgeState, inference: Inference, *, to_adapt: Mapping[str, str] | None = None
+) -> Plan:
     """Decide on every objective that is ungrounded, in error, updatable or always to be improved.
 
     Args:
         kb: the knowledge base.
         state: the state that was reasoned about.
         inference: what the reasoner added to it.
-        to_adapt: functions whose objectives are adapted whatever their status.
+        to_adapt: functions whose objectives are adapted whatever their status, each with the reason.
 
     Raises:
         KnowledgeError: an objective requires a value of a quality attribute type without comparison operator.
     """
     decisions = []
     for objective in state.objectives:
-        call = _call(objective, inference) or ("asked for" if objective.function in to_adapt else None)
+        call = _call(objective, inference) or (to_adapt or {}).get(objective.function)
         if call is not None:
             decisions.append(_decide(kb, inference, objective.function, call))
     return Plan(tuple(decisions))

@@ -74,11 +74,11 @@ def test_an_objective_that_is_well_is_left_alone(kb: KnowledgeBase, pellet: Reas
 
 
 def test_an_objective_is_adapted_on_request_or_when_always_to_be_improved(kb: KnowledgeBase, pellet: Reasoner) -> None:
-    asked = decide(kb, pellet, searching("fd_spiral_low", 3.5), to_adapt=[SEARCH])
+    asked = decide(kb, pellet, searching("fd_spiral_low", 3.5), to_adapt={SEARCH: "the water is clearer"})
     assert asked[SEARCH].design == "fd_spiral_high"
     always = decide(kb, pellet, searching("fd_spiral_low", 3.5, always_improve=True))
     assert always[SEARCH].design == "fd_spiral_high"
-    assert decide(kb, pellet, searching("fd_spiral_low", 3.5), to_adapt=[FOLLOW]) == {}
+    assert decide(kb, pellet, searching("fd_spiral_low", 3.5), to_adapt={FOLLOW: "the water is clearer"}) == {}
 
 
 @pytest.mark.parametrize(
