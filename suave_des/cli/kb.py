@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import typer
 
+from suave_des.cli import kb_infer
+
 app = typer.Typer(
     name="kb",
     add_completion=False,
@@ -20,3 +22,6 @@ app = typer.Typer(
 def _help(context: typer.Context) -> None:
     if context.invoked_subcommand is None:
         print(context.get_help())
+
+
+app.command("infer")(kb_infer.infer)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import jpype
+import jpype.config
 import owlready2
 
 from suave_des.errors import InputError
@@ -42,6 +43,8 @@ def start() -> None:
     with _lock:
         if _is_running():
             return
+        # The end of the process does not wait for Java, where a reasoner that was given up on may still run.
+        jpype.config.destroy_jvm = False
         jars = sorted(Path(owlready2.__file__).with_name("pellet").glob("*.jar"))
         if jpype.isJVMStarted():
             for jar in jars:

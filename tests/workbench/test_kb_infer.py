@@ -1,0 +1,123 @@
+"""kb infer: states as people write them, what follows, and the time limit."""
+
+import json
+import time
+
+import pytest
+
+from suave_des.errors import InputError, KnowledgeError
+from suave_des.knowledge.state import ObjectiveState
+from suave_des.workbench import KnowledgeBase
+from suave_des.workbench.limit import LimitedReasoner, TimeLimit
+
+HIGH = {"groundings": {"f_generate_search_path": "fd_spiral_high"}, "measurements": {"water_visibility": 1.8}}
+
+
+def test_infers_the_error_and_plans_the_lower_spiral(bench):
+    conclusion = bench.infer(bench.state(**HIGH))
+    assert "fg_status(fg_spiral_high, IN_ERROR_NFR)" in set(map(str, conclusion.inference.facts))
+    assert [(each.function, each.design) for each in conclusion.plan.decisions] == [
+        ("f_generate_search_path", "fd_spiral_low")
+    ]
+
+
+def test_without_objectives_the_search_task_s_are_asked_for(bench):
+    assert bench.state().objectives == (
+        ObjectiveState("f_generate_search_path", "UNGROUNDED"),
+        ObjectiveState("f_maintain_motion", "UNGROUNDED"),
+    )
+
+
+def test_the_revision_decides_whether_the_search_always_improves():
+    later = KnowledgeBase.load(scenario="release15")
+    assert later.state().objectives[0].always_improve
+    decision = later.infer(later.state(groundings={"f_generate_search_path": "fd_spiral_low"})).plan.decisions
+    assert decision[0].design == "fd_spiral_high"
+
+
+def test_a_file_and_words_make_one_state_and_words_win(bench, tmp_path):
+    file = tmp_path / "state.yaml"
+    file.write_text(
+        "objectives: [f_generate_search_path]\n"
+        "groundings: {f_generate_search_path: fd_spiral_high}\n"
+        "components: {c_thruster_1: FALSE}\n"  # YAML's own false
+        "measurements: {water_visibility: 1.8}\n"
+    )
+    assert bench.state(file).components == (("c_thruster_1", "FALSE"),)
+    state = bench.state(file, measurements={"water_visibility": 3.0}, components={"c_thruster_1": "RECOVERED"})
+    assert str(state.measured("water_visibility")[0]) == "3"
+    assert state.components == (("c_thruster_1", "RECOVERED"),)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("measurements: {water_visibilty: 1}\n", "line 1, measurements.water_visibilty: there is no quality attribute"),
+        ("measurements:\n  water_visibility: deep\n", "line 2, measurements.water_visibility: 'deep' is not a number"),
+        ("groundings: {f_maintain_motion: fd_spiral_low}\n", "f_maintain_motion has no function design"),
+        ("component: {}\n", "did you mean 'components'"),
+        ("components: 3\n", "is not a mapping"),
+        ("", "is empty"),
+    ],
+)
+def test_a_wrong_file_is_told_with_its_place(bench, tmp_path, text, said):
+    file = tmp_path / "state.yaml"
+    file.write_text(text)
+    with pytest.raises(InputError) as error:
+        bench.state(file)
+    assert said in str(error.value)
+    assert str(file) in str(error.value)
+
+
+def test_the_command_prints_what_the_library_gives(bench, command):
+    words = ("--ground", "f_generate_search_path=fd_spiral_high", "--set", "water_visibility=1.8")
+    status, text, _ = command("infer", *words)
+    assert status == 0
+    assert "  fg_status(fg_spiral_high, IN_ERROR_NFR)\n" in text
+    assert "    not fd_spiral_medium: water_visibility 1.80 measured < 2.25 expected\n" in text
+    status, printed, _ = command("infer", *words, "--format", "json")
+    assert json.loads(printed)["inferred"] == sorted(map(str, bench.infer(bench.state(**HIGH)).inference.facts))
+
+
+def test_a_rule_switched_off_infers_nothing(command):
+    words = ("--ground", "f_generate_search_path=fd_spiral_high", "--set", "water_visibility=1.8")
+    _, text, _ = command("infer", *words, "--disable-rule", "QAWaterVisibility")
+    assert "inferred\n  nothing\nplan\n  nothing to adapt\n" in text
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--set", "water_visibility"), "--set: 'water_visibility' has no value"),
+        (("--component", "c_thruster_7=FALSE"), "--component: there is no component 'c_thruster_7' (did you mean"),
+        (("--disable-rule", "QAWaterVisibilty"), "did you mean 'QAWaterVisibility'"),
+        (("--reasoner", "hermit"), "there is no reasoner 'hermit'"),
+        (("--state", "nowhere.yaml"), "nowhere.yaml: no such file"),
+    ],
+)
+def test_what_cannot_be_used_ends_in_one_line(command, words, said):
+    status, text, error = command("infer", *words)
+    assert (status, text) == (2, "")
+    assert said in error
+    assert error.count("\n") == 1
+
+
+class TestTimeLimit:
+    def test_names_the_state_that_takes_too_long_and_refuses_more(self, bench):
+        class Slow:
+            name = "slow"
+
+            def infer(self, state):
+                time.sleep(5.0)
+
+        reasoner = LimitedReasoner(Slow(), TimeLimit(0.05))
+        with pytest.raises(KnowledgeError, match=r"fd_spiral_high, water_visibility = 1.8: not done after 0.05 s"):
+            reasoner.infer(bench.state(**HIGH))
+        with pytest.raises(KnowledgeError, match="still reasoning"):
+            reasoner.infer(bench.state())
+
+    def test_passes_on_results_and_errors(self):
+        limit = TimeLimit(5.0)
+        assert limit.run(lambda: 3, "counting") == 3
+        with pytest.raises(ZeroDivisionError):
+            limit.run(lambda: 1 // 0, "dividing")
