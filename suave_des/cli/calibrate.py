@@ -92,11 +92,9 @@ def _problem(
     reasoner: str | None,
 ) -> tuple[Problem, tuple[str, str]]:
     """What is fitted to what, and the data's name and SHA-256."""
-    import numpy as np
-
-    from suave_des.calibration.distance import missions_as_vectors
     from suave_des.calibration.fit import Problem
     from suave_des.calibration.parameters import read_parameters
+    from suave_des.calibration.published import as_vectors
     from suave_des.resources import find
     from suave_des.scenario.loader import load_scenario
     from suave_des.validation.runs import choose_managers, read_runs
@@ -106,11 +104,4 @@ def _problem(
     chosen = choose_managers(published, wanted)
     loaded = load_scenario(scenario, ontologies=ontology or (), modes_file=modes, reasoner=reasoner)
     form, free = read_parameters(find(parameters, "scenarios/calibration"), loaded)
-    vectors = {}
-    for name in chosen:
-        rows = published.frame[published.frame["manager"] == name]
-        columns = [rows[each].to_numpy(float) for each in ("search_time_s", "distance_inspected_m", "detection_x_m")]
-        missions = missions_as_vectors(*columns)
-        # A component that is never known for a manager is not compared at all.
-        vectors[name] = missions[:, ~np.isnan(missions).all(axis=0)]
-    return Problem(form, free, vectors, runs, seed), (Path(data).name, published.sha256)
+    return Problem(form, free, as_vectors(published.frame, chosen), runs, seed), (Path(data).name, published.sha256)

@@ -1,0 +1,109 @@
+"""Which calibrated parameters matter: Morris screening of the two metrics, for each of the paper's managers.
+
+Elementary effects (Morris 1991; mu* after Campolongo et al. 2007; package SALib) of the mean search time and the mean
+distance inspected over the bounds of the calibration. All evaluations meet the same seas, so that differences are the
+parameters' doing. Writes sensitivity.csv and sensitivity.png.
+
+    python analysis/sensitivity.py --out analysis/sensitivity [--trajectories 10] [--runs 100] [--workers 2]
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import multiprocessing
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from SALib.analyze import morris as analyze_morris
+from SALib.sample import morris as sample_morris
+
+from suave_des.calibration.parameters import read_parameters
+from suave_des.resources import find
+from suave_des.scenario.loader import LoadedScenario, load_scenario
+from suave_des.scenario.overrides import with_values
+from suave_des.simulation.simulator import Simulator
+
+MANAGERS = ("none", "random", "metacontrol")
+METRICS = {"search_time_s": "mean search time (s)", "distance_inspected_m": "mean distance inspected (m)"}
+
+
+def means(loaded: LoadedScenario, paths: tuple[str, ...], runs: int, values: tuple[float, ...]) -> list[float]:
+    """Mean search time and distance of each manager with some parameter values."""
+    simulator = Simulator(with_values(loaded, dict(zip(paths, values, strict=True))))
+    found = []
+    for manager in MANAGERS:
+        metrics = [simulator.run(manager, run, 1).metrics for run in range(1, runs + 1)]
+        found += [float(np.mean([getattr(each, name) for each in metrics])) for name in METRICS]
+    return found
+
+
+def draw(path: Path, names: list[str], effects: dict[tuple[str, str], np.ndarray]) -> None:
+    """One panel a metric: mu* of each parameter and manager, the most important parameters on top."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.0, 4.6), layout="constrained")
+    panels = figure.subplots(1, len(METRICS))
+    colours = {"none": "#7f8c8d", "random": "#d98c21", "metacontrol": "#1f5f99"}
+    for panel, (metric, title) in zip(panels, METRICS.items(), strict=True):
+        order = np.argsort(np.mean([effects[manager, metric] for manager in MANAGERS], axis=0))
+        for offset, manager in zip((-0.26, 0.0, 0.26), MANAGERS, strict=True):
+            panel.barh(
+                np.arange(len(names)) + offset,
+                effects[manager, metric][order],
+                height=0.24,
+                color=colours[manager],
+                label=manager,
+            )
+        panel.set_yticks(range(len(names)), [names[index] for index in order], fontsize=8)
+        panel.set_xlabel(f"mean elementary effect on the {title}, over the bounds", fontsize=8)
+        panel.tick_params(axis="x", labelsize=8)
+        for side in ("top", "right"):
+            panel.spines[side].set_visible(False)
+    panels[0].legend(frameon=False, fontsize=8, loc="lower right")
+    figure.savefig(path, dpi=160)
+
+
+def main() -> None:
+    """Sample, simulate, analyze, draw."""
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--out", type=Path, required=True)
+    options.add_argument("--trajectories", type=int, default=10)
+    options.add_argument("--runs", type=int, default=100)
+    options.add_argument("--workers", type=int, default=2)
+    chosen = options.parse_args()
+    chosen.out.mkdir(parents=True, exist_ok=True)
+
+    loaded, free = read_parameters(find("seams2023", "scenarios/calibration"), load_scenario("seams2023"))
+    paths = tuple(each.path for each in free)
+    names = [path.split(".", 1)[1].removesuffix("_m_per_s") for path in paths]
+    problem = {"num_vars": len(free), "names": names, "bounds": [[each.lower, each.upper] for each in free]}
+    samples = sample_morris.sample(problem, chosen.trajectories, num_levels=4, seed=1)
+    with multiprocessing.get_context("spawn").Pool(chosen.workers) as pool:
+        found = np.array(
+            pool.map(partial(means, loaded, paths, chosen.runs), map(tuple, samples.tolist()), chunksize=2)
+        )
+
+    effects, rows = {}, []
+    for column, (manager, metric) in enumerate((m, k) for m in MANAGERS for k in METRICS):
+        result = analyze_morris.analyze(problem, samples, found[:, column], num_levels=4, seed=1)
+        effects[manager, metric] = np.asarray(result["mu_star"])
+        for index, path in enumerate(paths):
+            numbers = (
+                result["mu"][index],
+                result["mu_star"][index],
+                result["mu_star_conf"][index],
+                result["sigma"][index],
+            )
+            rows.append([manager, metric, path, *(f"{float(number):.4g}" for number in numbers)])
+    with (chosen.out / "sensitivity.csv").open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["manager", "metric", "parameter", "mu", "mu_star", "mu_star_conf95", "sigma"])
+        writer.writerows(rows)
+    draw(chosen.out / "sensitivity.png", names, effects)
+    print(f"{len(samples)} sets of values, {len(samples) * len(MANAGERS) * chosen.runs} missions; see {chosen.out}")
+
+
+if __name__ == "__main__":
+    main()
