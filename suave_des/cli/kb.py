@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import typer
 
-from suave_des.cli import kb_infer
+from suave_des.cli import kb_explain, kb_infer
 
 app = typer.Typer(
     name="kb",
@@ -25,3 +25,4 @@ def _help(context: typer.Context) -> None:
 
 
 app.command("infer")(kb_infer.infer)
+app.command("explain")(kb_explain.explain)

@@ -17,7 +17,7 @@ from suave_des.cli.kb_options import (
     print_json,
     state_lines,
 )
-from suave_des.cli.options import DisabledRules, Ontologies, Reasoner
+from suave_des.cli.options import DisabledRules, Ontologies, Reasoner, RuleFiles
 
 if TYPE_CHECKING:
     from suave_des.knowledge.deliberation import Conclusion
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 def infer(
     ontology: Ontologies = None,
     scenario: ScenarioOption = "seams2023",
+    rules: RuleFiles = None,
     disable_rule: DisabledRules = None,
     reasoner: Reasoner = None,
     state: StateFile = None,
@@ -44,6 +45,7 @@ def infer(
         ontology or (),
         scenario=scenario,
         reasoner=reasoner,
+        rules=rules or (),
         disabled_rules=disable_rule or (),
         time_limit_s=time_limit,
     )

@@ -74,8 +74,8 @@ def _decide(kb: KnowledgeBase, inference: Inference, function: str, call: str) -
         present = inference.state.grounded(function)
         kept = f"{present} is kept" if present else "it stays ungrounded"
         return Decision(function, None, f"{call}: no function design is left, {kept}", tuple(rejected))
-    best = min(left, key=lambda design: (-_performance(kb, inference, design), design))
-    shown = _show(_performance(kb, inference, best))
+    best = min(left, key=lambda design: (-performance(kb, inference, design), design))
+    shown = _show(performance(kb, inference, best))
     reason = f"{call}: highest performance, {shown}, of {len(left)} left among {len(designs)}"
     return Decision(function, best, reason, tuple(rejected))
 
@@ -127,7 +127,8 @@ def _operator(inference: Inference, attribute: str, objective: str) -> tuple[Cal
     )
 
 
-def _performance(kb: KnowledgeBase, inference: Inference, design: str) -> Decimal:
+def performance(kb: KnowledgeBase, inference: Inference, design: str) -> Decimal:
+    """What the planner maximises: the design's expected performance."""
     name = kb.names.short(PERFORMANCE)
     return max(
         (value for kind, value in _values(inference, design, "hasQAestimation") if kind == name),

@@ -107,7 +107,9 @@ class Fact:
     value: Value
 
     def __str__(self) -> str:
-        """As a rule atom would say it: fg_status(fg_spiral_high, IN_ERROR_NFR)."""
+        """As a rule atom would say it: fg_status(fg_spiral_high, IN_ERROR_NFR), Component(c_thruster_1)."""
+        if self.property == "type":
+            return f"{self.value}({self.subject})"
         value = str(self.value).lower() if isinstance(self.value, bool) else self.value
         return f"{self.property}({self.subject}, {value})"
 

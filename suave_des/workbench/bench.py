@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
 
-from suave_des.errors import InputError
 from suave_des.knowledge.base import KnowledgeBase as Ontologies
 from suave_des.knowledge.deliberation import Conclusion, Deliberation
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import KnowledgeState, Number
 from suave_des.scenario.loader import load_scenario
-from suave_des.scenario.wording import did_you_mean, shown
-from suave_des.workbench.limit import TIME_LIMIT_S, LimitedReasoner, TimeLimit
+from suave_des.workbench.explain import Explanation, explain
+from suave_des.workbench.limit import TIME_LIMIT_S, LimitedReasoner, TimeLimit, in_words
 from suave_des.workbench.states import Loop, state_from
 
 DEFAULT_SCENARIO = "seams2023"
@@ -45,7 +43,8 @@ class KnowledgeBase:
         *,
         scenario: str | Path = DEFAULT_SCENARIO,
         reasoner: str | None = None,
-        disabled_rules: Iterable[str] = (),
+        rules: Sequence[str | Path] = (),
+        disabled_rules: Sequence[str] = (),
         time_limit_s: float = TIME_LIMIT_S,
     ) -> KnowledgeBase:
         """Read ontologies and start a reasoner on them.
@@ -55,6 +54,7 @@ class KnowledgeBase:
             scenario: a scenario file, or the name of a shipped one: its ontologies, overridden values, measured
                 attributes, and what its revision does in code.
             reasoner: in place of the scenario's.
+            rules: files of rules as text, besides the scenario's.
             disabled_rules: names of rules to switch off.
             time_limit_s: for each inference.
 
@@ -62,11 +62,14 @@ class KnowledgeBase:
             InputError: a file or name cannot be used.
             KnowledgeError: the ontologies cannot be reasoned with.
         """
-        loaded = load_scenario(scenario, ontologies=ontologies, reasoner=reasoner)
+        loaded = load_scenario(
+            scenario, ontologies=ontologies, reasoner=reasoner, rules=rules, disabled_rules=disabled_rules
+        )
         knowledge = loaded.scenario.knowledge
         values = {name: Decimal(repr(value)) for name, value in knowledge.values.items()}
-        base = Ontologies.load(loaded.ontologies, values=values)
-        base = without_rules(base, disabled_rules)
+        base = Ontologies.load(
+            loaded.ontologies, values=values, rules=loaded.rules, disabled_rules=knowledge.disabled_rules
+        )
         return cls.of(base, Loop.of(loaded.scenario), knowledge.reasoner, TimeLimit(time_limit_s))
 
     @classmethod
@@ -118,24 +121,17 @@ class KnowledgeBase:
         """
         return self._deliberation.conclude(state, improve_exceeded=self.loop.improves_exceeded)
 
-    def with_base(self, base: Ontologies) -> KnowledgeBase:
-        """The same workbench on other ontologies."""
-        return KnowledgeBase.of(base, self.loop, self.reasoner, self.limit)
+    def explain(self, state: KnowledgeState, question: str = "") -> Explanation:
+        """Why a fact or a decision follows in a state, or why the state contradicts itself.
 
+        Args:
+            state: the state.
+            question: a fact such as "fg_status(fg_spiral_high, IN_ERROR_NFR)", "why fd_spiral_low?" or "why not
+                fd_spiral_high?"; empty: all that is inferred and decided.
 
-def without_rules(base: Ontologies, names: Iterable[str]) -> Ontologies:
-    """The same ontologies with some rules switched off.
-
-    Raises:
-        InputError: there is no rule of that name.
-    """
-    off = sorted(set(names))
-    known = [rule.name for rule in base.content.rules]
-    for name in off:
-        if name not in known:
-            raise InputError(f"there is no rule {shown(name)} to switch off", remedy=did_you_mean(name, known))
-    if not off:
-        return base
-    rules = tuple(replace(rule, enabled=rule.enabled and rule.name not in off) for rule in base.content.rules)
-    digest = hashlib.sha256("\n".join((base.content_hash, "without", *off)).encode()).hexdigest()
-    return replace(base, rules=rules, content=replace(base.content, rules=rules), content_hash=digest)
+        Raises:
+            InputError: the question is none of these, or names what the knowledge base does not have.
+            KnowledgeError: the reasoner takes too long.
+        """
+        doing = f"explaining the state {in_words(state)}"
+        return self.limit.run(lambda: explain(self.base, state, question, self.loop.improves_exceeded), doing)

@@ -211,5 +211,5 @@ def test_every_kind_of_conclusion_of_an_own_rule_is_read(suave_copy: MakeOntolog
     assert Fact("obs_water_visibility", "doubled", Decimal("3.4")) in inference.facts
     assert "note(c_thruster_2, it's 50% (no), été 🚨 C:\\new)" in found
     assert "hinders(c_thruster_2, o_generate_search_path)" in found
-    assert "type(c_thruster_2, Broken)" in found
+    assert "Broken(c_thruster_2)" in found
     assert make_reasoner("owlready2", base).infer(state).facts ^ inference.facts == frozenset()

@@ -90,7 +90,7 @@ def test_a_rule_switched_off_infers_nothing(command):
     [
         (("--set", "water_visibility"), "--set: 'water_visibility' has no value"),
         (("--component", "c_thruster_7=FALSE"), "--component: there is no component 'c_thruster_7' (did you mean"),
-        (("--disable-rule", "QAWaterVisibilty"), "did you mean 'QAWaterVisibility'"),
+        (("--disable-rule", "QAWaterVisibilty"), "did you mean QAWaterVisibility?"),
         (("--reasoner", "hermit"), "there is no reasoner 'hermit'"),
         (("--state", "nowhere.yaml"), "nowhere.yaml: no such file"),
     ],

@@ -1,0 +1,209 @@
+"""Explanations: why a fact follows, why a function design was chosen or not, and why a state contradicts itself."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from suave_des.errors import InputError, KnowledgeError
+from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.deliberation import Conclusion, Deliberation
+from suave_des.knowledge.model import facts_of
+from suave_des.knowledge.planning import performance
+from suave_des.knowledge.reasoners import make_reasoner
+from suave_des.knowledge.situation import Triple
+from suave_des.knowledge.state import Decision, Fact, KnowledgeState
+from suave_des.knowledge.vocabulary import objective_name
+from suave_des.scenario.wording import did_you_mean, shown
+from suave_des.workbench.derivation import Clash, Derivation, Tracer
+
+_WHY: Final = re.compile(r"why\s+(not\s+)?([\w.-]+)\s*\??", re.IGNORECASE)
+_ATOM: Final = re.compile(r"([^\s(]+)\s*\(\s*([^,()]+?)\s*(?:,\s*(.+?)\s*)?\)")
+_FORMS: Final = (
+    'a fact such as fg_status(fg_spiral_high, IN_ERROR_NFR), "why fd_spiral_low?" or "why not fd_spiral_high?"'
+)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A function design as the planner saw it.
+
+    Attributes:
+        design: its name.
+        verdict: "chosen", "left out" or "not the best".
+        reason: why.
+        because: how the facts follow that left it out.
+    """
+
+    design: str
+    verdict: str
+    reason: str
+    because: tuple[Derivation, ...] = ()
+
+
+@dataclass(frozen=True)
+class DecisionExplanation:
+    """Why a function gets a design.
+
+    Attributes:
+        function: which function.
+        answer: in one sentence.
+        because: how the facts follow that call for adaptation.
+        candidates: all designs of the function, by name; none when there is nothing to decide.
+    """
+
+    function: str
+    answer: str
+    because: tuple[Derivation, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """The answer to a question about a state.
+
+    Attributes:
+        state: the state.
+        facts: how facts follow.
+        decisions: why functions get their designs.
+        problem: for a state that contradicts itself: what Pellet says of it.
+        clashes: who clashes with whom then.
+        rules: the rules that the contradiction needs.
+    """
+
+    state: KnowledgeState
+    facts: tuple[Derivation, ...] = ()
+    decisions: tuple[DecisionExplanation, ...] = ()
+    problem: str | None = None
+    clashes: tuple[Clash, ...] = ()
+    rules: tuple[str, ...] = ()
+
+
+def explain(base: KnowledgeBase, state: KnowledgeState, question: str, improves_exceeded: bool) -> Explanation:
+    """Answer a question about a state; see KnowledgeBase.explain."""
+    why, atom = _WHY.fullmatch(question.strip()), _ATOM.fullmatch(question.strip())
+    if question.strip() and not why and not atom:
+        raise InputError(f"{shown(question)} is no question about a state", remedy=_FORMS)
+    tracer = Tracer(base, state)
+    reasoner = make_reasoner("pellet", base)
+    try:
+        conclusion = Deliberation(base, reasoner).conclude(state, improve_exceeded=improves_exceeded)
+    except KnowledgeError:
+        problem, clashes, rules = tracer.clashes()
+        if not rules and not clashes:
+            raise  # no contradiction of rules: the message that there is says it all
+        return Explanation(state, problem=problem, clashes=clashes, rules=rules)
+    told = _Teller(base, conclusion, tracer)
+    if atom:
+        return Explanation(state, facts=(told.fact(*atom.groups()),))
+    if why:
+        return Explanation(state, decisions=(told.design(why.group(2), wanted=why.group(1) is None),))
+    facts = tuple(tracer.derive(triple) for triple in told.inferred())
+    return Explanation(state, facts, tuple(told.decision(each) for each in conclusion.plan.decisions))
+
+
+class _Teller:
+    """Finds the facts behind a conclusion and how they follow."""
+
+    def __init__(self, base: KnowledgeBase, conclusion: Conclusion, tracer: Tracer) -> None:
+        self.base = base
+        self.conclusion = conclusion
+        self.tracer = tracer
+        self.triples: dict[Fact, Triple] = {}
+        for triple in sorted(tracer.entailed(), key=lambda each: (each not in tracer.asserted, str(each))):
+            for fact in facts_of([triple], base.names):
+                self.triples.setdefault(fact, triple)
+
+    def inferred(self) -> list[Triple]:
+        facts = self.conclusion.inference.facts
+        return [self.triples[fact] for fact in sorted(facts, key=str)]
+
+    def fact(self, property_name: str, subject: str, value: str | None) -> Derivation:
+        """How a fact follows that is written as an atom; a class atom has no value."""
+        name, wanted = ("type", property_name) if value is None else (property_name, value.strip("\"'"))
+        if value is None and wanted not in {str(fact.value) for fact in self.triples if fact.property == "type"}:
+            wanted = property_name
+        for fact, triple in self.triples.items():
+            if fact.property == name and fact.subject == subject and _text(fact) == wanted:
+                return self.tracer.derive(triple)
+        known = sorted({fact.subject for fact in self.triples})
+        if subject not in known:
+            raise InputError(f"there is nothing named {shown(subject)} in this state", remedy=_near(subject, known))
+        there = sorted(_text(fact) for fact in self.triples if (fact.property, fact.subject) == (name, subject))
+        properties = sorted({fact.property for fact in self.triples})
+        if not there and value is not None and name not in properties:
+            raise InputError(f"nothing has a {shown(name)} in this state", remedy=_near(name, properties))
+        raise InputError(
+            f"{property_name}({subject}{', ' + wanted if value is not None else ''}) does not follow in this state",
+            remedy=f"{name} of {subject}: {', '.join(there) or 'none'}",
+        )
+
+    def design(self, design: str, *, wanted: bool) -> DecisionExplanation:
+        """Why, or why not, a function design."""
+        functions = [name for name in self.base.functions if design in self.base.designs(name)]
+        if not functions:
+            known = [each for name in self.base.functions for each in self.base.designs(name)]
+            raise InputError(f"there is no function design {shown(design)}", remedy=did_you_mean(design, known))
+        function = functions[0]
+        decisions = [each for each in self.conclusion.plan.decisions if each.function == function]
+        if decisions:
+            return self.decision(decisions[0], design, wanted=wanted)
+        state = self.conclusion.inference.state
+        if function not in {each.function for each in state.objectives}:
+            return DecisionExplanation(function, f"nothing is decided: {function} has no objective in this state")
+        present = state.grounded(function)
+        return DecisionExplanation(
+            function,
+            f"nothing is decided: the objective of {function} calls for no adaptation, so {present or 'it'} stays",
+        )
+
+    def decision(self, decision: Decision, asked: str | None = None, *, wanted: bool = True) -> DecisionExplanation:
+        """Why a decision was made; with the design asked about first in the answer."""
+        candidates = tuple(self._candidate(decision, name) for name in self.base.designs(decision.function))
+        answer = f"{decision.design}: {decision.reason}" if decision.design else decision.reason
+        for each in candidates:
+            if each.design == asked and each.verdict != "chosen":
+                answer = f"{asked} is {each.verdict}: {each.reason}"
+            elif each.design == asked and not wanted:
+                answer = f"{asked} is chosen: {decision.reason}"
+        return DecisionExplanation(decision.function, answer, tuple(self._call(decision.function)), candidates)
+
+    def _call(self, function: str) -> Iterator[Derivation]:
+        objective = objective_name(function)
+        for fact in sorted(self.conclusion.inference.facts, key=str):
+            if fact.subject == objective and fact.property in ("o_status", "o_updatable"):
+                yield self.tracer.derive(self.triples[fact])
+
+    def _candidate(self, decision: Decision, design: str) -> Candidate:
+        if design == decision.design:
+            return Candidate(design, "chosen", decision.reason)
+        for rejection in decision.rejected:
+            if rejection.design == design:
+                return Candidate(
+                    design, "left out", rejection.reason, tuple(self._objection(decision.function, design))
+                )
+        inference = self.conclusion.inference
+        own = performance(self.base, inference, design)
+        best = performance(self.base, inference, str(decision.design))
+        if own == best:
+            return Candidate(design, "not the best", f"performance {own}, as {decision.design}, which is first by name")
+        return Candidate(design, "not the best", f"performance {own} < {best} of {decision.design}")
+
+    def _objection(self, function: str, design: str) -> Iterator[Derivation]:
+        """How the facts follow on which a design was left out, where the reasoner found them."""
+        for fact in (
+            Fact(design, "fd_realisability", False),
+            Fact(design, "fd_error_log", objective_name(function)),
+        ):
+            if fact in self.triples:
+                yield self.tracer.derive(self.triples[fact])
+
+
+def _text(fact: Fact) -> str:
+    return str(fact.value).lower() if isinstance(fact.value, bool) else str(fact.value)
+
+
+def _near(word: str, known: list[str]) -> str:
+    return did_you_mean(word, known).partition("? ")[0] + "?" if len(known) > 40 else did_you_mean(word, known)

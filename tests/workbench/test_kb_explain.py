@@ -1,0 +1,189 @@
+"""kb explain: derivations hold in Pellet step by step, decisions name the filter, contradictions name the rules."""
+
+import json
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from suave_des.errors import InputError
+from suave_des.workbench import KnowledgeBase
+from suave_des.workbench.derivation import Tracer
+
+MOTION, SEARCH = "f_maintain_motion", "f_generate_search_path"
+CLASH = (
+    "clash: FunctionGrounding(?fg) ^ hasQAvalue(?fg, ?q) ^ isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ "
+    'lessThan(?v, 2) -> fg_status(?fg, "IN_ERROR_FR")\n'
+)
+
+
+@pytest.fixture(scope="module")
+def in_error(bench):
+    return bench.state(
+        groundings={SEARCH: "fd_spiral_high", MOTION: "fd_all_thrusters"},
+        components={"c_thruster_1": "FALSE"},
+        measurements={"water_visibility": 1.8},
+    )
+
+
+def nodes(derivation):
+    yield derivation
+    for premise in derivation.premises:
+        yield from nodes(premise)
+
+
+@settings(max_examples=15)
+@given(
+    search=st.sampled_from(["fd_spiral_low", "fd_spiral_medium", "fd_spiral_high"]),
+    motion=st.sampled_from(["fd_all_thrusters", "fd_recover_thrusters"]),
+    statuses=st.lists(st.sampled_from(["FALSE", "RECOVERED"]), max_size=2),
+    visibility=st.sampled_from(["1", "1.25", "1.2500001", "2.25", "3", "4"]),
+)
+def test_every_inferred_fact_has_a_tree_down_to_asserted_facts(bench, search, motion, statuses, visibility):
+    state = bench.state(
+        groundings={SEARCH: search, MOTION: motion},
+        components={f"c_thruster_{n}": status for n, status in enumerate(statuses, start=1)},
+        measurements={"water_visibility": visibility},
+    )
+    inference = bench.infer(state).inference
+    rules = {rule.name: rule for rule in bench.base.rules}
+    derived = bench.explain(state).facts
+    assert {each.fact for each in derived} == inference.facts
+    for node in (node for each in derived for node in nodes(each)):
+        assert node.fact in inference.facts | inference.asserted
+        if node.source == "rule":
+            body = rules[node.rule].body
+            assert {name for name, _ in node.bindings} == {name for atom in body for name in atom.variables()}
+            assert len(node.premises) == sum(atom.kind in ("class", "object", "data") for atom in body)
+        else:
+            assert node.fact in inference.asserted
+            assert not node.premises
+
+
+def test_a_step_is_what_pellet_concludes_from_its_body_and_rule_alone(bench, in_error):
+    tracer = Tracer(bench.base, in_error)
+    rule = next(rule for rule in bench.base.rules if rule.name == "compError")
+    suave, tomasys = "http://www.metacontrol.org/suave#", "http://metacontrol.org/tomasys#"
+    body = {
+        triple
+        for triple in tracer.asserted
+        if triple[0] == f"{suave}c_thruster_1" and triple[1].rpartition("#")[2] in ("type", "c_status", "requiredBy")
+    }
+    assert {triple[:2] for triple in tracer._step(rule, frozenset(body))} == {
+        (f"{suave}fd_all_thrusters", f"{tomasys}fd_realisability")
+    }
+    without_status = {triple for triple in body if not triple[1].endswith("c_status")}
+    assert tracer._step(rule, frozenset(without_status)) == frozenset()
+
+
+def test_a_chain_of_rules_is_told_with_its_bindings(bench, in_error):
+    (tree,) = bench.explain(in_error, f"o_status(o_{SEARCH[2:]}, IN_ERROR_NFR)").facts
+    assert (tree.rule, tree.rules()) == ("S1b", {"S1b", "QAWaterVisibility"})
+    error = next(each for each in tree.premises if each.source == "rule")
+    assert {("expected", "3.25"), ("measured", "1.8")} <= {(name, str(value)) for name, value in error.bindings}
+
+
+def test_a_fact_that_the_schema_adds_names_it(edited):
+    # Nothing says that c_new is a Component but the domain of requiredBy.
+    bench = KnowledgeBase.load(
+        [
+            edited(
+                '<rdf:Description rdf:about="http://www.metacontrol.org/suave#c_new">'
+                '<mros:requiredBy rdf:resource="http://www.metacontrol.org/suave#fd_spiral_low"/></rdf:Description>'
+            )
+        ]
+    )
+    state = bench.state(components={"c_new": "FALSE"})
+    (tree,) = bench.explain(state, "fd_realisability(fd_spiral_low, false)").facts
+    assert tree.rule == "compError"
+    kind = next(each for each in tree.premises if each.fact.property == "type")
+    assert (kind.source, str(kind.fact)) == ("axioms", "Component(c_new)")
+    assert {each.source for each in kind.leaves()} <= {"state", "ontology"}
+
+
+def test_a_rule_that_computes_is_traced(tmp_path):
+    rules = tmp_path / "margin.swrl"
+    rules.write_text(
+        "margin: FunctionGrounding(?fg) ^ hasQAvalue(?fg, ?q) ^ hasValue(?q, ?v) ^ add(?w, ?v, 1.0) ^ "
+        'lessThan(?w, 3) -> fg_status(?fg, "IN_ERROR_FR")\n'
+    )
+    bench = KnowledgeBase.load(rules=[rules], disabled_rules=["QAWaterVisibility"])
+    state = bench.state(groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 1.5})
+    (tree,) = bench.explain(state, "fg_status(fg_spiral_high, IN_ERROR_FR)").facts
+    assert tree.rule == "margin"
+
+
+class TestDecisions:
+    def test_why_not_names_the_filter_and_how_its_fact_follows(self, bench, in_error):
+        (decision,) = bench.explain(in_error, "why not fd_all_thrusters?").decisions
+        assert decision.answer == "fd_all_thrusters is left out: not realisable"
+        left_out = next(each for each in decision.candidates if each.design == "fd_all_thrusters")
+        assert [each.rule for each in left_out.because] == ["compError"]
+
+    def test_why_tells_the_call_and_every_other_design(self, bench, in_error):
+        (decision,) = bench.explain(in_error, "why fd_spiral_low?").decisions
+        assert [each.rule for each in decision.because] == ["S1b"]
+        assert [(each.design, each.verdict) for each in decision.candidates] == [
+            ("fd_spiral_high", "left out"),
+            ("fd_spiral_low", "chosen"),
+            ("fd_spiral_medium", "left out"),
+        ]
+
+    def test_a_design_that_is_merely_worse_is_compared_with_the_best(self, bench):
+        (decision,) = bench.explain(bench.state(), "why not fd_spiral_low?").decisions
+        assert decision.answer == "fd_spiral_low is not the best: performance 0.25 < 1.0 of fd_spiral_high"
+
+    def test_nothing_to_adapt_is_said(self, bench):
+        state = bench.state(groundings={SEARCH: "fd_spiral_low"}, measurements={"water_visibility": 1.25})
+        (decision,) = bench.explain(state, "why not fd_spiral_high?").decisions
+        assert "calls for no adaptation, so fd_spiral_low stays" in decision.answer
+        (decision,) = bench.explain(state, "why fd_recover_thrusters?").decisions
+        assert "f_maintain_motion has no objective in this state" in decision.answer
+
+
+@pytest.mark.parametrize(
+    ("question", "said"),
+    [
+        ("fg_status(fg_spiral_high, IN_ERROR_FR)", "does not follow in this state (fg_status of fg_spiral_high: IN_E"),
+        ("fg_status(fg_spiral_hi, IN_ERROR_FR)", "there is nothing named 'fg_spiral_hi' in this state (did you mean"),
+        ("why fd_spiral_lo?", "there is no function design 'fd_spiral_lo' (did you mean 'fd_spiral_low'"),
+        ("because", "'because' is no question about a state"),
+        ("fg_status(", "is no question about a state"),
+    ],
+)
+def test_a_question_that_has_no_answer_is_told_so(bench, in_error, question, said):
+    with pytest.raises(InputError) as error:
+        bench.explain(in_error, question)
+    assert said in str(error.value)
+
+
+def test_a_contradiction_names_the_rules_and_derives_both_sides(tmp_path):
+    rules = tmp_path / "clash.swrl"
+    rules.write_text(CLASH)
+    bench = KnowledgeBase.load(rules=[rules])
+    state = bench.state(groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 1.8})
+    explanation = bench.explain(state)
+    assert explanation.rules == ("QAWaterVisibility", "clash")
+    (clash,) = explanation.clashes
+    assert (clash.subject, clash.property) == ("fg_spiral_high", "fg_status")
+    assert {(str(side.fact.value), side.rule) for side in clash.sides} == {
+        ("IN_ERROR_FR", "clash"),
+        ("IN_ERROR_NFR", "QAWaterVisibility"),
+    }
+    above = bench.state(groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 2})
+    assert bench.explain(above).problem is None
+
+
+def test_the_command_prints_the_tree_and_the_same_as_json(command, tmp_path):
+    words = ("--ground", f"{SEARCH}=fd_spiral_high", "--set", "water_visibility=1.8")
+    status, text, _ = command("explain", "fg_status(fg_spiral_high, IN_ERROR_NFR)", *words)
+    assert status == 0
+    assert text.startswith("fg_status(fg_spiral_high, IN_ERROR_NFR)  [by rule QAWaterVisibility with ?eqa = ")
+    assert "\n  hasValue(obs_water_visibility, 1.8)  [given in the state]\n" in text
+    _, printed, _ = command("explain", "why fd_spiral_low?", *words, "--format", "json")
+    assert json.loads(printed)["decisions"][0]["because"][0]["rule"] == "S1b"
+    rules = tmp_path / "clash.swrl"
+    rules.write_text(CLASH)
+    status, text, _ = command("explain", *words, "--rules", rules)
+    assert status == 0
+    assert "fg_status of fg_spiral_high would have 2 values:" in text
