@@ -98,6 +98,8 @@ def run_campaign(
     ontologies: Sequence[str | Path] = (),
     modes_file: str | Path | None = None,
     reasoner: str | None = None,
+    rules: Sequence[str | Path] = (),
+    disabled_rules: Sequence[str] = (),
     suave_format: bool = False,
     overwrite: bool = False,
     command: Sequence[str] = (),
@@ -118,6 +120,8 @@ def run_campaign(
         ontologies: files to use in place of the scenario's.
         modes_file: file to use in place of the scenario's.
         reasoner: to use in place of the scenario's.
+        rules: files of rules as text, besides the scenario's.
+        disabled_rules: names of rules to switch off, besides the scenario's.
         suave_format: whether to write the exemplar's own results file besides.
         overwrite: whether results in the folder may be replaced.
         command: the command line, for the manifest.
@@ -132,8 +136,15 @@ def run_campaign(
     if folder is not None:
         check_output_folder(folder, overwrite=overwrite)
     check_plan(managers, runs, workers)
-    loaded = load_scenario(scenario, ontologies=ontologies, modes_file=modes_file, reasoner=reasoner)
-    inputs = check_knowledge(loaded, managers, given=bool(ontologies))
+    loaded = load_scenario(
+        scenario,
+        ontologies=ontologies,
+        modes_file=modes_file,
+        reasoner=reasoner,
+        rules=rules,
+        disabled_rules=disabled_rules,
+    )
+    inputs = check_knowledge(loaded, managers, given=bool(ontologies or rules or disabled_rules))
     if workers > 1:
         _compile(loaded)
 

@@ -37,6 +37,8 @@ def run_mission(
     ontologies: Sequence[str | Path] = (),
     modes_file: str | Path | None = None,
     reasoner: str | None = None,
+    rules: Sequence[str | Path] = (),
+    disabled_rules: Sequence[str] = (),
     overwrite: bool = False,
     command: Sequence[str] = (),
 ) -> MissionResult:
@@ -53,6 +55,8 @@ def run_mission(
         ontologies: files to use in place of the scenario's.
         modes_file: file to use in place of the scenario's.
         reasoner: to use in place of the scenario's.
+        rules: files of rules as text, besides the scenario's.
+        disabled_rules: names of rules to switch off, besides the scenario's.
         overwrite: whether results in the folder may be replaced.
         command: the command line, for mission.json.
 
@@ -65,8 +69,15 @@ def run_mission(
         check_output_folder(folder, overwrite=overwrite)
     if run < 1:
         raise InputError(f"run: {run} is out of range", remedy="runs count from 1")
-    loaded = load_scenario(scenario, ontologies=ontologies, modes_file=modes_file, reasoner=reasoner)
-    inputs = check_knowledge(loaded, [manager], given=bool(ontologies))
+    loaded = load_scenario(
+        scenario,
+        ontologies=ontologies,
+        modes_file=modes_file,
+        reasoner=reasoner,
+        rules=rules,
+        disabled_rules=disabled_rules,
+    )
+    inputs = check_knowledge(loaded, [manager], given=bool(ontologies or rules or disabled_rules))
     result = Simulator(loaded).run(manager, run, seed, record=True)
     if folder is not None:
         make_output_folder(folder)

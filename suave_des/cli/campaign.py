@@ -8,7 +8,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli.options import Modes, Ontologies, Overwrite, Reasoner, Scenario, Seed, Workers, command_line
+from suave_des.cli.options import (
+    DisabledRules,
+    Modes,
+    Ontologies,
+    Overwrite,
+    Reasoner,
+    RuleFiles,
+    Scenario,
+    Seed,
+    Workers,
+    command_line,
+)
 
 if TYPE_CHECKING:
     from suave_des.campaign.campaign import CampaignResult
@@ -39,6 +50,8 @@ def campaign(
     ] = None,
     overwrite: Overwrite = False,
     ontology: Ontologies = None,
+    rules: RuleFiles = None,
+    disable_rule: DisabledRules = None,
     modes: Modes = None,
     reasoner: Reasoner = None,
 ) -> None:
@@ -58,6 +71,8 @@ def campaign(
             ontologies=ontology or (),
             modes_file=modes,
             reasoner=reasoner,
+            rules=rules or (),
+            disabled_rules=disable_rule or (),
             suave_format=also is Format.SUAVE,
             overwrite=overwrite,
             command=command_line(),

@@ -19,7 +19,7 @@ Modes = Annotated[
     Path | None, typer.Option("--modes", metavar="FILE", help="System Modes file in place of the scenario's.")
 ]
 Reasoner = Annotated[
-    str | None, typer.Option("--reasoner", metavar="NAME", help="pellet, or owlready2 (the reference, slow).")
+    str | None, typer.Option("--reasoner", metavar="NAME", help="remembered, pellet, or owlready2 (slow).")
 ]
 RuleFiles = Annotated[
     list[Path] | None,

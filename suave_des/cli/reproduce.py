@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from suave_des.cli.campaign import exit_telling_failures
-from suave_des.cli.options import Modes, Ontologies, Overwrite, Reasoner, Seed, Workers, command_line
+from suave_des.cli.options import (
+    DisabledRules,
+    Modes,
+    Ontologies,
+    Overwrite,
+    Reasoner,
+    RuleFiles,
+    Seed,
+    Workers,
+    command_line,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,6 +42,8 @@ def reproduce(
     ] = None,
     overwrite: Overwrite = False,
     ontology: Ontologies = None,
+    rules: RuleFiles = None,
+    disable_rule: DisabledRules = None,
     modes: Modes = None,
     reasoner: Reasoner = None,
 ) -> None:
@@ -58,6 +70,8 @@ def reproduce(
             ontologies=ontology or (),
             modes_file=modes,
             reasoner=reasoner,
+            rules=rules or (),
+            disabled_rules=disable_rule or (),
             overwrite=overwrite,
             command=command_line(),
             on_progress=show,

@@ -7,7 +7,17 @@ from typing import Annotated
 
 import typer
 
-from suave_des.cli.options import Modes, Ontologies, Overwrite, Reasoner, Scenario, Seed, command_line
+from suave_des.cli.options import (
+    DisabledRules,
+    Modes,
+    Ontologies,
+    Overwrite,
+    Reasoner,
+    RuleFiles,
+    Scenario,
+    Seed,
+    command_line,
+)
 
 
 def run(
@@ -24,6 +34,8 @@ def run(
     ] = None,
     overwrite: Overwrite = False,
     ontology: Ontologies = None,
+    rules: RuleFiles = None,
+    disable_rule: DisabledRules = None,
     modes: Modes = None,
     reasoner: Reasoner = None,
 ) -> None:
@@ -41,6 +53,8 @@ def run(
         ontologies=ontology or (),
         modes_file=modes,
         reasoner=reasoner,
+        rules=rules or (),
+        disabled_rules=disable_rule or (),
         overwrite=overwrite,
         command=command_line(),
     )

@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from suave_des.cli.campaign import exit_telling_failures
-from suave_des.cli.options import Modes, Ontologies, Overwrite, Reasoner, Seed, Workers, command_line
+from suave_des.cli.options import (
+    DisabledRules,
+    Modes,
+    Ontologies,
+    Overwrite,
+    Reasoner,
+    RuleFiles,
+    Seed,
+    Workers,
+    command_line,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -59,6 +69,8 @@ def validate(
     ] = False,
     overwrite: Overwrite = False,
     ontology: Ontologies = None,
+    rules: RuleFiles = None,
+    disable_rule: DisabledRules = None,
     modes: Modes = None,
     reasoner: Reasoner = None,
 ) -> None:
@@ -78,7 +90,15 @@ def validate(
 
     campaign: CampaignResult | None = None
     if runs_file is not None:
-        _check_unused({"--ontology": ontology, "--modes": modes, "--reasoner": reasoner})
+        _check_unused(
+            {
+                "--ontology": ontology,
+                "--rules": rules,
+                "--disable-rule": disable_rule,
+                "--modes": modes,
+                "--reasoner": reasoner,
+            }
+        )
         simulated, sources = _recorded(runs_file, chosen, scenario, out, overwrite=overwrite)
     else:
         from suave_des.campaign.campaign import run_campaign
@@ -96,6 +116,8 @@ def validate(
                 ontologies=ontology or (),
                 modes_file=modes,
                 reasoner=reasoner,
+                rules=rules or (),
+                disabled_rules=disable_rule or (),
                 overwrite=overwrite,
                 command=command_line(),
                 on_progress=show,

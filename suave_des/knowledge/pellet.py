@@ -17,14 +17,14 @@ from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.model import facts_of, properties_to_read
 from suave_des.knowledge.rules import Rule
 from suave_des.knowledge.situation import Lit, Triple
-from suave_des.knowledge.triples import RULE_IRI, n_triple
+from suave_des.knowledge.triples import RULE_IRI, canonical, n_triple
 from suave_des.knowledge.vocabulary import RDF_TYPE, XSD
 
 _LITERAL: Final = re.compile(r"literal\((.*),([^,]*),([^,]*)\)", re.DOTALL)
 _RULE: Final = re.compile(re.escape(RULE_IRI) + r"(\d+)")
 _PELLET: Final = "org.mindswap.pellet."
 #: One inference at a time in a process: Pellet's term factory is shared by all its knowledge bases.
-_one_at_a_time: Final = threading.RLock()
+one_at_a_time: Final = threading.RLock()
 
 
 def load_n_triples(text: str, *, explain: bool = False) -> Any:
@@ -48,7 +48,7 @@ class InProcessPellet:
 
     def __init__(self, kb: KnowledgeBase) -> None:
         self._kb = kb
-        with _one_at_a_time:
+        with one_at_a_time:
             jvm.start()
             self._make_term = jvm.java_class(_PELLET + "utils.ATermUtils").makeTermAppl
             self._make_literal = jvm.java_class(_PELLET + "utils.ATermUtils").makeTypedLiteral
@@ -76,7 +76,7 @@ class InProcessPellet:
             KnowledgeError: the situation contradicts itself.
         """
         jvm.start()  # it runs; but not in a process that was forked since
-        with _one_at_a_time:
+        with one_at_a_time:
             copy = self._base.copy()
             for subject, predicate, value in situation:
                 self._add(copy, subject, predicate, value)
@@ -96,6 +96,7 @@ class InProcessPellet:
         individual = self._term(subject)
         knowledge_base.addIndividual(individual)
         if isinstance(value, Lit):
+            value = canonical(value)
             if value.datatype.startswith("@"):
                 data = self._make_plain(value.text, value.datatype[1:])
             else:
@@ -120,7 +121,7 @@ class InProcessPellet:
                 else:
                     subject = str(item.getKey().toString())
                     for value in item.getValue():
-                        yield subject, name, _value(str(value.toString()))
+                        yield subject, name, read_term(str(value.toString()))
 
     def _collections(self, knowledge_base: Any) -> list[Any]:
         """For each property to read the (subject, values) entries, for each class its members."""
@@ -190,7 +191,7 @@ def _files(kb: KnowledgeBase) -> str:
     return ", ".join(map(str, kb.files))
 
 
-def _value(text: str) -> str | Lit:
+def read_term(text: str) -> str | Lit:
     """A term as Pellet prints it: an IRI, or literal(text,language,datatype)."""
     found = _LITERAL.fullmatch(text)
     if found is None:

@@ -22,8 +22,9 @@ from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.java import java_executable
 from suave_des.knowledge.model import properties_to_read
 from suave_des.knowledge.pellet import unescape
+from suave_des.knowledge.rules import literal
 from suave_des.knowledge.situation import Lit, Triple
-from suave_des.knowledge.triples import literal, n_triple
+from suave_des.knowledge.triples import n_triple
 from suave_des.knowledge.vocabulary import RDF as RDF_IRI
 from suave_des.knowledge.vocabulary import RDF_TYPE, XSD
 

@@ -5,6 +5,7 @@ Text is N-Triples: unlike RDF/XML it can be written without loss by every librar
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
@@ -18,7 +19,7 @@ from rdflib.term import Node
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.catalogue import supplies
 from suave_des.knowledge.ontology_file import OntologyFile
-from suave_des.knowledge.rules import RdfTriple, Rule, rules_of
+from suave_des.knowledge.rules import RdfTriple, Rule, literal, rules_of
 from suave_des.knowledge.situation import Lit, Triple
 from suave_des.knowledge.vocabulary import (
     MROS,
@@ -154,24 +155,32 @@ def _declarations(triples: Iterable[Triple], rules: Sequence[Rule]) -> list[Trip
     return [(name, RDF_TYPE, OWL + kind) for name, kind in sorted(heads) if name not in declared]
 
 
-def literal(term: Literal) -> Lit:
-    """A literal with its datatype; plain text is xsd:string, as RDF 1.1 says."""
-    if term.language:
-        return Lit(str(term), f"@{term.language}")
-    return Lit(str(term), str(term.datatype) if term.datatype is not None else XSD + "string")
-
-
 def _plain(triple: RdfTriple) -> Triple:
     subject, predicate, value = triple
     return str(subject), str(predicate), literal(value) if isinstance(value, Literal) else str(value)
 
 
+_DECIMAL: Final = re.compile(r"([+-]?)(?=\.?[0-9])([0-9]*)\.?([0-9]*)")
 _ESCAPES: Final = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"})
+
+
+def canonical(value: Lit) -> Lit:
+    """A decimal number in its one shortest form.
+
+    A rule's 2.00 is meant to match a measured 2; Pellet compares texts, and stock owlready2 rewrites some of them.
+    """
+    found = _DECIMAL.fullmatch(value.text.strip())
+    if value.datatype != XSD + "decimal" or found is None:
+        return value
+    sign, whole, part = found.groups()
+    text = (whole.lstrip("0") or "0") + (f".{part.rstrip('0')}" if part.rstrip("0") else "")
+    return Lit(f"-{text}" if sign == "-" and text != "0" else text, value.datatype)
 
 
 def _object(value: str | Lit) -> str:
     if isinstance(value, str):
         return f"<{value}>"
+    value = canonical(value)
     text = "".join(char if char.isascii() else f"\\U{ord(char):08X}" for char in value.text.translate(_ESCAPES))
     return f'"{text}"{value.datatype}' if value.datatype.startswith("@") else f'"{text}"^^<{value.datatype}>'
 

@@ -6,6 +6,8 @@ that either side's files work with the other's.
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from typing import Final
 
 TOMASYS: Final = "http://metacontrol.org/tomasys#"
@@ -85,3 +87,9 @@ def grounding_name(design: str) -> str:
 def measurement_name(attribute: str) -> str:
     """Name of the measured value of a quality attribute type: obs_water_visibility for water_visibility."""
     return f"obs_{attribute}"
+
+
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """A question after the known name that is most like a word; None when none is."""
+    found = difflib.get_close_matches(word, sorted(known), n=1, cutoff=0.6)
+    return f"did you mean {found[0]}?" if found else None

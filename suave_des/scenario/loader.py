@@ -40,6 +40,7 @@ class LoadedScenario:
         modes_path: the modes file.
         tables: times (s) and values of each table signal, by the signal's name.
         inputs: SHA-256 of each file read, by its name as shown to the user.
+        rules: files of rules as text, in the order in which they count.
     """
 
     scenario: Scenario
@@ -49,6 +50,7 @@ class LoadedScenario:
     modes_path: Path
     tables: Mapping[str, Table]
     inputs: Mapping[str, str]
+    rules: tuple[Path, ...] = ()
 
 
 def load_scenario(
@@ -57,6 +59,8 @@ def load_scenario(
     ontologies: Sequence[str | Path] = (),
     modes_file: str | Path | None = None,
     reasoner: str | None = None,
+    rules: Sequence[str | Path] = (),
+    disabled_rules: Sequence[str] = (),
 ) -> LoadedScenario:
     """Read and check a scenario and the files that it names.
 
@@ -67,6 +71,8 @@ def load_scenario(
         ontologies: files to use in place of the scenario's.
         modes_file: file to use in place of the scenario's.
         reasoner: to use in place of the scenario's.
+        rules: files of rules as text, besides the scenario's.
+        disabled_rules: names of rules to switch off, besides the scenario's.
 
     Raises:
         InputError: a file that cannot be read, or a value that cannot be right, with file and line.
@@ -95,6 +101,15 @@ def load_scenario(
     for each in ontology_paths:
         files.ontology(each)
 
+    rules_paths = tuple(
+        find_named(
+            layer, ("knowledge", "rules", index), each, "ontology", "a file of rules as text, named relative to this"
+        )
+        for index, each in enumerate(scenario.knowledge.rules)
+    ) + tuple(map(Path, rules))
+    for each in rules_paths:
+        files.ontology(each)
+
     tables = {}
     for signal_name, signal in scenario.signals.items():
         if isinstance(signal, TableSignal):
@@ -103,17 +118,26 @@ def load_scenario(
             tables[signal_name], digest = read_table(table_path)
             files.note(table_path, digest)
 
-    scenario = _overridden(scenario, ontologies, modes_file, reasoner)
-    return LoadedScenario(scenario, path, ontology_paths, modes, modes_path, tables, files.inputs)
+    scenario = _overridden(scenario, ontologies, modes_file, reasoner, rules, disabled_rules)
+    return LoadedScenario(scenario, path, ontology_paths, modes, modes_path, tables, files.inputs, rules_paths)
 
 
 def _overridden(
-    scenario: Scenario, ontologies: Sequence[str | Path], modes_file: str | Path | None, reasoner: str | None
+    scenario: Scenario,
+    ontologies: Sequence[str | Path],
+    modes_file: str | Path | None,
+    reasoner: str | None,
+    rules: Sequence[str | Path],
+    disabled_rules: Sequence[str],
 ) -> Scenario:
     """The scenario as if it had named what was given in its place."""
     knowledge: dict[str, object] = {}
     if ontologies:
         knowledge["ontologies"] = tuple(map(str, ontologies))
+    if rules:
+        knowledge["rules"] = (*scenario.knowledge.rules, *map(str, rules))
+    if disabled_rules:
+        knowledge["disabled_rules"] = (*scenario.knowledge.disabled_rules, *disabled_rules)
     if reasoner is not None:
         knowledge["reasoner"] = reasoner
     update: dict[str, object] = {"knowledge": scenario.knowledge.model_copy(update=knowledge)}

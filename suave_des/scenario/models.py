@@ -250,10 +250,14 @@ class Knowledge(Strict):
 
     ontologies: Annotated[tuple[FileName, ...], Field(min_length=1)] = ("suave.owl",)
     """Ontology files; what they import is resolved through the catalogue beside them."""
+    rules: tuple[FileName, ...] = ()
+    """Files of rules as text; a rule takes the place of those of its name in the ontologies."""
+    disabled_rules: tuple[Name, ...] = ()
+    """Rules to switch off, by name."""
     values: dict[str, Number] = Field(default_factory=dict)
     """New value (hasValue) of named individuals of QAvalue, such as qa_water_visibility_low: 0.5."""
     reasoner: str = "pellet"
-    """Which reasoner analyzes: pellet, or owlready2 (the reference, slow)."""
+    """Which reasoner analyzes: remembered, pellet, or owlready2 (the reference, slow)."""
 
 
 _DEFAULT_MODES = {"f_generate_search_path": "fd_spiral_low", "f_follow_pipeline": "fd_follow_pipeline"}

@@ -22,7 +22,14 @@ def open_knowledge(loaded: LoadedScenario) -> Deliberation:
     """
     knowledge = loaded.scenario.knowledge
     values = tuple((name, Decimal(repr(value))) for name, value in sorted(knowledge.values.items()))
-    deliberation = _open(loaded.ontologies, tuple(sorted(loaded.inputs.items())), values, knowledge.reasoner)
+    deliberation = _open(
+        loaded.ontologies,
+        tuple(sorted(loaded.inputs.items())),
+        values,
+        loaded.rules,
+        knowledge.disabled_rules,
+        knowledge.reasoner,
+    )
     base = deliberation.base
     base.check(MISSION_FUNCTIONS)
     for function in MISSION_FUNCTIONS:
@@ -42,8 +49,10 @@ def _open(
     ontologies: tuple[Path, ...],
     hashes: tuple[tuple[str, str], ...],
     values: tuple[tuple[str, Decimal], ...],
+    rules: tuple[Path, ...],
+    disabled_rules: tuple[str, ...],
     reasoner: str,
 ) -> Deliberation:
     """Kept between scenarios that differ in other things: what was inferred stays true while the files' hashes do."""
-    base = KnowledgeBase.load(ontologies, values=dict(values))
+    base = KnowledgeBase.load(ontologies, values=dict(values), rules=rules, disabled_rules=disabled_rules)
     return Deliberation(base, make_reasoner(reasoner, base))

@@ -1,0 +1,274 @@
+"""Rules as text: what is read, what is refused and where, and that what is written reads back the same."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from suave_des.errors import InputError, KnowledgeError
+from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.rule_checks import check_rule
+from suave_des.knowledge.rule_names import rule_from_text
+from suave_des.knowledge.rule_parser import RuleError, parse_rule, parse_rules
+from suave_des.knowledge.rule_syntax import Atom, Named, Place, Variable
+from suave_des.knowledge.rule_writer import full_name, naming, write_rule
+from suave_des.knowledge.rules import Rule
+from suave_des.knowledge.situation import Lit
+from suave_des.knowledge.vocabulary import MROS, SWRLB, TOMASYS, XSD
+
+RULE = "LowBattery: QAvalue(?q) ^ isQAtype(?q, battery_level) ^ hasValue(?q, ?v) ^ lessThan(?v, 0.25) -> Role(?q)\n"
+EVERYTHING = r"""# rules for a test
+prefix my: <http://example.org/my#>
+
+LowBattery:
+    FunctionGrounding(?fg) ^ hasQAvalue(?fg, ?q), mros:requiredBy(?fg, suave:fd_spiral_low)   # a comment
+    ∧ hasValue(?q, ?v) ^ lessThan(?v, -2.5)
+    -> fg_status(?fg, "IN \"ERROR\" \u00e9")
+
+disabled "a rule, with: words": -> my:seen(<http://example.org/x>, true) ^ my:seen(my:y, "3"^^xsd:float)
+disabled: A(?x) ^ tomasys:b(?x, 1e-3) → B(?x)
+ñandú:é(?ü)->fin(?ü,"x"@en-GB)
+"""
+
+
+def rules_with(text: str, tmp_path: Path, **options: object) -> KnowledgeBase:
+    path = tmp_path / "mine.swrl"
+    path.write_text(text, encoding="utf-8")
+    return KnowledgeBase.load(rules=[path], **options)  # type: ignore[arg-type]
+
+
+def told(text: str, tmp_path: Path) -> str:
+    with pytest.raises(KnowledgeError) as caught:
+        rules_with(text, tmp_path)
+    return str(caught.value)
+
+
+def test_every_construct_is_read() -> None:
+    parsed = parse_rules(EVERYTHING)
+    assert parsed.errors == ()
+    low, quoted, disabled, foreign = parsed.rules
+    assert (low.name, low.enabled, low.place) == ("LowBattery", True, Place(4, 1))
+    assert low.body[1] == Atom("", "hasQAvalue", (Variable("fg"), Variable("q")))
+    assert low.body[2] == Atom("", MROS + "requiredBy", (Variable("fg"), Named(full("suave:fd_spiral_low"))))
+    assert low.body[4].arguments[1] == Lit("-2.5", XSD + "decimal")
+    assert low.body[4].places[2] == Place(6, 39)
+    assert low.head[0].arguments[1] == Lit('IN "ERROR" é', XSD + "string")
+    assert (quoted.name, quoted.enabled, quoted.body) == ("a rule, with: words", False, ())
+    assert quoted.head[0] == Atom(
+        "", "http://example.org/my#seen", (Named("http://example.org/x"), Lit("true", XSD + "boolean"))
+    )
+    assert quoted.head[1].arguments == (Named("http://example.org/my#y"), Lit("3", XSD + "float"))
+    assert (disabled.name, disabled.enabled) == ("disabled", True)
+    assert disabled.body[1] == Atom("", TOMASYS + "b", (Variable("x"), Lit("1e-3", XSD + "double")))
+    assert (foreign.name, foreign.head[0].arguments[1]) == ("ñandú", Lit("x", "@en-GB"))
+
+
+def full(name: str) -> str:
+    return {"suave:fd_spiral_low": "http://www.metacontrol.org/suave#fd_spiral_low"}[name]
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "problem"),
+    [
+        ("A: B(?x -> C(?x)", "line 1, column 9", "expected , or )"),
+        ("A: B(?x)) -> C(?x)", "line 1, column 9", "expected ^ or ->"),
+        ("A: B(?x)\n  C(?x) -> D(?x)", "line 2, column 3", "expected ^ or -> instead of C"),
+        ("A B(?x) -> C(?x)", "line 1, column 3", "expected : after the rule's name A"),
+        ("A: B(?x) ->", "line 1, column 12", "the text ends here"),
+        ("A: -> ", "line 1, column 7", "the text ends here"),
+        ('A: B(?x) -> c(?x, "open)', "line 1, column 19", "no closing quote"),
+        (r'A: B(?x) -> c(?x, "\q")', "line 1, column 19", r"unknown escape \q"),
+        (r'A: B(?x) -> c(?x, "\ud800")', "line 1, column 19", "no file can hold"),
+        ("A: foo:B(?x) -> C(?x)", "line 1, column 4", "unknown prefix foo:"),
+        ("A: B(?x) -> mors:C(?x)", "line 1, column 13", "did you mean mros?"),
+        ("A: B(<no iri>) -> C(?x)", "line 1, column 6", "expected an argument"),
+        ("A: B(2x) -> C(?x)", "line 1, column 6", "expected an argument"),
+        (f"A: B({'9' * 500}) -> C(?x)", "line 1, column 6", "too many digits"),
+        ("prefix my: nope\n", "line 1, column 12", "IRI in angle brackets"),
+        ("\x00", "line 1, column 1", "expected a rule's name instead of '\\x00'"),
+    ],
+)
+def test_mistakes_are_told_with_line_and_column(text: str, place: str, problem: str) -> None:
+    (error,) = parse_rules(text).errors
+    assert error.place == place
+    assert problem in str(error)
+    assert "\n" not in str(error)
+
+
+def test_after_a_mistake_the_other_rules_are_read() -> None:
+    parsed = parse_rules(f"Bad: A(?x -> B(?x)\n{RULE}Worse: )\n    ^ more\n\n{RULE}")
+    assert [rule.name for rule in parsed.rules] == ["LowBattery", "LowBattery"]
+    assert [error.place for error in parsed.errors] == ["line 1, column 11", "line 3, column 8"]
+
+
+@pytest.mark.parametrize(
+    ("rule", "column", "words"),
+    [
+        ("Objectiv(?o) -> Role(?o)", 4, "Objectiv is not defined (did you mean Objective?)"),
+        ('Objective(?o) -> o_stat(?o, "x")', 21, "o_stat is not defined (did you mean o_status?)"),
+        ("isQAtype(?q, water_visibilty) -> Role(?q)", 17, "did you mean water_visibility?"),
+        ("hasValue(?q, ?v) ^ lessThn(?v, 1) -> Role(?q)", 23, "did you mean lessThan?"),
+        ("hasValue(?q, ?v) ^ swrlb:lessThn(?v, 1) -> Role(?q)", 23, "no builtin lessThn in Pellet"),
+        ("hasValue(?q, ?v) ^ lessThan(?v) -> Role(?q)", 23, "lessThan takes 2 arguments, not 1"),
+        ("hasValue(?q, ?v) ^ lessThan(?w, 1) -> Role(?q)", 32, "?w has no value in lessThan"),
+        ("hasValue(?q, ?v) -> Role(?g)", 29, "?g stands in the head, but the body does not bind it"),
+        ("Objective(?o, ?x) -> Role(?o)", 4, "Objective is a class, but is used as a property"),
+        ("o_status(?o) -> Role(?o)", 4, "o_status is a data property, but is used as a class"),
+        ("solvesO(?f, ?o, ?p) -> Role(?o)", 4, "solvesO takes two arguments, not 3"),
+        ('typeFD(?f, "x") -> Role(?f)', 15, "is a value where an individual is needed"),
+        ("fg_status(?f, fd_spiral_low) -> Role(?f)", 18, "is an individual where a value is needed"),
+        ("fg_status(?f, 3) -> Role(?f)", 18, "is no string, which fg_status has: it never matches"),
+        ("FunctionGrounding(?f) -> fg_status(?f, false)", 43, "contradicts whatever it is concluded of"),
+        ("hasValue(?f, 2) -> Role(?f)", 17, "write 2.0"),
+        ("hasValue(?q, ?v) ^ Role(?v) -> Role(?q)", 28, "?v stands for an individual and for a value"),
+        ("Role(?x) -> lessThan(1, 2)", 16, "stands in the head"),
+        ("Role(?x) ^ differentFrom(?x, energy) -> Role(?x)", 15, "makes Pellet lose"),
+        ("<http://x.org/#a>(?x) -> Role(?x)", 4, "class a is not defined"),
+        ("Role(<http://x.org/#i>) -> Role(energy)", 9, "individual i is not defined"),
+    ],
+)
+def test_rules_that_pellet_would_ignore_are_refused(rule: str, column: int, words: str, tmp_path: Path) -> None:
+    said = told(f"A: {rule}", tmp_path)
+    assert f"mine.swrl: line 1, column {column}: " in said
+    assert words in said
+
+
+def test_an_ambiguous_name_wants_a_prefix(suave_copy, tmp_path: Path) -> None:
+    twins = "".join(f'<owl:Class rdf:about="http://{one}.org/#Twin"/>' for one in "ab")
+    path = tmp_path / "mine.swrl"
+    path.write_text("A: Twin(?x) -> Role(?x)", encoding="utf-8")
+    with pytest.raises(RuleError, match=r"ambiguous \(write http://a.org/#Twin or http://b.org/#Twin\)"):
+        KnowledgeBase.load([suave_copy(twins)], rules=[path])
+    path.write_text("A: <http://a.org/#Twin>(?x) -> Role(?x)", encoding="utf-8")
+    assert KnowledgeBase.load([suave_copy(twins)], rules=[path]).rules
+
+
+def test_a_file_takes_the_place_of_rules_of_its_names(kb: KnowledgeBase, tmp_path: Path) -> None:
+    changed = rules_with("disabled QAenergy: Role(?x) -> Role(?x)\ncompRecov: Role(?x) -> Role(?x)\n", tmp_path)
+    assert len(changed.rules) == len(kb.rules)
+    by_name = {rule.name: rule for rule in changed.rules}
+    assert not by_name["QAenergy"].enabled
+    assert by_name["compRecov"].text == "Role(?x) -> Role(?x)"
+    assert by_name["compRecov"].file.name == "mine.swrl"
+    assert changed.content_hash != kb.content_hash
+
+
+def test_rules_are_switched_off_by_name(kb: KnowledgeBase, tmp_path: Path) -> None:
+    off = rules_with(RULE, tmp_path, disabled_rules=["LowBattery", "S1a"])
+    assert [rule.name for rule in off.rules if not rule.enabled] == ["LowBattery", "S1a"]
+    assert off.content_hash not in (kb.content_hash, rules_with(RULE, tmp_path).content_hash)
+    with pytest.raises(KnowledgeError, match=r"no rule LowBatery to switch off \(did you mean LowBattery"):
+        rules_with(RULE, tmp_path, disabled_rules=["LowBatery"])
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"\xff\xfe\x00", "is not text in UTF-8"),
+        (b"<?xml version='1.0'?><x/>", "this is XML, not rules as text"),
+        (b"A: B(", "line 1, column 6"),
+    ],
+)
+def test_files_that_are_no_rules(content: bytes, words: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.swrl"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=words):
+        KnowledgeBase.load(rules=[path])
+
+
+def test_missing_files_and_folders(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        KnowledgeBase.load(rules=[tmp_path / "none.swrl"])
+    with pytest.raises(InputError, match="this is a folder"):
+        KnowledgeBase.load(rules=[tmp_path])
+
+
+def same(one: Rule, other: Rule) -> bool:
+    return (one.name, one.enabled, one.body, one.head) == (other.name, other.enabled, other.body, other.head)
+
+
+def test_the_shipped_rules_written_and_read_back_are_the_same(kb: KnowledgeBase, tmp_path: Path) -> None:
+    named = naming(lambda iri: not kb.vocabulary.means_itself(iri))
+    text = "\n".join(write_rule(rule.name, rule.body, rule.head, named, enabled=rule.enabled) for rule in kb.rules)
+    assert "<" not in text.replace("<http", "")
+    again = rules_with(text, tmp_path)
+    assert all(map(same, again.rules, kb.rules))
+    assert again.content.n_triples().count("BuiltinAtom") == kb.content.n_triples().count("BuiltinAtom")
+
+
+words = st.from_regex(r"[A-Za-zé_][\w.-]{0,8}", fullmatch=True)
+texts = st.text(st.characters(exclude_categories=["Cs", "Cc"]) | st.sampled_from('"\\\n\t#'), max_size=12)
+iris = words.filter(lambda word: word[-1] not in ".-").map(lambda word: f"http://x.org/{word}#y") | st.sampled_from(
+    [TOMASYS + "Objective", MROS + "energy", SWRLB + "lessThan", "urn:a:b"]
+)
+literals = (
+    texts.map(lambda text: Lit(text, XSD + "string"))
+    | texts.map(lambda text: Lit(text, "http://x.org/#t"))
+    | st.decimals(allow_nan=False, allow_infinity=False).map(lambda number: Lit(format(number, "f"), XSD + "decimal"))
+    | st.integers().map(lambda number: Lit(str(number), XSD + "integer"))
+    | st.floats(allow_nan=False).map(lambda number: Lit(repr(number), XSD + "double"))
+    | st.booleans().map(lambda truth: Lit(str(truth).lower(), XSD + "boolean"))
+    | texts.map(lambda text: Lit(text, "@en"))
+)
+terms = literals | iris.map(Named) | st.from_regex(r"\w[\w-]{0,6}", fullmatch=True).map(Variable)
+atoms = st.builds(lambda name, arguments: Atom("", name, tuple(arguments)), iris, st.lists(terms, max_size=4))
+
+
+@given(
+    texts.filter(str.strip) | words.filter(lambda word: word[-1] not in ".-"),
+    st.lists(atoms, max_size=4),
+    st.lists(atoms, min_size=1, max_size=3),
+    st.booleans(),
+)
+def test_any_rule_that_is_written_reads_back_the_same(name, body, head, enabled) -> None:
+    rule = parse_rule(write_rule(name, body, head, full_name, enabled=enabled))
+    assert (rule.name, rule.body, rule.head, rule.enabled) == (name, tuple(body), tuple(head), enabled)
+
+
+def test_twenty_thousand_mutated_texts_give_rules_or_rule_errors(kb: KnowledgeBase) -> None:
+    draw = random.Random(3)
+    alphabet = [
+        *"()?,:^->\"\\#<>@{}[]' \n\t\r0129.eE+_x",
+        "->",
+        "∧",
+        "é",
+        "\x00",
+        "\ud800",
+        "\u2028",
+        "𝔘",
+        "prefix ",
+        "^^",
+    ]
+    pieces = [*EVERYTHING.splitlines(), RULE, *(f"{rule.name}: {rule.text}" for rule in kb.rules)]
+    outcomes = {"rule": 0, "syntax": 0, "meaning": 0}
+    for _ in range(20_000):
+        text = list("\n".join(draw.sample(pieces, 2)))
+        for _ in range(draw.randint(1, 6)):
+            at = draw.randrange(len(text) + 1)
+            change = draw.random()
+            if change < 0.4:
+                text[at : at + draw.randint(1, 12)] = []
+            elif change < 0.8:
+                text.insert(at, draw.choice(alphabet))
+            else:
+                begin = draw.randrange(len(text) + 1)
+                text[at:at] = text[begin : begin + draw.randint(1, 30)]
+        parsed = parse_rules("".join(text), "fuzz.swrl")
+        outcomes["syntax"] += len(parsed.errors)
+        for rule in parsed.rules:
+            try:
+                check_rule(rule_from_text(rule, kb.vocabulary, Path("fuzz.swrl")), kb.vocabulary)
+                outcomes["rule"] += 1
+            except RuleError:
+                outcomes["meaning"] += 1
+    assert min(outcomes.values()) > 1000
+
+
+def test_a_rule_of_five_thousand_atoms_is_read_at_once() -> None:
+    body = " ^ ".join(f"hasValue(?q, ?v{number})" for number in range(5000))
+    rule = parse_rule(f"Long: {body} -> Role(?q)")
+    assert len(rule.body) == 5000
