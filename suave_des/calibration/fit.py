@@ -15,6 +15,10 @@ from suave_des.scenario.overrides import with_values
 from suave_des.simulation.simulator import Simulator
 
 
+FIRST_STEP = 0.15
+"""Standard deviation of the first generation, as a share of each parameter's range."""
+
+
 @dataclass(frozen=True, slots=True)
 class FreeParameter:
     """A parameter to fit: key path in the scenario, bounds, and where it starts."""
@@ -134,7 +138,7 @@ def fit(
 
     start = [parameter.start_unit for parameter in problem.parameters]
     settings = {"seed": seed, "verbose": -9, "maxfevals": evaluations, "tolfun": 1e-9}
-    search = cma.CMAEvolutionStrategy(start, 0.2, settings)
+    search = cma.CMAEvolutionStrategy(start, FIRST_STEP, settings)
     tried: list[Evaluation] = []
     with evaluator(problem, workers) as evaluate_all:
         while len(tried) < evaluations:

@@ -56,19 +56,21 @@ def calibrate(
         on_generation=lambda count, best: console.print(f"{count:5d} sets tried, least distance {best.loss:.4f}"),
     )
     best = min(tried, key=lambda each: each.loss)
+    values = report.fitted_values(problem.parameters, best)
+    if out is not None:  # at once: the profiles take as long again
+        write_files(out, {report.SCENARIO: report.fitted_scenario(problem, scenario, values)}, stale=report.FILES)
     fresh = evaluate(on_fresh_seed(problem, seed + 1), best.values)
     spread = resampling_spread(problem, best, seed)
     threshold = best.loss + spread
     found = profiles(problem, best, threshold, workers) if profile else []
     console.print(f"\nleast distance {best.loss:.4f}, with other random streams {fresh.loss:.4f}")
-    for path, value in report.fitted_values(problem.parameters, best).items():
+    for path, value in values.items():
         admitted = next((f"   {one.low:8.3f} to {one.high:.3f}" for one in found if one.parameter.path == path), "")
         console.print(f"{path:48s} {value:8.3f}{admitted}", soft_wrap=True)
     if out is None:
         console.print("\nNo files were written; --out DIR keeps the fit.", soft_wrap=True)
         return
     provenance = {"command": command_line(), "data": {"file": published[0], "sha256": published[1]}}
-    values = report.fitted_values(problem.parameters, best)
     contents: dict[str, str | bytes] = {
         report.SCENARIO: report.fitted_scenario(problem, scenario, values),
         report.RECORD: report.record(problem, tried, best, fresh, spread, found, provenance),
