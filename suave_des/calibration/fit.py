@@ -14,7 +14,6 @@ from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.overrides import with_values
 from suave_des.simulation.simulator import Simulator
 
-
 FIRST_STEP = 0.15
 """Standard deviation of the first generation, as a share of each parameter's range."""
 

@@ -1,0 +1,53 @@
+"""A small guard: the shipped calibration still gives missions like the published ones.
+
+Sixty missions a manager, with fixed seeds, against bounds that are wide for that number; `suave-des validate` with 2,000
+missions is the real check, and docs/background/fidelity.md shows what it found.
+"""
+
+import pandas as pd
+import pytest
+from scipy.stats import ks_2samp
+
+from suave_des.campaign.campaign import run_campaign
+from suave_des.resources import find
+from suave_des.validation.runs import METRICS, read_runs
+
+MANAGERS = ("none", "random", "metacontrol")
+
+
+@pytest.fixture(scope="module")
+def published() -> pd.DataFrame:
+    return read_runs(find("seams2023_runs.csv", "scenarios/published")).frame
+
+
+@pytest.fixture(scope="module")
+def simulated() -> pd.DataFrame:
+    return run_campaign("seams2023", MANAGERS, 60, 1).frame()
+
+
+@pytest.mark.parametrize("metric", METRICS)
+@pytest.mark.parametrize("manager", MANAGERS)
+def test_a_cell_of_the_papers_table_is_still_near(
+    published: pd.DataFrame, simulated: pd.DataFrame, manager: str, metric: str
+) -> None:
+    theirs = published[published["manager"] == manager][metric]
+    ours = simulated[simulated["manager"] == manager][metric]
+    assert abs(ours.mean() - theirs.mean()) < 0.8 * theirs.std()
+    assert 0.5 < ours.std() / theirs.std() < 2.0
+    assert ks_2samp(ours, theirs).pvalue > 0.001
+
+
+@pytest.mark.parametrize("metric", METRICS)
+def test_metacontrol_is_still_the_best_by_far(simulated: pd.DataFrame, metric: str) -> None:
+    means = simulated.groupby("manager")[metric].mean()
+    sign = -1.0 if metric == "search_time_s" else 1.0
+    others = max(sign * means["none"], sign * means["random"])
+    assert sign * means["metacontrol"] > others + (20.0 if metric == "search_time_s" else 8.0)
+
+
+def test_metacontrols_two_clusters_are_still_there(simulated: pd.DataFrame) -> None:
+    times = simulated[simulated["manager"] == "metacontrol"]["search_time_s"]
+    assert times.between(65, 95).mean() > 0.25
+    assert times.between(118, 135).mean() > 0.12
+    late = simulated[(simulated["manager"] == "metacontrol") & simulated["search_time_s"].between(120, 130)]
+    assert late["detection_x_m"].between(-19.5, -18.5).mean() > 0.6
