@@ -1,6 +1,14 @@
-"""Settings of all tests: property tests draw the same examples on every machine, and are not timed."""
+"""Settings of all tests: property tests draw the same examples on every machine, and are not timed.
+
+What reasoners remember is kept in a folder of the test run, away from the user's.
+"""
+
+import os
+import tempfile
 
 from hypothesis import settings
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
+
+os.environ["SUAVE_DES_CACHE_DIR"] = tempfile.mkdtemp(prefix="suave-des-tests-")

@@ -130,6 +130,10 @@ class KnowledgeBase:
         """
         return self.model.situation(state)
 
+    def asserted(self, state: KnowledgeState) -> frozenset[Fact]:
+        """The facts of the ontologies and of a state."""
+        return self.facts.union(facts_of(self.situation(state), self.names))
+
     def check(self, functions: Collection[str]) -> None:
         """See that the mission's functions can be solved at all.
 

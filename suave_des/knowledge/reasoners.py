@@ -1,4 +1,4 @@
-"""Reasoners: what a state of the knowledge base entails. Two ways to run the same Pellet.
+"""Reasoners: what a state of the knowledge base entails. Ways to run the same Pellet, or to run it seldom.
 
 An inference is a pure function of knowledge base and state; so it may be remembered.
 """
@@ -88,13 +88,24 @@ def _owlready2(kb: KnowledgeBase) -> Reasoner:
     return _Remembering("owlready2", kb, entailed)
 
 
+def _remembered(kb: KnowledgeBase) -> Reasoner:
+    from suave_des.knowledge.remembered import Remembered
+
+    return Remembered(kb)
+
+
 BACKENDS: Final[Mapping[str, Callable[[KnowledgeBase], Reasoner]]] = MappingProxyType(
-    {"owlready2": _owlready2, "pellet": _pellet}
+    {"owlready2": _owlready2, "pellet": _pellet, "remembered": _remembered}
 )
 
 
 def make_reasoner(name: str, kb: KnowledgeBase) -> Reasoner:
-    """A reasoner by name: "pellet" (kept running in this process) or "owlready2" (stock, the reference).
+    """A reasoner by name.
+
+    Args:
+        name: "remembered" (asks Pellet once for each situation that the rules can tell apart), "pellet" (kept running
+            in this process) or "owlready2" (stock, the reference).
+        kb: the knowledge base.
 
     Raises:
         InputError: the name is unknown, or there is no usable Java.

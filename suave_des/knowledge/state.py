@@ -6,11 +6,11 @@ Nothing here imports a reasoner, so that the rest of the simulation may use thes
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from functools import cached_property
-from typing import Final
+from typing import Final, NamedTuple
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.vocabulary import grounding_name, objective_name
@@ -39,8 +39,7 @@ def exact(number: Number) -> Decimal:
     return Decimal(text.rstrip("0").rstrip(".") if "." in text else text)
 
 
-@dataclass(frozen=True, slots=True)
-class ObjectiveState:
+class ObjectiveState(NamedTuple):
     """An objective that the mission has now: the function it asks for and what the loop has noted of it."""
 
     function: str
@@ -114,19 +113,52 @@ class Fact:
         return f"{self.property}({self.subject}, {value})"
 
 
-@dataclass(frozen=True)
 class Inference:
-    """What the reasoner adds to a state.
+    """What the reasoner adds to a state; not to be changed.
 
     Attributes:
         state: the state that was reasoned about.
-        asserted: the facts of the knowledge base and of the state.
         facts: the inferred facts, none of which is asserted.
     """
 
-    state: KnowledgeState
-    asserted: frozenset[Fact] = field(repr=False)
-    facts: frozenset[Fact]
+    def __init__(
+        self,
+        state: KnowledgeState,
+        asserted: frozenset[Fact] | Callable[[KnowledgeState], frozenset[Fact]],
+        facts: frozenset[Fact],
+    ) -> None:
+        """An inference.
+
+        Args:
+            state: the state that was reasoned about.
+            asserted: the facts of the knowledge base and of the state, or what gives them when they are needed.
+            facts: the inferred facts.
+        """
+        self.state = state
+        self.facts = facts
+        self._asserted = asserted
+
+    @cached_property
+    def asserted(self) -> frozenset[Fact]:
+        """The facts of the knowledge base and of the state."""
+        return self._asserted(self.state) if callable(self._asserted) else self._asserted
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both say the same of the same state."""
+        return (
+            isinstance(other, Inference)
+            and self.state == other.state
+            and self.facts == other.facts
+            and self.asserted == other.asserted
+        )
+
+    def __hash__(self) -> int:
+        """Equal for equal inferences."""
+        return hash((self.state, self.facts))
+
+    def __repr__(self) -> str:
+        """State and inferred facts."""
+        return f"Inference({self.state!r}, {sorted(map(str, self.facts))})"
 
     @cached_property
     def _index(self) -> dict[tuple[str, str], tuple[Value, ...]]:

@@ -256,7 +256,7 @@ class Knowledge(Strict):
     """Rules to switch off, by name."""
     values: dict[str, Number] = Field(default_factory=dict)
     """New value (hasValue) of named individuals of QAvalue, such as qa_water_visibility_low: 0.5."""
-    reasoner: str = "pellet"
+    reasoner: str = "remembered"
     """Which reasoner analyzes: remembered, pellet, or owlready2 (the reference, slow)."""
 
 

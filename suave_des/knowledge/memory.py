@@ -1,0 +1,207 @@
+"""What a reasoner found out, kept in a file between runs.
+
+The file is text, one entry a line, each with a checksum. Entries are appended with a single write each, so that
+several processes share a file without locks; a line that two of them mangled, or that was cut short, fails its
+checksum and is left out. Nothing in a file is ever executed: entries are JSON, checked to the last value. A file is
+named after all that its entries depend on; with another first line it is somebody else's, and is replaced.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Mapping
+from contextlib import suppress
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+from typing import Any, Final
+
+from suave_des.knowledge.regions import Key
+from suave_des.knowledge.state import Fact, ObjectiveState
+
+#: Raised when entries are written in another way.
+_FORMAT: Final = 1
+_SUFFIX: Final = ".memory"
+#: A file that has grown to this is not added to: with exact values there is no end to new ones.
+MAX_BYTES: Final = 16 * 2**20
+#: Files that are kept; those used longest ago are removed.
+MAX_FILES: Final = 64
+
+
+def cache_folder() -> Path:
+    """The user's folder for what can be made again: SUAVE_DES_CACHE_DIR, or where the system keeps such things."""
+    chosen = os.environ.get("SUAVE_DES_CACHE_DIR")
+    if chosen:
+        return Path(chosen)
+    if sys.platform == "win32":
+        start = os.environ.get("LOCALAPPDATA")
+        return (Path(start) if start else Path.home() / "AppData" / "Local") / "suave-des" / "Cache"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "suave-des"
+    start = os.environ.get("XDG_CACHE_HOME")  # to be ignored unless absolute, says the XDG specification
+    return (Path(start) if start and Path(start).is_absolute() else Path.home() / ".cache") / "suave-des"
+
+
+class DiskMemory:
+    """Inferred facts by key, in a file of the user's cache folder.
+
+    Where the folder cannot be written to, there is simply no memory between runs.
+
+    Args:
+        digest: stands for all that the entries depend on.
+        folder: in place of the user's cache folder.
+    """
+
+    def __init__(self, digest: str, folder: Path | None = None) -> None:
+        self._salt = digest.encode()
+        self._first = f"suave-des memory {_FORMAT} {digest}"
+        try:
+            self._path: Path | None = (folder or cache_folder()) / "memory" / f"{digest}{_SUFFIX}"
+        except RuntimeError:  # no home folder
+            self._path = None
+
+    def load(self) -> dict[Key, frozenset[Fact]]:
+        """All entries that can be trusted. A file in which others are is written anew without them."""
+        found: dict[Key, frozenset[Fact]] = {}
+        if self._path is None:
+            return found
+        try:
+            lines = self._path.read_bytes().split(b"\n")
+            os.utime(self._path)
+        except OSError:
+            return found
+        is_ours = lines[0] == self._first.encode()
+        damaged = not is_ours
+        for line in lines[1:] if is_ours else ():
+            if line and line != self._first.encode():
+                entry = self._entry(line)
+                if entry is None:
+                    damaged = True
+                else:
+                    found[entry[0]] = entry[1]
+        if damaged:
+            self._replace(found)
+        return found
+
+    def add(self, key: Key, facts: frozenset[Fact]) -> None:
+        """Append an entry."""
+        if self._path is None:
+            return
+        line = self._line(key, facts)
+        with suppress(OSError):  # a memory that cannot be written is a slower one, not a wrong one
+            if not self._path.parent.is_dir():
+                self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            handle = os.open(self._path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
+            try:
+                size = os.fstat(handle).st_size
+                if size == 0:
+                    line = self._first.encode() + line
+                if size < MAX_BYTES:
+                    os.write(handle, line)
+            finally:
+                os.close(handle)
+            if size == 0:
+                self._remove_old(self._path.parent)
+
+    def _line(self, key: Key, facts: frozenset[Fact]) -> bytes:
+        text = json.dumps([_key_to_json(key), sorted(map(_fact_to_json, facts))], separators=(",", ":")).encode()
+        # The line break before it parts it from a line that another process left unfinished.
+        return b"\n" + self._checksum(text) + b" " + text + b"\n"
+
+    def _checksum(self, text: bytes) -> bytes:
+        return hashlib.sha256(self._salt + text).hexdigest()[:24].encode()
+
+    def _entry(self, line: bytes) -> tuple[Key, frozenset[Fact]] | None:
+        checksum, _, text = line.partition(b" ")
+        if checksum != self._checksum(text):
+            return None
+        try:
+            key, facts = json.loads(text)
+            return _key_from_json(key), frozenset(map(_fact_from_json, facts))
+        except (ValueError, TypeError, InvalidOperation, RecursionError):
+            return None
+
+    def _replace(self, entries: Mapping[Key, frozenset[Fact]]) -> None:
+        assert self._path is not None
+        with suppress(OSError):
+            handle, name = tempfile.mkstemp(dir=self._path.parent)
+            try:
+                with os.fdopen(handle, "wb") as file:
+                    file.write(self._first.encode() + b"\n" + b"".join(self._line(*entry) for entry in entries.items()))
+                Path(name).replace(self._path)
+            except BaseException:
+                Path(name).unlink(missing_ok=True)
+                raise
+
+    @staticmethod
+    def _remove_old(folder: Path) -> None:
+        files = sorted(folder.glob(f"*{_SUFFIX}"), key=lambda path: path.stat().st_mtime)
+        for path in files[:-MAX_FILES]:
+            path.unlink(missing_ok=True)
+
+
+def _key_to_json(key: Key) -> list[Any]:
+    objectives, groundings, components, where = key
+    return [
+        [[one.function, one.status, one.always_improve] for one in objectives],
+        groundings,
+        components,
+        [[name, f"{place:f}" if isinstance(place, Decimal) else place] for name, place in where],
+    ]
+
+
+def _key_from_json(content: Any) -> Key:
+    objectives, groundings, components, where = content
+    return (
+        tuple(ObjectiveState(_text(f), None if s is None else _text(s), _truth(a)) for f, s, a in objectives),
+        tuple((_text(function), _text(design)) for function, design in groundings),
+        tuple((_text(component), _text(status)) for component, status in components),
+        tuple((_text(name), _where(place)) for name, place in where),
+    )
+
+
+def _where(place: Any) -> Any:
+    """A region's number, a number with a rank among the values in one gap, or an exact value."""
+    if isinstance(place, str):
+        return Decimal(place)
+    if isinstance(place, list):
+        number, rank = place
+        return _whole(number), _whole(rank)
+    return _whole(place)
+
+
+def _fact_to_json(fact: Fact) -> list[str]:
+    if isinstance(fact.value, bool):
+        return [fact.subject, fact.property, "truth", "true" if fact.value else "false"]
+    if isinstance(fact.value, Decimal):
+        return [fact.subject, fact.property, "number", str(fact.value)]
+    return [fact.subject, fact.property, "text", fact.value]
+
+
+def _fact_from_json(content: Any) -> Fact:
+    subject, name, kind, value = map(_text, content)
+    values = {"truth": {"true": True, "false": False}.get, "number": Decimal, "text": str}
+    if kind not in values or (kind == "truth" and value not in ("true", "false")):
+        raise ValueError(f"a value of kind {kind}")
+    return Fact(subject, name, values[kind](value))  # type: ignore[operator]
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"{value!r} is no text")
+    return value
+
+
+def _truth(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise TypeError(f"{value!r} is no truth value")
+    return value
+
+
+def _whole(value: Any) -> int:
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise TypeError(f"{value!r} is no whole number")
+    return value

@@ -1,0 +1,169 @@
+"""Which states are the same to the rules: those whose measured values lie in the same regions.
+
+Where rules only compare numbers, what they infer depends on the order of the measured values relative to one another
+and to the numbers in the knowledge base alone. The numbers cut the line into regions: each number is one of its own,
+and so is each gap between two. Numbers are compared exactly, as decimals.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import Any, Final
+
+from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.rule_syntax import EXPRESSION, Variable
+from suave_des.knowledge.rules import Rule
+from suave_des.knowledge.situation import Lit
+from suave_des.knowledge.state import MAX_EXPONENT, KnowledgeState
+from suave_des.knowledge.vocabulary import OWL, RDF_TYPE, RDFS, SWRLB, TOMASYS, XSD, local_name
+
+#: What a reasoner can be asked about: all of a state but its measured values, and where these lie.
+Key = tuple[Any, ...]
+_COMPARING: Final = frozenset(
+    SWRLB + name for name in ("equal", "notEqual", "lessThan", "lessThanOrEqual", "greaterThan", "greaterThanOrEqual")
+)
+_HAS_VALUE: Final = TOMASYS + "hasValue"
+_SAME_VALUES: Final = (RDFS + "subPropertyOf", OWL + "equivalentProperty")
+_BINARY: Final = frozenset((XSD + "float", XSD + "double"))
+#: Datatypes of which a number is or is not by its size alone, or in which there is no number.
+_SIZELESS: Final = frozenset(XSD + name for name in ("decimal", "string", "boolean", "anyURI", "dateTime", "date"))
+_SIZES: Final = frozenset(XSD + name for name in ("minInclusive", "minExclusive", "maxInclusive", "maxExclusive"))
+_LITERAL: Final = re.compile(r'"((?:[^"\\]|\\.)*)"(?:\^\^<([^>]*)>)?')
+_XSD_TERM: Final = re.compile(rf"(?<!\^)<({re.escape(XSD)}[^>]*)>")
+_NUMBER: Final = re.compile(r"\s*[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]{1,3})?\s*")
+
+
+@dataclass(frozen=True)
+class Regions:
+    """The regions of measured values in a knowledge base.
+
+    Attributes:
+        thresholds: every number in the knowledge base, ascending.
+        reasons: why regions do not tell enough, so that only equal values count as the same; empty where they do.
+    """
+
+    thresholds: tuple[Decimal, ...]
+    reasons: tuple[str, ...]
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether all values of a region are the same to the rules."""
+        return not self.reasons
+
+    def region(self, value: Decimal) -> int:
+        """Number of a value's region: odd for a threshold itself, even for the gap before the next one."""
+        return bisect_left(self.thresholds, value) + bisect_right(self.thresholds, value)
+
+    def key(self, state: KnowledgeState) -> Key:
+        """What a state is to the rules: equal keys entail the same."""
+        measured = state.measurements
+        if self.reasons:
+            return state.objectives, state.groundings, state.components, measured
+        thresholds = self.thresholds
+        where = [(name, bisect_left(thresholds, value) + bisect_right(thresholds, value)) for name, value in measured]
+        if len(measured) > 1 and len({number for _, number in where}) < len(where):
+            return state.objectives, state.groundings, state.components, _ranked(state, where)
+        return state.objectives, state.groundings, state.components, tuple(where)
+
+
+def _ranked(state: KnowledgeState, where: list[tuple[str, int]]) -> tuple[tuple[str, int | tuple[int, int]], ...]:
+    """Regions, with the place of each value among those that share its gap; equal values share a place."""
+    in_gap: dict[int, set[Decimal]] = {}
+    for (_, value), (_, number) in zip(state.measurements, where, strict=True):
+        in_gap.setdefault(number, set()).add(value)
+    return tuple(
+        (name, number if number % 2 else (number, sorted(in_gap[number]).index(value)))
+        for (name, value), (_, number) in zip(state.measurements, where, strict=True)
+    )
+
+
+def regions_of(kb: KnowledgeBase) -> Regions:
+    """The regions of a knowledge base, or why it has none."""
+    carriers = _carriers(kb)
+    reasons = [*_of_rules(kb, carriers), *_of_ontologies(kb, carriers)]
+    return Regions(tuple(sorted(set(_numbers(kb)))), tuple(dict.fromkeys(reasons)))
+
+
+def _carriers(kb: KnowledgeBase) -> frozenset[str]:
+    """Properties that can have a measured value: hasValue, and what holds wherever it does."""
+    found = {_HAS_VALUE}
+    while True:
+        more = {
+            one
+            for subject, predicate, value in kb.content.triples
+            if predicate in _SAME_VALUES and isinstance(value, str) and {subject, value} & found
+            for one in (value, subject)
+        }
+        if more <= found:
+            return frozenset(found)
+        found |= more
+
+
+def _of_rules(kb: KnowledgeBase, carriers: frozenset[str]) -> Iterator[str]:
+    for rule in kb.content.enabled_rules:
+        for atom in rule.atoms:
+            if atom.kind == "builtin" and atom.predicate not in _COMPARING:
+                yield f"rule {rule.name} computes with {local_name(atom.predicate)}"
+            if atom.kind == "range" or atom.predicate == EXPRESSION:
+                yield f"rule {rule.name} asks for a datatype or a class expression"
+            if any(isinstance(term, Lit) and term.datatype in _BINARY for term in atom.arguments):
+                yield f"rule {rule.name} has a binary number, which is compared inexactly"
+        copied = _measured_variables(rule, carriers) & {name for atom in rule.head for name in atom.variables()}
+        for name in sorted(copied):
+            yield f"rule {rule.name} copies the value ?{name} to its head"
+
+
+def _measured_variables(rule: Rule, carriers: frozenset[str]) -> set[str]:
+    values = [
+        atom.arguments[1]
+        for atom in rule.body
+        if atom.kind == "data" and atom.predicate in carriers and len(atom.arguments) == 2
+    ]
+    return {term.name for term in values if isinstance(term, Variable)}
+
+
+def _of_ontologies(kb: KnowledgeBase, carriers: frozenset[str]) -> Iterator[str]:
+    for name in sorted(carriers - {_HAS_VALUE}):
+        yield f"{local_name(name)} has the values of hasValue"
+    for subject, predicate, value in kb.content.triples:
+        if isinstance(value, Lit) and value.datatype in _BINARY:
+            yield f"{local_name(subject)} has a binary number, which is compared inexactly"
+        if predicate == RDFS + "range" and subject in carriers and value != XSD + "decimal":
+            yield f"{local_name(subject)} has a range other than decimal"
+        if predicate == RDF_TYPE and value == RDFS + "Datatype":
+            yield f"the ontology defines a datatype, {local_name(subject)}"
+    for line in kb.content.structure:
+        for term in _XSD_TERM.findall(line):
+            if term not in _SIZELESS | _SIZES:
+                yield f"a class expression speaks of {local_name(term)}"
+        if any(datatype in _BINARY for _, datatype in _LITERAL.findall(line)):
+            yield "a class expression has a binary number, which is compared inexactly"
+
+
+def _numbers(kb: KnowledgeBase) -> Iterator[Decimal]:
+    """Every number in the knowledge base, whatever its datatype, and texts that look like one."""
+    model = kb.model
+    groups = (model.objectives, model.groundings, model.measurements)
+    for triples in (
+        kb.content.triples,
+        *(individual.own for group in groups for individual in group.values()),
+        *model.initial.values(),
+    ):
+        yield from _in_texts(value.text for _, _, value in triples if isinstance(value, Lit))
+    for line in kb.content.structure:
+        yield from _in_texts(text for text, _ in _LITERAL.findall(line))
+    for rule in kb.content.enabled_rules:
+        for atom in rule.atoms:
+            yield from _in_texts(term.text for term in atom.arguments if isinstance(term, Lit))
+
+
+def _in_texts(texts: Iterator[str]) -> Iterator[Decimal]:
+    for text in texts:
+        if _NUMBER.fullmatch(text):
+            value = Decimal(text.strip())
+            if abs(value.adjusted()) <= MAX_EXPONENT:
+                yield value

@@ -1,0 +1,284 @@
+"""Remembered answers are Pellet's answers: on several ontologies, around every threshold, and from a file."""
+
+from __future__ import annotations
+
+import random
+from concurrent.futures import ProcessPoolExecutor
+from decimal import Decimal
+from functools import lru_cache
+from multiprocessing import get_context
+from pathlib import Path
+from tempfile import mkdtemp
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from knowledge_states import MOTION, SEARCH, searching
+from owl_text import individual
+
+from suave_des.errors import KnowledgeError
+from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.memory import DiskMemory
+from suave_des.knowledge.reasoners import Reasoner, make_reasoner
+from suave_des.knowledge.regions import regions_of
+from suave_des.knowledge.remembered import Remembered, memory_digest
+from suave_des.knowledge.state import Inference, KnowledgeState, ObjectiveState
+from suave_des.resources import shipped_folder
+
+MORE_DESIGNS = "".join(
+    individual(f"qa_extra_{n}", "QAvalue", ("isQAtype", ":water_visibility"), ("hasValue", f"{n}.{n}"))
+    + individual(f"fd_extra_{n}", "FunctionDesign", ("solvesF", f":{SEARCH}"), ("hasQAestimation", f":qa_extra_{n}"))
+    for n in range(5)
+)
+MORE_ATTRIBUTES = individual("temperature", "QualityAttributeType", ("qa_comparison_operator", ">")) + "".join(
+    individual(f"qa_{name}", "QAvalue", ("isQAtype", f":{name}"), ("hasValue", value))
+    + individual(f"fd_{name}", "FunctionDesign", ("solvesF", f":{SEARCH}"), ("hasQAestimation", f":qa_{name}"))
+    for name, value in (("battery_level", "0.25"), ("temperature", "40.0"))
+)
+BATTERY = (
+    "Battery: hasQAvalue(?fg, ?q) ^ isQAtype(?q, battery_level) ^ hasValue(?q, ?v) ^ lessThanOrEqual(?v, 0.25)"
+    ' -> fg_status(?fg, "IN_ERROR_NFR")\n'
+)
+CHAIN = """
+Low: isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ lessThan(?v, 1.5) -> Role(?q)
+Exact: Role(?q) ^ hasValue(?q, 1.25) -> Binding(?q)
+Both: Role(?q) ^ isQAtype(?p, battery_level) ^ hasValue(?p, ?w) ^ greaterThanOrEqual(?w, 0.5) -> ComponentClass(?p)
+Then: ComponentClass(?p) ^ Objective(?o) -> o_updatable(?o, true)
+"""
+RELATIVE = """
+Below: isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ isQAtype(?p, battery_level) ^ hasValue(?p, ?w)
+    ^ lessThan(?v, ?w) -> Role(?p)
+Level: isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ isQAtype(?p, battery_level) ^ hasValue(?p, ?w)
+    ^ equal(?v, ?w) -> Binding(?p)
+"""
+ARITHMETIC = """
+Sum: isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ isQAtype(?p, battery_level) ^ hasValue(?p, ?w)
+    ^ add(?s, ?v, ?w) ^ greaterThan(?s, 2.0) -> Role(?p)
+"""
+ONTOLOGIES = {
+    "shipped": ("", ""),
+    "more designs": (MORE_DESIGNS, ""),
+    "more attributes": (MORE_ATTRIBUTES, BATTERY),
+    "chained rules": ("", CHAIN),
+    "relative order": ("", RELATIVE),
+    "arithmetic": ("", ARITHMETIC),
+}
+
+
+@lru_cache
+def loaded(name: str) -> tuple[KnowledgeBase, Reasoner, Remembered]:
+    extra, rules = ONTOLOGIES[name]
+    folder = Path(mkdtemp())
+    text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
+    (folder / "suave.owl").write_text(text.replace("</rdf:RDF>", extra + "</rdf:RDF>"), encoding="utf-8")
+    (folder / "mine.swrl").write_text(rules, encoding="utf-8")
+    kb = KnowledgeBase.load([folder / "suave.owl"], rules=[folder / "mine.swrl"])
+    return kb, make_reasoner("pellet", kb), Remembered(kb, folder)
+
+
+def outcome(reasoner: Reasoner, state: KnowledgeState) -> Inference | str:
+    try:
+        return reasoner.infer(state)
+    except KnowledgeError as error:
+        return str(error)
+
+
+def near(kb: KnowledgeBase) -> st.SearchStrategy[Decimal]:
+    """Just below, on and just above each number of the knowledge base, and anything else."""
+    thresholds = st.sampled_from(regions_of(kb).thresholds)
+    steps = st.sampled_from([Decimal(0), *(sign * Decimal(10) ** -power for sign in (1, -1) for power in (1, 6, 25))])
+    return st.builds(lambda a, b: a + b, thresholds, steps) | st.decimals(0, 50, places=3)
+
+
+@st.composite
+def states(draw: st.DrawFn, kb: KnowledgeBase) -> KnowledgeState:
+    grounded = {SEARCH: draw(st.sampled_from(kb.designs(SEARCH))), MOTION: draw(st.sampled_from(kb.designs(MOTION)))}
+    functions = draw(st.lists(st.sampled_from([SEARCH, MOTION]), unique=True))
+    measured = draw(st.lists(st.sampled_from(kb.quality_attributes), unique=True, max_size=3))
+    return KnowledgeState.of(
+        [ObjectiveState(name) for name in functions],
+        groundings={name: grounded[name] for name in functions if draw(st.booleans())},
+        components=draw(st.dictionaries(st.just("c_thruster_1"), st.sampled_from(["FALSE", "RECOVERED"]))),
+        measurements={name: draw(near(kb)) for name in measured},
+    )
+
+
+def moved(draw: random.Random, kb: KnowledgeBase, state: KnowledgeState) -> KnowledgeState:
+    """The state with its values moved about inside their gaps, their order kept where they share one."""
+    regions = regions_of(kb)
+    bounds = [Decimal(-10), *regions.thresholds, Decimal(100)]
+    gaps: dict[int, list[Decimal]] = {}
+    for _, value in state.measurements:
+        gaps.setdefault(regions.region(value), []).append(value)
+    fresh: dict[Decimal, Decimal] = {}
+    for region, values in gaps.items():
+        low, high = bounds[region // 2], bounds[min(region // 2 + 1, len(bounds) - 1)]
+        places = sorted(draw.sample(range(1, 1000), len(set(values))))
+        for value, place in zip(sorted(set(values)), places, strict=True):
+            fresh[value] = value if region % 2 else low + (high - low) * place / 1000
+    return KnowledgeState.of(
+        state.objectives,
+        groundings=dict(state.groundings),
+        components=dict(state.components),
+        measurements={name: fresh[value] for name, value in state.measurements},
+    )
+
+
+@pytest.mark.parametrize("name", ONTOLOGIES)
+@settings(max_examples=60)
+@given(data=st.data(), seed=st.integers(0, 2**32))
+def test_remembered_and_pellet_agree_around_thresholds(name: str, data: st.DataObject, seed: int) -> None:
+    kb, pellet, remembered = loaded(name)
+    state = data.draw(states(kb))
+    assert outcome(remembered, state) == outcome(pellet, state)
+    twin = moved(random.Random(seed), kb, state)
+    if remembered.regions.is_sound:
+        assert remembered.regions.key(twin) == remembered.regions.key(state)
+    found, wanted = outcome(remembered, twin), outcome(pellet, twin)
+    assert found == wanted
+    if isinstance(found, Inference) and isinstance(wanted, Inference):
+        assert (found.state, found.asserted) == (twin, wanted.asserted)
+
+
+@pytest.mark.parametrize("name", [name for name in ONTOLOGIES if name != "shipped"])
+def test_stock_owlready2_agrees(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("JAVA_TOOL_OPTIONS", "-XX:TieredStopAtLevel=1 -XX:+UseSerialGC")
+    kb, pellet, remembered = loaded(name)
+    draw = random.Random(name)
+    stock = make_reasoner("owlready2", kb)
+    for visibility, battery in (("1.25", "0.5"), ("1.249999", "1.3")):
+        state = searching(draw.choice(kb.designs(SEARCH)), visibility)
+        state = KnowledgeState.of(
+            state.objectives,
+            groundings=dict(state.groundings),
+            measurements={"water_visibility": visibility, "battery_level": battery},
+        )
+        assert outcome(stock, state) == outcome(pellet, state) == outcome(remembered, state)
+
+
+def test_rules_that_only_compare_need_regions_only() -> None:
+    for name in ("shipped", "more designs", "more attributes", "chained rules", "relative order"):
+        assert loaded(name)[2].regions.reasons == ()
+    assert loaded("shipped")[2].regions.thresholds == tuple(
+        map(Decimal, ["0.25", "0.5", "0.75", "1", "1.25", "2.25", "3.25"])
+    )
+
+
+@pytest.mark.parametrize(
+    ("rules", "reason"),
+    [
+        (ARITHMETIC, "rule Sum computes with add"),
+        ("A: hasValue(?q, ?v) -> fd_efficacy(?q, ?v)", "rule A copies the value ?v to its head"),
+        ("A: hasValue(?q, ?v) ^ lessThan(?v, 1e0) -> Role(?q)", "rule A has a binary number"),
+        ("A: hasValue(?q, ?v) ^ xsd:integer(?v) -> Role(?q)", "rule A asks for a datatype"),
+    ],
+)
+def test_why_exact_values_count(rules: str, reason: str, tmp_path: Path) -> None:
+    (tmp_path / "mine.swrl").write_text(rules, encoding="utf-8")
+    kb = KnowledgeBase.load(rules=[tmp_path / "mine.swrl"])
+    regions = regions_of(kb)
+    assert reason in " ".join(regions.reasons)
+    one, other = searching("fd_spiral_low", "2.0"), searching("fd_spiral_low", "2.1")
+    assert regions.key(one) != regions.key(other)
+    (tmp_path / "mine.swrl").write_text(f"disabled {rules.strip()}", encoding="utf-8")
+    assert regions_of(KnowledgeBase.load(rules=[tmp_path / "mine.swrl"])).is_sound
+
+
+@pytest.fixture
+def no_pellet(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise AssertionError("Pellet was asked")
+
+    monkeypatch.setattr("suave_des.knowledge.pellet.InProcessPellet.__init__", refuse)
+
+
+STATES = [searching(f"fd_spiral_{name}", value) for name in ("low", "high") for value in ("1.0", "1.25", "2.0", "4")]
+
+
+@pytest.fixture
+def filled(kb: KnowledgeBase, tmp_path: Path) -> Path:
+    remembered = Remembered(kb, tmp_path)
+    for state in STATES:
+        remembered.infer(state)
+    (file,) = (tmp_path / "memory").iterdir()
+    return file
+
+
+def test_a_filled_memory_asks_nobody(kb: KnowledgeBase, pellet: Reasoner, filled: Path, no_pellet: None) -> None:
+    remembered = Remembered(kb, filled.parent.parent)
+    for state in [*STATES, searching("fd_spiral_high", "2.1234")]:
+        assert remembered.infer(state) == pellet.infer(state)
+    with pytest.raises(AssertionError, match="asked"):
+        remembered.infer(searching("fd_spiral_medium", "1.0"))
+
+
+def test_another_knowledge_base_does_not_use_it(filled: Path, tmp_path: Path, kb: KnowledgeBase) -> None:
+    other = KnowledgeBase.load(disabled_rules=["S1b"])
+    assert memory_digest(other) != memory_digest(kb)
+    assert DiskMemory(memory_digest(other), filled.parent.parent).load() == {}
+
+
+def test_damaged_entries_are_left_out_and_the_file_is_mended(kb: KnowledgeBase, filled: Path) -> None:
+    disk = DiskMemory(memory_digest(kb), filled.parent.parent)
+    whole = disk.load()
+    assert len(whole) == len(STATES)
+    lines = filled.read_bytes().split(b"\n")
+    entry = next(number for number, line in enumerate(lines) if b"IN_ERROR_NFR" in line)
+    lines[entry] = lines[entry].replace(b"IN_ERROR_NFR", b"IN_ERROR_FR_")
+    filled.write_bytes(b"\n".join(lines) + b"\xff\x00 trash [\n" + lines[-2][:40])
+    mended = disk.load()
+    assert len(mended) == len(whole) - 1
+    assert mended.items() <= whole.items()
+    content = filled.read_bytes()
+    assert disk.load() == mended
+    assert filled.read_bytes() == content
+    assert b"trash" not in content
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"\x80\x04pickled", b"suave-des memory 1 other\n" + b"x" * 24 + b" [[],[]]\n"]
+)
+def test_a_foreign_file_is_rebuilt(kb: KnowledgeBase, filled: Path, content: bytes) -> None:
+    filled.write_bytes(content)
+    remembered = Remembered(kb, filled.parent.parent)
+    remembered.infer(STATES[0])
+    assert len(DiskMemory(memory_digest(kb), filled.parent.parent).load()) == 1
+
+
+def test_random_bytes_never_break_the_memory(kb: KnowledgeBase, filled: Path) -> None:
+    whole = DiskMemory(memory_digest(kb), filled.parent.parent).load()
+    original = filled.read_bytes()
+    draw = random.Random(5)
+    for _ in range(300):
+        content = bytearray(original)
+        for _ in range(draw.randint(1, 20)):
+            content[draw.randrange(len(content))] = draw.randrange(256)
+        filled.write_bytes(bytes(content[: draw.randrange(len(content))]))
+        assert DiskMemory(memory_digest(kb), filled.parent.parent).load().items() <= whole.items()
+
+
+def test_a_folder_that_cannot_be_written_is_no_obstacle(kb: KnowledgeBase, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("not a folder", encoding="utf-8")
+    remembered = Remembered(kb, tmp_path / "file")
+    assert remembered.infer(STATES[0]).grounding_status(SEARCH) == "IN_ERROR_NFR"
+
+
+def _add_many(folder: str, digest: str, number: int) -> None:
+    disk = DiskMemory(digest, Path(folder))
+    for count in range(200):
+        state = KnowledgeState.of(components={f"c_{number}": str(count)})
+        disk.add((state.objectives, state.groundings, state.components, ()), frozenset())
+
+
+def test_several_processes_share_a_file(tmp_path: Path) -> None:
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        list(pool.map(_add_many, [str(tmp_path)] * 2, ["d" * 64] * 2, range(2)))
+    assert len(DiskMemory("d" * 64, tmp_path).load()) == 400
+
+
+def test_a_contradiction_is_told_for_each_state_with_its_own_values(kb: KnowledgeBase, tmp_path: Path) -> None:
+    remembered = Remembered(kb, tmp_path)
+    for _ in range(2):
+        with pytest.raises(KnowledgeError, match="o_status"):
+            remembered.infer(searching("fd_spiral_high", "1.0", status="UNGROUNDED"))
+    assert not (tmp_path / "memory").exists()
