@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import typer
 
-from suave_des.cli import kb_explain, kb_infer
+from suave_des.cli import kb_diff, kb_explain, kb_infer, kb_policy, kb_rules
 
 app = typer.Typer(
     name="kb",
@@ -26,3 +26,10 @@ def _help(context: typer.Context) -> None:
 
 app.command("infer")(kb_infer.infer)
 app.command("explain")(kb_explain.explain)
+app.command("policy")(kb_policy.policy)
+app.command("diff")(kb_diff.diff)
+app.command("rules")(kb_rules.rules)
+app.command("add-rule")(kb_rules.add_rule)
+app.command("remove-rule")(kb_rules.remove_rule)
+app.command("enable-rule")(kb_rules.enable_rule)
+app.command("disable-rule")(kb_rules.disable_rule)

@@ -136,14 +136,19 @@ class _Scan:
         self._spend(len(text))
 
 
-def read_ontology(path: Path) -> OntologyFile:
+def read_ontology(path: Path, content: bytes | None = None) -> OntologyFile:
     """Read and check one ontology file.
+
+    Args:
+        path: where it is.
+        content: what to take for its content, instead of reading it.
 
     Raises:
         KnowledgeError: missing, a folder, empty, too large, not XML, not OWL in RDF/XML, or with external,
             nested or oversized entities; with the line where it is known.
     """
-    content = _read_bytes(path)
+    if content is None:
+        content = _read_bytes(path)
     scan = _Scan(path, len(content))
     try:
         scan.parser.Parse(content, True)

@@ -115,17 +115,17 @@ def parse_rules(text: str, file: Path | str | None = None) -> ParsedRules:
     return ParsedRules(tuple(rules), tuple(errors))
 
 
-def parse_rule(text: str) -> RuleText:
+def parse_rule(text: str, file: Path | str | None = None) -> RuleText:
     """Read one rule, as it is given on a command line.
 
     Raises:
         RuleError: there is none, there are several, or it cannot be read.
     """
-    parsed = parse_rules(text)
+    parsed = parse_rules(text, file)
     if parsed.errors:
         raise parsed.errors[0]
     if len(parsed.rules) != 1:
-        raise RuleError(f"{len(parsed.rules)} rules instead of one", remedy='write "name: body -> head"')
+        raise RuleError(f"{len(parsed.rules)} rules instead of one", file=file, remedy='write "name: body -> head"')
     return parsed.rules[0]
 
 

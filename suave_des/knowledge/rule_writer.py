@@ -119,12 +119,14 @@ def distinct_variables(atoms: Iterable[Atom], written: Callable[[str], str]) -> 
         written: the name that a variable would like to have.
     """
     chosen: dict[str, str] = {}
+    taken: set[str] = set()
     for variable in dict.fromkeys(name for atom in atoms for name in atom.variables()):
         wish = re.sub(r"[^\w-]", "_", written(variable)).lstrip("-") or "v"
         name, number = wish, 2
-        while name in chosen.values():
+        while name in taken:
             name, number = f"{wish}_{number}", number + 1
         chosen[variable] = name
+        taken.add(name)
     return chosen
 
 

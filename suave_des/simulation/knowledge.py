@@ -13,6 +13,21 @@ from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.scenario.loader import MISSION_FUNCTIONS, LoadedScenario
 
 
+def open_base(loaded: LoadedScenario) -> KnowledgeBase:
+    """The scenario's knowledge base with its values and rules, and no reasoner.
+
+    Raises:
+        KnowledgeError: the ontologies or rules cannot be read.
+    """
+    knowledge = loaded.scenario.knowledge
+    return KnowledgeBase.load(
+        loaded.ontologies,
+        values={name: Decimal(repr(value)) for name, value in knowledge.values.items()},
+        rules=loaded.rules,
+        disabled_rules=knowledge.disabled_rules,
+    )
+
+
 def open_knowledge(loaded: LoadedScenario) -> Deliberation:
     """The scenario's knowledge base with the reasoner that the scenario names.
 

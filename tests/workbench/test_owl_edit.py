@@ -1,0 +1,193 @@
+"""Rules of OWL files are edited in place: the rest of the file stays as it was, byte for byte."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+import pytest
+from rdflib import Graph
+
+from suave_des.errors import InputError, KnowledgeError
+from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.reasoners import make_reasoner
+from suave_des.knowledge.state import KnowledgeState, ObjectiveState
+from suave_des.resources import shipped_folder
+from suave_des.workbench.owl_edit import add_rule, remove_rule, set_enabled
+
+SEARCH = "f_generate_search_path"
+BATTERY = (
+    "Battery: hasQAvalue(?fg, ?q) ^ isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ lessThan(?v, 9.5)"
+    " ^ FunctionGrounding(?fg) -> fd_error_log(fd_spiral_low, o_generate_search_path) ^ Role(?q)"
+)
+
+
+@pytest.fixture
+def owl(tmp_path: Path) -> Path:
+    path = tmp_path / "suave.owl"
+    path.write_bytes((shipped_folder("ontology") / "suave.owl").read_bytes())
+    return path
+
+
+def said(path: Path) -> set[tuple[str, str, bool]]:
+    return {(rule.name, rule.text, rule.enabled) for rule in KnowledgeBase.load([path]).rules}
+
+
+def as_protege_writes(path: Path) -> None:
+    """With a DOCTYPE of entities, CRLF line ends and tabs."""
+    text = path.read_text(encoding="utf-8")
+    entities = '<!DOCTYPE rdf:RDF [\n    <!ENTITY swrl "http://www.w3.org/2003/11/swrl#" >\n]>\n'
+    head, _, rest = text.partition("?>\n")
+    rest = rest.replace('rdf:resource="http://www.w3.org/2003/11/swrl#', 'rdf:resource="&swrl;').replace("    ", "\t")
+    path.write_bytes(f"{head}?>\n{entities}{rest}".replace("\n", "\r\n").encode())
+
+
+def as_rdflib_writes(path: Path) -> None:
+    """Flat: lists and atoms are elements of their own, referred to by rdf:nodeID."""
+    graph = Graph()
+    graph.parse(path, format="xml")
+    graph.serialize(path, format="xml", encoding="utf-8")
+
+
+STYLES = {"shipped": lambda path: None, "Protégé": as_protege_writes, "rdflib": as_rdflib_writes}
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_add_switch_and_remove(owl: Path, style: str) -> None:
+    STYLES[style](owl)
+    original, before = owl.read_bytes(), said(owl)
+    add_rule(owl, BATTERY)
+    added = owl.read_bytes()
+    (new,) = said(owl) - before
+    assert new == ("Battery", BATTERY.partition(": ")[2], True)
+    assert (owl.parent / "suave.owl.bak").read_bytes() == original
+    at = next(n for n, (one, other) in enumerate(zip(original, added, strict=False)) if one != other)
+    rest = original[at:]
+    assert original[:at] + added[at : len(added) - len(rest)] + rest == added  # nothing but an insertion
+
+    assert set_enabled(owl, "Battery", enabled=False)
+    assert said(owl) == {*before, (new[0], new[1], False)}
+    assert not set_enabled(owl, "Battery", enabled=False)
+    assert set_enabled(owl, "Battery", enabled=True)
+    assert owl.read_bytes() == added
+    remove_rule(owl, "Battery")
+    assert said(owl) == before
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_a_rule_of_the_file_itself(owl: Path, style: str) -> None:
+    STYLES[style](owl)
+    before = said(owl)
+    assert set_enabled(owl, "QAWaterVisibility", enabled=False)
+    assert {name for name, _, enabled in said(owl) if not enabled} == {"QAWaterVisibility"}
+    remove_rule(owl, "QAWaterVisibility")
+    assert {name for name, *_ in before - said(owl)} == {"QAWaterVisibility"}
+    assert b"IN_ERROR_NFR" not in owl.read_bytes()
+
+
+def test_only_the_mark_is_written_when_there_is_none(owl: Path) -> None:
+    text = owl.read_text(encoding="utf-8")
+    mark = next(line for line in text.splitlines(keepends=True) if "<swrla:isRuleEnabled rdf" in line)
+    owl.write_text(text.replace(mark, ""), encoding="utf-8")
+    set_enabled(owl, "QAWaterVisibility", enabled=False)
+    assert owl.read_text(encoding="utf-8") == text.replace(mark, mark.replace("true", "false"))
+
+
+def test_an_added_rule_infers_what_it_does_as_text(owl: Path, tmp_path: Path) -> None:
+    (tmp_path / "mine.swrl").write_text(BATTERY, encoding="utf-8")
+    state = KnowledgeState.of(
+        [ObjectiveState(SEARCH)], groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 4}
+    )
+    as_text = make_reasoner("pellet", KnowledgeBase.load([owl], rules=[tmp_path / "mine.swrl"])).infer(state)
+    add_rule(owl, BATTERY)
+    assert make_reasoner("pellet", KnowledgeBase.load([owl])).infer(state).facts == as_text.facts
+    assert as_text.error_log("fd_spiral_low") == ("o_generate_search_path",)
+    set_enabled(owl, "Battery", enabled=False)
+    for backend in ("pellet", "remembered"):
+        assert not make_reasoner(backend, KnowledgeBase.load([owl])).infer(state).facts
+
+
+def test_rules_without_a_prefix_for_swrl_declare_it(tmp_path: Path) -> None:
+    path = tmp_path / "tiny.owl"
+    path.write_text(
+        '<r:RDF xmlns:r="http://www.w3.org/1999/02/22-rdf-syntax-ns#" xmlns:o="http://www.w3.org/2002/07/owl#"'
+        ' xmlns:swrl="http://x.org/"><o:Ontology r:about="http://x.org/tiny"/>'
+        '<o:Class r:about="http://x.org/#Kläng"/></r:RDF>',
+        encoding="utf-8",
+    )
+    add_rule(path, 'disabled "my rule": Kläng(?ö) -> Kläng(?ö)')
+    assert said(path) == {("my rule", "Kläng(?ö) -> Kläng(?ö)", False)}
+    set_enabled(path, "my rule", enabled=True)
+    assert said(path) == {("my rule", "Kläng(?ö) -> Kläng(?ö)", True)}
+
+
+@pytest.mark.parametrize(
+    ("edit", "words"),
+    [
+        (lambda path: add_rule(path, "A: Objective(?o -> Role(?o)"), "the rule: line 1, column 17"),
+        (lambda path: add_rule(path, "A: Objective(?o) -> Role(?p)"), "?p stands in the head"),
+        (lambda path: add_rule(path, "QAWaterVisibility: Objective(?o) -> Role(?o)"), "there is a rule"),
+        (lambda path: add_rule(path, ""), "0 rules instead of one"),
+        (lambda path: remove_rule(path, "QAWaterVisibilty"), "did you mean QAWaterVisibility?"),
+        (lambda path: set_enabled(path, "S1a", enabled=False), "there is no rule S1a"),
+    ],
+)
+def test_what_cannot_be_done_leaves_the_file_alone(owl: Path, edit, words: str) -> None:
+    original = owl.read_bytes()
+    with pytest.raises(KnowledgeError) as caught:
+        edit(owl)
+    assert words in str(caught.value)
+    assert owl.read_bytes() == original
+    assert [entry.name for entry in owl.parent.iterdir()] == ["suave.owl"]
+
+
+def entity_bomb(path: Path) -> None:
+    entities = "".join(f'<!ENTITY e{n} "{f"&e{n - 1};" * 10 if n else "x" * 10}">' for n in range(30))
+    path.write_text(f"<!DOCTYPE r [{entities}]><r>&e29;</r>" + "<!-- -->" * 1_300_000, encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda path: path.write_bytes(b""),
+        lambda path: path.write_bytes(path.read_bytes()[:9000]),
+        lambda path: path.write_text("<html/>", encoding="utf-8"),
+        entity_bomb,
+        lambda path: path.write_text('<!DOCTYPE r SYSTEM "file:///etc/passwd"><r/>', encoding="utf-8"),
+        lambda path: path.write_bytes(path.read_text(encoding="utf-8").encode("utf-16")),
+        lambda path: path.unlink(),
+    ],
+    ids=["empty", "cut", "page", "bomb", "external", "utf-16", "missing"],
+)
+def test_files_that_cannot_be_edited(owl: Path, spoil) -> None:
+    spoil(owl)
+    original = owl.read_bytes() if owl.exists() else None
+    for edit in (
+        lambda: add_rule(owl, BATTERY),
+        lambda: remove_rule(owl, "QAWaterVisibility"),
+        lambda: set_enabled(owl, "QAWaterVisibility", enabled=False),
+    ):
+        with pytest.raises(InputError) as caught:
+            edit()
+        assert "\n" not in str(caught.value)
+    assert (owl.read_bytes() if owl.exists() else None) == original
+
+
+def test_links_and_permissions_stay(owl: Path) -> None:
+    owl.chmod(0o640)
+    link = owl.parent / "link.owl"
+    link.symlink_to(owl)
+    set_enabled(link, "QAWaterVisibility", enabled=False)
+    assert link.is_symlink()
+    assert stat.S_IMODE(owl.stat().st_mode) == 0o640
+    assert {name for name, _, enabled in said(owl) if not enabled} == {"QAWaterVisibility"}
+
+
+def test_a_rule_of_a_thousand_atoms(owl: Path) -> None:
+    body = " ^ ".join(f"hasValue(?q, ?v{number})" for number in range(1000))
+    before = said(owl)
+    add_rule(owl, f"Long: {body} -> Role(?q)")
+    (new,) = said(owl) - before
+    assert new[1].count("hasValue") == 1000
+    remove_rule(owl, "Long")
+    assert said(owl) == before
