@@ -12,8 +12,10 @@ from suave_des.knowledge.deliberation import Conclusion, Deliberation
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import KnowledgeState, Number
 from suave_des.scenario.loader import load_scenario
+from suave_des.workbench.difference import PolicyDifference, compare
 from suave_des.workbench.explain import Explanation, explain
 from suave_des.workbench.limit import TIME_LIMIT_S, LimitedReasoner, TimeLimit, in_words
+from suave_des.workbench.policy import Policy, Space, make_policy
 from suave_des.workbench.states import Loop, state_from
 
 DEFAULT_SCENARIO = "seams2023"
@@ -135,3 +137,32 @@ class KnowledgeBase:
         """
         doing = f"explaining the state {in_words(state)}"
         return self.limit.run(lambda: explain(self.base, state, question, self.loop.improves_exceeded), doing)
+
+    def policy(self, max_failed: int = 2) -> Policy:
+        """What is decided in every state.
+
+        Args:
+            max_failed: at most so many components report anything.
+
+        Raises:
+            InputError: there would be too many states.
+            KnowledgeError: the reasoner takes too long for one of them.
+        """
+        return make_policy(self.base, self.loop, self.infer, max_failed)
+
+    def diff(self, other: KnowledgeBase, max_failed: int = 2) -> PolicyDifference:
+        """Where another knowledge base decides differently, over everything that either of them distinguishes.
+
+        Args:
+            other: the other one.
+            max_failed: at most so many components report anything.
+
+        Raises:
+            InputError: there would be too many states.
+            KnowledgeError: the reasoner takes too long for one of them.
+        """
+        space = Space.of(self.base, self.loop).common(Space.of(other.base, other.loop))
+        return compare(
+            make_policy(self.base, self.loop, self.infer, max_failed, space),
+            make_policy(other.base, other.loop, other.infer, max_failed, space),
+        )
