@@ -5,16 +5,20 @@ from __future__ import annotations
 import multiprocessing
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from suave_des.calibration.distance import Array, energy_distance, missions_as_vectors
+from suave_des.calibration.distance import SCALES, Array, energy_distance, missions_as_vectors
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.overrides import with_values
 from suave_des.simulation.simulator import Simulator
+from suave_des.validation.shares import Share, count
 
-FIRST_STEP = 0.15
+FINALISTS, FINAL_FACTOR = 8, 4
+"""How many of the best sets of values are looked at again, and with how many times the missions."""
+METRICS_AND_PLACE = ["search_time_s", "distance_inspected_m", "detection_x_m"]
+FIRST_STEP = 0.1
 """Standard deviation of the first generation, as a share of each parameter's range."""
 
 
@@ -40,10 +44,18 @@ class FreeParameter:
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """One set of values and its distances from the published runs, for each manager and their mean."""
+    """One set of values and how far its missions are from the published ones.
+
+    Attributes:
+        values: of the parameters.
+        distances: energy distance of each manager's missions.
+        share_difference: mean absolute difference of the clusters' shares; nought if none are compared.
+        loss: mean of the distances, plus the difference of the shares.
+    """
 
     values: tuple[float, ...]
     distances: tuple[float, ...]
+    share_difference: float
     loss: float
 
 
@@ -65,18 +77,46 @@ class Problem:
     published: Mapping[str, Array]
     runs: int
     seed: int
+    shares: tuple[tuple[Share, float], ...] = ()
+    """Shares of missions in clusters, each with the published one; their mean absolute difference adds to the loss."""
 
 
 def evaluate(problem: Problem, values: Sequence[float]) -> Evaluation:
     """Simulate all managers with one set of parameter values, and measure how far they are from the published runs."""
     named = {parameter.path: value for parameter, value in zip(problem.parameters, values, strict=True)}
     simulator = Simulator(with_values(problem.loaded, named))
-    distances = []
+    distances, missions = [], {}
     for manager in sorted(problem.published):
         published = problem.published[manager]
-        simulated = simulate(simulator, manager, problem.runs, problem.seed)[:, : published.shape[1]]
-        distances.append(energy_distance(simulated, published))
-    return Evaluation(tuple(map(float, values)), tuple(distances), float(np.mean(distances)))
+        missions[manager] = simulate(simulator, manager, problem.runs, problem.seed)
+        distances.append(energy_distance(missions[manager][:, : published.shape[1]], published))
+    difference = _share_difference(problem.shares, missions)
+    return Evaluation(tuple(map(float, values)), tuple(distances), difference, float(np.mean(distances)) + difference)
+
+
+def select(problem: Problem, tried: Sequence[Evaluation], workers: int) -> Evaluation:
+    """The best of the few best evaluations, simulated anew with more missions and other streams.
+
+    The least of many noisy losses is partly luck; this looks at it again, without the luck.
+    """
+    finalists = sorted(tried, key=lambda each: each.loss)[:FINALISTS]
+    larger = replace(problem, runs=problem.runs * FINAL_FACTOR, seed=problem.seed + 1)
+    with evaluator(larger, workers) as evaluate_all:
+        return min(evaluate_all([each.values for each in finalists]), key=lambda each: each.loss)
+
+
+def _share_difference(shares: Sequence[tuple[Share, float]], missions: Mapping[str, Array]) -> float:
+    if not shares:
+        return 0.0
+    import pandas
+
+    frames = [
+        pandas.DataFrame(vectors * np.array(SCALES), columns=METRICS_AND_PLACE).assign(manager=name)
+        for name, vectors in missions.items()
+    ]
+    simulated = pandas.concat(frames, ignore_index=True)
+    differences = [abs((count(share, simulated).share or 0.0) - published) for share, published in shares]
+    return float(np.mean(differences))
 
 
 def simulate(simulator: Simulator, manager: str, runs: int, seed: int) -> Array:

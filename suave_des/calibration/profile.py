@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -95,8 +95,3 @@ def _crossing(best: float, loss: float, grid: tuple[float, ...], losses: tuple[f
             return before + max(0.0, share) * (value - before)
         before, loss_before = value, here
     return before
-
-
-def on_fresh_seed(problem: Problem, seed: int) -> Problem:
-    """The same problem with other random streams, to see a fit that the streams had no part in."""
-    return replace(problem, seed=seed)

@@ -65,7 +65,6 @@ def record(
     problem: Problem,
     tried: Sequence[Evaluation],
     best: Evaluation,
-    fresh: Evaluation,
     spread: float,
     found: Sequence[Profile],
     provenance: Mapping[str, Any],
@@ -74,15 +73,14 @@ def record(
     managers = sorted(problem.published)
     content = {
         **provenance,
-        "distance": "mean over managers of the energy distance between missions as vectors (search time / 40 s, "
-        "distance inspected / 12 m, x of detection / 1.5 m)",
+        "loss": "mean over managers of the energy distance between missions as vectors (search time / 40 s, distance "
+        "inspected / 12 m, x of detection / 1.5 m), plus the mean absolute difference of the shares in clusters",
         "managers": managers,
         "published_runs": {name: len(problem.published[name]) for name in managers},
         "runs": problem.runs,
         "seed": problem.seed,
         "evaluations": len(tried),
         "best": _evaluation(best, managers),
-        "best_on_fresh_streams": _evaluation(fresh, managers),
         "spread_of_loss_over_resampled_published_runs": round(spread, 5),
         "fitted": {each.parameter.path: each.best for each in found},
         "profiles": {
@@ -96,7 +94,8 @@ def record(
 
 def _evaluation(evaluation: Evaluation, managers: Sequence[str]) -> dict[str, Any]:
     by_manager = zip(managers, evaluation.distances, strict=True)
-    return {"loss": round(evaluation.loss, 5), **{name: round(distance, 5) for name, distance in by_manager}}
+    shares = {"share_difference": round(evaluation.share_difference, 5)}
+    return {"loss": round(evaluation.loss, 5), **shares, **{name: round(distance, 5) for name, distance in by_manager}}
 
 
 def profiles_png(found: Sequence[Profile], best: Evaluation, threshold: float) -> bytes:

@@ -38,8 +38,8 @@ def calibrate(
 ) -> None:
     """Fit free parameters to real missions, and write the fitted scenario."""
     from suave_des.calibration import report
-    from suave_des.calibration.fit import evaluate, fit
-    from suave_des.calibration.profile import on_fresh_seed, profiles, resampling_spread
+    from suave_des.calibration.fit import FINAL_FACTOR, evaluate, fit, select
+    from suave_des.calibration.profile import profiles, resampling_spread
     from suave_des.campaign.output import check_output_folder, make_output_folder, write_files
     from suave_des.cli.console import output
 
@@ -53,17 +53,19 @@ def calibrate(
         evaluations,
         workers=workers,
         seed=seed,
-        on_generation=lambda count, best: console.print(f"{count:5d} sets tried, least distance {best.loss:.4f}"),
+        on_generation=lambda count, best: console.print(f"{count:5d} sets tried, least loss {best.loss:.4f}"),
     )
-    best = min(tried, key=lambda each: each.loss)
+    best = select(problem, tried, workers)
     values = report.fitted_values(problem.parameters, best)
     if out is not None:  # at once: the profiles take as long again
         write_files(out, {report.SCENARIO: report.fitted_scenario(problem, scenario, values)}, stale=report.FILES)
-    fresh = evaluate(on_fresh_seed(problem, seed + 1), best.values)
     spread = resampling_spread(problem, best, seed)
-    threshold = best.loss + spread
-    found = profiles(problem, best, threshold, workers) if profile else []
-    console.print(f"\nleast distance {best.loss:.4f}, with other random streams {fresh.loss:.4f}")
+    here = evaluate(problem, best.values)  # the profiles are seen with the search's own streams
+    threshold = here.loss + spread
+    found = profiles(problem, here, threshold, workers) if profile else []
+    console.print(
+        f"\nloss {best.loss:.4f} with {problem.runs * FINAL_FACTOR} missions for each manager and other streams"
+    )
     for path, value in values.items():
         admitted = next((f"   {one.low:8.3f} to {one.high:.3f}" for one in found if one.parameter.path == path), "")
         console.print(f"{path:48s} {value:8.3f}{admitted}", soft_wrap=True)
@@ -73,11 +75,11 @@ def calibrate(
     provenance = {"command": command_line(), "data": {"file": published[0], "sha256": published[1]}}
     contents: dict[str, str | bytes] = {
         report.SCENARIO: report.fitted_scenario(problem, scenario, values),
-        report.RECORD: report.record(problem, tried, best, fresh, spread, found, provenance),
+        report.RECORD: report.record(problem, tried, best, spread, found, provenance),
     }
     if found:
         contents[report.TABLE] = report.table(found)
-        contents[report.FIGURE] = report.profiles_png(found, best, threshold)
+        contents[report.FIGURE] = report.profiles_png(found, here, threshold)
     write_files(out, contents, stale=report.FILES)
     console.print(f"\nThe fitted scenario and the report are in {out}", soft_wrap=True)
 
@@ -96,7 +98,7 @@ def _problem(
     """What is fitted to what, and the data's name and SHA-256."""
     from suave_des.calibration.fit import Problem
     from suave_des.calibration.parameters import read_parameters
-    from suave_des.calibration.published import as_vectors
+    from suave_des.calibration.published import as_vectors, published_shares
     from suave_des.resources import find
     from suave_des.scenario.loader import load_scenario
     from suave_des.validation.runs import choose_managers, read_runs
@@ -106,4 +108,8 @@ def _problem(
     chosen = choose_managers(published, wanted)
     loaded = load_scenario(scenario, ontologies=ontology or (), modes_file=modes, reasoner=reasoner)
     form, free = read_parameters(find(parameters, "scenarios/calibration"), loaded)
-    return Problem(form, free, as_vectors(published.frame, chosen), runs, seed), (Path(data).name, published.sha256)
+    shares = published_shares(published.frame, chosen, published.path)
+    return Problem(form, free, as_vectors(published.frame, chosen), runs, seed, shares), (
+        Path(data).name,
+        published.sha256,
+    )

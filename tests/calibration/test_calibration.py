@@ -99,7 +99,7 @@ def test_a_fitted_scenario_loads_with_the_fitted_values(tmp_path: Path) -> None:
     paths = (GAIN, "calibration.altitude_error_m.mean", "revision.set_points.loss_probability")
     free = tuple(FreeParameter(path, 0.0, 1.0, 0.5) for path in paths)
     problem = Problem(load_scenario("seams2023"), free, {}, 1, 1)
-    values = fitted_values(free, Evaluation((0.41234, 0.3, 0.05), (), 0.0))
+    values = fitted_values(free, Evaluation((0.41234, 0.3, 0.05), (), 0.0, 0.0))
     file = tmp_path / "fitted.yaml"
     file.write_text(fitted_scenario(problem, "seams2023", values))
     fitted = load_scenario(file)
@@ -116,7 +116,7 @@ def test_the_admitted_interval_ends_where_the_loss_crosses_the_threshold() -> No
 def test_profiles_become_a_table_and_a_picture() -> None:
     one = Profile(FreeParameter(GAIN, 0.2, 1.2, 0.6), 0.5, (0.2, 0.5, 1.2), (0.9, 0.1, 0.8), 0.4, 0.7)
     assert table([one]).splitlines()[1] == f"{GAIN},0.2,1.2,0.6,0.5,0.4,0.7"
-    assert profiles_png([one], Evaluation((0.5,), (0.1,), 0.1), 0.2).startswith(b"\x89PNG")
+    assert profiles_png([one], Evaluation((0.5,), (0.1,), 0.0, 0.1), 0.2).startswith(b"\x89PNG")
 
 
 def test_the_command_writes_a_scenario_a_report_and_the_profiles(
@@ -138,4 +138,4 @@ def test_the_command_writes_a_scenario_a_report_and_the_profiles(
     record = json.loads((out / "calibration.json").read_text())
     assert record["managers"] == ["none"] and len(record["history"]) == record["evaluations"]
     assert value_at(load_scenario(out / "fitted.yaml"), GAIN) == pytest.approx(record["fitted"][GAIN], abs=0.001)
-    assert "least distance" in capsys.readouterr().out
+    assert "loss" in capsys.readouterr().out
