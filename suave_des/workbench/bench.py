@@ -16,6 +16,7 @@ from suave_des.workbench.difference import PolicyDifference, compare
 from suave_des.workbench.explain import Explanation, explain
 from suave_des.workbench.limit import TIME_LIMIT_S, LimitedReasoner, TimeLimit, in_words
 from suave_des.workbench.policy import Policy, Space, make_policy
+from suave_des.workbench.query import QueryResult, run_query
 from suave_des.workbench.states import Loop, state_from
 
 DEFAULT_SCENARIO = "seams2023"
@@ -166,3 +167,17 @@ class KnowledgeBase:
             make_policy(self.base, self.loop, self.infer, max_failed, space),
             make_policy(other.base, other.loop, other.infer, max_failed, space),
         )
+
+    def query(self, text: str, state: KnowledgeState | None = None, *, inferred: bool = False) -> QueryResult:
+        """Ask in SPARQL.
+
+        Args:
+            text: the query; see suave_des.workbench.query.run_query.
+            state: adds what it asserts; None: the ontologies alone.
+            inferred: adds what Pellet infers.
+
+        Raises:
+            InputError: it is no query.
+            KnowledgeError: the state contradicts itself, or it takes too long.
+        """
+        return self.limit.run(lambda: run_query(self.base, text, state, inferred=inferred), "answering the query")

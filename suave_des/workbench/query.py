@@ -1,0 +1,112 @@
+"""SPARQL over what the ontologies and a state assert, and what follows from them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+import rdflib
+from rdflib.namespace import RDFS
+
+from suave_des.errors import InputError
+from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.pellet import InProcessPellet
+from suave_des.knowledge.situation import Triple
+from suave_des.knowledge.state import KnowledgeState
+from suave_des.knowledge.triples import n_triple
+from suave_des.knowledge.vocabulary import MROS, OWL, RDF, SUAVE, SWRL, TOMASYS, XSD
+
+_PREFIXES: Final = {
+    "suave": SUAVE,
+    "tomasys": TOMASYS,
+    "mros": MROS,
+    "rdf": RDF,
+    "rdfs": str(RDFS),
+    "owl": OWL,
+    "xsd": XSD,
+    "swrl": SWRL,
+}
+
+
+@dataclass(frozen=True)
+class QueryResult:
+    """A table of answers.
+
+    Attributes:
+        columns: names of the variables; "answer" for ASK; subject, predicate, object for CONSTRUCT and DESCRIBE.
+        rows: texts, sorted unless the query orders them; known namespaces as prefixes; None for an unbound variable.
+    """
+
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str | None, ...], ...]
+
+
+def run_query(base: KnowledgeBase, text: str, state: KnowledgeState | None, *, inferred: bool) -> QueryResult:
+    """Ask a query.
+
+    Args:
+        base: the ontologies; labels and comments are there too.
+        text: SELECT, ASK, CONSTRUCT or DESCRIBE. The prefixes suave, tomasys, mros, rdf, rdfs, owl, xsd
+            and swrl need no declaration.
+        state: adds what it asserts; None: the ontologies alone.
+        inferred: adds what Pellet infers.
+
+    Raises:
+        InputError: it is no query, or wants to read something else than the knowledge base.
+        KnowledgeError: the state contradicts itself.
+    """
+    situation = () if state is None else base.situation(state)
+    more: Iterable[Triple] = InProcessPellet(base).infer(situation) if inferred else ()
+    graph = rdflib.Graph()
+    lines = base.content.n_triples(base.content.rules) + "".join(map(n_triple, (*situation, *more)))
+    graph.parse(data=lines, format="nt")
+    for source in base._sources:
+        for predicate in (RDFS.label, RDFS.comment):
+            for subject, value in source.graph.subject_objects(predicate):
+                if isinstance(subject, rdflib.URIRef):
+                    graph.add((subject, predicate, value))
+    for prefix, namespace in _PREFIXES.items():
+        graph.bind(prefix, namespace, override=True, replace=True)
+    return _asked(graph, text)
+
+
+def _asked(graph: rdflib.Graph, text: str) -> QueryResult:
+    from rdflib.plugins.sparql import prepareQuery
+
+    try:
+        query = prepareQuery(text, initNs=_PREFIXES)
+    except Exception as error:  # the parser raises many kinds; each means that this is no query
+        reason = " ".join(str(error).split()) or type(error).__name__
+        remedy = "for instance SELECT ?d WHERE { ?d tomasys:solvesF ?f }"
+        raise InputError(f"not a SPARQL query: {reason}", remedy=remedy) from None
+    if "ServiceGraphPattern" in str(query.algebra) or query.algebra.get("datasetClause"):
+        raise InputError("SERVICE and FROM read elsewhere", remedy="leave them out: only the knowledge base is asked")
+    try:
+        result = graph.query(query)
+        if result.type == "ASK":
+            return QueryResult(("answer",), ((str(result.askAnswer).lower(),),))
+        if result.type == "SELECT":
+            columns = tuple(map(str, result.vars or ()))
+            rows = [tuple(_text(graph, cell) for cell in row) for row in result]  # type: ignore[union-attr]
+            ordered = "OrderBy" in str(query.algebra)
+            return QueryResult(columns, tuple(rows if ordered else sorted(rows, key=_sortable)))
+        triples = [tuple(_text(graph, term) for term in triple) for triple in result.graph or ()]
+        return QueryResult(("subject", "predicate", "object"), tuple(sorted(triples, key=_sortable)))
+    except InputError:
+        raise
+    except Exception as error:  # evaluation runs whatever the query says
+        raise InputError(f"the query cannot be answered: {' '.join(str(error).split())}") from None
+
+
+def _sortable(row: tuple[str | None, ...]) -> tuple[str, ...]:
+    return tuple(cell or "" for cell in row)
+
+
+def _text(graph: rdflib.Graph, term: object) -> str | None:
+    if term is None:
+        return None
+    if isinstance(term, rdflib.URIRef):
+        name = graph.namespace_manager.normalizeUri(term)
+        return name.strip("<>") if name.startswith("<") else name
+    return f"_:{term}" if isinstance(term, rdflib.BNode) else str(term)

@@ -1,0 +1,65 @@
+"""kb query: SPARQL over ontologies, states and inferences, and nothing else."""
+
+import csv
+import io
+import json
+
+import pytest
+
+from suave_des.errors import InputError
+
+SEARCH = "f_generate_search_path"
+
+
+def test_asks_the_ontologies(bench):
+    found = bench.query(f"SELECT ?d WHERE {{ ?d tomasys:solvesF suave:{SEARCH} }}")
+    assert found.columns == ("d",)
+    assert found.rows == (("suave:fd_spiral_high",), ("suave:fd_spiral_low",), ("suave:fd_spiral_medium",))
+
+
+def test_inferred_facts_are_there_when_asked_for(bench):
+    state = bench.state(groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 1.8})
+    query = "SELECT ?g ?s WHERE { ?g tomasys:fg_status ?s }"
+    assert bench.query(query, state).rows == ()
+    assert bench.query(query, state, inferred=True).rows == (("suave:fg_spiral_high", "IN_ERROR_NFR"),)
+    assert bench.query("ASK { suave:fg_spiral_high a tomasys:FunctionGrounding }", state).rows == (("true",),)
+    assert bench.query("ASK { suave:fg_spiral_high a tomasys:FunctionGrounding }").rows == (("false",),)
+
+
+def test_an_order_that_the_query_wants_is_kept(bench):
+    found = bench.query(f"SELECT ?d WHERE {{ ?d tomasys:solvesF suave:{SEARCH} }} ORDER BY DESC(?d)")
+    assert [row[0] for row in found.rows] == ["suave:fd_spiral_medium", "suave:fd_spiral_low", "suave:fd_spiral_high"]
+
+
+def test_labels_are_there(bench):
+    assert bench.query("SELECT ?l WHERE { suave:c_thruster_1 rdfs:label ?l }").rows == (("c_thruster_1",),)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("SELECT WHERE", "not a SPARQL query"),
+        ("", "not a SPARQL query"),
+        ("SELECT ?s WHERE { ?s nowhere:is ?o }", "not a SPARQL query: Unknown namespace prefix : nowhere"),
+        ("DELETE WHERE { ?s ?p ?o }", "not a SPARQL query"),
+        ("SELECT ?s WHERE { SERVICE <http://example.org/> { ?s ?p ?o } }", "SERVICE and FROM read elsewhere"),
+        ("SELECT ?s FROM <http://example.org/> WHERE { ?s ?p ?o }", "SERVICE and FROM read elsewhere"),
+    ],
+)
+def test_what_is_no_query_of_the_knowledge_base_is_refused(bench, text, said):
+    with pytest.raises(InputError) as error:
+        bench.query(text)
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_the_command_prints_tables(command):
+    words = ("query", "SELECT ?g ?s WHERE { ?g tomasys:fg_status ?s }", "--inferred")
+    state = ("--ground", f"{SEARCH}=fd_spiral_high", "--set", "water_visibility=1.8")
+    status, text, _ = command(*words, *state)
+    assert status == 0
+    assert text.splitlines()[1].split() == ["suave:fg_spiral_high", "IN_ERROR_NFR"]
+    _, text, _ = command(*words, *state, "--format", "csv")
+    assert list(csv.DictReader(io.StringIO(text))) == [{"g": "suave:fg_spiral_high", "s": "IN_ERROR_NFR"}]
+    _, text, _ = command(*words, "--format", "json")
+    assert json.loads(text) == []
