@@ -1,0 +1,122 @@
+"""Which rules can never fire: a bound on what can hold in any state, from above.
+
+What no ontology asserts, no state brings and no rule that can fire concludes, cannot hold. Properties are taken one by
+one and individuals not told apart, so a rule that is said to be dead is dead, but not each dead rule is found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+from suave_des.knowledge.rule_syntax import EXPRESSION, Atom
+from suave_des.knowledge.rule_writer import write_atom
+from suave_des.knowledge.rules import Rule
+from suave_des.knowledge.situation import Lit, Model, Triple
+from suave_des.knowledge.triples import Content, canonical
+from suave_des.knowledge.vocabulary import LANGUAGE_NAMESPACES, OWL, RDF_TYPE, RDFS, TOMASYS, XSD
+
+_ANY: Final = "any value"
+_ANY_TEXT: Final = "any text"
+_SUBCLASS: Final = RDFS + "subClassOf"
+_SPREADS: Final = (RDFS + "subPropertyOf", OWL + "inverseOf", OWL + "equivalentProperty")
+
+
+class _Possible:
+    """Classes that can have members, and values that properties can have."""
+
+    def __init__(self, triples: Iterable[Triple], content: Content, model: Model) -> None:
+        self.structure = "".join(content.structure)
+        self.classes: set[str] = {OWL + "Thing", *(TOMASYS + name for name in ("Objective", "FunctionGrounding"))}
+        self.values: dict[str, set[object]] = {}
+        self.axioms = [triple for triple in triples if triple[1].startswith(LANGUAGE_NAMESPACES)]
+        for _, predicate, value in triples:
+            if predicate == RDF_TYPE and isinstance(value, str) and not value.startswith(LANGUAGE_NAMESPACES):
+                self.classes.add(value)
+            elif not predicate.startswith(LANGUAGE_NAMESPACES):
+                self.values.setdefault(predicate, set()).add(canonical(value) if isinstance(value, Lit) else value)
+        for name in ("typeF", "typeFD", "solvesO", "o_always_improve"):
+            self.values[TOMASYS + name] = {_ANY}
+        for name in ("o_status", "c_status"):
+            self.values.setdefault(TOMASYS + name, set()).add(_ANY_TEXT)
+        if model.attributes:
+            self.classes.add(TOMASYS + "QAvalue")
+            self.values.update({TOMASYS + name: {_ANY} for name in ("isQAtype", "hasValue")})
+        if any(model.estimated.values()):
+            self.values[TOMASYS + "hasQAvalue"] = {_ANY}
+        self.spread()
+
+    def spread(self) -> None:
+        """Follow subclasses, domains and ranges, and properties that hold because others do."""
+        while True:
+            before = len(self.classes), len(self.values), sum(map(len, self.values.values()))
+            for subject, predicate, value in self.axioms:
+                if not isinstance(value, str):
+                    continue
+                if predicate in (_SUBCLASS, OWL + "equivalentClass"):
+                    if subject in self.classes:
+                        self.classes.add(value)
+                    if predicate != _SUBCLASS and value in self.classes:
+                        self.classes.add(subject)
+                elif predicate in (RDFS + "domain", RDFS + "range") and subject in self.values:
+                    self.classes.add(value)
+                elif predicate in _SPREADS:
+                    for one, other in ((subject, value), (value, subject)):
+                        if one in self.values:
+                            self.values.setdefault(other, set()).add(_ANY)
+            if before == (len(self.classes), len(self.values), sum(map(len, self.values.values()))):
+                return
+
+    def allows(self, atom: Atom) -> bool:
+        """Whether an atom of a body can hold."""
+        if atom.kind == "class":
+            return atom.predicate in self.classes or atom.predicate == EXPRESSION or self._is_defined(atom.predicate)
+        if atom.kind not in ("object", "data") or len(atom.arguments) != 2:
+            return True
+        values = self.values.get(atom.predicate)
+        if values is None:
+            return self._is_defined(atom.predicate)
+        wanted = atom.arguments[1]
+        if _ANY in values or not isinstance(wanted, Lit):
+            return True
+        return canonical(wanted) in values or (_ANY_TEXT in values and wanted.datatype == XSD + "string")
+
+    def _is_defined(self, iri: str) -> bool:
+        """Whether a class expression or property chain speaks of it, which is not followed here."""
+        return f"<{iri}>" in self.structure
+
+    def conclude(self, atom: Atom) -> None:
+        """Add what an atom of a head makes true."""
+        if atom.kind == "class":
+            self.classes.add(atom.predicate)
+        elif atom.kind in ("object", "data") and len(atom.arguments) == 2:
+            value = atom.arguments[1]
+            known = self.values.setdefault(atom.predicate, set())
+            known.add(canonical(value) if isinstance(value, Lit) else _ANY)
+
+
+def dead_rules(triples: Iterable[Triple], content: Content, model: Model) -> list[tuple[Rule, Atom]]:
+    """Enabled rules that no state can make fire, each with an atom that can never hold.
+
+    Args:
+        triples: all that the ontologies say outside of rules.
+        content: the ontologies and the rules.
+        model: what states are made of.
+    """
+    possible = _Possible(list(triples), content, model)
+    waiting = list(content.enabled_rules)
+    while True:
+        firing = [rule for rule in waiting if all(map(possible.allows, rule.body))]
+        if not firing:
+            break
+        for rule in firing:
+            for atom in rule.head:
+                possible.conclude(atom)
+        possible.spread()
+        waiting = [rule for rule in waiting if rule not in firing]
+    return [(rule, next(atom for atom in rule.body if not possible.allows(atom))) for rule in waiting]
+
+
+def atom_text(atom: Atom) -> str:
+    """An atom as its rule writes it."""
+    return write_atom(atom)

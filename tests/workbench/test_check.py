@@ -1,0 +1,254 @@
+"""kb check: every mistake that Pellet is silent about is an ERROR with its place, and good models pass."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from suave_des.cli.main import main
+from suave_des.resources import shipped_folder
+from suave_des.workbench.check import Subject, check
+from suave_des.workbench.findings import Finding, Level, fails
+
+SUAVE = "http://www.metacontrol.org/suave#"
+TOMASYS = "http://metacontrol.org/tomasys#"
+SWRL = "http://www.w3.org/2003/11/swrl#"
+
+
+def found(tmp_path: Path, rules: str = "", extra: str = "", **options: object) -> tuple[Finding, ...]:
+    text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
+    (tmp_path / "suave.owl").write_text(text.replace("</rdf:RDF>", extra + "</rdf:RDF>"), encoding="utf-8")
+    (tmp_path / "mine.swrl").write_text(rules, encoding="utf-8")
+    return check(Subject([tmp_path / "suave.owl"], [tmp_path / "mine.swrl"], **options))  # type: ignore[arg-type]
+
+
+def errors(findings: tuple[Finding, ...]) -> list[Finding]:
+    return [one for one in findings if one.level is Level.ERROR]
+
+
+def only(findings: tuple[Finding, ...], words: str) -> Finding:
+    (one,) = [finding for finding in findings if words in finding.message]
+    return one
+
+
+def test_the_shipped_ontology_passes(tmp_path: Path) -> None:
+    findings = found(tmp_path)
+    assert not fails(findings, Level.WARN)
+    assert only(findings, "battery_level").level is Level.INFO
+
+
+DECLARE = "declare it as {} property in the ontology"
+#: What Pellet drops or ignores (the table of its silent cases), each as a rule on one line.
+SILENT = {
+    "unknown builtin": ("A: hasValue(?q, ?v) ^ swrlb:lessThn(?v, 1) -> Role(?q)", 23, "did you mean lessThan?"),
+    "head variable": ("A: Role(?q) -> Role(?p)", 21, None),
+    "builtin variable": ("A: Role(?q) ^ lessThan(?v, 1) -> Role(?q)", 24, None),
+    "undeclared class": ("A: <http://x.org/#Rol>(?q) -> Role(?q)", 4, "did you mean Role?"),
+    "undeclared property": (
+        "A: <http://x.org/#p>(?q, ?r) -> Role(?q)",
+        4,
+        DECLARE.format("object"),
+    ),
+    "undeclared individual": ("A: typeFD(?q, suave:fd_spiral) -> Role(?q)", 15, "did you mean fd_spiral_low?"),
+    "lessThan with one": ("A: hasValue(?q, ?v) ^ lessThan(?v) -> Role(?q)", 23, None),
+    "undeclared in the head": (
+        'A: Role(?q) -> <http://x.org/#p>(?q, "x")',
+        16,
+        DECLARE.format("data"),
+    ),
+    "literal of an object property": ('A: typeFD(?q, "fd") -> Role(?q)', 15, None),
+    "head literal outside the range": ("A: Role(?q) -> fg_status(?q, 1)", 30, "a value of string"),
+    "individual of a data property": ("A: fg_status(?q, energy) -> Role(?q)", 18, 'a text stands in quotes: "energy"'),
+    "class as property": ("A: Role(?q, ?r) -> Role(?q)", 4, "write Role(?x)"),
+    "differentFrom": (
+        "A: Role(?q) ^ differentFrom(?q, ?q) -> Role(?q)",
+        15,
+        "distinguish individuals by a property",
+    ),
+    "integer for a decimal": ("A: hasValue(?q, 1) -> Role(?q)", 17, "write 1.0"),
+    "misspelt name": ("A: Objectve(?q) -> Role(?q)", 4, "did you mean Objective?"),
+    "syntax": ("A: Role(?q -> Role(?q)", 12, "parentheses must balance"),
+}
+
+
+@pytest.mark.parametrize("case", SILENT)
+def test_silent_cases_are_errors_with_file_rule_and_column(case: str, tmp_path: Path) -> None:
+    rule, column, remedy = SILENT[case]
+    (error,) = errors(found(tmp_path, f"# first line\n{rule}\n"))
+    assert (error.file, error.line, error.column) == (str(tmp_path / "mine.swrl"), 2, column)
+    assert error.rule == ("A" if case != "syntax" else None)
+    assert error.remedy == remedy
+
+
+OWL_RULE = f"""
+    <rdf:Description><rdfs:label>mine</rdfs:label><rdf:type rdf:resource="{SWRL}Imp"/>
+      <swrl:body rdf:parseType="Collection"><swrl:IndividualPropertyAtom>
+        <swrl:propertyPredicate rdf:resource="{TOMASYS}fg_status"/>
+        <swrl:argument1 rdf:resource="urn:swrl:var#x"/><swrl:argument2 rdf:resource="urn:swrl:var#y"/>
+      </swrl:IndividualPropertyAtom></swrl:body>
+      <swrl:head rdf:parseType="Collection"><swrl:ClassAtom>
+        <swrl:classPredicate rdf:resource="{TOMASYS}Roel"/><swrl:argument1 rdf:resource="urn:swrl:var#z"/>
+      </swrl:ClassAtom></swrl:head></rdf:Description>
+"""
+
+
+def test_rules_of_ontologies_are_checked_likewise(tmp_path: Path) -> None:
+    findings = errors(found(tmp_path, extra=OWL_RULE))
+    text = (tmp_path / "suave.owl").read_text(encoding="utf-8")
+    line = text[: text.index("mine</rdfs:label>")].count("\n") + 1
+    assert {(one.file, one.line, one.rule) for one in findings} == {(str(tmp_path / "suave.owl"), line, "mine")}
+    # fg_status(?x, ?y) -> Roel(?z)
+    assert [(one.column, one.message) for one in findings] == [
+        (1, "fg_status is a data property, but is used as an object property"),
+        (22, "class Roel is not defined"),
+        (27, "?z stands in the head, but the body does not bind it"),
+    ]
+
+
+def test_all_mistakes_of_a_file_are_told_at_once(tmp_path: Path) -> None:
+    rules = "A: Rle(?x) -> Role(?x)\nB: Role(?x -> Role(?x)\ndisabled C: Role(?x) -> Role(?y)\n"
+    findings = found(tmp_path, rules)
+    assert [one.line for one in errors(findings)] == [1, 2]
+    assert only(findings, "switched off").level is Level.INFO
+
+
+def test_a_rule_that_never_fires(tmp_path: Path) -> None:
+    rules = 'A: fg_status(?g, "IN_EROR_NFR") -> Role(?g)\nB: Role(?g) -> Binding(?g)\n'
+    rules += 'C: c_status(?c, "ANYTHING") -> Binding(?c)\n'
+    findings = [one for one in found(tmp_path, rules) if one.file and one.file.endswith("mine.swrl")]
+    assert [(one.level, one.rule, one.column) for one in findings] == [(Level.WARN, "A", 4), (Level.WARN, "B", 4)]
+
+
+def test_contradictions_come_from_pellet(tmp_path: Path) -> None:
+    rules = 'A: Component(?c) -> c_status(?c, "x") ^ c_status(?c, "y")'
+    (error,) = errors(found(tmp_path, rules))
+    assert "contradiction" in error.message
+    assert "by the rules A" in error.message
+
+
+def test_exact_values_are_told(tmp_path: Path) -> None:
+    rules = "A: hasValue(?q, ?v) ^ add(?s, ?v, 1) ^ lessThan(?s, 2) -> Role(?q)"
+    assert only(found(tmp_path, rules), "rule A computes with add").level is Level.INFO
+
+
+def individual(name: str, kind: str, inside: str = "") -> str:
+    return (
+        f'<owl:NamedIndividual rdf:about="{SUAVE}{name}"><rdf:type rdf:resource="{TOMASYS}{kind}"/>{inside}'
+        "</owl:NamedIndividual>\n"
+    )
+
+
+def link(name: str, target: str) -> str:
+    return f'<tomasys:{name} rdf:resource="{SUAVE}{target}"/>'
+
+
+def test_the_model(tmp_path: Path) -> None:
+    extra = (
+        individual("f_new", "Function")
+        + individual("fd_new", "FunctionDesign", link("solvesF", "f_follow_pipeline"))
+        + individual("fd_lost", "FunctionDesign", link("hasQAestimation", "qa_empty"))
+        + individual("qa_empty", "QAvalue")
+    )
+    modes = {"f_follow_pipeline": ["fd_follow_pipeline", "fd_unground", "fd_old"]}
+    findings = found(tmp_path, extra=extra, modes=modes, needed=["f_follow_pipeline", "f_gone"])
+    assert only(findings, "function f_new has no function design").level is Level.WARN
+    assert only(findings, "fd_new has no mode").level is Level.ERROR
+    assert only(findings, "mode fd_old of f_follow_pipeline has no function design").level is Level.WARN
+    assert only(findings, "there is no function f_gone").level is Level.ERROR
+    assert only(findings, "fd_new has no performance").level is Level.WARN
+    assert only(findings, "fd_lost: solvesF: a function design must solve a function").level is Level.ERROR
+    assert only(findings, "qa_empty: isQAtype: a QAvalue must be of exactly one").line is not None
+
+
+def test_shapes_of_ones_own(tmp_path: Path) -> None:
+    shapes = tmp_path / "mine.ttl"
+    shapes.write_text(
+        f"@prefix sh: <http://www.w3.org/ns/shacl#> .\n<urn:x> a sh:NodeShape ; sh:targetClass <{TOMASYS}Component> ;\n"
+        f' sh:property [ sh:path <{TOMASYS}typeC> ; sh:minCount 1 ; sh:severity sh:Warning ; sh:message "no class" ] .',
+        encoding="utf-8",
+    )
+    findings = found(tmp_path, shapes=[shapes])
+    assert len([one for one in findings if one.message == "c_thruster_1: typeC: no class"]) == 1
+    assert fails(findings, Level.WARN)
+    assert not fails(findings, Level.ERROR)
+
+
+def command(*arguments: str) -> int:
+    with pytest.raises(SystemExit) as caught:
+        main(["kb", "check", *arguments])
+    return int(str(caught.value.code or 0))
+
+
+def test_formats_and_exit_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rules = tmp_path / "mine.swrl"
+    rules.write_text('A: fg_status(?g, "NEVER") -> Role(?g)', encoding="utf-8")
+    assert command("--rules", str(rules)) == 0
+    assert f"WARN   {rules}: line 1, rule A, column 4: can never fire" in capsys.readouterr().out
+    assert command("--rules", str(rules), "--fail-on", "warn", "--format", "json") == 1
+    first = json.loads(capsys.readouterr().out)[0]
+    assert (first["level"], first["file"], first["line"], first["column"]) == ("WARN", str(rules), 1, 4)
+    rules.write_text("A: Rol(?g) -> Role(?g)", encoding="utf-8")
+    assert command("--rules", str(rules), "--format", "markdown") == 1
+    assert "| ERROR | " in capsys.readouterr().out
+
+
+def entity_bomb() -> str:
+    entities = "".join(f'<!ENTITY e{n} "{f"&e{n - 1};" * 10 if n else "x" * 10}">' for n in range(30))
+    return f"<!DOCTYPE r [{entities}]><r>&e29;</r>" + "<!-- -->" * 1_300_000
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("", "the file is empty"),
+        ("<?xml version='1.0'?>\n<rdf:RDF", "line 2"),
+        (entity_bomb(), "line 1"),
+        ('<!DOCTYPE r SYSTEM "file:///etc/passwd"><r/>', "line 1"),
+        ("<html/>", "not OWL"),
+        (
+            '<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#" xmlns:owl="http://www.w3.org/2002/07/owl#">'
+            '\n<owl:Ontology rdf:about="http://x.org/">\n<owl:imports rdf:resource="http://x.org/none"/>'
+            "</owl:Ontology></rdf:RDF>",
+            "line 3: import http://x.org/none does not resolve",
+        ),
+    ],
+    ids=["empty", "cut", "bomb", "external", "page", "import"],
+)
+def test_what_cannot_be_read_exits_with_2(
+    content: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "bad.owl"
+    path.write_text(content, encoding="utf-8")
+    assert command("--ontology", str(path)) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count("\n") == 1
+    assert path.read_text(encoding="utf-8") == content
+
+
+@pytest.mark.parametrize(
+    ("option", "name"), [("--rules", "none.swrl"), ("--shapes", "none.ttl"), ("--ontology", "n.owl")]
+)
+def test_missing_files_exit_with_2(option: str, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert command(option, name) == 2
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_another_ontology_altogether_lacks_what_the_mission_needs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "wine.owl"
+    path.write_text(
+        '<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#" xmlns:owl="http://www.w3.org/2002/07/owl#">'
+        '<owl:Ontology rdf:about="http://x.org/wine"/><owl:Class rdf:about="http://x.org/wine#Bordeaux"/></rdf:RDF>',
+        encoding="utf-8",
+    )
+    assert command("--ontology", str(path)) == 1
+    assert "there is no function f_maintain_motion, which the mission needs" in capsys.readouterr().out
+
+
+def test_a_reasoner_that_takes_too_long_is_given_up_on(tmp_path: Path) -> None:
+    findings = found(tmp_path, time_limit_s=1e-6)
+    assert "not done after" in errors(findings)[0].message
