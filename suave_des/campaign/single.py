@@ -7,6 +7,7 @@ from dataclasses import astuple, fields
 from pathlib import Path
 
 from suave_des.campaign.campaign import check_knowledge
+from suave_des.campaign.knowledge_file import KNOWLEDGE_FILE, knowledge_text
 from suave_des.campaign.outcomes import COLUMNS, row_of
 from suave_des.campaign.output import (
     check_output_folder,
@@ -51,7 +52,8 @@ def run_mission(
         manager: name of the managing subsystem, or module:Class.
         run: number of the run, from 1.
         seed: of everything that is random.
-        out: folder for mission.json, events.csv and trajectory.csv; it is made if its parent exists. None: no files.
+        out: folder for mission.json, events.csv, trajectory.csv and, of a manager that reasons,
+            knowledge.jsonl; it is made if its parent exists. None: no files.
         ontologies: files to use in place of the scenario's.
         modes_file: file to use in place of the scenario's.
         reasoner: to use in place of the scenario's.
@@ -81,7 +83,7 @@ def run_mission(
     result = Simulator(loaded).run(manager, run, seed, record=True)
     if folder is not None:
         make_output_folder(folder)
-        write_files(folder, _files(loaded, result, inputs, command))
+        write_files(folder, _files(loaded, result, inputs, command), stale=(KNOWLEDGE_FILE,))
     return result
 
 
@@ -94,8 +96,11 @@ def _files(
         "scenario": loaded.scenario.model_dump(mode="json"),
         **provenance(loaded, inputs, command),
     }
-    return {
+    files = {
         MISSION_FILE: json_text(mission),
         EVENTS_FILE: csv_text(EVENT_COLUMNS, map(astuple, result.events)),
         TRAJECTORY_FILE: csv_text(TRAJECTORY_COLUMNS, map(astuple, result.trajectory)),
     }
+    if result.knowledge:
+        files[KNOWLEDGE_FILE] = knowledge_text(result.knowledge)
+    return files

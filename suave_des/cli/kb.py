@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import typer
 
-from suave_des.cli import kb_check, kb_diff, kb_explain, kb_infer, kb_policy, kb_query, kb_rules
+from suave_des.cli import kb_check, kb_diff, kb_explain, kb_infer, kb_policy, kb_query, kb_rules, kb_try
 
 app = typer.Typer(
     name="kb",
@@ -29,6 +29,7 @@ app.command("explain")(kb_explain.explain)
 app.command("policy")(kb_policy.policy)
 app.command("diff")(kb_diff.diff)
 app.command("query")(kb_query.query)
+app.command("try")(kb_try.try_rule)
 app.command("check")(kb_check.check)
 app.command("rules")(kb_rules.rules)
 app.command("add-rule")(kb_rules.add_rule)

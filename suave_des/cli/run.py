@@ -30,7 +30,10 @@ def run(
         int, typer.Option("--run", metavar="K", help="Run of a campaign with this seed: the same mission again.")
     ] = 1,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for mission.json, events.csv, trajectory.csv.")
+        Path | None,
+        typer.Option(
+            "--out", metavar="DIR", help="Folder for mission.json, events.csv, trajectory.csv, knowledge.jsonl."
+        ),
     ] = None,
     overwrite: Overwrite = False,
     ontology: Ontologies = None,

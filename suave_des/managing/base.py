@@ -35,6 +35,7 @@ class ManagedSystem:
         stream: makes a named random stream of this run, the same for every manager.
         log: takes an event and its detail for the mission's record.
         knowledge: gives the knowledge base with its reasoner (a Deliberation), opened on the first call.
+        reasoned: takes each KnowledgeState that is reasoned about, for the mission's record.
     """
 
     env: simpy.Environment
@@ -45,6 +46,7 @@ class ManagedSystem:
     stream: Callable[[str], random.Random]
     log: Callable[[str, str], None]
     knowledge: Callable[[], Any]
+    reasoned: Callable[[Any], None] = lambda state: None
 
     @property
     def now_s(self) -> float:

@@ -76,9 +76,8 @@ class Metacontrol(ManagingSubsystem):
             return
         state = self._state()
         self._cancelled.clear()
-        conclusion = self._deliberation.conclude(
-            state, improve_exceeded=self._revision.search_improves_when_exceeded
-        )
+        self.system.reasoned(state)
+        conclusion = self._deliberation.conclude(state, improve_exceeded=self._revision.search_improves_when_exceeded)
         yield self.system.env.timeout(draw(self.system.scenario.latencies.inference_s, self._latency_stream))
         self._tell(conclusion.statuses)
         self._execute(conclusion.plan)
@@ -150,12 +149,13 @@ class Metacontrol(ManagingSubsystem):
     def _carry_out(self, decision: Decision) -> None:
         function, design = decision.function, decision.design
         if design is None:
-            self.system.log("no_design_left", f"{function}: {decision.reason}")
+            self.system.log("no_design_left", f"{function}: {decision.reason}{_left_out(decision)}")
             return
         if self.system.change_mode(function, design):
             if self._groundings.get(function) != design:
                 before = self._groundings.get(function, "ungrounded")
-                self.system.log("adaptation", f"{function}: {before} -> {design}: {decision.reason}")
+                why = f"{decision.reason}{_left_out(decision)}"
+                self.system.log("adaptation", f"{function}: {before} -> {design}: {why}")
             self._groundings[function] = design
             self._objectives[function] = None
 
@@ -163,3 +163,8 @@ class Metacontrol(ManagingSubsystem):
         for line in sorted(statuses - self._told):
             self.system.log("inferred", line)
         self._told = statuses
+
+
+def _left_out(decision: Decision) -> str:
+    """The designs that were left out, with the reason of each."""
+    return "".join(f"; not {each.design}: {each.reason}" for each in decision.rejected)

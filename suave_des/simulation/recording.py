@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import simpy
 
@@ -11,7 +12,7 @@ from suave_des.managed.coordinator import MAINTAIN_MOTION
 from suave_des.monitor.diagnostics import Diagnostic, Kind
 from suave_des.monitor.monitors import Measurements
 from suave_des.scenario.modes import Mode
-from suave_des.simulation.result import Event, TrajectoryPoint
+from suave_des.simulation.result import Event, KnowledgeRecord, TrajectoryPoint
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
 
 TRAJECTORY_PERIOD_ROWS = 4
@@ -29,12 +30,18 @@ class Recorder:
         self._env = env
         self._enabled = enabled
         self.events: list[Event] = []
+        self.knowledge: list[KnowledgeRecord] = []
         self._modes: list[tuple[float, str]] = [(0.0, "")]
 
     def log(self, source: str, event: str, detail: str) -> None:
         """Keep an event."""
         if self._enabled:
             self.events.append(Event(float(self._env.now), source, event, detail))
+
+    def reasoned(self, state: Any) -> None:
+        """Keep a state that is reasoned about, if it differs from the one before."""
+        if self._enabled and (not self.knowledge or self.knowledge[-1].state != state):
+            self.knowledge.append(KnowledgeRecord(float(self._env.now), state))
 
     def diagnostic_of(self, thresholds: Sequence[float]) -> Callable[[Diagnostic], None]:
         """A subscriber that keeps component reports, and visibility measurements that cross a threshold."""

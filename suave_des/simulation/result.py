@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +68,14 @@ class TrajectoryPoint:
     visibility_m: float | None
 
 
+@dataclass(frozen=True, slots=True)
+class KnowledgeRecord:
+    """A KnowledgeState that was reasoned about at a mission time, and again until that of the next record."""
+
+    t_s: float
+    state: Any
+
+
 @dataclass(frozen=True)
 class MissionResult:
     """A mission's metrics, with the record of how it went if that was asked for."""
@@ -74,5 +83,6 @@ class MissionResult:
     metrics: MissionMetrics
     events: tuple[Event, ...] = ()
     trajectory: tuple[TrajectoryPoint, ...] = ()
+    knowledge: tuple[KnowledgeRecord, ...] = ()
     drawn: dict[str, float] = field(default_factory=dict)
     """What this run's streams gave for the scenario's distributions, by key path."""

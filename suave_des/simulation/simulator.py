@@ -144,7 +144,9 @@ class _Mission:
             detection_y_m=float(self.simulator.points[point, 1]) if found and point is not None else None,
         )
         trajectory = self.recorder.trajectory(self.vehicle, self.visibility)
-        return MissionResult(metrics, tuple(self.recorder.events), trajectory, self.chance.drawn)
+        return MissionResult(
+            metrics, tuple(self.recorder.events), trajectory, tuple(self.recorder.knowledge), self.chance.drawn
+        )
 
     # The world and the vehicle.
 
@@ -312,5 +314,6 @@ class _Mission:
             stream=lambda stream: self.chance.stream(f"manager/{stream}"),
             log=lambda event, detail: self.recorder.log(name, event, detail),
             knowledge=lambda: self.simulator.knowledge,
+            reasoned=self.recorder.reasoned,
         )
         return ManagerHost(name, self.run, system, self.bus)

@@ -126,6 +126,16 @@ class Tracer:
         premises = tuple(known[each] for each in sorted(known, key=str))
         return Derivation(self._fact(triple), "axioms", premises=premises, axioms=traced.axioms)
 
+    def firings(self, rule: Rule) -> Iterator[tuple[tuple[tuple[str, Value], ...], tuple[Fact, ...]]]:
+        """Every way in which a rule fires: the bindings, and what it concludes."""
+        known = dict.fromkeys(sorted(self.entailed(), key=str))
+        with one_at_a_time:
+            for binding, body in sorted(_matches(rule.body, {}, (), known), key=str):
+                concluded = self._step(rule, frozenset(body))
+                if concluded:
+                    bound = tuple((name, value_of(binding[name], self.base.names)) for name in sorted(binding))
+                    yield bound, tuple(self._fact(triple) for triple in sorted(concluded, key=str))
+
     def clashes(self) -> tuple[str, tuple[Clash, ...], tuple[str, ...]]:
         """For a state that contradicts itself: what Pellet says, who clashes, and the names of the rules involved."""
         with one_at_a_time:

@@ -1,0 +1,122 @@
+"""kb try, and the record of knowledge states that it works on."""
+
+import csv
+import itertools
+import json
+
+import pytest
+
+from suave_des.campaign.knowledge_file import KNOWLEDGE_FILE, knowledge_text, read_knowledge
+from suave_des.campaign.single import run_mission
+from suave_des.errors import InputError
+from suave_des.workbench.trial import try_rule
+
+SEARCH = "f_generate_search_path"
+NEAR = (
+    "near: FunctionGrounding(?fg) ^ hasQAvalue(?fg, ?q) ^ isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ "
+    'lessThan(?v, 2.5) -> fg_status(?fg, "IN_ERROR_NFR")'
+)
+
+
+@pytest.fixture(scope="module")
+def mission(tmp_path_factory):
+    scenario = tmp_path_factory.mktemp("scenario") / "short.yaml"
+    scenario.write_text("base: seams2023.yaml\nmission: {time_limit_s: 60}\n")
+    folder = tmp_path_factory.mktemp("missions") / "one"
+    result = run_mission(scenario, "metacontrol", 1, 1, folder)
+    return folder, result
+
+
+def test_a_mission_keeps_every_state_that_differs_from_the_one_before(mission):
+    folder, result = mission
+    records = read_knowledge(folder / KNOWLEDGE_FILE)
+    assert [record.state for record in records] == [record.state for record in result.knowledge]
+    assert knowledge_text(records) == (folder / KNOWLEDGE_FILE).read_text()
+    assert all(one.state != other.state for one, other in itertools.pairwise(records))
+    assert [record.t_s for record in records] == sorted(record.t_s for record in records)
+
+
+def test_a_manager_that_does_not_reason_leaves_no_such_file(tmp_path):
+    run_mission("seams2023", "none", 1, 1, tmp_path / "none")
+    assert not (tmp_path / "none" / KNOWLEDGE_FILE).exists()
+
+
+def test_adaptations_tell_why_the_other_designs_were_left_out(mission):
+    folder, _ = mission
+    rows = list(csv.DictReader((folder / "events.csv").open()))
+    lower = next(row["detail"] for row in rows if "-> fd_spiral_medium: o_status IN_ERROR_NFR" in row["detail"])
+    assert "; not fd_spiral_high: water_visibility " in lower
+    assert lower.endswith("measured < 3.25 expected")
+
+
+def test_a_rule_fires_exactly_where_its_body_holds(mission):
+    folder, result = mission
+    (trial,) = try_rule(folder, NEAR, None, (), None, 60.0)
+    expected = [
+        record.t_s
+        for record in result.knowledge
+        if record.state.grounded(SEARCH) is not None and record.state.measured("water_visibility")[0] < 2.5
+    ]
+    assert expected
+    assert [moment.t_s for moment in trial.moments if moment.firings] == pytest.approx(expected, abs=1e-6)
+    (firing,) = trial.moments[0].firings
+    assert dict(firing.bindings)["q"] == "obs_water_visibility"
+    assert firing.is_new
+    assert trial.cycles == len(result.knowledge)
+
+
+def test_doing_without_a_rule_undoes_the_decisions_that_it_called_for(mission):
+    folder, result = mission
+    (trial,) = try_rule(folder, None, "QAWaterVisibility", (), None, 60.0)
+    lost = [each for moment in trial.moments for each in moment.otherwise]
+    adapted = [event for event in result.events if event.event == "adaptation" and "IN_ERROR_NFR" in event.detail]
+    assert len(lost) == len(adapted) > 0
+    assert {each.then for each in lost} == {None}
+    assert {each.function for each in lost} == {SEARCH}
+
+
+def test_a_rule_that_contradicts_others_is_told_with_its_time(mission, command):
+    folder, _ = mission
+    clash = NEAR.replace("near:", "clash:").replace("IN_ERROR_NFR", "IN_ERROR_FR").replace("2.5", "4")
+    (trial,) = try_rule(folder, clash, None, (), None, 60.0)
+    problems = [moment for moment in trial.moments if moment.problem]
+    assert problems
+    assert all("by the rules QAWaterVisibility, clash" in moment.problem for moment in problems)
+    status, text, _ = command("try", clash, "--on", folder)
+    assert status == 0
+    assert f"states that would contradict themselves: {len(problems)}" in text
+
+
+def test_a_folder_of_missions_is_tried_one_by_one(mission, command):
+    folder, _ = mission
+    status, printed, _ = command("try", NEAR, "--on", folder.parent, "--format", "json")
+    assert status == 0
+    assert [each["folder"] for each in json.loads(printed)] == [str(folder)]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((NEAR, "--disable", "S1a"), "give a rule, or --disable NAME"),
+        ((), "give a rule, or --disable NAME"),
+        (("--disable", "S1x"), "there is no rule S1x"),
+        (("near: FunctionGroundin(?fg) -> fg_status(?fg, 3)",), "FunctionGroundin is not defined"),
+        (("near FunctionGrounding(?fg)",), "the rule to try"),
+    ],
+)
+def test_what_cannot_be_tried_is_told(mission, command, words, said):
+    status, text, error = command("try", *words, "--on", mission[0])
+    assert (status, text) == (2, "")
+    assert said in error
+    assert error.count("\n") == 1
+
+
+def test_folders_and_files_that_are_no_record_are_told(mission, tmp_path):
+    with pytest.raises(InputError, match=r"has no knowledge\.jsonl"):
+        try_rule(tmp_path, NEAR, None, (), None, 60.0)
+    (tmp_path / KNOWLEDGE_FILE).write_text('{"t_s": 1}\n')
+    with pytest.raises(InputError, match=r"mission\.json: cannot be read"):
+        try_rule(tmp_path, NEAR, None, (), None, 60.0)
+    (tmp_path / "mission.json").write_bytes((mission[0] / "mission.json").read_bytes())
+    with pytest.raises(InputError, match=r"knowledge\.jsonl: line 1: is damaged"):
+        try_rule(tmp_path, NEAR, None, (), None, 60.0)
