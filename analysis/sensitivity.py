@@ -57,7 +57,7 @@ def draw(path: Path, names: list[str], effects: dict[tuple[str, str], np.ndarray
                 label=manager,
             )
         panel.set_yticks(range(len(names)), [names[index] for index in order], fontsize=8)
-        panel.set_xlabel(f"mean elementary effect on the {title}, over the bounds", fontsize=8)
+        panel.set_xlabel(f"effect (mu*) on the {title}", fontsize=8)
         panel.tick_params(axis="x", labelsize=8)
         for side in ("top", "right"):
             panel.spines[side].set_visible(False)
