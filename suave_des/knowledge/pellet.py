@@ -9,7 +9,10 @@ from __future__ import annotations
 import re
 import threading
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, Final
+
+import jpype
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge import jvm
@@ -39,6 +42,18 @@ def load_n_triples(text: str, *, explain: bool = False) -> Any:
     return knowledge_base
 
 
+@contextmanager
+def _java_errors(kb: KnowledgeBase) -> Iterator[None]:
+    """What Java throws, as an error for the user: Pellet meets something that it cannot use at all."""
+    try:
+        yield
+    except jpype.JException as error:
+        said = " ".join(str(error).split()).rpartition("Exception: ")[2]
+        raise KnowledgeError(
+            f"Pellet cannot use the ontologies: {said}", file=_files(kb), remedy="suave-des kb check may say where"
+        ) from error
+
+
 class InProcessPellet:
     """Pellet with one knowledge base loaded.
 
@@ -48,7 +63,7 @@ class InProcessPellet:
 
     def __init__(self, kb: KnowledgeBase) -> None:
         self._kb = kb
-        with one_at_a_time:
+        with one_at_a_time, _java_errors(kb):
             jvm.start()
             self._make_term = jvm.java_class(_PELLET + "utils.ATermUtils").makeTermAppl
             self._make_literal = jvm.java_class(_PELLET + "utils.ATermUtils").makeTypedLiteral
@@ -76,7 +91,7 @@ class InProcessPellet:
             KnowledgeError: the situation contradicts itself.
         """
         jvm.start()  # it runs; but not in a process that was forked since
-        with one_at_a_time:
+        with one_at_a_time, _java_errors(self._kb):
             copy = self._base.copy()
             for subject, predicate, value in situation:
                 self._add(copy, subject, predicate, value)

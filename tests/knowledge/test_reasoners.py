@@ -19,7 +19,7 @@ from suave_des.knowledge.reasoners import BACKENDS, REMEMBERED, Reasoner, make_r
 
 
 def test_an_unknown_reasoner_is_told_with_those_known(kb: KnowledgeBase) -> None:
-    with pytest.raises(InputError, match=r"there is no reasoner 'hermit' \(one of owlready2, pellet\)"):
+    with pytest.raises(InputError, match=r"there is no reasoner 'hermit' \(one of owlready2, pellet, remembered\)"):
         make_reasoner("hermit", kb)
     assert all(make_reasoner(name, kb).name == name for name in BACKENDS)
 

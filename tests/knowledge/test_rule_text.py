@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.rule_checks import check_rule
 from suave_des.knowledge.rule_names import rule_from_text
 from suave_des.knowledge.rule_parser import RuleError, parse_rule, parse_rules
@@ -272,3 +273,17 @@ def test_a_rule_of_five_thousand_atoms_is_read_at_once() -> None:
     body = " ^ ".join(f"hasValue(?q, ?v{number})" for number in range(5000))
     rule = parse_rule(f"Long: {body} -> Role(?q)")
     assert len(rule.body) == 5000
+
+
+def test_what_java_throws_is_an_error_for_the_user(suave_copy) -> None:
+    swrl = "http://www.w3.org/2003/11/swrl#"
+    rule = (
+        f'<rdf:Description><rdf:type rdf:resource="{swrl}Imp"/><swrl:body rdf:parseType="Collection">'
+        f'<swrl:IndividualPropertyAtom><swrl:propertyPredicate rdf:resource="{TOMASYS}typeFD"/>'
+        '<swrl:argument1 rdf:resource="urn:swrl:var#fg"/><swrl:argument2>text</swrl:argument2>'
+        '</swrl:IndividualPropertyAtom></swrl:body><swrl:head rdf:parseType="Collection"><swrl:ClassAtom>'
+        f'<swrl:classPredicate rdf:resource="{TOMASYS}Role"/><swrl:argument1 rdf:resource="urn:swrl:var#fg"/>'
+        "</swrl:ClassAtom></swrl:head></rdf:Description>"
+    )
+    with pytest.raises(KnowledgeError, match=r"Pellet cannot use the ontologies: .*literal as an individual"):
+        make_reasoner("pellet", KnowledgeBase.load([suave_copy(rule)]))
