@@ -56,13 +56,14 @@ def draw(path: Path, found: dict[tuple[str, float, str], dict[str, list[float]]]
                 panel.fill_between(values, low, high, color=colours[manager], alpha=0.2, lw=0)
                 panel.plot(values, means, color=colours[manager], marker="o", ms=3.5, lw=1.3, label=manager)
             panel.axvline({0: 80.0, 1: 35.0}[column], color="0.6", lw=0.8, ls=":")
-            panel.set_ylim(bottom=0.0)
             for side in ("top", "right"):
                 panel.spines[side].set_visible(False)
             if column == 0:
                 panel.set_ylabel(title)
             if row == len(METRICS) - 1:
                 panel.set_xlabel(LABELS[study])
+    for row in panels:  # when everything is drawn: the panels of a row share their scale
+        row[0].set_ylim(bottom=0.0)
     panels[0, 1].legend(frameon=False, fontsize=9)
     figure.savefig(path, dpi=160)
 
