@@ -2,7 +2,7 @@
 
 All managers are in one file, as the mission's name carries the manager's. The exemplar stamps each row with the time of
 day. Ours must be the same each time, so mission number n of the campaign bears the time n seconds after midnight of
-1 January 2000. Seconds and metres are as in runs.csv.
+1 January 2000. Seconds and metres are as in runs.csv, but for the search time when the pipeline was not found.
 """
 
 from __future__ import annotations
@@ -58,7 +58,10 @@ _LAYOUT_1_5: _Layout = {
     "initial pos (x,y)": _position,
     "mission duration (s)": lambda mission: mission["mission_duration_s"],
     "pipeline found": lambda mission: mission["pipeline_found"],
-    "time searching pipeline (s)": lambda mission: _whole(mission["search_time_s"]),
+    # The program writes the mission's duration when the pipeline was not found.
+    "time searching pipeline (s)": lambda mission: (
+        _whole(mission["search_time_s"]) if mission["pipeline_found"] else mission["mission_duration_s"]
+    ),
     "distance inspected (m)": lambda mission: mission["distance_inspected_m"],
     # The exemplar writes 0.0 when no reaction was completed.
     "mean reaction time (s)": lambda mission: mission["mean_reaction_time_s"] or 0.0,

@@ -91,12 +91,8 @@ class MissionCoordinator:
         env.process(self._watch_limit())
 
     def search_time_or_limit_s(self) -> float:
-        """The search time metric; when the pipeline was not found what the revision writes then."""
-        if self.search_time_s is not None:
-            return self.search_time_s
-        if self._revision.search_time_when_not_found == "limit":
-            return self._time_limit_s
-        return self._env.now
+        """The search time metric; the time limit when the pipeline was not found."""
+        return self._time_limit_s if self.search_time_s is None else self.search_time_s
 
     def _coordinate(self) -> Process:
         yield self._env.timeout(self._start_delay_s)

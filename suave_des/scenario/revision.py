@@ -27,8 +27,6 @@ class CoordinatorRevision(Strict):
     """Period at which the time limit is checked."""
     search_time: Literal["poll", "detection"]
     """Time of the poll that saw the detection, or of the detection itself; cut to whole seconds."""
-    search_time_when_not_found: Literal["limit", "duration"]
-    """Search time when the pipeline is not found: the time limit, or the mission's duration."""
     maintain_motion_per_task: bool
     """Whether maintain_motion is cancelled with each task and requested anew with the next."""
 

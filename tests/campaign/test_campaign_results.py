@@ -183,3 +183,13 @@ class TestSuaveFormat:
         assert theirs[1]["datetime"] == "01-Jan-2000-00-00-02"
         assert theirs[0]["pipeline found"] in ("True", "False")
         assert theirs[0]["mean reaction time (s)"] == "0.0"  # none never reacts
+
+    def test_revision_1_5_writes_the_duration_where_runs_csv_has_the_limit(self, tmp_path: Path) -> None:
+        scenario = tmp_path / "short.yaml"
+        scenario.write_text("base: release15.yaml\nmission: {time_limit_s: 20}\n")
+        run_campaign(scenario, ["none"], 2, 1, out=tmp_path / "out", suave_format=True)
+        theirs = rows_of(tmp_path / "out" / "suave_results.csv")
+        ours = rows_of(tmp_path / "out" / "runs.csv")
+        assert [(row["pipeline_found"], row["search_time_s"]) for row in ours] == [("False", "20.0")] * 2
+        assert [row["time searching pipeline (s)"] for row in theirs] == [row["mission_duration_s"] for row in ours]
+        assert all(float(row["mission_duration_s"]) > 20 for row in ours)
