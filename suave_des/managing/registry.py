@@ -53,7 +53,7 @@ def _load(name: str, target: str) -> type[ManagingSubsystem]:
         sys.path.append(here)
     try:
         module = importlib.import_module(module_name)
-    except Exception as error:  # whatever the module's own code raises on import
+    except (Exception, SystemExit) as error:  # whatever the module's own code raises on import
         raise InputError(
             f"manager {name!r}: {type(error).__name__}: {error}",
             remedy="module must be importable: installed, or in the current folder or one on PYTHONPATH",

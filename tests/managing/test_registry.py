@@ -52,6 +52,13 @@ def test_a_name_that_leads_to_no_manager_is_bad_input(name: str, words: str) -> 
         manager_class(name)
 
 
+def test_a_module_that_ends_the_program_on_import_is_bad_input(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "leaving_manager_module.py").write_text("import sys\nsys.exit(0)\n")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match="SystemExit"):
+        manager_class("leaving_manager_module:Mine")
+
+
 def test_a_module_that_fails_on_import_is_bad_input(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "broken_manager_module.py").write_text("def broken(:\n")
     monkeypatch.chdir(tmp_path)
