@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,6 +20,7 @@ MaxFailed = Annotated[
     int, typer.Option("--max-failed", metavar="N", help="At most so many components have failed or recovered.")
 ]
 _TOLD = 5
+_WIDE = 300
 
 
 def policy(
@@ -80,21 +82,30 @@ def _print_table(table: FunctionTable) -> None:
     with_components = any(row.components for row in table.rows)
     if with_components:
         shown.add_column("components", overflow="fold")
-    for column in table.columns:
-        shown.add_column(_heading(table, column), overflow="fold")
+    for name in table.attributes[:-1]:
+        shown.add_column(name, overflow="fold")
+    # The last attribute goes across, the others down.
+    across = list(dict.fromkeys(column[-1:] for column in table.columns))
+    for last in across:
+        shown.add_column(str(last[0]) if last else "then", overflow="fold")
     for row in table.rows:
         own = dict(row.groundings)
         components = [row.components] if with_components else []
-        shown.add_row(own.get(table.function, "any"), *(own[name] for name in others), *components, *row.outcomes)
+        outcomes = dict(zip(table.columns, row.outcomes, strict=True))
+        for down in dict.fromkeys(column[:-1] for column in table.columns):
+            shown.add_row(
+                own.get(table.function, "any"),
+                *(own[name] for name in others),
+                *components,
+                *map(str, down),
+                *(outcomes[(*down, *last)] for last in across),
+            )
     what = f", by measured {', '.join(table.attributes)}" if table.attributes else ""
-    print_table(output(), f"{table.function}{what}", shown)
+    console = output()
+    if not console.is_terminal and "COLUMNS" not in os.environ:
+        console.width = _WIDE  # names stay whole where nobody's window ends
+    print_table(console, f"{table.function}{what}", shown)
     print()
-
-
-def _heading(table: FunctionTable, column: tuple[Any, ...]) -> str:
-    if len(column) == 1:
-        return str(column[0])
-    return "; ".join(f"{name} {region}" for name, region in zip(table.attributes, column, strict=True)) or "then"
 
 
 def _summary(found: Policy) -> Iterator[str]:

@@ -9,13 +9,14 @@ from typing import Any
 
 from suave_des.errors import InputError
 from suave_des.report.style import MODE_COLOURS, OTHER_MODES, VERMILION, WIDTH_IN, publication
-from suave_des.workbench.policy import INCONSISTENT, NONE_LEFT, Policy
+from suave_des.workbench.policy import FLIP_FLOP, INCONSISTENT, NONE_LEFT, Policy
 from suave_des.workbench.policy_table import UNGROUNDED, FunctionTable, function_table
 from suave_des.workbench.regions import Region
 
 _FIXED = {INCONSISTENT: "#B00020", NONE_LEFT: "#D9D9D9"}
 _ROW_IN = 0.21
 _MOST_ROWS = 60
+_FLIPS = "////"
 
 
 def draw_policy(policy: Policy, path: Path) -> None:
@@ -102,20 +103,21 @@ def _one_attribute(plt: Any, policy: Policy, tables: Sequence[FunctionTable]) ->
 def _two_attributes(plt: Any, policy: Policy, tables: Sequence[FunctionTable]) -> Any:
     """One small panel for each row of each function: one attribute across, the other up."""
     shown = [(table, row) for table in tables for row in table.rows]
-    across = min(3, len(shown))
+    across = min(2 if len(shown) == 4 else 3, len(shown))
     down = -(-len(shown) // across)
     figure, panels = plt.subplots(
-        down, across, figsize=(WIDTH_IN, 2.0 * down + 0.6), squeeze=False, layout="constrained"
+        down, across, figsize=(WIDTH_IN, 2.2 * down + 0.6), squeeze=False, layout="constrained"
     )
     for panel in panels.flat[len(shown) :]:
         panel.set_axis_off()
     colours = _colours(tables)
     for panel, (table, row) in zip(panels.flat, shown, strict=False):
         x_name, y_name = policy.attributes
-        spans = {}
+        spans, all_ends = {}, {}
         for name in policy.attributes:
-            own = policy.regions[name]
-            ends = _finite_ends([each for each in own if not each.is_missing])
+            place = table.attributes.index(name) if name in table.attributes else None
+            ends = _finite_ends([] if place is None else [column[place] for column in table.columns])
+            all_ends[name] = ends
             low, high = float(ends[0]), float(ends[-1])
             spans[name] = (low, high, max((high - low) * 0.25, 0.25))
         for column, outcome in zip(table.columns, row.outcomes, strict=True):
@@ -124,13 +126,19 @@ def _two_attributes(plt: Any, policy: Policy, tables: Sequence[FunctionTable]) -
             bottom, height = _span(at.get(y_name), *spans[y_name])
             if width and height:
                 text = _shown(outcome, row.groundings, table.function)
-                panel.add_patch(_patch(left, bottom, width, height, _colour(text, colours)))
+                hatch = _FLIPS if FLIP_FLOP in text else None
+                panel.add_patch(_patch(left, bottom, width, height, _colour(text, colours), hatch))
         for name, limit in ((x_name, panel.set_xlim), (y_name, panel.set_ylim)):
             low, high, margin = spans[name]
             limit(low - 2.2 * margin, high + margin)
-        panel.set_title(_label(table, row.components, row.groundings), fontsize=7.5)
-        panel.set_xlabel(x_name.replace("_", " "))
-        panel.set_ylabel(y_name.replace("_", " "))
+        for name, set_ticks in ((x_name, panel.set_xticks), (y_name, panel.set_yticks)):
+            low, _, margin = spans[name]
+            ends = all_ends[name] if name in table.attributes else []
+            set_ticks([low - 1.7 * margin, *map(float, ends)], ["none", *(f"{end:f}" for end in ends)])
+        panel.tick_params(length=0)
+        panel.set_title(f"now {_label(table, row.components, row.groundings)}", fontsize=7.5)
+        panel.set_xlabel(f"measured {x_name.replace('_', ' ')}")
+        panel.set_ylabel(f"measured {y_name.replace('_', ' ')}")
         panel.grid(False)
     _legend(figure, tables)
     return figure
@@ -170,8 +178,8 @@ def _shown(outcome: str, groundings: Sequence[tuple[str, str]], function: str) -
 
 def _tile(panel: Any, left: float, row: float, width: float, text: str, colours: dict[str, str]) -> None:
     if width > 0.0:
-        flips = "flip-flop" in text
-        panel.add_patch(_patch(left, row - 0.42, width, 0.84, _colour(text, colours), hatch="////" if flips else None))
+        hatch = _FLIPS if FLIP_FLOP in text else None
+        panel.add_patch(_patch(left, row - 0.42, width, 0.84, _colour(text, colours), hatch))
     else:  # one value alone
         panel.plot([left], [row], marker="D", markersize=3.5, color=_colour(text, colours), markeredgecolor="black")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -70,11 +71,7 @@ def function_table(policy: Policy, function: str) -> FunctionTable:
         column = tuple(cell.regions[place] for place in places)
         before = found.setdefault(key, {}).get(column, result)
         found[key][column] = before if before == result else f"{before} or {result}, by the order of the values"
-    columns = tuple(dict.fromkeys(tuple(cell.regions[place] for place in places) for cell in cells))
-    if len(attributes) == 1:
-        merged = _merged(columns, list(found.values()))
-    else:
-        merged = [(column, column) for column in columns]
+    merged = _merged([policy.regions[name] for name in attributes], list(found.values()))
     rows = _rows(policy, found, row_of, merged)
     return FunctionTable(function, attributes, tuple(shown for shown, _ in merged), rows)
 
@@ -112,19 +109,28 @@ def _decides(coordinates: Sequence[Callable[[Cell], Hashable]], cells: Sequence[
 
 
 def _merged(
-    columns: Sequence[tuple[Region, ...]], rows: Sequence[dict[tuple[Region, ...], str]]
+    axes: Sequence[Sequence[Region]], rows: Sequence[dict[tuple[Region, ...], str]]
 ) -> list[tuple[tuple[Region, ...], tuple[Region, ...]]]:
-    """(range shown, one region in it) where neighbouring ranges are alike in all rows."""
-    merged: list[tuple[tuple[Region, ...], tuple[Region, ...]]] = []
-    for column in columns:
-        region = column[0]
-        if merged and not merged[-1][0][0].is_missing:
-            (shown,), first = merged[-1]
-            if all(row.get(first) == row.get(column) for row in rows):
-                merged[-1] = (shown.with_next(region),), first
-                continue
-        merged.append((column, column))
-    return merged
+    """(ranges shown, regions in them): of each attribute, neighbours that are alike in all else are one."""
+    groups = []
+    for place, regions in enumerate(axes):
+        others = list(itertools.product(*(each for number, each in enumerate(axes) if number != place)))
+
+        def alike(one: Region, other: Region, place: int = place, others: list[tuple[Region, ...]] = others) -> bool:
+            pairs = [((*rest[:place], one, *rest[place:]), (*rest[:place], other, *rest[place:])) for rest in others]
+            return all(row.get(first) == row.get(second) for row in rows for first, second in pairs)
+
+        merged: list[tuple[Region, Region]] = []
+        for region in regions:
+            if merged and not merged[-1][0].is_missing and alike(merged[-1][1], region):
+                merged[-1] = merged[-1][0].with_next(region), merged[-1][1]
+            else:
+                merged.append((region, region))
+        groups.append(merged)
+    return [
+        (tuple(shown for shown, _ in chosen), tuple(first for _, first in chosen))
+        for chosen in itertools.product(*groups)
+    ]
 
 
 def _rows(
