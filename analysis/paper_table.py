@@ -33,7 +33,8 @@ def main() -> None:
             tables = {"paper_table.md": markdown_table(comparison), "paper_table.csv": csv_table(comparison)}
             write_files(arguments.out, tables)
     except SuaveDesError as error:
-        sys.exit(f"paper_table.py: {error}")
+        print("paper_table.py: " + " ".join(str(error).split()), file=sys.stderr)
+        sys.exit(2)
     print(markdown_table(comparison), end="")
 
 

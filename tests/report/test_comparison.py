@@ -158,3 +158,15 @@ def test_the_analysis_script_makes_the_table_from_a_runs_csv(tmp_path: Path) -> 
     assert "| none | search time (s) | mean | 187.85 |" in ended.stdout
     assert "| 185.00 |" in ended.stdout
     assert (tmp_path / "paper_table.csv").is_file()
+
+
+@pytest.mark.parametrize("text", [None, "a,b\n1,2\n", "a\nb\n1,2,3\n"])
+def test_the_script_ends_with_one_line_and_status_2_when_its_input_is_bad(text: str | None, tmp_path: Path) -> None:
+    runs = tmp_path / "runs.csv"
+    if text is not None:
+        runs.write_text(text)
+    script = Path(__file__).parents[2] / "analysis" / "paper_table.py"
+    ended = subprocess.run([sys.executable, str(script), str(runs)], capture_output=True, text=True, check=False)
+    assert ended.returncode == 2
+    assert len(ended.stderr.splitlines()) == 1
+    assert str(runs) in ended.stderr
