@@ -4,6 +4,7 @@ What reasoners remember is kept in a folder of the test run, away from the user'
 """
 
 import os
+import signal
 import tempfile
 
 from hypothesis import settings
@@ -12,3 +13,6 @@ settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
 os.environ["SUAVE_DES_CACHE_DIR"] = tempfile.mkdtemp(prefix="suave-des-tests-")
+
+# A shell that runs the tests in the background has them ignore Ctrl-C; those that press it need it, and so do their children.
+signal.signal(signal.SIGINT, signal.default_int_handler)

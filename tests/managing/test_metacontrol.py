@@ -218,7 +218,7 @@ def modes_with_a_fourth_altitude(folder: Path) -> Path:
 
 def test_a_fourth_search_altitude_needs_no_python(tmp_path: Path) -> None:
     given = {"ontologies": [suave_with(tmp_path, NEW_DESIGN)], "modes_file": modes_with_a_fourth_altitude(tmp_path)}
-    found = mission(steps(4.5, 3.5, 30.0), **given)
+    found = mission(steps(4.5, 3.5, 12.0), **given)  # before anything is found from up there
     assert [mode for _, mode in modes(found, SEARCH)][:2] == ["fd_spiral_very_high", "fd_spiral_high"]
     highest_m = max(point.z_m for point in mission(visibility(4.5), **given).trajectory)
     assert highest_m > max(point.z_m for point in mission(visibility(4.5)).trajectory) + 0.7
