@@ -98,7 +98,7 @@ def advance(
         fx = mass * (prm[VELOCITY_GAIN] * ex + ix)
         fy = mass * (prm[VELOCITY_GAIN] * ey + iy)
         fz = mass * (prm[VELOCITY_GAIN] * ez + iz)
-        # Fed forward: the thrust that holds the wanted velocity in still water, so that the loop corrects the rest only.
+        # Fed forward: the thrust that holds the wanted velocity in still water; the loop corrects the rest only.
         u_sp = r00 * vx_sp + r10 * vy_sp + r20 * vz_sp
         v_sp = r01 * vx_sp + r11 * vy_sp + r21 * vz_sp
         w_sp = r02 * vx_sp + r12 * vy_sp + r22 * vz_sp

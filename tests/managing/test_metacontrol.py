@@ -15,7 +15,7 @@ from suave_des.simulation.result import MissionResult
 from suave_des.simulation.simulator import Simulator
 
 sys.path.append(str(Path(__file__).parents[1] / "knowledge"))
-from exemplar_files import write_exemplar_files  # noqa: E402
+from exemplar_files import write_exemplar_files
 
 MOTION, SEARCH, FOLLOW = "f_maintain_motion", "f_generate_search_path", "f_follow_pipeline"
 REASONED_AT_ONCE = {"latencies.inference_s": 0.0, "latencies.mode_change_s": 0.0}
@@ -84,7 +84,11 @@ def test_a_lost_thruster_is_recovered_and_all_thrusters_are_used_again(name: str
 def test_a_recovery_is_reasoned_about_once() -> None:
     found = mission(visibility(1.5))
     assert told(found, "inferred").count("objective of f_maintain_motion is updatable") == 1
-    assert [mode for _, mode in modes(found, MOTION)] == ["fd_all_thrusters", "fd_recover_thrusters", "fd_all_thrusters"]
+    assert [mode for _, mode in modes(found, MOTION)] == [
+        "fd_all_thrusters",
+        "fd_recover_thrusters",
+        "fd_all_thrusters",
+    ]
 
 
 @pytest.mark.parametrize("latency_s", [0.0, 0.7])

@@ -1,7 +1,7 @@
 """A small guard: the shipped calibration still gives missions like the published ones.
 
-Sixty missions a manager, with fixed seeds, against bounds that are wide for that number; `suave-des validate` with 2,000
-missions is the real check, and docs/background/fidelity.md shows what it found.
+Sixty missions a manager, with fixed seeds, against bounds that are wide for that number; `suave-des validate` with
+2,000 missions is the real check, and docs/background/fidelity.md shows what it found.
 """
 
 import pandas as pd

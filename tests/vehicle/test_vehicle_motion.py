@@ -33,7 +33,7 @@ def depth_error_m(vehicle: Vehicle, z_m: float, duration_s: float = 60.0) -> flo
 
 @DIRECTIONS
 def test_vehicle_goes_ten_metres_at_its_speed_limit(make_vehicle, direction_deg: int) -> None:
-    # Along a diagonal the box of 0.4 m in x and in y reaches 0.57 m towards the vehicle; at first it may be a little fast.
+    # Along a diagonal the box of 0.4 m in x and y reaches 0.57 m towards the vehicle; at first it may be a bit fast.
     way_m = 10.0 - 0.4 * (math.sqrt(2.0) if direction_deg % 90 else 1.0)
     assert way_m / 0.34 - 0.5 < time_to_go_s(make_vehicle(), direction_deg) < way_m / 0.34 + 3.0
 
