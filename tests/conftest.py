@@ -14,5 +14,5 @@ settings.load_profile("repeatable")
 
 os.environ["SUAVE_DES_CACHE_DIR"] = tempfile.mkdtemp(prefix="suave-des-tests-")
 
-# A shell that runs the tests in the background has them ignore Ctrl-C: those that press it, and their children, need it.
+# A shell that runs tests in the background has them ignore Ctrl-C: those that press it, and their children, need it.
 signal.signal(signal.SIGINT, signal.default_int_handler)

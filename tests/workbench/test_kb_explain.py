@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from suave_des.errors import InputError
 from suave_des.workbench import KnowledgeBase
-from suave_des.workbench.derivation import Tracer
+from suave_des.workbench.tracing import Tracer
 
 MOTION, SEARCH = "f_maintain_motion", "f_generate_search_path"
 CLASH = (
