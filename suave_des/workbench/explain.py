@@ -17,7 +17,8 @@ from suave_des.knowledge.situation import Triple
 from suave_des.knowledge.state import Decision, Fact, KnowledgeState
 from suave_des.knowledge.vocabulary import objective_name
 from suave_des.scenario.wording import did_you_mean, shown
-from suave_des.workbench.derivation import Clash, Derivation, Tracer
+from suave_des.workbench.derivation import Clash, Derivation
+from suave_des.workbench.tracing import Tracer
 
 _WHY: Final = re.compile(r"why\s+(not\s+)?([\w.-]+)\s*\??", re.IGNORECASE)
 _ATOM: Final = re.compile(r"([^\s(]+)\s*\(\s*([^,()]+?)\s*(?:,\s*(.+?)\s*)?\)")

@@ -21,9 +21,9 @@ from suave_des.resources import find
 from suave_des.scenario.models import Scenario
 from suave_des.simulation.result import KnowledgeRecord
 from suave_des.workbench.bench import KnowledgeBase
-from suave_des.workbench.derivation import Tracer
 from suave_des.workbench.limit import TimeLimit
 from suave_des.workbench.states import Loop
+from suave_des.workbench.tracing import Tracer
 
 _MISSION_FILE = "mission.json"
 
