@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from typing import Annotated, Any
@@ -96,4 +97,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if not hasattr(error, "format_message"):
             raise
         status = _tell(_usage_line(error), BAD_INPUT)
+    _leave(status)
+
+
+def _leave(status: int) -> None:
+    """End with a status, even while a reasoner that was given up on still runs in Java, which cannot be stopped."""
+    limit = sys.modules.get("suave_des.workbench.limit")
+    if limit is not None and limit.has_abandoned():
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
     sys.exit(status)

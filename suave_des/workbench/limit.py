@@ -14,6 +14,12 @@ from suave_des.knowledge.state import Inference, KnowledgeState
 #: What a reasoner may take for one state, where nothing else is said.
 TIME_LIMIT_S: Final = 60.0
 _Result = TypeVar("_Result")
+_abandoned: Final[list[str]] = []
+
+
+def has_abandoned() -> bool:
+    """Whether some work was given up on in this process, and may still run: it then cannot end in the usual way."""
+    return bool(_abandoned)
 
 
 class _Job(Generic[_Result]):
@@ -74,6 +80,7 @@ class TimeLimit:
         self._jobs.put(job)  # type: ignore[arg-type]
         if not job.wait(self.seconds):
             self._stuck = doing
+            _abandoned.append(doing)
             raise KnowledgeError(
                 f"{doing}: not done after {self.seconds:g} s",
                 remedy="look for a rule that matches too many combinations, or allow more with --time-limit",

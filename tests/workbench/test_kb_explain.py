@@ -113,6 +113,18 @@ def test_a_rule_that_computes_is_traced(tmp_path):
     assert tree.rule == "margin"
 
 
+def test_of_several_derivations_the_first_is_told_whatever_pellet_picks(tmp_path):
+    rules = tmp_path / "any.swrl"
+    rules.write_text(
+        "any: isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ lessThan(?v, 9) -> "
+        "fd_realisability(fd_spiral_high, false)\n"
+    )
+    bench = KnowledgeBase.load(rules=[rules])
+    trees = [bench.explain(bench.state(), "fd_realisability(fd_spiral_high, false)").facts[0] for _ in range(3)]
+    assert len(set(trees)) == 1
+    assert dict(trees[0].bindings)["q"] == "qa_water_visibility_high"
+
+
 class TestDecisions:
     def test_why_not_names_the_filter_and_how_its_fact_follows(self, bench, in_error):
         (decision,) = bench.explain(in_error, "why not fd_all_thrusters?").decisions

@@ -1,10 +1,15 @@
 """kb infer: states as people write them, what follows, and the time limit."""
 
 import json
+import os
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import pytest
 
+import suave_des
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.state import ObjectiveState
 from suave_des.workbench import KnowledgeBase
@@ -103,7 +108,9 @@ def test_what_cannot_be_used_ends_in_one_line(command, words, said):
 
 
 class TestTimeLimit:
-    def test_names_the_state_that_takes_too_long_and_refuses_more(self, bench):
+    def test_names_the_state_that_takes_too_long_and_refuses_more(self, bench, monkeypatch):
+        monkeypatch.setattr("suave_des.workbench.limit._abandoned", [])
+
         class Slow:
             name = "slow"
 
@@ -115,6 +122,24 @@ class TestTimeLimit:
             reasoner.infer(bench.state(**HIGH))
         with pytest.raises(KnowledgeError, match="still reasoning"):
             reasoner.infer(bench.state())
+
+    def test_a_rule_that_explodes_ends_in_a_message_and_the_process_ends_too(self, tmp_path):
+        rules = tmp_path / "explosion.swrl"
+        body = " ^ ".join(f"isQAtype(?a{n}, ?b{n})" for n in range(12))
+        rules.write_text(f"explosion: {body} -> o_updatable(o_generate_search_path, true)\n")
+        command = [sys.executable, "-m", "suave_des", "kb", "infer", "--reasoner", "pellet", "--time-limit", "2"]
+        path = str(Path(suave_des.__file__).parents[1])
+        done = subprocess.run(
+            [*command, "--rules", str(rules)],
+            env={**os.environ, "PYTHONPATH": path},
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+        assert done.returncode == 2
+        assert "not done after 2 s" in done.stderr
+        assert done.stderr.count("\n") == 1
 
     def test_passes_on_results_and_errors(self):
         limit = TimeLimit(5.0)
