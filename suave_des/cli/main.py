@@ -87,6 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """
     arguments = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     remember_command_line(arguments)
+    abandoned = _abandoned()
     command = typer.main.get_command(app)
     try:
         status = command.main(arguments, prog_name="suave-des", standalone_mode=False) or 0
@@ -97,13 +98,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if not hasattr(error, "format_message"):
             raise
         status = _tell(_usage_line(error), BAD_INPUT)
-    _leave(status)
+    _leave(status, by_force=_abandoned() > abandoned)
 
 
-def _leave(status: int) -> None:
-    """End with a status, even while a reasoner that was given up on still runs in Java, which cannot be stopped."""
+def _abandoned() -> int:
+    """How often a reasoner was given up on in this process."""
     limit = sys.modules.get("suave_des.workbench.limit")
-    if limit is not None and limit.has_abandoned():
+    return 0 if limit is None else int(limit.times_abandoned())
+
+
+def _leave(status: int, *, by_force: bool) -> None:
+    """End with a status, even while a reasoner that was given up on still runs in Java, which cannot be stopped."""
+    if by_force:
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(status)

@@ -17,9 +17,9 @@ _Result = TypeVar("_Result")
 _abandoned: Final[list[str]] = []
 
 
-def has_abandoned() -> bool:
-    """Whether some work was given up on in this process, and may still run: it then cannot end in the usual way."""
-    return bool(_abandoned)
+def times_abandoned() -> int:
+    """How often work was given up on in this process: it may still run, and then the process cannot end as usual."""
+    return len(_abandoned)
 
 
 class _Job(Generic[_Result]):
