@@ -43,8 +43,6 @@ def start() -> None:
     with _lock:
         if _is_running():
             return
-        # The end of the process does not wait for Java, where a reasoner that was given up on may still run.
-        jpype.config.destroy_jvm = False
         jars = sorted(Path(owlready2.__file__).with_name("pellet").glob("*.jar"))
         if jpype.isJVMStarted():
             for jar in jars:
