@@ -1,33 +1,54 @@
-"""A campaign: many missions of one scenario under several managers, and the files that tell of them."""
+"""A campaign: many missions of one scenario under several managers, kept as they finish."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from suave_des.campaign.executors import WorkerError, make_executor
-from suave_des.campaign.outcomes import COLUMNS, Failure, MissionRunner, Outcome, Row
-from suave_des.campaign.output import check_output_folder, csv_text, json_text, make_output_folder, write_files
-from suave_des.campaign.plan import RunSpec, check_plan, plan
-from suave_des.campaign.provenance import provenance
-from suave_des.campaign.suave_format import SUAVE_FILE, suave_text
-from suave_des.campaign.summary import SUMMARY_COLUMNS, summary_rows
+from suave_des.campaign.lock import LOCK_FILE, locked
+from suave_des.campaign.outcomes import COLUMNS, Failure, Finished, Job, MissionRunner
+from suave_des.campaign.output import check_output_folder, make_output_folder, remove_parts
+from suave_des.campaign.plan import MissionKey, check_plan, plan
+from suave_des.campaign.request import TIME_OUT_S, Request, check_same, check_time_out, deciding
+from suave_des.campaign.results import (
+    FILES,
+    MANIFEST_FILE,
+    RUNS_FILE,
+    SUMMARY_FILE,
+    CampaignResult,
+    gather,
+    write_results,
+)
+from suave_des.campaign.store import (
+    NEW_STORE_FILE,
+    STORE_FILE,
+    Store,
+    StoreError,
+    make_store,
+    remove_store,
+    stored_outcomes,
+)
+from suave_des.errors import InputError, SuaveDesError
 from suave_des.managing.registry import manager_class
 from suave_des.scenario.bases import Files
 from suave_des.scenario.loader import LoadedScenario, load_scenario
 from suave_des.scenario.models import Mission
-from suave_des.simulation.result import MissionMetrics
 
-if TYPE_CHECKING:
-    import pandas
-
-RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE = "runs.csv", "summary.csv", "manifest.json"
-FILES = (RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE, SUAVE_FILE)
-
-_RUN, _MANAGER = COLUMNS.index("run"), COLUMNS.index("manager")
+__all__ = [
+    "FILES",
+    "MANIFEST_FILE",
+    "RUNS_FILE",
+    "SUMMARY_FILE",
+    "CampaignInterrupted",
+    "CampaignResult",
+    "Progress",
+    "check_knowledge",
+    "resume_campaign",
+    "run_campaign",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,42 +60,6 @@ class Progress:
     total: int
 
 
-@dataclass(frozen=True)
-class CampaignResult:
-    """What a campaign gave.
-
-    Attributes:
-        loaded: the scenario.
-        managers: in the order given.
-        runs: planned for each manager.
-        seed: the campaign's.
-        rows: of runs.csv, in its order and with its columns (COLUMNS).
-        failures: missions that have no row, in the same order.
-        folder: where the files are; none if there are none.
-    """
-
-    loaded: LoadedScenario
-    managers: tuple[str, ...]
-    runs: int
-    seed: int
-    rows: tuple[Row, ...]
-    failures: tuple[Failure, ...]
-    folder: Path | None
-
-    @property
-    def planned(self) -> int:
-        """Number of missions that were to be run."""
-        return len(self.managers) * self.runs
-
-    def frame(self) -> pandas.DataFrame:
-        """The rows as a data frame with the columns of runs.csv; what is empty there is nan here."""
-        import pandas
-
-        # Without a value in any row, a column would not be known to hold numbers.
-        kinds = {field.name: "float64" for field in fields(MissionMetrics) if "float" in str(field.type)}
-        return pandas.DataFrame.from_records(self.rows, columns=list(COLUMNS)).astype(kinds)
-
-
 class CampaignInterrupted(KeyboardInterrupt):
     """Ctrl-C during a campaign; finished missions are kept.
 
@@ -84,7 +69,10 @@ class CampaignInterrupted(KeyboardInterrupt):
 
     def __init__(self, result: CampaignResult) -> None:
         self.result = result
-        super().__init__(f"interrupted; {_kept(result)}")
+        super().__init__(f"interrupted; {result.kept()}")
+
+
+OnProgress = Callable[[Progress], None]
 
 
 def run_campaign(
@@ -101,13 +89,16 @@ def run_campaign(
     rules: Sequence[str | Path] = (),
     disabled_rules: Sequence[str] = (),
     suave_format: bool = False,
+    time_out_s: float = TIME_OUT_S,
     overwrite: bool = False,
     command: Sequence[str] = (),
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: OnProgress | None = None,
 ) -> CampaignResult:
     """Run `runs` missions of a scenario under each manager.
 
-    The result is the same for any number of workers. A mission whose manager raises has no row; the others are kept.
+    The result is the same for any number of workers, and however often the campaign was interrupted and resumed. A
+    mission that fails (its manager raises, it takes too long, it ends its worker process again and again) has no row;
+    the others are kept.
 
     Args:
         scenario: path of a scenario file, or name of a shipped one.
@@ -123,56 +114,111 @@ def run_campaign(
         rules: files of rules as text, besides the scenario's.
         disabled_rules: names of rules to switch off, besides the scenario's.
         suave_format: whether to write the exemplar's own results file besides.
+        time_out_s: time that one mission may take, in s of the clock on the wall.
         overwrite: whether results in the folder may be replaced.
         command: the command line, for the manifest.
         on_progress: called when missions are done.
 
     Raises:
         InputError: something given cannot be used; nothing is written then.
-        WorkerError: a worker process was killed; finished missions are kept.
+        WorkerError: worker processes end again and again; finished missions are kept.
+        StoreError: the disk is full, or the folder was removed.
         CampaignInterrupted: Ctrl-C; finished missions are kept.
     """
+    request = Request(
+        str(scenario),
+        tuple(managers),
+        runs,
+        seed,
+        ontologies=tuple(map(str, ontologies)),
+        modes_file=None if modes_file is None else str(modes_file),
+        reasoner=reasoner,
+        rules=tuple(map(str, rules)),
+        disabled_rules=tuple(disabled_rules),
+        suave_format=suave_format,
+        time_out_s=time_out_s,
+        folder=str(Path.cwd()),
+        command=tuple(command),
+    )
     folder = None if out is None else Path(out)
     if folder is not None:
-        check_output_folder(folder, overwrite=overwrite)
+        _check_new(folder, overwrite=overwrite)
     check_plan(managers, runs, workers)
-    loaded = load_scenario(
-        scenario,
-        ontologies=ontologies,
-        modes_file=modes_file,
-        reasoner=reasoner,
-        rules=rules,
-        disabled_rules=disabled_rules,
-    )
-    inputs = check_knowledge(loaded, managers, given=bool(ontologies or rules or disabled_rules))
-    if workers > 1:
-        _compile(loaded)
+    check_time_out(time_out_s)
+    loaded, inputs = _read(request)
+    return _Campaign(request, loaded, inputs, folder).run(workers, on_progress, resumed=False)
 
-    campaign = CampaignResult(loaded, tuple(managers), runs, seed, (), (), folder)
-    made = folder is not None and not folder.exists()
-    if folder is not None:
-        make_output_folder(folder)
+
+def resume_campaign(
+    folder: str | Path, workers: int = 1, *, runs: int | None = None, on_progress: OnProgress | None = None
+) -> CampaignResult:
+    """Go on with a campaign where it stopped; what it was asked is in its folder.
+
+    Missions that failed for reasons that may have passed (time-out, a worker that was killed) are run again.
+
+    Args:
+        folder: the campaign's output folder.
+        workers: as of run_campaign; it may be another number.
+        runs: more runs than were asked for at first; left out: as many.
+        on_progress: called when missions are done.
+
+    Raises:
+        InputError: there is no campaign, it is damaged or in use, or something that decides results has changed; the
+            difference is named.
+        WorkerError, StoreError, CampaignInterrupted: as of run_campaign.
+    """
+    folder = Path(folder)
+    request = _request_of(folder)
+    if runs is not None:
+        request = replace(request, runs=runs)
+    check_plan(request.managers, request.runs, workers)
     try:
-        finished, stopped = _run(campaign, workers, on_progress)
-        if stopped is not None and not finished:
-            raise stopped
-    except BaseException:
-        if made and folder is not None:
-            with suppress(OSError):  # not ours to remove any more, if something else is in it
-                folder.rmdir()
-        raise
-    result = replace(
-        campaign,
-        rows=tuple(outcome for outcome in finished if not isinstance(outcome, Failure)),
-        failures=tuple(outcome for outcome in finished if isinstance(outcome, Failure)),
+        loaded, inputs = _read(request)
+    except InputError as error:
+        if str(Path.cwd()) == request.folder:
+            raise
+        remedy = f"the campaign was started in {request.folder}: resume it there"
+        raise InputError(error.problem, file=error.file, place=error.place, remedy=remedy) from None
+    return _Campaign(request, loaded, inputs, folder).run(workers, on_progress, resumed=True)
+
+
+def _check_new(folder: Path, *, overwrite: bool) -> None:
+    check_output_folder(folder, overwrite=overwrite, left_over=_is_of_campaign)
+    if not overwrite and (folder / STORE_FILE).exists():
+        raise InputError(
+            "the output folder is not empty: it has a campaign in it",
+            file=folder,
+            remedy=f"--resume {folder} goes on with it, --overwrite replaces it",
+        )
+
+
+def _is_of_campaign(name: str) -> bool:
+    """Whether a file is a campaign's own; without a store it is what is left of one that was killed as it began."""
+    return name in (LOCK_FILE, *FILES) or name.startswith((STORE_FILE, NEW_STORE_FILE))
+
+
+def _request_of(folder: Path) -> Request:
+    if not (folder / STORE_FILE).is_file():
+        raise InputError("there is no campaign to go on with", file=folder, remedy="start one with --out")
+    with locked(folder):
+        store = Store(folder / STORE_FILE)
+        try:
+            return Request.of(store.about("request"))
+        finally:
+            store.close()
+
+
+def _read(request: Request) -> tuple[LoadedScenario, dict[str, str]]:
+    loaded = load_scenario(
+        request.scenario,
+        ontologies=request.ontologies,
+        modes_file=request.modes_file,
+        reasoner=request.reasoner,
+        rules=request.rules,
+        disabled_rules=request.disabled_rules,
     )
-    if folder is not None:
-        write_files(folder, _files(result, inputs, command, suave_format=suave_format), stale=FILES)
-    if isinstance(stopped, WorkerError):
-        raise WorkerError(f"{stopped}; {_kept(result)}")
-    if stopped is not None:
-        raise CampaignInterrupted(result)
-    return result
+    given = bool(request.ontologies or request.rules or request.disabled_rules)
+    return loaded, check_knowledge(loaded, request.managers, given=given)
 
 
 def check_knowledge(loaded: LoadedScenario, managers: Sequence[str], *, given: bool) -> dict[str, str]:
@@ -201,69 +247,118 @@ def check_knowledge(loaded: LoadedScenario, managers: Sequence[str], *, given: b
     return {**loaded.inputs, **files.inputs}
 
 
-def _run(
-    campaign: CampaignResult, workers: int, on_progress: Callable[[Progress], None] | None
-) -> tuple[list[Outcome], KeyboardInterrupt | WorkerError | None]:
-    """Outcomes in the order of the plan, and what stopped the campaign before its end."""
-    chunks: dict[int, list[Outcome]] = {}
-    done = failed = 0
-    stopped: KeyboardInterrupt | WorkerError | None = None
-    missions = plan(campaign.loaded.scenario.name, campaign.managers, campaign.runs, campaign.seed)
-    try:
-        for number, outcomes in make_executor(workers).outcomes(campaign.loaded, missions, campaign.planned):
-            chunks[number] = outcomes
-            done += len(outcomes)
-            failed += sum(isinstance(outcome, Failure) for outcome in outcomes)
-            if on_progress is not None:
-                on_progress(Progress(done, failed, campaign.planned))
-    except (KeyboardInterrupt, WorkerError) as error:
-        stopped = error
-    return [outcome for number in sorted(chunks) for outcome in chunks[number]], stopped
+class _Campaign:
+    """A campaign whose input is read and checked."""
+
+    def __init__(self, request: Request, loaded: LoadedScenario, inputs: dict[str, str], folder: Path | None) -> None:
+        self.request, self.loaded, self.inputs, self.folder = request, loaded, inputs, folder
+        self.job = Job(loaded, request.managers, request.seed, request.time_out_s)
+        self.columns = COLUMNS
+        self.total = len(request.managers) * request.runs
+
+    def run(self, workers: int, on_progress: OnProgress | None, *, resumed: bool) -> CampaignResult:
+        """Run what is not done yet, and write the files."""
+        if workers > 1:
+            _compile(self.job)
+        with ExitStack() as stack:
+            if self.folder is not None:
+                if not self.folder.exists():
+                    stack.callback(_remove_empty, self.folder)  # unless something is in it then
+                make_output_folder(self.folder)
+                stack.enter_context(locked(self.folder))
+                remove_parts(self.folder, FILES)
+            store = self._store(resumed=resumed)
+            try:
+                stopped = self._work(store, workers, on_progress)
+                is_empty = store.count() == 0
+            finally:
+                if self.folder is not None:
+                    store.close()
+            if stopped is not None and is_empty and not resumed:
+                if self.folder is not None:
+                    remove_store(self.folder)
+                raise stopped
+            if isinstance(stopped, StoreError):
+                raise StoreError(f"{stopped}{self._how_to_go_on()}") from None
+            if isinstance(stopped, InputError):
+                raise stopped
+            result = gather(self.request, self.loaded, self.columns, self.folder, self._outcomes(store))
+            if self.folder is not None:
+                try:
+                    write_results(result, self.request, self.inputs)
+                except InputError as error:
+                    remedy = f"nothing is lost: suave-des campaign --resume {self.folder} writes the files"
+                    raise InputError(error.problem, file=error.file, remedy=remedy) from None
+        if isinstance(stopped, WorkerError):
+            raise WorkerError(f"{stopped}; {result.kept()}")
+        if stopped is not None:
+            raise CampaignInterrupted(result)
+        return result
+
+    def _store(self, *, resumed: bool) -> Store:
+        if self.folder is None:
+            return Store(None)
+        about = {
+            "request": self.request.plain(),
+            "deciding": deciding(self.request, self.loaded, self.inputs),
+        }
+        path = self.folder / STORE_FILE
+        if not resumed:
+            make_store(path, about)
+        store = Store(path)
+        try:
+            if resumed:
+                check_same(store.about("deciding"), about["deciding"], self.folder)
+                store.forget_passing_failures()
+                for name, value in about.items():
+                    store.note(name, value)
+        except BaseException:
+            store.close()
+            raise
+        return store
+
+    def _work(
+        self, store: Store, workers: int, on_progress: OnProgress | None
+    ) -> KeyboardInterrupt | SuaveDesError | None:
+        """Run missions until all are done; what stopped the campaign before that."""
+        try:
+            done, failed = store.count(), store.count_failures()
+            missions = plan(1, len(self.request.managers), self.request.runs, store.settled)
+            left = self.total - done
+            if left:
+                for finished in make_executor(workers).outcomes(self.job, missions, left):
+                    store.append(finished)
+                    done += len(finished)
+                    failed += sum(isinstance(outcome, Failure) for _, outcome in finished)
+                    if on_progress is not None:
+                        on_progress(Progress(done, failed, self.total))
+            store.commit()
+        except (KeyboardInterrupt, SuaveDesError) as error:
+            if not isinstance(error, StoreError):
+                with suppress(StoreError):  # which is told when the files cannot be written either
+                    store.commit()
+            return error
+        return None
+
+    def _outcomes(self, store: Store) -> Callable[[], Iterator[Finished]]:
+        if self.folder is None:
+            return store.outcomes
+        path = self.folder / STORE_FILE
+        return lambda: stored_outcomes(path)
+
+    def _how_to_go_on(self) -> str:
+        if self.folder is None or not (self.folder / STORE_FILE).exists():
+            return ""
+        return f"; what was kept before is safe: suave-des campaign --resume {self.folder} does the rest"
 
 
-def _compile(loaded: LoadedScenario) -> None:
+def _remove_empty(folder: Path) -> None:
+    with suppress(OSError):
+        folder.rmdir()
+
+
+def _compile(job: Job) -> None:
     """Have inner loops compiled and stored once, before workers would each compile them: a mission of a second does."""
+    loaded = job.loaded
     short = loaded.scenario.model_copy(update={"mission": Mission(time_limit_s=1.0)})
-    MissionRunner(replace(loaded, scenario=short)).run((RunSpec(short.name, "none", 1, 0),))
-
-
-def _files(
-    result: CampaignResult, inputs: Mapping[str, str], command: Sequence[str], *, suave_format: bool
-) -> dict[str, str]:
-    files = {
-        RUNS_FILE: csv_text(COLUMNS, result.rows),
-        SUMMARY_FILE: csv_text(SUMMARY_COLUMNS, summary_rows(result.managers, result.rows)),
-        MANIFEST_FILE: json_text(
-            {
-                "scenario": result.loaded.scenario.name,
-                "managers": result.managers,
-                "runs": result.runs,
-                "seed": result.seed,
-                "missions": {
-                    "planned": result.planned,
-                    "done": len(result.rows),
-                    "failed": len(result.failures),
-                    "left_out": result.planned - len(result.rows) - len(result.failures),
-                },
-                "failures": [failure._asdict() for failure in result.failures],
-                **provenance(result.loaded, inputs, command),
-            }
-        ),
-    }
-    if suave_format:
-        scenario = result.loaded.scenario
-        numbered = ((_number(result, row), row) for row in result.rows)
-        files[SUAVE_FILE] = suave_text(scenario.revision.name, numbered, scenario.mission.time_limit_s)
-    return files
-
-
-def _number(result: CampaignResult, row: Row) -> int:
-    """Number of a row's mission in the campaign, from 1, whether or not those before have a row."""
-    run = row[_RUN]
-    assert isinstance(run, int)
-    return result.managers.index(str(row[_MANAGER])) * result.runs + run
-
-
-def _kept(result: CampaignResult) -> str:
-    kept = f"{len(result.rows)} of {result.planned} missions are done"
-    return kept if result.folder is None else f"{kept}, and kept in {result.folder}"
+    MissionRunner(replace(job, loaded=replace(loaded, scenario=short), managers=("none",))).run((MissionKey(0, 0, 1),))

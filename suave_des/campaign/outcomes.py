@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import fields
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields
 from operator import attrgetter
 from typing import NamedTuple
 
 from suave_des.campaign.output import rounded
-from suave_des.campaign.plan import Chunk, RunSpec
+from suave_des.campaign.plan import Chunk, MissionKey
+from suave_des.campaign.time_limit import Limit, TimeOut, time_limits
 from suave_des.errors import MissionError
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.simulation.result import MissionMetrics
 from suave_des.simulation.simulator import Simulator
 
 COLUMNS = tuple(field.name for field in fields(MissionMetrics))
-"""Columns of runs.csv."""
+"""Columns of runs.csv that every campaign has."""
 
 Cell = str | int | float | bool | None
 Row = tuple[Cell, ...]
@@ -29,49 +30,92 @@ def row_of(metrics: MissionMetrics) -> Row:
 
 
 class Failure(NamedTuple):
-    """A mission that has no row, because its manager raised.
+    """A mission that has no row.
 
     Attributes:
         manager: name of the managing subsystem.
         run: number of the run.
-        time_s: mission time at which it happened.
-        cause: what it raised.
+        time_s: mission time at which it happened; none if that is not known.
+        cause: what the manager raised, or what else ended the mission.
+        lasting: whether the mission itself failed; a time-out or a worker that was killed may not happen again, so a
+            resumed campaign runs such a mission once more.
     """
 
     manager: str
     run: int
-    time_s: float
+    time_s: float | None
     cause: str
+    lasting: bool = True
 
     def __str__(self) -> str:
         """In one line, with all that is known."""
+        if self.time_s is None:
+            return f"manager {self.manager}, run {self.run}: {self.cause}"
         return str(MissionError(self.manager, self.run, self.time_s, self.cause))
 
 
 Outcome = Row | Failure
+Finished = tuple[MissionKey, Outcome]
+
+
+@dataclass(frozen=True)
+class Job:
+    """All that a worker needs besides the numbers of the missions; it travels by value.
+
+    Attributes:
+        loaded: the scenario with its files.
+        managers: names, in the campaign's order.
+        seed: the campaign's.
+        time_out_s: time that a mission may take.
+    """
+
+    loaded: LoadedScenario
+    managers: tuple[str, ...]
+    seed: int
+    time_out_s: float
+
+    def failed(self, key: MissionKey, cause: str) -> Finished:
+        """The outcome of a mission that was ended from outside."""
+        return key, Failure(self.managers[key.manager], key.run, None, cause, lasting=False)
 
 
 class MissionRunner:
-    """Runs chunks of missions of one scenario in this process.
+    """Runs chunks of missions of one job in this process.
 
     Args:
-        loaded: the scenario with its files.
+        job: the scenario and what else decides a mission.
     """
 
-    def __init__(self, loaded: LoadedScenario) -> None:
-        self._simulator = Simulator(loaded)
+    def __init__(self, job: Job) -> None:
+        self._job = job
+        self._simulator = Simulator(job.loaded)
 
-    def run(self, chunk: Chunk) -> list[Outcome]:
+    def run(self, chunk: Chunk) -> list[Finished]:
         """The outcome of each mission, in order.
 
         Raises:
             InputError: the scenario, a manager or the knowledge base cannot be used at all.
         """
-        return [self._outcome(spec) for spec in chunk]
+        return list(self.each(chunk))
 
-    def _outcome(self, spec: RunSpec) -> Outcome:
+    def each(self, missions: Iterator[MissionKey] | Chunk) -> Iterator[Finished]:
+        """The same mission by mission."""
+        with time_limits() as limit:
+            for key in missions:
+                yield key, self._outcome(key, limit)
+
+    def _outcome(self, key: MissionKey, limit: Limit) -> Outcome:
+        manager = self._job.managers[key.manager]
         try:
-            result = self._simulator.run(spec.manager, spec.run, spec.seed)
+            with limit(self._job.time_out_s):
+                result = self._simulator.run(manager, key.run, self._job.seed)
         except MissionError as error:
             return Failure(error.manager, error.run, error.time_s, error.cause)
+        except TimeOut:
+            return self._job.failed(key, time_out_cause(self._job.time_out_s))[1]
         return row_of(result.metrics)
+
+
+def time_out_cause(time_out_s: float) -> str:
+    """What is said of a mission that took too long."""
+    return f"not done after {time_out_s:g} s (time-out)"

@@ -6,11 +6,15 @@ import csv
 import io
 import json
 import os
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from suave_des.errors import InputError
+
+_PIECE_ROWS = 1000
+_PART = ".part"
 
 DECIMALS = 6
 """Digits after the point in result files."""
@@ -28,11 +32,18 @@ def cell(value: object) -> object:
 
 def csv_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     r"""A CSV file: RFC 4180 but for its line ends, which are \n, with a header."""
-    buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(map(cell, row) for row in rows)
-    return buffer.getvalue()
+    return "".join(csv_pieces(columns, rows))
+
+
+def csv_pieces(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:
+    """A CSV file as csv_text gives it, piece by piece: of many rows, only some are in memory."""
+    rest = iter(rows)
+    part: list[Sequence[object]] = [columns]
+    while part:
+        buffer = io.StringIO()
+        csv.writer(buffer, lineterminator="\n").writerows([cell(value) for value in row] for row in part)
+        yield buffer.getvalue()
+        part = list(islice(rest, _PIECE_ROWS))
 
 
 def json_text(content: Mapping[str, Any]) -> str:
@@ -40,14 +51,22 @@ def json_text(content: Mapping[str, Any]) -> str:
     return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
 
-def check_output_folder(folder: Path, *, overwrite: bool) -> None:
+def check_output_folder(
+    folder: Path, *, overwrite: bool, left_over: Callable[[str], bool] = lambda name: False
+) -> None:
     """See that results can go into a folder, without changing anything.
+
+    Args:
+        folder: where they are to go.
+        overwrite: whether there may be something in it.
+        left_over: whether a file of some name counts as nothing.
 
     Raises:
         InputError: it has something in it and `overwrite` is false, is a file, or cannot be written.
     """
     try:
-        found = min((entry.name for entry in folder.iterdir()), default=None) if folder.is_dir() else None
+        entries = [entry.name for entry in folder.iterdir()] if folder.is_dir() else []
+        found = min((name for name in entries if not left_over(name)), default=None)
         is_there, has_parent = folder.exists() or folder.is_symlink(), folder.parent.is_dir()
     except OSError as error:
         raise _not_written(folder, error) from None
@@ -78,12 +97,12 @@ def make_output_folder(folder: Path) -> None:
         raise _not_written(folder, error) from None
 
 
-def write_files(folder: Path, files: Mapping[str, str | bytes], *, stale: Collection[str] = ()) -> None:
+def write_files(folder: Path, files: Mapping[str, str | bytes | Iterable[str]], *, stale: Collection[str] = ()) -> None:
     """Write files under temporary names, and rename them when all are complete.
 
     Args:
         folder: an existing folder.
-        files: content by name; text is written as UTF-8.
+        files: content by name; text is written as UTF-8, pieces of text one after the other.
         stale: names of files of an earlier use of the folder, removed unless they are written anew.
 
     Raises:
@@ -92,9 +111,9 @@ def write_files(folder: Path, files: Mapping[str, str | bytes], *, stale: Collec
     written: list[tuple[Path, Path]] = []
     try:
         for name, content in files.items():
-            temporary = folder / f".{name}.{os.getpid()}.part"
+            temporary = folder / f".{name}.{os.getpid()}{_PART}"
             written.append((temporary, folder / name))
-            temporary.write_bytes(content if isinstance(content, bytes) else content.encode())
+            _write(temporary, content)
         for temporary, final in written:
             temporary.replace(final)
         for name in set(stale) - set(files):
@@ -104,6 +123,22 @@ def write_files(folder: Path, files: Mapping[str, str | bytes], *, stale: Collec
     finally:
         for temporary, _ in written:
             temporary.unlink(missing_ok=True)
+
+
+def remove_parts(folder: Path, names: Iterable[str]) -> None:
+    """Remove what a process that was killed while it wrote files of these names has left."""
+    for name in names:
+        for part in folder.glob(f".{name}.*{_PART}"):
+            part.unlink(missing_ok=True)
+
+
+def _write(path: Path, content: str | bytes | Iterable[str]) -> None:
+    if isinstance(content, str | bytes):
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return
+    with path.open("wb") as file:
+        for piece in content:
+            file.write(piece.encode())
 
 
 def _not_written(folder: Path, error: OSError) -> InputError:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from itertools import islice
+from typing import NamedTuple
 
 from suave_des.errors import InputError
 from suave_des.managing.registry import manager_class
@@ -14,32 +14,51 @@ RUNS_LIMIT = 1_000_000
 _WORKERS_PER_CORE = 4
 
 
-@dataclass(frozen=True, slots=True)
-class RunSpec:
-    """One mission of a campaign: everything that decides its row, but for the files of its scenario.
+class MissionKey(NamedTuple):
+    """Which mission of a campaign; missions and their rows are in the order of their keys.
 
     Attributes:
-        scenario: the scenario's name.
-        manager: name of the managing subsystem, or module:Class.
-        run: number of the run, from 1; equal runs of different managers meet the same sea.
-        seed: the campaign's seed.
+        point: number of the sweep's point, from 0; 0 without a sweep.
+        manager: place among the campaign's managers, from 0.
+        run: number of the run, from 1; equal runs of different managers and points meet the same sea.
     """
 
-    scenario: str
-    manager: str
+    point: int
+    manager: int
     run: int
-    seed: int
 
 
-Chunk = tuple[RunSpec, ...]
+Chunk = tuple[MissionKey, ...]
+Group = tuple[int, int]
+"""Point and manager: the missions that differ in the run only."""
 
 
-def plan(scenario: str, managers: Sequence[str], runs: int, seed: int) -> Iterator[RunSpec]:
-    """All missions in the order of their rows: managers as given, runs 1 to `runs` of each."""
-    return (RunSpec(scenario, manager, run, seed) for manager in managers for run in range(1, runs + 1))
+def plan(
+    points: int,
+    managers: int,
+    runs: int,
+    settled: Callable[[Group], Collection[int]] = lambda group: (),
+    is_over: Callable[[Group], bool] = lambda group: False,
+) -> Iterator[MissionKey]:
+    """The missions still to run, in order.
+
+    Args:
+        points: number of points of the sweep.
+        managers: number of managers.
+        runs: for each manager at each point.
+        settled: runs of a group that need not be run, asked for once, when the group's turn comes.
+        is_over: whether a group needs no further runs, asked before each.
+    """
+    for group in ((point, manager) for point in range(points) for manager in range(managers)):
+        known = settled(group)
+        for run in range(1, runs + 1):
+            if is_over(group):
+                break
+            if run not in known:
+                yield MissionKey(*group, run)
 
 
-def chunked(missions: Iterable[RunSpec], size: int) -> Iterator[Chunk]:
+def chunked(missions: Iterable[MissionKey], size: int) -> Iterator[Chunk]:
     """Portions of `size` missions, the last one perhaps smaller."""
     rest = iter(missions)
     while chunk := tuple(islice(rest, size)):

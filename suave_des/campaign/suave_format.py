@@ -7,12 +7,12 @@ day. Ours must be the same each time, so mission number n of the campaign bears 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from datetime import datetime, timedelta
 from typing import Any
 
 from suave_des.campaign.outcomes import COLUMNS, Row
-from suave_des.campaign.output import csv_text
+from suave_des.campaign.output import csv_pieces
 
 SUAVE_FILE = "suave_results.csv"
 
@@ -70,7 +70,12 @@ _LAYOUTS = {"2023": _LAYOUT_2023}
 
 
 def suave_text(revision: str, rows: Iterable[tuple[int, Row]], time_limit_s: float) -> str:
-    """The file's content.
+    """The file's content, as of suave_pieces."""
+    return "".join(suave_pieces(revision, rows, time_limit_s))
+
+
+def suave_pieces(revision: str, rows: Iterable[tuple[int, Row]], time_limit_s: float) -> Iterator[str]:
+    """The file's content, piece by piece.
 
     Args:
         revision: the scenario's; all but 2023 have the current layout, that of 1.5.
@@ -80,10 +85,10 @@ def suave_text(revision: str, rows: Iterable[tuple[int, Row]], time_limit_s: flo
     layout = _LAYOUTS.get(revision, _LAYOUT_1_5)
     missions = (
         {
-            **dict(zip(COLUMNS, row, strict=True)),
+            **dict(zip(COLUMNS, row, strict=False)),  # columns of drawn and swept parameters follow
             "time_limit_s": time_limit_s,
             "stamp": _FIRST_STAMP + timedelta(seconds=number),
         }
         for number, row in rows
     )
-    return csv_text(tuple(layout), ([make(mission) for make in layout.values()] for mission in missions))
+    return csv_pieces(tuple(layout), ([make(mission) for make in layout.values()] for mission in missions))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from array import array
 
 from suave_des.campaign.outcomes import COLUMNS, Row
 from suave_des.estimates import Estimate, estimate
@@ -19,26 +19,30 @@ SUMMARY_COLUMNS = (
 )
 """Columns of summary.csv."""
 
-_MANAGER, _FOUND = COLUMNS.index("manager"), COLUMNS.index("pipeline_found")
+_FOUND = COLUMNS.index("pipeline_found")
+_PLACES = tuple(COLUMNS.index(metric) for metric in METRICS)
 
 
-def summary_rows(managers: Sequence[str], rows: Iterable[Row]) -> list[Row]:
-    """A row for each manager, in the order given; a figure that needs more missions than there are is none."""
-    by_manager: dict[str, list[Row]] = {manager: [] for manager in managers}
-    for row in rows:
-        by_manager[str(row[_MANAGER])].append(row)
-    return [_summary(manager, own) for manager, own in by_manager.items()]
+class Tally:
+    """The figures of one manager's missions, gathered row by row; of each metric only the numbers are kept."""
 
+    def __init__(self) -> None:
+        self._rows = self._found = 0
+        self._values = tuple(array("d") for _ in METRICS)
 
-def _summary(manager: str, rows: Sequence[Row]) -> Row:
-    share = sum(bool(row[_FOUND]) for row in rows) / len(rows) if rows else None
-    figures = [figure for metric in METRICS for figure in _figures(estimate(_values(rows, metric)))]
-    return (manager, len(rows), share, *figures)
+    def add(self, row: Row) -> None:
+        """Count a row of runs.csv."""
+        self._rows += 1
+        self._found += bool(row[_FOUND])
+        for values, place in zip(self._values, _PLACES, strict=True):
+            value = row[place]
+            if value is not None:
+                values.append(float(value))
 
-
-def _values(rows: Sequence[Row], metric: str) -> list[float]:
-    place = COLUMNS.index(metric)
-    return [float(value) for row in rows if (value := row[place]) is not None]
+    def figures(self) -> Row:
+        """Cells of summary.csv after the first; a figure that needs more missions than there are is none."""
+        share = self._found / self._rows if self._rows else None
+        return (self._rows, share, *(figure for values in self._values for figure in _figures(estimate(values))))
 
 
 def _figures(found: Estimate) -> Row:

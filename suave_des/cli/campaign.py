@@ -15,8 +15,6 @@ from suave_des.cli.options import (
     Overwrite,
     Reasoner,
     RuleFiles,
-    Scenario,
-    Seed,
     Workers,
     command_line,
 )
@@ -26,6 +24,7 @@ if TYPE_CHECKING:
 
 
 _FAILURES_TOLD = 20
+_MANAGERS, _RUNS, _SEED, _TIME_OUT = ("none", "random", "metacontrol"), 20, 1, "120"
 
 
 class Format(StrEnum):
@@ -35,16 +34,37 @@ class Format(StrEnum):
 
 
 def campaign(
-    scenario: Scenario,
+    scenario: Annotated[
+        str | None,
+        typer.Argument(metavar="[SCENARIO]", help="A scenario file, or the name of a shipped one.", show_default=False),
+    ] = None,
     out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Folder for runs.csv, summary.csv and manifest.json.")
-    ],
+        Path | None, typer.Option("--out", metavar="DIR", help="Folder for runs.csv, summary.csv and manifest.json.")
+    ] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option("--resume", metavar="DIR", help="Go on with the campaign in this folder; --runs may add runs."),
+    ] = None,
     managers: Annotated[
-        str, typer.Option("--managers", metavar="NAME,...", help="Managing subsystems: names, or module:Class.")
-    ] = "none,random,metacontrol",
-    runs: Annotated[int, typer.Option("--runs", help="Missions for each manager.")] = 20,
+        str | None,
+        typer.Option(
+            "--managers",
+            metavar="NAME,...",
+            help="Managing subsystems: names, or module:Class.",
+            show_default=",".join(_MANAGERS),
+        ),
+    ] = None,
+    runs: Annotated[
+        int | None, typer.Option("--runs", help="Missions for each manager.", show_default=str(_RUNS))
+    ] = None,
     workers: Workers = 2,
-    seed: Seed = 1,
+    seed: Annotated[
+        int | None, typer.Option("--seed", help="Seed of everything that is random.", show_default=str(_SEED))
+    ] = None,
+    time_out: Annotated[
+        float | None,
+        typer.Option("--time-out", metavar="SECONDS", help="Time that a mission may take.", show_default=_TIME_OUT),
+    ] = None,
     also: Annotated[
         Format | None, typer.Option("--format", help="Write the exemplar's own suave_results.csv besides.")
     ] = None,
@@ -55,32 +75,66 @@ def campaign(
     modes: Modes = None,
     reasoner: Reasoner = None,
 ) -> None:
-    """Run many missions and write their results."""
-    from suave_des.campaign.campaign import run_campaign
+    """Run many missions and write their results.
+
+    What is done is kept while the campaign runs; after an interruption, --resume DIR does the rest.
+    """
+    from suave_des.campaign.campaign import resume_campaign, run_campaign
+    from suave_des.campaign.request import TIME_OUT_S
     from suave_des.cli.console import output, progress_bar
     from suave_des.cli.tables import print_summary
+    from suave_des.errors import InputError
 
-    with progress_bar(scenario) as show:
-        result = run_campaign(
-            scenario,
-            [name.strip() for name in managers.split(",") if name.strip()],
-            runs,
-            seed,
-            workers,
-            out,
-            ontologies=ontology or (),
-            modes_file=modes,
-            reasoner=reasoner,
-            rules=rules or (),
-            disabled_rules=disable_rule or (),
-            suave_format=also is Format.SUAVE,
-            overwrite=overwrite,
-            command=command_line(),
-            on_progress=show,
-        )
+    if resume is not None:
+        fixed = {
+            "SCENARIO": scenario,
+            "--out": out,
+            "--managers": managers,
+            "--seed": seed,
+            "--time-out": time_out,
+            "--format": also,
+            "--overwrite": overwrite,
+            "--ontology": ontology,
+            "--modes": modes,
+            "--reasoner": reasoner,
+            "--rules": rules,
+            "--disable-rule": disable_rule,
+        }
+        for option, value in fixed.items():
+            if not (value is None or value is False or value == []):
+                raise InputError(
+                    f"{option} has no use with --resume: the campaign goes on as it began",
+                    remedy="leave it out, or start anew in another folder",
+                )
+        with progress_bar(str(resume)) as show:
+            result = resume_campaign(resume, workers, runs=runs, on_progress=show)
+    elif scenario is None or out is None:
+        missing = "SCENARIO" if scenario is None else "--out DIR"
+        raise InputError(f"{missing} is missing", remedy="see suave-des campaign --help")
+    else:
+        names = _MANAGERS if managers is None else [name.strip() for name in managers.split(",") if name.strip()]
+        with progress_bar(scenario) as show:
+            result = run_campaign(
+                scenario,
+                names,
+                _RUNS if runs is None else runs,
+                _SEED if seed is None else seed,
+                workers,
+                out,
+                ontologies=ontology or (),
+                modes_file=modes,
+                reasoner=reasoner,
+                rules=rules or (),
+                disabled_rules=disable_rule or (),
+                suave_format=also is Format.SUAVE,
+                time_out_s=TIME_OUT_S if time_out is None else time_out,
+                overwrite=overwrite,
+                command=command_line(),
+                on_progress=show,
+            )
     console = output()
     print_summary(console, result)
-    console.print(f"{len(result.rows)} missions are in {out}/runs.csv", soft_wrap=True)
+    console.print(f"{result.done} missions are in {result.folder}/runs.csv", soft_wrap=True)
     exit_telling_failures(result)
 
 

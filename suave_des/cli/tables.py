@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from suave_des.campaign.summary import METRICS, SUMMARY_COLUMNS, summary_rows
+from suave_des.campaign.summary import METRICS, SUMMARY_COLUMNS
 
 if TYPE_CHECKING:
     from suave_des.campaign.campaign import CampaignResult
@@ -46,7 +46,7 @@ def print_summary(console: Console, result: CampaignResult) -> None:
         table.add_column(METRIC_TITLES[metric], justify="right")
         table.add_column("95% interval", justify="right")
         table.add_column("std", justify="right")
-    for row in summary_rows(result.managers, result.rows):
+    for row in result.summary:
         cells = dict(zip(SUMMARY_COLUMNS, row, strict=True))
         share = cells["found_share"]
         table.add_row(

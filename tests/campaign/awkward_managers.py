@@ -5,6 +5,9 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import time
+from contextlib import suppress
+from pathlib import Path
 
 from suave_des.managed.coordinator import Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
@@ -58,6 +61,32 @@ class DiesInSome(_InRun):
     def adapt(self) -> None:
         if self.draw < 0.1:
             os.kill(os.getpid(), signal.SIGKILL)
+
+
+class DiesAlways(NoManager):
+    """Ends its process in each mission."""
+
+    def task_requested(self, task: Task) -> None:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+class HangsInSome(_InRun):
+    """Never comes back in about one of ten runs, whatever Exception it meets."""
+
+    def adapt(self) -> None:
+        while self.draw < 0.1:
+            with suppress(Exception):
+                time.sleep(60.0)
+
+
+class HangsOnce(_InRun):
+    """Does not come back in about one of ten runs, the first time it is tried."""
+
+    def adapt(self) -> None:
+        mark = Path(os.environ["AWKWARD_MARKS"]) / f"{self.draw}"
+        if self.draw < 0.1 and not mark.exists():
+            mark.touch()
+            time.sleep(60.0)
 
 
 class TellsItsProcess(NoManager):

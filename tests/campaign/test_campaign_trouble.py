@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from suave_des.campaign.campaign import CampaignInterrupted, run_campaign
+from suave_des.campaign.campaign import CampaignInterrupted, resume_campaign, run_campaign
 from suave_des.campaign.executors import WorkerError
 from suave_des.campaign.outcomes import MissionRunner
 from suave_des.errors import InputError
@@ -84,17 +84,39 @@ def test_interrupted_before_the_first_mission_is_done_leaves_nothing(
     def ctrl_c(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(MissionRunner, "run", ctrl_c)
+    monkeypatch.setattr(MissionRunner, "each", ctrl_c)
     with pytest.raises(KeyboardInterrupt):
         run_campaign("seams2023", ["none"], 2, 1, out=tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
-def test_a_worker_that_is_killed_ends_the_campaign_with_what_is_there(tmp_path: Path) -> None:
-    managers = ["none", "awkward_managers:DiesInSome"]
-    with pytest.raises(WorkerError, match=r"status -9 .* \d+ of 200 missions are done, and kept in "):
-        run_campaign("seams2023", managers, 100, 1, 2, tmp_path / "out")
-    assert len(rows_of(tmp_path / "out")) > 0
+def test_a_mission_that_kills_its_worker_again_and_again_has_failed_and_the_others_go_on(tmp_path: Path) -> None:
+    manager = "awkward_managers:DiesInSome"
+    result = run_campaign("seams2023", ["none", manager], 12, 1, 2, tmp_path / "out")
+    assert 0 < len(result.failures) < 6
+    assert {failure.manager for failure in result.failures} == {manager}
+    for failure in result.failures:
+        assert failure.cause == "its worker process ended with status -9, 3 times (killed, or out of memory?)"
+        assert not failure.lasting
+    assert result.done + len(result.failures) == 24
+    rows = rows_of(tmp_path / "out")
+    assert [row["run"] for row in rows if row["manager"] == "none"] == [str(run) for run in range(1, 13)]
+
+
+def test_when_every_worker_dies_the_campaign_stops_with_one_line(tmp_path: Path) -> None:
+    with pytest.raises(WorkerError, match=r"8 worker processes in a row ended before a mission was done"):
+        run_campaign("seams2023", ["awkward_managers:DiesAlways"], 20, 1, 2, tmp_path / "out")
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_mission_that_takes_too_long_has_failed_and_the_others_go_on(workers: int) -> None:
+    result = run_campaign("seams2023", ["awkward_managers:HangsInSome", "none"], 12, 1, workers, time_out_s=0.5)
+    assert 0 < len(result.failures) < 12
+    for failure in result.failures:
+        assert str(failure) == (
+            f"manager awkward_managers:HangsInSome, run {failure.run}: not done after 0.5 s (time-out)"
+        )
+    assert result.done == 24 - len(result.failures)
 
 
 def test_missions_run_in_as_many_processes_as_asked_for() -> None:
@@ -118,6 +140,8 @@ class TestRefusedBeforeAnythingIsWritten:
             ({"managers": ["awkward_managers:NoSuchClass"]}, "NoSuchClass"),
             ({"runs": 0}, "runs: 0 is out of range"),
             ({"runs": -5}, "runs: -5"),
+            ({"time_out_s": 0.0}, "time-out: 0 is out of range"),
+            ({"time_out_s": float("nan")}, "time-out: nan is out of range"),
             ({"workers": 0}, "workers: 0 is out of range"),
             ({"workers": 10_000}, "workers: 10000 is out of range"),
             ({"scenario": "no_such_scenario"}, "no_such_scenario"),
@@ -151,7 +175,7 @@ class TestRefusedBeforeAnythingIsWritten:
         run_campaign("seams2023", ["none"], 2, 1, out=tmp_path / "out", overwrite=True)
         assert len(rows_of(tmp_path / "out")) == 2
         assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
-            *("manifest.json", "notes.txt", "runs.csv", "summary.csv"),
+            *("campaign.sqlite", "manifest.json", "notes.txt", "runs.csv", "summary.csv"),
         ]
 
     def test_a_file_in_place_of_the_folder(self, tmp_path: Path) -> None:
@@ -182,6 +206,9 @@ def test_a_disk_that_fills_up_leaves_nothing_half_written(tmp_path: Path, monkey
         return real(path, content)
 
     monkeypatch.setattr(Path, "write_bytes", full)
-    with pytest.raises(InputError, match="No space left on device"):
+    with pytest.raises(InputError, match=r"No space left on device .*--resume .* writes the files"):
         run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out")
-    assert list((tmp_path / "out").iterdir()) == []
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["campaign.sqlite"]
+    monkeypatch.undo()
+    resume_campaign(tmp_path / "out")
+    assert len(rows_of(tmp_path / "out")) == 1

@@ -89,6 +89,32 @@ class TestHelp:
         assert command("--version").out == f"suave-des {__version__}\n"
 
 
+class TestResume:
+    def test_does_what_is_left_and_may_add_runs(self, command, tmp_path: Path) -> None:
+        command("campaign", "seams2023", "--managers", "none", "--runs", "2", "--workers", "1", *OUT)
+        ended = command("campaign", "--resume", "out", "--runs", "4", "--workers", "1")
+        assert ended.status == 0
+        assert "4 missions are in out/runs.csv" in ended.out
+        command("campaign", "seams2023", "--managers", "none", "--runs", "4", "--workers", "1", "--out", "whole")
+        assert (tmp_path / "out" / "runs.csv").read_bytes() == (tmp_path / "whole" / "runs.csv").read_bytes()
+
+    @pytest.mark.parametrize(
+        ("arguments", "words"),
+        [
+            (("--resume", "out", "--seed", "0"), "--seed has no use with --resume"),
+            (("seams2023", "--resume", "out"), "SCENARIO has no use with --resume"),
+            (("--resume", "nowhere"), "nowhere: there is no campaign to go on with"),
+            (("seams2023",), "--out DIR is missing"),
+            (("--out", "out"), "SCENARIO is missing"),
+        ],
+    )
+    def test_what_cannot_be_done_is_one_line(self, command, arguments: tuple[str, ...], words: str) -> None:
+        ended = command("campaign", *arguments)
+        assert (ended.status, ended.out) == (2, "")
+        assert words in ended.err
+        assert ended.err.count("\n") == 1
+
+
 class TestRun:
     def test_tells_the_mission_as_a_timeline(self, command) -> None:
         ended = command("run", "seams2023", "--manager", "none", "--seed", "1")

@@ -1,0 +1,252 @@
+"""Where outcomes are kept while a campaign runs, so that nothing that is done is lost: an SQLite database.
+
+SQLite and not Parquet, because a transaction is either whole or not there after a kill, appending costs no file of its
+own, damage is noticed, and it comes with Python. Each outcome carries a checksum besides.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import time
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import closing, contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from suave_des.campaign.outcomes import Failure, Finished, Outcome
+from suave_des.campaign.plan import Group, MissionKey
+from suave_des.errors import InputError, SuaveDesError
+
+STORE_FILE = "campaign.sqlite"
+NEW_STORE_FILE = f".{STORE_FILE}.new"
+"""Its name until it is whole."""
+
+_VERSION = 1
+_COMMIT_PERIOD_S = 0.1
+"""A kill loses at most the missions of this time, besides those under way."""
+_ROW, _LASTING, _PASSING = 0, 1, 2
+"""Kinds of outcome: a row of runs.csv, a failure, a failure that may not happen again."""
+_TABLES = """
+CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE outcomes (
+    point INTEGER, manager INTEGER, run INTEGER, kind INTEGER NOT NULL, content TEXT NOT NULL, crc INTEGER NOT NULL,
+    PRIMARY KEY (point, manager, run)
+) WITHOUT ROWID;
+"""
+
+_ALL = "SELECT * FROM outcomes ORDER BY point, manager, run"
+
+
+class StoreError(SuaveDesError):
+    """Outcomes cannot be kept any more; those that were kept before are."""
+
+
+class Store:
+    """The outcomes of one campaign.
+
+    Args:
+        path: the database's file, made by make_store; none for a temporary one, which is gone when this is closed.
+
+    Raises:
+        InputError: it is not there, is damaged, or is another version's.
+    """
+
+    def __init__(self, path: Path | None) -> None:
+        self.path = path
+        self._committed_s = time.monotonic()
+        self._inode = 0
+        if path is not None and not path.is_file():
+            raise InputError("there is no campaign to go on with", file=path.parent, remedy="start one with --out")
+        with _telling(path):
+            self._db = sqlite3.connect("" if path is None else path, isolation_level=None)
+            self._db.execute("PRAGMA locking_mode = EXCLUSIVE")
+            if path is None:
+                self._db.executescript(_TABLES)
+            else:
+                self._check()
+            self._db.execute("PRAGMA journal_mode = WAL")
+            # With this a kill of the process loses nothing; loss of power perhaps the last transactions, whole ones.
+            self._db.execute("PRAGMA synchronous = NORMAL")
+            self._db.execute("BEGIN")
+        if path is not None:
+            self._inode = path.stat().st_ino
+
+    def _check(self) -> None:
+        (version,) = self._db.execute("PRAGMA user_version").fetchone()
+        if version != _VERSION:
+            raise InputError(
+                f"is a campaign's store of version {version}, and this suave-des has version {_VERSION}",
+                file=self.path,
+                remedy="go on with the suave-des that began it, or start anew with --overwrite",
+            )
+        (verdict,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
+        if verdict != "ok":
+            raise _damaged(self.path, verdict)
+
+    # What it is about.
+
+    def about(self, name: str) -> Any:
+        """What was noted under a name; none if nothing was."""
+        with _telling(self.path):
+            found = self._db.execute("SELECT value FROM about WHERE name = ?", (name,)).fetchone()
+        return None if found is None else json.loads(found[0])
+
+    def note(self, name: str, value: Any) -> None:
+        """Note something about the campaign, at once and lastingly."""
+        with _telling(self.path):
+            self._db.execute("INSERT OR REPLACE INTO about VALUES (?, ?)", (name, json.dumps(value)))
+        self.commit()
+
+    # Outcomes.
+
+    def append(self, finished: Iterable[Finished]) -> None:
+        """Keep outcomes; they are safe after _COMMIT_PERIOD_S at the latest, if more are appended, or after commit().
+
+        Raises:
+            StoreError: the disk is full, or the output folder was removed.
+        """
+        with _telling(self.path):
+            self._db.executemany("INSERT OR REPLACE INTO outcomes VALUES (?, ?, ?, ?, ?, ?)", map(_written, finished))
+        if time.monotonic() - self._committed_s > _COMMIT_PERIOD_S:
+            self.commit()
+
+    def commit(self) -> None:
+        """Make safe what was appended."""
+        if self.path is not None:
+            self._check_still_there(self.path)
+        with _telling(self.path):
+            self._db.execute("COMMIT")
+            self._db.execute("BEGIN")
+        self._committed_s = time.monotonic()
+
+    def _check_still_there(self, path: Path) -> None:
+        # The system lets a process write into a file that was removed, and throws it away afterwards.
+        try:
+            same = path.stat().st_ino == self._inode
+        except OSError:
+            same = False
+        if not same:
+            raise StoreError(f"{path} was removed while the campaign ran; what it held is lost, so start anew")
+
+    def forget_passing_failures(self) -> None:
+        """Drop failures that may not happen again."""
+        with _telling(self.path):
+            self._db.execute("DELETE FROM outcomes WHERE kind = ?", (_PASSING,))
+
+    def settled(self, group: Group) -> set[int]:
+        """Runs of a group that have an outcome."""
+        with _telling(self.path):
+            found = self._db.execute("SELECT run FROM outcomes WHERE point = ? AND manager = ?", group)
+            return {run for (run,) in found}
+
+    def count(self) -> int:
+        """Number of outcomes."""
+        with _telling(self.path):
+            (number,) = self._db.execute("SELECT count(*) FROM outcomes").fetchone()
+        return int(number)
+
+    def count_failures(self) -> int:
+        """Number of failures among the outcomes."""
+        with _telling(self.path):
+            (number,) = self._db.execute("SELECT count(*) FROM outcomes WHERE kind <> ?", (_ROW,)).fetchone()
+        return int(number)
+
+    def outcomes(self) -> Iterator[Finished]:
+        """All outcomes in the order of their keys, read as they are asked for.
+
+        Raises:
+            InputError: the store is damaged.
+        """
+        with _telling(self.path):
+            for record in self._db.execute(_ALL):
+                yield _read(record, self.path)
+
+    def close(self) -> None:
+        """Leave one plain file behind. If the disk is full, a journal stays beside it, from which the rest is read."""
+        with suppress(sqlite3.Error):
+            self._db.execute("COMMIT")
+        with suppress(sqlite3.Error):
+            self._db.execute("PRAGMA journal_mode = DELETE")
+        self._db.close()
+
+
+def make_store(path: Path, about: Mapping[str, Any]) -> None:
+    """Make the database of a new campaign, in place of an earlier one: whole, or not at all.
+
+    Args:
+        path: its file.
+        about: what is noted about the campaign, by name.
+
+    Raises:
+        StoreError: it cannot be written.
+    """
+    new = path.with_name(NEW_STORE_FILE)
+    new.unlink(missing_ok=True)
+    with _telling(path), closing(sqlite3.connect(new, isolation_level=None)) as db:
+        db.executescript(f"BEGIN; {_TABLES} PRAGMA user_version = {_VERSION};")
+        db.executemany("INSERT INTO about VALUES (?, ?)", ((name, json.dumps(about[name])) for name in about))
+        db.execute("COMMIT")
+    remove_store(path.parent)
+    new.rename(path)
+
+
+def stored_outcomes(path: Path) -> Iterator[Finished]:
+    """The outcomes in a store that is closed, in the order of their keys.
+
+    Raises:
+        InputError: the store is not there, or is damaged.
+    """
+    with _telling(path), closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as db:
+        for record in db.execute(_ALL):
+            yield _read(record, path)
+
+
+@contextmanager
+def _telling(path: Path | None) -> Iterator[None]:
+    """Errors of the database as errors for the user."""
+    try:
+        yield
+    except sqlite3.OperationalError as error:
+        if error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB):
+            raise _damaged(path, error) from None
+        raise StoreError(f"{path or 'temporary files'}: results cannot be kept: {error}") from None
+    except sqlite3.DatabaseError as error:
+        raise _damaged(path, error) from None
+
+
+def _damaged(path: Path | None, what: object) -> InputError:
+    return InputError(f"is damaged: {what}", file=path, remedy="start anew with --overwrite")
+
+
+def remove_store(folder: Path) -> None:
+    """Remove a campaign's store from a folder, if there is one."""
+    for ending in ("", "-wal", "-shm", "-journal"):
+        with suppress(FileNotFoundError):
+            (folder / f"{STORE_FILE}{ending}").unlink()
+
+
+def _written(finished: Finished) -> tuple[int, int, int, int, str, int]:
+    key, outcome = finished
+    kind, content = _kind(outcome), json.dumps(outcome)
+    return (*key, kind, content, _crc(key, kind, content))
+
+
+def _kind(outcome: Outcome) -> int:
+    if not isinstance(outcome, Failure):
+        return _ROW
+    return _LASTING if outcome.lasting else _PASSING
+
+
+def _read(record: tuple[int, int, int, int, str, int], path: Path | None) -> Finished:
+    *place, kind, content, crc = record
+    key = MissionKey(*place)
+    if _crc(key, kind, content) != crc:
+        raise _damaged(path, f"the outcome of run {key.run} is not what was written")
+    cells = json.loads(content)
+    return key, tuple(cells) if kind == _ROW else Failure(*cells)
+
+
+def _crc(key: MissionKey, kind: int, content: str) -> int:
+    return zlib.crc32(f"{key.point} {key.manager} {key.run} {kind} {content}".encode())
