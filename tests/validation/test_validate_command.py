@@ -48,6 +48,7 @@ def test_three_missions_of_each_manager_are_simulated_and_compared(validate, tmp
     assert "targets are met" in ended.out
     assert "cannot be judged: too few missions" in ended.out
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "campaign.sqlite",
         "runs.csv",
         "summary.csv",
         "manifest.json",
