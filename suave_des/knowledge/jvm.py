@@ -60,6 +60,9 @@ def start(*more: str) -> None:
         _capture_log()
         options = jpype.JClass("org.mindswap.pellet.PelletOptions")
         options.USE_CLASSIFICATION_MONITOR = jpype.JClass("org.mindswap.pellet.PelletOptions$MonitorType").NONE
+        # The end of the process waits for the thread that started Java, unless it lets go; it is attached anew, as one
+        # that is not waited for, when it next calls Java.
+        jpype.JClass("java.lang.Thread").detach()
         _started_in.append(os.getpid())
 
 
