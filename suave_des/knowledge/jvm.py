@@ -49,6 +49,11 @@ def start() -> None:
                 jpype.addClassPath(str(jar))
         else:
             jpype.startJVM(str(java_library()), *_OPTIONS, classpath=[str(jar) for jar in jars], convertStrings=False)
+            # Java's end waits for the thread that started it, unless that is the one in which the process ends.
+            if threading.current_thread() is not threading.main_thread():
+                thread = jpype.JClass("java.lang.Thread")
+                thread.detach()
+                thread.attachAsDaemon()
         _capture_log()
         options = jpype.JClass("org.mindswap.pellet.PelletOptions")
         options.USE_CLASSIFICATION_MONITOR = jpype.JClass("org.mindswap.pellet.PelletOptions$MonitorType").NONE
