@@ -10,7 +10,7 @@ import simpy
 from suave_des.clock import Process, until
 from suave_des.managed.node import FunctionNode, SetPointSender
 from suave_des.scenario.revision import FollowRevision
-from suave_des.vehicle.vehicle import Vehicle, row_at
+from suave_des.vehicle.vehicle import Vehicle
 from suave_des.world.pipeline import SEA_BED_Z_M
 
 ALTITUDE_M = 1.25
@@ -100,15 +100,18 @@ class FollowPipeline(FunctionNode):
         period_s = self._revision.poll_period_s
         poll = _polls_until(self.env.now, started_s, period_s) + 1
         last = poll + POLLS_BEFORE_RESENDING - 1
-        reached = self._reached(point, self.env.now)
-        while not reached:
-            coming = range(poll, last + 1)
-            wake = next((each for each in coming if self._reached(point, started_s + each * period_s)), last)
+        if self._is_at(point):
+            return
+        while True:
+            reached = self._vehicle.first_tick_in_box(
+                *point, self._revision.acceptance_m, began_s=started_s, period_s=period_s, first=poll, last=last
+            )
+            wake = last if reached is None else reached
             if (yield from self._sleep_until(started_s + wake * period_s)):
                 poll = max(poll, _polls_until(self.env.now, started_s, period_s))
-                continue
-            reached = self._reached(point, self.env.now)
-            if not reached:
+            elif reached is not None:
+                return
+            else:
                 self._send(point)
                 poll, last = wake + 1, wake + POLLS_BEFORE_RESENDING
 
@@ -133,10 +136,8 @@ class FollowPipeline(FunctionNode):
     def _send(self, point: tuple[float, float]) -> None:
         self._sender.send(point[0], point[1], SEA_BED_Z_M + ALTITUDE_M)
 
-    def _reached(self, point: tuple[float, float], t_s: float) -> bool:
-        if row_at(t_s) > self._vehicle.last_row:
-            return False  # after the mission's end
-        x, y, _ = self._vehicle.position(t_s)
+    def _is_at(self, point: tuple[float, float]) -> bool:
+        x, y, _ = self._vehicle.position(self.env.now)
         box = self._revision.acceptance_m
         return abs(x - point[0]) <= box and abs(y - point[1]) <= box
 

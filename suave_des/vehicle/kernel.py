@@ -15,6 +15,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from suave_des.compiling import compiled
 from suave_des.vehicle.model import Array
 
@@ -185,3 +187,41 @@ def advance(
         track[row, 7], track[row, 8], track[row, 9] = u, v, w
         track[row, 10], track[row, 11], track[row, 12] = p, q, r
         track[row, 13], track[row, 14], track[row, 15], track[row, 16] = ix, iy, iz, ir
+
+
+@compiled
+def first_tick_in_box(
+    track: Array,
+    computed: int,
+    step_s: float,
+    set_point: Array,
+    parameters: Array,
+    allocation: Array,
+    effectiveness: Array,
+    box: tuple[float, float, float],
+    timer: tuple[float, float, float],
+    first: int,
+    last: int,
+) -> tuple[int, int]:
+    """First tick of a timer at which the vehicle is in a box, -1 if at none; and the last row that is filled now.
+
+    Args:
+        track: as for `advance`, likewise step_s, set_point, parameters, allocation and effectiveness.
+        computed: last row that is filled.
+        box: x and y of its centre and half its width, m.
+        timer: time of tick 0, time between ticks, and time between rows, s.
+        first: first tick to look at.
+        last: last tick to look at; ticks beyond the track do not count.
+    """
+    x, y, half_width = box
+    began_s, period_s, grid_s = timer
+    for tick in range(first, last + 1):
+        row = int(np.rint((began_s + tick * period_s) / grid_s))
+        if row >= track.shape[0]:
+            break
+        if row > computed:
+            advance(track, computed, row, step_s, set_point, parameters, allocation, effectiveness)
+            computed = row
+        if abs(track[row, 0] - x) <= half_width and abs(track[row, 1] - y) <= half_width:
+            return tick, computed
+    return -1, computed

@@ -103,6 +103,7 @@ class Vehicle:
         current_m_per_s: velocity of the water, world frame.
         time_scale: simulated seconds that pass in a second of mission time (the simulator's real-time factor).
         z_limits_m: sea bed and surface, which stop the vehicle.
+        memory: where to keep the track, instead of memory of its own; see `track_rows`.
     """
 
     def __init__(
@@ -115,6 +116,7 @@ class Vehicle:
         current_m_per_s: tuple[float, float, float] = (0.0, 0.0, 0.0),
         time_scale: float = 1.0,
         z_limits_m: tuple[float, float] = (-math.inf, math.inf),
+        memory: Array | None = None,
     ) -> None:
         self._B = allocation_matrix(model)
         self._allocation = autopilot_allocation(model)
@@ -123,8 +125,9 @@ class Vehicle:
         self._parameters = _parameters(model, autopilot, current_m_per_s, z_limits_m)
         self._altitude_error_m = autopilot.altitude_error_m
         self._step_s = STEP_S * time_scale
-        self.last_row = row_at(duration_s) + 1
-        self.track: Array = np.empty((self.last_row + 1, kernel.ROW))
+        rows = track_rows(duration_s)
+        self.last_row = rows - 1
+        self.track: Array = np.empty((rows, kernel.ROW)) if memory is None else memory
         self.track[0] = 0.0
         self.track[0, kernel.POSITION] = (start.x_m, start.y_m, start.z_m)
         self.track[0, kernel.ATTITUDE] = quaternion(start.roll_rad, start.pitch_rad, start.yaw_rad)
@@ -135,20 +138,22 @@ class Vehicle:
 
     def command(self, t_s: float, x_m: float, y_m: float, z_m: float) -> None:
         """Give the autopilot a new position set-point; it replaces the one before."""
-        self._change_control(row_at(t_s))
+        row = row_at(t_s)
+        self._change_control(row)
         self._set_point[0] = x_m
         self._set_point[1] = y_m
         self._set_point[2] = z_m + self._altitude_error_m
-        self._tell(t_s)
+        self._tell(row)
 
     def set_thruster_health(self, t_s: float, thruster: int, health: float) -> None:
         """Set what share of its thrust thruster 1 .. n gives: 1 works, 0 is lost. The autopilot does not learn of
         it.
         """
-        self._change_control(row_at(t_s))
+        row = row_at(t_s)
+        self._change_control(row)
         self._health[thruster - 1] = health
         self._effectiveness[:] = self._B * self._health
-        self._tell(t_s)
+        self._tell(row)
 
     def thruster_health(self, thruster: int) -> float:
         """Share of its thrust that thruster 1 .. n gives."""
@@ -196,13 +201,47 @@ class Vehicle:
             )
             self.computed_row = row
 
+    def first_tick_in_box(
+        self, x_m: float, y_m: float, half_width_m: float, *, began_s: float, period_s: float, first: int, last: int
+    ) -> int | None:
+        """First tick at which the vehicle will be in a box in x and y, if control does not change; none if at none.
+
+        Args:
+            x_m: the box's centre.
+            y_m: the box's centre.
+            half_width_m: half the box's width.
+            began_s: time of tick 0.
+            period_s: time between ticks.
+            first: first tick to look at.
+            last: last tick to look at; ticks after the mission's end do not count.
+        """
+        tick, self.computed_row = kernel.first_tick_in_box(
+            self.track,
+            self.computed_row,
+            self._step_s,
+            self._set_point,
+            self._parameters,
+            self._allocation,
+            self._effectiveness,
+            (x_m, y_m, half_width_m),
+            (float(began_s), period_s, STEP_S),
+            first,
+            last,
+        )
+        return None if tick < 0 else tick
+
     def _change_control(self, row: int) -> None:
         self.look_ahead(row)
         self.computed_row = row
 
-    def _tell(self, t_s: float) -> None:
+    def _tell(self, row: int) -> None:
         for listener in self.control_listeners:
-            listener(row_at(t_s))
+            listener(row)
+
+
+def track_rows(duration_s: float) -> int:
+    """Rows of the track of a mission; each has `kernel.ROW` columns."""
+    return row_at(duration_s) + 2
 
 
 def row_at(t_s: float) -> int:

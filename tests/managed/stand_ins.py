@@ -23,7 +23,6 @@ class PlacedVehicle:
 
     def __init__(self, place: Place = START, *, obeys: bool = False, rise_m: float = 0.0) -> None:
         self.control_listeners: list[Callable[[int], None]] = []
-        self.last_row = 1_000_000
         self._place = place
         self.obeys = obeys
         self.rise_m = rise_m
@@ -42,6 +41,15 @@ class PlacedVehicle:
 
     def position(self, t_s: float) -> Place:
         return self.place
+
+    def first_tick_in_box(
+        self, x_m: float, y_m: float, half_width_m: float, *, began_s: float, period_s: float, first: int, last: int
+    ) -> int | None:
+        for tick in range(first, last + 1):
+            x, y, _ = self.position(began_s + tick * period_s)
+            if abs(x - x_m) <= half_width_m and abs(y - y_m) <= half_width_m:
+                return tick
+        return None
 
     def command(self, t_s: float, x_m: float, y_m: float, z_m: float) -> None:
         self.commands.append((t_s, (x_m, y_m, z_m)))
