@@ -42,11 +42,3 @@ def table(times_s: Sequence[float], values: Sequence[float], *, linear: bool = F
         return values[after - 1] + share * (values[after] - values[after - 1])
 
     return value
-
-
-def in_time_steps(signal: Signal, time_step_s: float) -> Signal:
-    """The signal at mission time cut to multiples of time_step_s (the exemplar's monitor counts whole seconds)."""
-    if time_step_s == 0.0:
-        return signal
-    # A time within a millionth of a step below a multiple counts as the multiple: timers add up rounding errors.
-    return lambda t_s: signal(math.floor(t_s / time_step_s + 1e-6) * time_step_s)
