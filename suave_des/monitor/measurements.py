@@ -6,6 +6,7 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -84,7 +85,7 @@ def measure(
         # A time within a millionth of a step below a multiple counts as the multiple: timers add up rounding errors.
         looks = np.floor(times / time_step_s + 1e-6) * time_step_s
     first = _changes(looks)
-    values = np.array([signal(t_s) for t_s in looks[first].tolist()])
+    values = _looked_up(signal, looks[first].tobytes())
     if noise is None:
         times = times[first]
     else:
@@ -92,6 +93,14 @@ def measure(
         values = values + np.array([noise() for _ in range(len(times))])
     changed = _changes(values)
     return Measurements(key, tuple(times[changed].tolist()), tuple(values[changed].tolist()), phase_s, period_s)
+
+
+@lru_cache(maxsize=64)
+def _looked_up(signal: Signal, times_s: bytes) -> NDArray[np.float64]:
+    """Values of a signal at times (float64): the same in most runs, as long as time is cut and the signal is not drawn."""
+    values = np.array([signal(t_s) for t_s in np.frombuffer(times_s).tolist()])
+    values.flags.writeable = False
+    return values
 
 
 def _changes(values: NDArray[np.floating[Any]]) -> NDArray[np.int64]:
