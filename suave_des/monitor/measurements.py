@@ -97,7 +97,7 @@ def measure(
 
 @lru_cache(maxsize=64)
 def _looked_up(signal: Signal, times_s: bytes) -> NDArray[np.float64]:
-    """Values of a signal at times (float64): the same in most runs, as long as time is cut and the signal is not drawn."""
+    """Values of a signal at times (float64): if time is cut and the signal is not drawn, the same in most runs."""
     values = np.array([signal(t_s) for t_s in np.frombuffer(times_s).tolist()])
     values.flags.writeable = False
     return values
