@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
+from suave_des.campaign.early_stop import parse_until_ci
 from suave_des.campaign.executors import WorkerError, make_executor
 from suave_des.campaign.lock import LOCK_FILE, locked
-from suave_des.campaign.outcomes import COLUMNS, Failure, Finished, Job, MissionRunner
+from suave_des.campaign.outcomes import COLUMNS, Finished, Job, MissionRunner
 from suave_des.campaign.output import check_output_folder, make_output_folder, remove_parts
 from suave_des.campaign.plan import MissionKey, check_plan, plan
+from suave_des.campaign.progress import OnProgress, Progress, Watch
 from suave_des.campaign.request import TIME_OUT_S, Request, check_same, check_time_out, deciding
 from suave_des.campaign.results import (
     FILES,
@@ -51,15 +53,6 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """How far a campaign is, in missions; failed ones are among those done."""
-
-    done: int
-    failed: int
-    total: int
-
-
 class CampaignInterrupted(KeyboardInterrupt):
     """Ctrl-C during a campaign; finished missions are kept.
 
@@ -70,9 +63,6 @@ class CampaignInterrupted(KeyboardInterrupt):
     def __init__(self, result: CampaignResult) -> None:
         self.result = result
         super().__init__(f"interrupted; {result.kept()}")
-
-
-OnProgress = Callable[[Progress], None]
 
 
 def run_campaign(
@@ -90,6 +80,7 @@ def run_campaign(
     disabled_rules: Sequence[str] = (),
     suave_format: bool = False,
     time_out_s: float = TIME_OUT_S,
+    until_ci: str | None = None,
     overwrite: bool = False,
     command: Sequence[str] = (),
     on_progress: OnProgress | None = None,
@@ -103,7 +94,7 @@ def run_campaign(
     Args:
         scenario: path of a scenario file, or name of a shipped one.
         managers: names, or module:Class.
-        runs: missions for each manager.
+        runs: missions for each manager; with `until_ci` at most.
         seed: of everything that is random.
         workers: processes; with 1 the missions run in this one. With more, a script that calls this must guard itself
             with `if __name__ == "__main__":`, because worker processes import it.
@@ -115,6 +106,8 @@ def run_campaign(
         disabled_rules: names of rules to switch off, besides the scenario's.
         suave_format: whether to write the exemplar's own results file besides.
         time_out_s: time that one mission may take, in s of the clock on the wall.
+        until_ci: METRIC:HALF_WIDTH; a manager is stopped after the first run, of at least 20, with which half the 95%
+            interval of that metric's mean is less.
         overwrite: whether results in the folder may be replaced.
         command: the command line, for the manifest.
         on_progress: called when missions are done.
@@ -137,6 +130,7 @@ def run_campaign(
         disabled_rules=tuple(disabled_rules),
         suave_format=suave_format,
         time_out_s=time_out_s,
+        until_ci=until_ci,
         folder=str(Path.cwd()),
         command=tuple(command),
     )
@@ -145,12 +139,19 @@ def run_campaign(
         _check_new(folder, overwrite=overwrite)
     check_plan(managers, runs, workers)
     check_time_out(time_out_s)
+    if until_ci is not None:
+        parse_until_ci(until_ci)
     loaded, inputs = _read(request)
     return _Campaign(request, loaded, inputs, folder).run(workers, on_progress, resumed=False)
 
 
 def resume_campaign(
-    folder: str | Path, workers: int = 1, *, runs: int | None = None, on_progress: OnProgress | None = None
+    folder: str | Path,
+    workers: int = 1,
+    *,
+    runs: int | None = None,
+    until_ci: str | None = None,
+    on_progress: OnProgress | None = None,
 ) -> CampaignResult:
     """Go on with a campaign where it stopped; what it was asked is in its folder.
 
@@ -160,6 +161,7 @@ def resume_campaign(
         folder: the campaign's output folder.
         workers: as of run_campaign; it may be another number.
         runs: more runs than were asked for at first; left out: as many.
+        until_ci: the metric asked for at first with a smaller half-width; left out: as at first.
         on_progress: called when missions are done.
 
     Raises:
@@ -171,6 +173,8 @@ def resume_campaign(
     request = _request_of(folder)
     if runs is not None:
         request = replace(request, runs=runs)
+    if until_ci is not None:
+        request = replace(request, until_ci=until_ci)
     check_plan(request.managers, request.runs, workers)
     try:
         loaded, inputs = _read(request)
@@ -254,7 +258,12 @@ class _Campaign:
         self.request, self.loaded, self.inputs, self.folder = request, loaded, inputs, folder
         self.job = Job(loaded, request.managers, request.seed, request.time_out_s)
         self.columns = COLUMNS
-        self.total = len(request.managers) * request.runs
+        self.until = None if request.until_ci is None else parse_until_ci(request.until_ci)
+        self.groups = [(0, manager) for manager in range(len(request.managers))]
+        self.watch = self._new_watch()
+
+    def _new_watch(self) -> Watch:
+        return Watch(self.groups, self.request.managers, self.request.runs, self.until)
 
     def run(self, workers: int, on_progress: OnProgress | None, *, resumed: bool) -> CampaignResult:
         """Run what is not done yet, and write the files."""
@@ -282,7 +291,19 @@ class _Campaign:
                 raise StoreError(f"{stopped}{self._how_to_go_on()}") from None
             if isinstance(stopped, InputError):
                 raise stopped
-            result = gather(self.request, self.loaded, self.columns, self.folder, self._outcomes(store))
+            outcomes, watch = self._outcomes(store), self.watch
+            if stopped is not None:  # perhaps while something was counted
+                self.watch = watch = self._new_watch()
+                watch.take(outcomes())
+            result = gather(
+                self.request,
+                self.loaded,
+                self.columns,
+                self.folder,
+                lambda: watch.counted(outcomes()),
+                planned=watch.total,
+                stops=watch.stops(),
+            )
             if self.folder is not None:
                 try:
                     write_results(result, self.request, self.inputs)
@@ -322,16 +343,16 @@ class _Campaign:
     ) -> KeyboardInterrupt | SuaveDesError | None:
         """Run missions until all are done; what stopped the campaign before that."""
         try:
-            done, failed = store.count(), store.count_failures()
-            missions = plan(1, len(self.request.managers), self.request.runs, store.settled)
-            left = self.total - done
+            watch = self.watch
+            watch.take_earlier(store.outcomes())
+            missions = plan(1, len(self.request.managers), self.request.runs, store.settled, watch.is_over)
+            left = watch.total - watch.done
             if left:
                 for finished in make_executor(workers).outcomes(self.job, missions, left):
                     store.append(finished)
-                    done += len(finished)
-                    failed += sum(isinstance(outcome, Failure) for _, outcome in finished)
+                    watch.take(finished)
                     if on_progress is not None:
-                        on_progress(Progress(done, failed, self.total))
+                        on_progress(watch.progress())
             store.commit()
         except (KeyboardInterrupt, SuaveDesError) as error:
             if not isinstance(error, StoreError):

@@ -7,8 +7,9 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from suave_des.campaign.early_stop import FEWEST_RUNS, Stop, parse_until_ci
 from suave_des.campaign.outcomes import Failure, Finished, Row
-from suave_des.campaign.output import csv_pieces, csv_text, json_text, write_files
+from suave_des.campaign.output import csv_pieces, csv_text, json_text, rounded, write_files
 from suave_des.campaign.plan import Group
 from suave_des.campaign.provenance import provenance
 from suave_des.campaign.request import Request
@@ -34,8 +35,10 @@ class CampaignResult:
         runs: planned for each manager.
         seed: the campaign's.
         columns: of runs.csv.
-        planned: number of missions that were to be run.
+        until_ci: METRIC:HALF_WIDTH at which managers were to be stopped; none: never.
+        planned: number of missions that were to be run; those of a manager that was stopped early up to there.
         done: number of missions that have a row.
+        stops: where each manager ends, if managers were to be stopped early; otherwise nothing.
         failures: missions that have no row because they failed, in the order of the missions.
         summary: rows of summary.csv.
         folder: where the files are; none if there are none.
@@ -47,8 +50,10 @@ class CampaignResult:
     runs: int
     seed: int
     columns: tuple[str, ...]
+    until_ci: str | None
     planned: int
     done: int
+    stops: tuple[Stop, ...]
     failures: tuple[Failure, ...]
     summary: tuple[Row, ...]
     folder: Path | None
@@ -85,8 +90,11 @@ def gather(
     columns: tuple[str, ...],
     folder: Path | None,
     outcomes: Callable[[], Iterator[Finished]],
+    *,
+    planned: int,
+    stops: tuple[Stop, ...],
 ) -> CampaignResult:
-    """Count what is in a store."""
+    """Count the outcomes of a campaign's missions."""
     tallies: dict[Group, Tally] = {(0, manager): Tally() for manager in range(len(request.managers))}
     failures = []
     done = 0
@@ -102,8 +110,10 @@ def gather(
         runs=request.runs,
         seed=request.seed,
         columns=columns,
-        planned=len(request.managers) * request.runs,
+        until_ci=request.until_ci,
+        planned=planned,
         done=done,
+        stops=stops,
         failures=tuple(failures),
         summary=tuple((request.managers[manager], *tally.figures()) for (_, manager), tally in tallies.items()),
         folder=folder,
@@ -141,6 +151,7 @@ def _manifest(result: CampaignResult, request: Request, inputs: Mapping[str, str
             "failed": len(result.failures),
             "left_out": result.planned - result.done - len(result.failures),
         },
+        "until_ci": _told_stops(result),
         "failures": [_told(failure) for failure in result.failures],
         **provenance(result.loaded, inputs, request.command),
     }
@@ -148,6 +159,34 @@ def _manifest(result: CampaignResult, request: Request, inputs: Mapping[str, str
 
 def _told(failure: Failure) -> dict[str, Any]:
     return {"manager": failure.manager, "run": failure.run, "time_s": failure.time_s, "cause": failure.cause}
+
+
+def _told_stops(result: CampaignResult) -> dict[str, Any] | None:
+    if result.until_ci is None:
+        return None
+    until = parse_until_ci(result.until_ci)
+    return {
+        "metric": until.metric,
+        "half_width": until.half_width,
+        "fewest_runs": FEWEST_RUNS,
+        "managers": [
+            {
+                "manager": result.managers[stop.group[1]],
+                "last_run": stop.last_run,
+                "why": _why(stop),
+                "n": stop.n,
+                "mean": None if stop.mean is None else rounded(stop.mean),
+                "half_width": None if stop.half_width is None else rounded(stop.half_width),
+            }
+            for stop in result.stops
+        ],
+    }
+
+
+def _why(stop: Stop) -> str:
+    if stop.reached:
+        return "the interval is narrow"
+    return "all runs are done" if stop.is_complete else "interrupted"
 
 
 def _numbered(result: CampaignResult) -> Iterator[tuple[int, Row]]:

@@ -147,12 +147,6 @@ class Store:
             (number,) = self._db.execute("SELECT count(*) FROM outcomes").fetchone()
         return int(number)
 
-    def count_failures(self) -> int:
-        """Number of failures among the outcomes."""
-        with _telling(self.path):
-            (number,) = self._db.execute("SELECT count(*) FROM outcomes WHERE kind <> ?", (_ROW,)).fetchone()
-        return int(number)
-
     def outcomes(self) -> Iterator[Finished]:
         """All outcomes in the order of their keys, read as they are asked for.
 
