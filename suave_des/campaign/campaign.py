@@ -276,6 +276,8 @@ class _Campaign:
                 make_output_folder(self.folder)
                 stack.enter_context(locked(self.folder))
                 remove_parts(self.folder, FILES)
+            if not resumed:
+                stack.callback(self._remove_if_empty)
             store = self._store(resumed=resumed)
             try:
                 stopped = self._work(store, workers, on_progress)
@@ -284,32 +286,17 @@ class _Campaign:
                 if self.folder is not None:
                     store.close()
             if stopped is not None and is_empty and not resumed:
-                if self.folder is not None:
-                    remove_store(self.folder)
                 raise stopped
             if isinstance(stopped, StoreError):
                 raise StoreError(f"{stopped}{self._how_to_go_on()}") from None
             if isinstance(stopped, InputError):
                 raise stopped
-            outcomes, watch = self._outcomes(store), self.watch
-            if stopped is not None:  # perhaps while something was counted
-                self.watch = watch = self._new_watch()
-                watch.take(outcomes())
-            result = gather(
-                self.request,
-                self.loaded,
-                self.columns,
-                self.folder,
-                lambda: watch.counted(outcomes()),
-                planned=watch.total,
-                stops=watch.stops(),
-            )
-            if self.folder is not None:
-                try:
-                    write_results(result, self.request, self.inputs)
-                except InputError as error:
-                    remedy = f"nothing is lost: suave-des campaign --resume {self.folder} writes the files"
-                    raise InputError(error.problem, file=error.file, remedy=remedy) from None
+            try:
+                result = self._results(store, is_whole=stopped is None)
+            except KeyboardInterrupt:
+                if self.folder is None:
+                    raise
+                raise KeyboardInterrupt(f"interrupted; {self._how_to_have_files()}") from None
         if isinstance(stopped, WorkerError):
             raise WorkerError(f"{stopped}; {result.kept()}")
         if stopped is not None:
@@ -361,11 +348,42 @@ class _Campaign:
             return error
         return None
 
+    def _results(self, store: Store, *, is_whole: bool) -> CampaignResult:
+        outcomes, watch = self._outcomes(store), self.watch
+        if not is_whole:  # it may have been interrupted while it counted
+            watch = self._new_watch()
+            watch.take(outcomes())
+        result = gather(
+            self.request,
+            self.loaded,
+            self.columns,
+            self.folder,
+            lambda: watch.counted(outcomes()),
+            planned=watch.total,
+            stops=watch.stops(),
+        )
+        if self.folder is not None:
+            try:
+                write_results(result, self.request, self.inputs)
+            except InputError as error:
+                raise InputError(error.problem, file=error.file, remedy=self._how_to_have_files()) from None
+        return result
+
     def _outcomes(self, store: Store) -> Callable[[], Iterator[Finished]]:
         if self.folder is None:
             return store.outcomes
         path = self.folder / STORE_FILE
         return lambda: stored_outcomes(path)
+
+    def _remove_if_empty(self) -> None:
+        """Remove a store in which nothing is; what cannot be read stays."""
+        if self.folder is not None:
+            with suppress(SuaveDesError):
+                if next(stored_outcomes(self.folder / STORE_FILE), None) is None:
+                    remove_store(self.folder)
+
+    def _how_to_have_files(self) -> str:
+        return f"nothing is lost: suave-des campaign --resume {self.folder} writes the files"
 
     def _how_to_go_on(self) -> str:
         if self.folder is None or not (self.folder / STORE_FILE).exists():
