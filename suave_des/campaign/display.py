@@ -5,7 +5,7 @@ All that a campaign does for it, mission by mission, is to look at the clock.
 
 from __future__ import annotations
 
-import sys
+import io
 import threading
 import time
 from collections import deque
@@ -21,15 +21,12 @@ from rich.table import Table
 from rich.text import Text
 
 from suave_des.campaign.progress import GroupProgress, OnProgress, Progress
-
-METRIC_TITLES = {"search_time_s": "search time, s", "distance_inspected_m": "distance, m"}
+from suave_des.campaign.summary import METRIC_TITLES
 
 _UPDATE_PERIOD_S = 0.25
 _FIRST_LINE_S, _LINE_PERIOD_S = 10.0, 30.0
 _RECENT_S = 10.0
 """Missions a second are those of this time."""
-_LINES = 8
-"""Managers in the display at most; of more, those that are under way."""
 _BAR_WIDTH = 22
 _NOTEBOOK_WIDTH = 90
 
@@ -79,7 +76,8 @@ class _Meter:
         self._recent.append((now, progress.done))
         while len(self._recent) > 2 and self._recent[1][0] <= now - _RECENT_S:
             self._recent.popleft()
-        (then, before), elapsed = self._recent[0], now - self._recent[0][0]
+        then, before = self._recent[0]
+        elapsed = now - then
         rate = (progress.done - before) / elapsed if elapsed > 0.0 and progress.done > before else None
         return _Seen(progress, progress.groups(), now, rate)
 
@@ -156,7 +154,7 @@ def _body(seen: _Seen) -> Table:
     body.add_column("failed", justify="right", no_wrap=True)
     body.add_column(METRIC_TITLES.get(metric, metric), justify="right", no_wrap=True)
     body.add_column("", no_wrap=True)
-    for group in _chosen(seen.groups):
+    for group in seen.groups:
         body.add_row(
             _name(group, seen.groups),
             _counted(group.done),
@@ -167,24 +165,16 @@ def _body(seen: _Seen) -> Table:
     return body
 
 
-def _chosen(groups: tuple[GroupProgress, ...]) -> tuple[GroupProgress, ...]:
-    if len(groups) <= _LINES:
-        return groups
-    first = next((place for place, group in enumerate(groups) if not _is_done(group)), len(groups))
-    start = max(0, min(first - _LINES // 2, len(groups) - _LINES))
-    return groups[start : start + _LINES]
-
-
 def _name(group: GroupProgress, groups: tuple[GroupProgress, ...]) -> str:
     return f"{group.manager}, point {group.point + 1}" if groups[-1].point else group.manager
 
 
 def _is_done(group: GroupProgress) -> bool:
-    return group.is_over or group.done == group.runs
+    return group.is_narrow or group.done == group.runs
 
 
 def _state(group: GroupProgress) -> str:
-    if group.is_over:
+    if group.is_narrow:
         return f"narrow after run {group.runs}"
     return "done" if group.done == group.runs else ""
 
@@ -236,7 +226,7 @@ class _Log:
         progress = seen.progress
         means = [
             f"{_name(group, seen.groups)} {estimated(group.mean, group.half_width)}"
-            for group in _chosen(seen.groups)
+            for group in seen.groups
             if group.mean is not None
         ]
         parts = [
@@ -273,17 +263,9 @@ def _in_notebook(label: str) -> Iterator[OnProgress]:
 
 
 def _html(display: _Display) -> str:
-    console = Console(file=_Nowhere(), record=True, width=_NOTEBOOK_WIDTH, force_jupyter=False, force_terminal=True)
+    console = Console(file=io.StringIO(), record=True, width=_NOTEBOOK_WIDTH, force_jupyter=False, force_terminal=True)
     console.print(display)
     return console.export_html(inline_styles=True, code_format="<pre style='line-height: 1.2'>{code}</pre>")
-
-
-class _Nowhere:
-    def write(self, text: str) -> int:
-        return len(text)
-
-    def flush(self) -> None:
-        pass
 
 
 # Words.

@@ -67,7 +67,7 @@ def parse_until_ci(text: str) -> UntilCi:
 
 
 def _wrong(text: str, what: str, remedy: str) -> InputError:
-    return InputError(f"until-ci {text!r}: {what}", remedy=remedy)
+    return InputError(f"{text!r}: {what}", place="until_ci", remedy=remedy)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +104,7 @@ class Standing:
         half_width: the group is over as soon as the interval's half-width is below this; none: after all runs.
     """
 
-    __slots__ = ("_half_width", "_next", "_place", "_waiting", "done", "failed", "is_over", "last_run", "values")
+    __slots__ = ("_half_width", "_next", "_place", "_waiting", "done", "failed", "is_narrow", "last_run", "values")
 
     def __init__(self, runs: int, metric: str, half_width: float | None) -> None:
         self._place = COLUMNS.index(metric)
@@ -113,12 +113,17 @@ class Standing:
         self._waiting: dict[int, object] = {}
         self.done = self.failed = 0
         self.last_run = runs
-        self.is_over = False
+        self.is_narrow = False
         self.values = Running()
+
+    @property
+    def is_over(self) -> bool:
+        """Whether no more missions are to come."""
+        return self.done == self.last_run
 
     def take(self, run: int, outcome: Outcome) -> None:
         """Count an outcome; one of a run that is counted already, or that does not count any more, changes nothing."""
-        if self.is_over or run < self._next or run in self._waiting:
+        if run > self.last_run or run < self._next or run in self._waiting:
             return
         self.done += 1
         self.failed += isinstance(outcome, Failure)
@@ -139,9 +144,15 @@ class Standing:
         half_width = self.values.half_width
         return half_width is not None and half_width < self._half_width
 
+    def stop(self, group: Group) -> Stop:
+        """Where the group ends, as far as is known."""
+        known = self.values
+        mean = known.mean if known.n else None
+        return Stop(group, self.last_run, self.is_narrow, self.is_over, known.n, mean, known.half_width)
+
     def _end(self) -> None:
         """The run before the next one is the last; what is known of later ones does not count."""
-        self.is_over = True
+        self.is_narrow = True
         self.last_run = self._next - 1
         self.failed -= sum(isinstance(outcome, Failure) for outcome in self._waiting.values())
         self.done = self.last_run
