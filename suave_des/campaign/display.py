@@ -55,7 +55,6 @@ class _Meter:
         self._due_s = 0.0
         self._latest: Progress | None = None
         self._recent: deque[tuple[float, int]] = deque()
-        self._began_s = time.monotonic()
 
     def __call__(self, progress: Progress) -> None:
         """Take what is known; called for each mission or chunk."""
@@ -71,8 +70,7 @@ class _Meter:
             self._update(self._look(self._latest, time.monotonic()))
 
     def _look(self, progress: Progress, now: float) -> _Seen:
-        if not self._recent:
-            self._recent.append((self._began_s, progress.before))
+        # The first outcomes are where counting begins: before them, workers were starting.
         self._recent.append((now, progress.done))
         while len(self._recent) > 2 and self._recent[1][0] <= now - _RECENT_S:
             self._recent.popleft()
@@ -134,10 +132,11 @@ class _Display:
 def _head(seen: _Seen) -> Table:
     progress = seen.progress
     head = Table.grid(padding=(0, 2))
-    for _ in range(5):
+    head.add_column(max_width=_BAR_WIDTH)
+    for _ in range(4):
         head.add_column(no_wrap=True)
     head.add_row(
-        ProgressBar(total=max(progress.total, 1), completed=progress.done, width=_BAR_WIDTH),
+        ProgressBar(total=max(progress.total, 1), completed=progress.done),
         f"{_counted(progress.done)}/{_counted(progress.total)}",
         _rate(seen),
         _left(seen),
@@ -149,10 +148,9 @@ def _head(seen: _Seen) -> Table:
 def _body(seen: _Seen) -> Table:
     metric = seen.progress.metric
     body = Table(box=None, padding=(0, 1), pad_edge=False)
-    body.add_column("manager", no_wrap=True, overflow="ellipsis")
-    body.add_column("missions", justify="right", no_wrap=True)
-    body.add_column("failed", justify="right", no_wrap=True)
-    body.add_column(METRIC_TITLES.get(metric, metric), justify="right", no_wrap=True)
+    body.add_column("manager", overflow="ellipsis")  # the one that gives way on a narrow terminal
+    for heading in ("missions", "failed", METRIC_TITLES.get(metric, metric)):
+        body.add_column(heading, justify="right", no_wrap=True)
     body.add_column("", no_wrap=True)
     for group in seen.groups:
         body.add_row(
@@ -160,23 +158,13 @@ def _body(seen: _Seen) -> Table:
             _counted(group.done),
             _counted(group.failed) if group.failed else "",
             estimated(group.mean, group.half_width),
-            _state(group),
+            "stopped" if group.is_narrow else "done" if group.done == group.runs else "",
         )
     return body
 
 
 def _name(group: GroupProgress, groups: tuple[GroupProgress, ...]) -> str:
     return f"{group.manager}, point {group.point + 1}" if groups[-1].point else group.manager
-
-
-def _is_done(group: GroupProgress) -> bool:
-    return group.is_narrow or group.done == group.runs
-
-
-def _state(group: GroupProgress) -> str:
-    if group.is_narrow:
-        return f"narrow after run {group.runs}"
-    return "done" if group.done == group.runs else ""
 
 
 # Lines.
