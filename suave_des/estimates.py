@@ -39,7 +39,7 @@ def estimate(values: Sequence[float]) -> Estimate:
     The interval of the mean holds well for samples of twenty and more; that of the standard deviation supposes values
     that are normally distributed, and is a rough guide where they are not.
     """
-    from scipy.special import chdtri, stdtrit  # scipy.stats would take a second to import
+    from scipy.special import chdtri  # scipy.stats would take a second to import
 
     n = len(values)
     if n == 0:
@@ -50,6 +50,37 @@ def estimate(values: Sequence[float]) -> Estimate:
         return Estimate(1, mean, median=median)
     std = math.sqrt(math.fsum((value - mean) ** 2 for value in values) / (n - 1))
     tail = (1.0 - CONFIDENCE) / 2.0
-    half = float(stdtrit(n - 1, 1.0 - tail)) * std / math.sqrt(n)
+    half = t_quantile(n - 1) * std / math.sqrt(n)
     low, high = (std * math.sqrt((n - 1) / float(chdtri(n - 1, share))) for share in (tail, 1.0 - tail))
     return Estimate(n, mean, std, median, (mean - half, mean + half), (low, high))
+
+
+def t_quantile(freedom: int) -> float:
+    """Half the width of the 95% interval of Student's t with that many degrees of freedom."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(freedom, (1.0 + CONFIDENCE) / 2.0))
+
+
+class Running:
+    """Mean of values that come one by one, and its interval, by Welford's sums: nothing but these is kept."""
+
+    __slots__ = ("_squares", "mean", "n")
+
+    def __init__(self) -> None:
+        self.n = 0
+        self.mean = self._squares = 0.0
+
+    def add(self, value: float) -> None:
+        """Count a value."""
+        self.n += 1
+        off = value - self.mean
+        self.mean += off / self.n
+        self._squares += off * (value - self.mean)
+
+    @property
+    def half_width(self) -> float | None:
+        """Half the width of the 95% interval of the mean by Student's t, none for fewer than two values."""
+        if self.n < 2:
+            return None
+        return t_quantile(self.n - 1) * math.sqrt(self._squares / (self.n - 1) / self.n)

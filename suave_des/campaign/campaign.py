@@ -5,15 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from suave_des.campaign.early_stop import RUNS_LIMIT_DEFAULT, parse_until_ci
 from suave_des.campaign.executors import WorkerError, make_executor
 from suave_des.campaign.lock import LOCK_FILE, locked
-from suave_des.campaign.outcomes import Failure, Finished, Job, MissionRunner
+from suave_des.campaign.outcomes import Finished, Job, MissionRunner
 from suave_des.campaign.output import check_output_folder, make_output_folder, remove_parts
 from suave_des.campaign.plan import MissionKey, check_plan, plan
+from suave_des.campaign.progress import OnProgress, Progress, Watch
 from suave_des.campaign.request import Request, check_same, check_time_out, deciding
 from suave_des.campaign.results import (
     FILES,
@@ -55,15 +57,6 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """How far a campaign is, in missions; failed ones are among those done."""
-
-    done: int
-    failed: int
-    total: int
-
-
 class CampaignInterrupted(KeyboardInterrupt):
     """Ctrl-C during a campaign; finished missions are kept.
 
@@ -79,8 +72,6 @@ class CampaignInterrupted(KeyboardInterrupt):
 LARGE = 1_000_000
 """Missions from which a campaign wants to be confirmed."""
 _TIMED_RUNS = 3
-
-OnProgress = Callable[[Progress], None]
 
 
 def run_campaign(
@@ -101,6 +92,7 @@ def run_campaign(
     disabled_rules: Sequence[str] = (),
     suave_format: bool = False,
     time_out_s: float | None = None,
+    until_ci: str | None = None,
     confirmed: bool = False,
     overwrite: bool = False,
     command: Sequence[str] = (),
@@ -117,7 +109,7 @@ def run_campaign(
     Args:
         scenario: path of a scenario file or of a campaign file, or name of a shipped scenario.
         managers: names, or module:Class.
-        runs: missions for each manager, at each point.
+        runs: missions for each manager, at each point; with `until_ci` at most, and 10,000 if they are left out.
         seed: of everything that is random.
         workers: processes; with 1 the missions run in this one. With more, a script that calls this must guard itself
             with `if __name__ == "__main__":`, because worker processes import it.
@@ -134,6 +126,8 @@ def run_campaign(
         disabled_rules: names of rules to switch off, besides the scenario's.
         suave_format: whether to write the exemplar's own results file besides.
         time_out_s: time that one mission may take, in s of the clock on the wall.
+        until_ci: METRIC:HALF_WIDTH; a manager is stopped after the first run, of at least 20, with which half the 95%
+            interval of that metric's mean is less; at each point of its own.
         confirmed: whether more than a million missions are meant.
         overwrite: whether results in the folder may be replaced.
         command: the command line, for the manifest.
@@ -151,6 +145,7 @@ def run_campaign(
         "runs": runs,
         "seed": seed,
         "time_out_s": time_out_s,
+        "until_ci": until_ci,
         "sweep": sweep,
         "perturbations": perturbations,
         "runs_per_draw": runs_per_draw,
@@ -172,6 +167,7 @@ def run_campaign(
     folder = None if out is None else Path(out)
     if folder is not None:
         _check_new(folder, overwrite=overwrite)
+    request = _with_until_ci(request, sheet)
     check_plan(request.managers, request.runs, workers)
     check_time_out(request.time_out_s)
     campaign = _Campaign(request, *_read(request, sheet), folder)
@@ -186,7 +182,12 @@ def run_campaign(
 
 
 def resume_campaign(
-    folder: str | Path, workers: int = 1, *, runs: int | None = None, on_progress: OnProgress | None = None
+    folder: str | Path,
+    workers: int = 1,
+    *,
+    runs: int | None = None,
+    until_ci: str | None = None,
+    on_progress: OnProgress | None = None,
 ) -> CampaignResult:
     """Go on with a campaign where it stopped; what it was asked is in its folder.
 
@@ -196,6 +197,7 @@ def resume_campaign(
         folder: the campaign's output folder.
         workers: as of run_campaign; it may be another number.
         runs: more runs than were asked for at first; left out: as many.
+        until_ci: the metric asked for at first with a smaller half-width; left out: as at first.
         on_progress: called when missions are done.
 
     Raises:
@@ -206,7 +208,11 @@ def resume_campaign(
     folder = Path(folder)
     request = _request_of(folder)
     if runs is not None:
-        request = replace(request, runs=runs, of_file=tuple(name for name in request.of_file if name != "runs"))
+        request = replace(request, runs=runs)
+    if until_ci is not None:
+        request = replace(request, until_ci=until_ci)
+    given = {"runs": runs, "until_ci": until_ci}
+    request = replace(request, of_file=tuple(name for name in request.of_file if given.get(name) is None))
     try:
         sheet = read_sheet(request.scenario)
         request = replace(request, **said(sheet, request.of_file))
@@ -218,6 +224,22 @@ def resume_campaign(
         remedy = f"the campaign was started in {request.folder}: resume it there"
         raise InputError(error.problem, file=error.file, place=error.place, remedy=remedy) from None
     return campaign.run(workers, on_progress, resumed=True)
+
+
+def _with_until_ci(request: Request, sheet: Sheet | None) -> Request:
+    """A new request whose early stop is checked; if nobody says how many runs there may be, there may be many."""
+    if request.until_ci is None:
+        return request
+    try:
+        parse_until_ci(request.until_ci)
+    except InputError as error:
+        if sheet is None or "until_ci" not in request.of_file:
+            raise
+        raise sheet.located(error) from None
+    if "runs" not in request.of_file or (sheet is not None and "runs" in sheet.content.model_fields_set):
+        return request
+    of_file = tuple(name for name in request.of_file if name != "runs")
+    return replace(request, runs=RUNS_LIMIT_DEFAULT, of_file=of_file)
 
 
 def _check_new(folder: Path, *, overwrite: bool) -> None:
@@ -303,7 +325,11 @@ class _Campaign:
     ) -> None:
         self.request, self.loaded, self.variation, self.inputs, self.folder = request, loaded, variation, inputs, folder
         self.job = Job(loaded, variation, request.managers, request.seed, request.time_out_s)
-        self.total = variation.sweep.points * len(request.managers) * request.runs
+        self.until = None if request.until_ci is None else parse_until_ci(request.until_ci)
+        self.watch = self._new_watch()
+
+    def _new_watch(self) -> Watch:
+        return Watch(self.variation.sweep.points, self.request.managers, self.request.runs, self.until)
 
     def check_size(self, workers: int) -> None:
         """See that a very large campaign is meant.
@@ -311,7 +337,8 @@ class _Campaign:
         Raises:
             InputError: it has more than LARGE missions; the time that they take is told, from some of them.
         """
-        if self.total <= LARGE:
+        total = self.watch.total
+        if total <= LARGE:
             return
         managers = range(len(self.request.managers))
         few = tuple(MissionKey(0, manager, run) for manager in managers for run in range(1, _TIMED_RUNS + 1))
@@ -319,10 +346,8 @@ class _Campaign:
         runner.run(few[::_TIMED_RUNS])  # compiles, and fills the reasoner's memory
         began_s = time.perf_counter()
         runner.run(few)
-        expected_s = (time.perf_counter() - began_s) / len(few) * self.total / workers
-        problem = (
-            f"{self.total:,} missions take about {_duration_text(expected_s)} with {workers} workers on this machine"
-        )
+        expected_s = (time.perf_counter() - began_s) / len(few) * total / workers
+        problem = f"{total:,} missions take about {_duration_text(expected_s)} with {workers} workers on this machine"
         raise InputError(problem, remedy="give --yes if that is meant")
 
     def run(self, workers: int, on_progress: OnProgress | None, *, resumed: bool) -> CampaignResult:
@@ -336,6 +361,8 @@ class _Campaign:
                 make_output_folder(self.folder)
                 stack.enter_context(locked(self.folder))
                 remove_parts(self.folder, FILES)
+            if not resumed:
+                stack.callback(self._remove_if_empty)
             store = self._store(resumed=resumed)
             try:
                 stopped = self._work(store, workers, on_progress)
@@ -344,20 +371,17 @@ class _Campaign:
                 if self.folder is not None:
                     store.close()
             if stopped is not None and is_empty and not resumed:
-                if self.folder is not None:
-                    remove_store(self.folder)
                 raise stopped
             if isinstance(stopped, StoreError):
                 raise StoreError(f"{stopped}{self._how_to_go_on()}") from None
             if isinstance(stopped, InputError):
                 raise stopped
-            result = gather(self.request, self.loaded, self.variation, self.folder, self._outcomes(store))
-            if self.folder is not None:
-                try:
-                    write_results(result, self.request, self.inputs)
-                except InputError as error:
-                    remedy = f"nothing is lost: suave-des campaign --resume {self.folder} writes the files"
-                    raise InputError(error.problem, file=error.file, remedy=remedy) from None
+            try:
+                result = self._results(store, is_whole=stopped is None)
+            except KeyboardInterrupt:
+                if self.folder is None:
+                    raise
+                raise KeyboardInterrupt(f"interrupted; {self._how_to_have_files()}") from None
         if isinstance(stopped, WorkerError):
             raise WorkerError(f"{stopped}; {result.kept()}")
         if stopped is not None:
@@ -391,16 +415,17 @@ class _Campaign:
     ) -> KeyboardInterrupt | SuaveDesError | None:
         """Run missions until all are done; what stopped the campaign before that."""
         try:
-            done, failed = store.count(), store.count_failures()
-            missions = plan(self.variation.sweep.points, len(self.request.managers), self.request.runs, store.settled)
-            left = self.total - done
+            watch = self.watch
+            watch.take_earlier(store.outcomes())
+            points, managers = self.variation.sweep.points, len(self.request.managers)
+            missions = plan(points, managers, self.request.runs, store.settled, watch.is_over)
+            left = watch.total - watch.done
             if left:
                 for finished in make_executor(workers).outcomes(self.job, missions, left):
                     store.append(finished)
-                    done += len(finished)
-                    failed += sum(isinstance(outcome, Failure) for _, outcome in finished)
+                    watch.take(finished)
                     if on_progress is not None:
-                        on_progress(Progress(done, failed, self.total))
+                        on_progress(watch.progress())
             store.commit()
         except (KeyboardInterrupt, SuaveDesError) as error:
             if not isinstance(error, StoreError):
@@ -409,11 +434,42 @@ class _Campaign:
             return error
         return None
 
+    def _results(self, store: Store, *, is_whole: bool) -> CampaignResult:
+        outcomes, watch = self._outcomes(store), self.watch
+        if not is_whole:  # it may have been interrupted while it counted
+            watch = self._new_watch()
+            watch.take(outcomes())
+        result = gather(
+            self.request,
+            self.loaded,
+            self.variation,
+            self.folder,
+            lambda: watch.counted(outcomes()),
+            planned=watch.total,
+            stops=watch.stops(),
+        )
+        if self.folder is not None:
+            try:
+                write_results(result, self.request, self.inputs)
+            except InputError as error:
+                raise InputError(error.problem, file=error.file, remedy=self._how_to_have_files()) from None
+        return result
+
     def _outcomes(self, store: Store) -> Callable[[], Iterator[Finished]]:
         if self.folder is None:
             return store.outcomes
         path = self.folder / STORE_FILE
         return lambda: stored_outcomes(path)
+
+    def _remove_if_empty(self) -> None:
+        """Remove a store in which nothing is; what cannot be read stays."""
+        if self.folder is not None:
+            with suppress(SuaveDesError):
+                if next(stored_outcomes(self.folder / STORE_FILE), None) is None:
+                    remove_store(self.folder)
+
+    def _how_to_have_files(self) -> str:
+        return f"nothing is lost: suave-des campaign --resume {self.folder} writes the files"
 
     def _how_to_go_on(self) -> str:
         if self.folder is None or not (self.folder / STORE_FILE).exists():

@@ -110,7 +110,7 @@ class _Crew:
         finally:
             for worker in self._workers:
                 worker.connection.close()
-                worker.process.terminate()
+                worker.process.kill()
             for worker in self._workers:
                 _end(worker.process)
 
@@ -213,8 +213,8 @@ def _end(process: BaseProcess) -> None:
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Hold Ctrl-C back while a worker starts: it inherits that, so that Ctrl-C reaches this process alone."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    """Hold Ctrl-C and kill back while a worker starts: it inherits that, so that they reach this process alone."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:
         yield
     finally:

@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from suave_des.campaign.early_stop import parse_until_ci
 from suave_des.campaign.provenance import versions
 from suave_des.errors import InputError
 from suave_des.managing.registry import manager_class
@@ -36,6 +37,7 @@ class Request:
         disabled_rules: names of rules to switch off, besides the scenario's.
         suave_format: whether the exemplar's results file is written too.
         time_out_s: time that a mission may take.
+        until_ci: METRIC:HALF_WIDTH, when a manager is stopped before it had all runs; none: never.
         sweep: values by key path; see variation.vary.
         perturbations: distribution by key path.
         runs_per_draw: how many runs in a row share what is drawn.
@@ -55,6 +57,7 @@ class Request:
     disabled_rules: tuple[str, ...] = ()
     suave_format: bool = False
     time_out_s: float = 120.0
+    until_ci: str | None = None
     sweep: Mapping[str, Any] = field(default_factory=dict)
     perturbations: Mapping[str, Any] = field(default_factory=dict)
     runs_per_draw: int = 1
@@ -102,6 +105,7 @@ def deciding(request: Request, loaded: LoadedScenario, inputs: Mapping[str, str]
         "manager_code_sha256": {name: _code(name) for name in request.managers},
         "runs": request.runs,
         "time_out_s": request.time_out_s,
+        "until_ci": None if request.until_ci is None else asdict(parse_until_ci(request.until_ci)),
         "sweep": request.sweep,
         "perturbations": request.perturbations,
         "runs_per_draw": request.runs_per_draw,
@@ -128,13 +132,13 @@ def _code(name: str) -> str:
 
 
 def check_same(before: Mapping[str, Any], now: Mapping[str, Any], folder: Path) -> None:
-    """See that a campaign may go on: what decides results is as it was, except that there may be more runs.
+    """See that a campaign may go on: what decides results is as it was, but for what only adds runs.
 
     Raises:
         InputError: something differs, with its name and both values.
     """
     for place, old, new in _differences(before, now, ""):
-        if place == "runs" and isinstance(new, int) and new >= old:
+        if (place == "runs" and new >= old) or (place == "until_ci.half_width" and new <= old):
             continue
         raise InputError(
             f"the campaign cannot go on: {place} was {shown(old)}, and is {shown(new)} now",

@@ -7,8 +7,9 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from suave_des.campaign.early_stop import FEWEST_RUNS, Stop, parse_until_ci
 from suave_des.campaign.outcomes import COLUMNS, Failure, Finished, Row
-from suave_des.campaign.output import csv_pieces, csv_text, json_text, write_files
+from suave_des.campaign.output import csv_pieces, csv_text, json_text, rounded, write_files
 from suave_des.campaign.plan import Group
 from suave_des.campaign.provenance import provenance
 from suave_des.campaign.request import Request
@@ -37,8 +38,10 @@ class CampaignResult:
         seed: the campaign's.
         variation: what differs between missions besides manager and run.
         columns: of runs.csv.
-        planned: number of missions that were to be run.
+        until_ci: METRIC:HALF_WIDTH at which managers were to be stopped; none: never.
+        planned: number of missions that were to be run; those of a manager that was stopped early up to there.
         done: number of missions that have a row.
+        stops: where each manager ends, if managers were to be stopped early; otherwise nothing.
         failures: missions that have no row because they failed, in the order of the missions.
         summary: rows of summary.csv: for each manager, at each point that was reached.
         folder: where the files are; none if there are none.
@@ -51,8 +54,10 @@ class CampaignResult:
     seed: int
     variation: Variation
     columns: tuple[str, ...]
+    until_ci: str | None
     planned: int
     done: int
+    stops: tuple[Stop, ...]
     failures: tuple[Failure, ...]
     summary: tuple[Row, ...]
     folder: Path | None
@@ -89,8 +94,11 @@ def gather(
     variation: Variation,
     folder: Path | None,
     outcomes: Callable[[], Iterator[Finished]],
+    *,
+    planned: int,
+    stops: tuple[Stop, ...],
 ) -> CampaignResult:
-    """Count what is in a store."""
+    """Count the outcomes of a campaign's missions."""
     failures: list[Failure] = []
     summary: list[Row] = []
     done = reached = 0
@@ -121,8 +129,10 @@ def gather(
         seed=request.seed,
         variation=variation,
         columns=(*COLUMNS, *variation.columns),
-        planned=variation.sweep.points * len(request.managers) * request.runs,
+        until_ci=request.until_ci,
+        planned=planned,
         done=done,
+        stops=stops,
         failures=tuple(failures),
         summary=tuple(summary),
         folder=folder,
@@ -161,6 +171,7 @@ def _manifest(result: CampaignResult, request: Request, inputs: Mapping[str, str
             "failed": len(result.failures),
             "left_out": result.planned - result.done - len(result.failures),
         },
+        "until_ci": _told_stops(result),
         "failures": [_told(failure, result.variation) for failure in result.failures],
         **provenance(result.loaded, inputs, request.command),
     }
@@ -187,6 +198,35 @@ def _varied(result: CampaignResult, request: Request) -> dict[str, Any]:
 def _told(failure: Failure, variation: Variation) -> dict[str, Any]:
     where = {"manager": failure.manager, "run": failure.run, **variation.sweep.values(failure.point)}
     return {**where, "time_s": failure.time_s, "cause": failure.cause}
+
+
+def _told_stops(result: CampaignResult) -> dict[str, Any] | None:
+    if result.until_ci is None:
+        return None
+    until = parse_until_ci(result.until_ci)
+    return {
+        "metric": until.metric,
+        "half_width": until.half_width,
+        "fewest_runs": FEWEST_RUNS,
+        "managers": [
+            {
+                "manager": result.managers[stop.group[1]],
+                **result.variation.sweep.values(stop.group[0]),
+                "last_run": stop.last_run,
+                "why": _why(stop),
+                "n": stop.n,
+                "mean": None if stop.mean is None else rounded(stop.mean),
+                "half_width": None if stop.half_width is None else rounded(stop.half_width),
+            }
+            for stop in result.stops
+        ],
+    }
+
+
+def _why(stop: Stop) -> str:
+    if stop.reached:
+        return "the interval is narrow"
+    return "all runs are done" if stop.is_complete else "interrupted"
 
 
 def _numbered(result: CampaignResult) -> Iterator[tuple[int, Row]]:

@@ -36,6 +36,9 @@ class CampaignFile(Strict):
     """Seed of everything that is random."""
     time_out_s: Number = 120.0
     """Time that one mission may take, in s of the clock on the wall."""
+    until_ci: str | None = None
+    """METRIC:HALF_WIDTH: a manager is stopped, at each point of its own, when half the 95% interval of the metric's
+    mean is less; `runs` is then how many there are at most, and 10000 if it is left out."""
     perturbations: dict[str, Any] = Field(default_factory=dict)
     """Distributions by key path of the scenario: each run draws its own value, the same under all managers and at all
     points."""

@@ -61,17 +61,24 @@ class Store:
             raise InputError("there is no campaign to go on with", file=path.parent, remedy="start one with --out")
         with _telling(path):
             self._db = sqlite3.connect("" if path is None else path, isolation_level=None)
-            self._db.execute("PRAGMA locking_mode = EXCLUSIVE")
-            if path is None:
-                self._db.executescript(_TABLES)
-            else:
-                self._check()
-            self._db.execute("PRAGMA journal_mode = WAL")
-            # With this a kill of the process loses nothing; loss of power perhaps the last transactions, whole ones.
-            self._db.execute("PRAGMA synchronous = NORMAL")
-            self._db.execute("BEGIN")
+            try:
+                self._open()
+            except BaseException:
+                self._db.close()
+                raise
         if path is not None:
             self._inode = path.stat().st_ino
+
+    def _open(self) -> None:
+        self._db.execute("PRAGMA locking_mode = EXCLUSIVE")
+        if self.path is None:
+            self._db.executescript(_TABLES)
+        else:
+            self._check()
+        self._db.execute("PRAGMA journal_mode = WAL")
+        # With this a kill of the process loses nothing; loss of power perhaps the last transactions, whole ones.
+        self._db.execute("PRAGMA synchronous = NORMAL")
+        self._db.execute("BEGIN")
 
     def _check(self) -> None:
         (version,) = self._db.execute("PRAGMA user_version").fetchone()
@@ -147,12 +154,6 @@ class Store:
             (number,) = self._db.execute("SELECT count(*) FROM outcomes").fetchone()
         return int(number)
 
-    def count_failures(self) -> int:
-        """Number of failures among the outcomes."""
-        with _telling(self.path):
-            (number,) = self._db.execute("SELECT count(*) FROM outcomes WHERE kind <> ?", (_ROW,)).fetchone()
-        return int(number)
-
     def outcomes(self) -> Iterator[Finished]:
         """All outcomes in the order of their keys, read as they are asked for.
 
@@ -184,12 +185,16 @@ def make_store(path: Path, about: Mapping[str, Any]) -> None:
     """
     new = path.with_name(NEW_STORE_FILE)
     new.unlink(missing_ok=True)
-    with _telling(path), closing(sqlite3.connect(new, isolation_level=None)) as db:
-        db.executescript(f"BEGIN; {_TABLES} PRAGMA user_version = {_VERSION};")
-        db.executemany("INSERT INTO about VALUES (?, ?)", ((name, json.dumps(about[name])) for name in about))
-        db.execute("COMMIT")
-    remove_store(path.parent)
-    new.rename(path)
+    try:
+        with _telling(path), closing(sqlite3.connect(new, isolation_level=None)) as db:
+            db.executescript(f"BEGIN; {_TABLES} PRAGMA user_version = {_VERSION};")
+            db.executemany("INSERT INTO about VALUES (?, ?)", ((name, json.dumps(about[name])) for name in about))
+            db.execute("COMMIT")
+        remove_store(path.parent)
+        new.rename(path)
+    except BaseException:
+        new.unlink(missing_ok=True)
+        raise
 
 
 def stored_outcomes(path: Path) -> Iterator[Finished]:

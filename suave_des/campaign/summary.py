@@ -9,6 +9,8 @@ from suave_des.estimates import Estimate, estimate
 
 METRICS = ("search_time_s", "distance_inspected_m")
 """Metrics that are summarised: those of the paper's table."""
+METRIC_TITLES = dict(zip(METRICS, ("search time, s", "distance, m"), strict=True))
+"""What they are called in tables."""
 _FIGURES = ("mean", "std", "median", "ci95_low", "ci95_high")
 
 SUMMARY_COLUMNS = (

@@ -13,6 +13,7 @@ from suave_des.cli.options import (
     Modes,
     Ontologies,
     Overwrite,
+    Quiet,
     Reasoner,
     RuleFiles,
     Workers,
@@ -67,6 +68,15 @@ def campaign(
     seed: Annotated[
         int | None, typer.Option("--seed", help="Seed of everything that is random.", show_default=_SEED)
     ] = None,
+    until_ci: Annotated[
+        str | None,
+        typer.Option(
+            "--until-ci",
+            metavar="METRIC:HALF_WIDTH",
+            help="Stop a manager when half the 95% interval of the metric's mean is less, after 20 runs at least, and"
+            " after --runs (then 10000 if left out) at most; for instance search_time_s:5.",
+        ),
+    ] = None,
     time_out: Annotated[
         float | None,
         typer.Option("--time-out", metavar="SECONDS", help="Time that a mission may take.", show_default=_TIME_OUT),
@@ -75,6 +85,7 @@ def campaign(
         Format | None, typer.Option("--format", help="Write the exemplar's own suave_results.csv besides.")
     ] = None,
     overwrite: Overwrite = False,
+    quiet: Quiet = False,
     yes: Annotated[bool, typer.Option("--yes", help="More than a million missions are meant.")] = False,
     ontology: Ontologies = None,
     rules: RuleFiles = None,
@@ -88,8 +99,8 @@ def campaign(
     What is done is kept while the campaign runs; after an interruption, --resume DIR does the rest.
     """
     from suave_des.campaign.campaign import resume_campaign, run_campaign
-    from suave_des.cli.console import output, progress_bar
-    from suave_des.cli.tables import print_summary
+    from suave_des.cli.console import output, progress
+    from suave_des.cli.tables import print_stops, print_summary
     from suave_des.errors import InputError
 
     if resume is not None:
@@ -114,14 +125,14 @@ def campaign(
                     f"{option} has no use with --resume: the campaign goes on as it began",
                     remedy="leave it out, or start anew in another folder",
                 )
-        with progress_bar(str(resume)) as show:
-            result = resume_campaign(resume, workers, runs=runs, on_progress=show)
+        with progress(str(resume), quiet=quiet) as show:
+            result = resume_campaign(resume, workers, runs=runs, until_ci=until_ci, on_progress=show)
     elif scenario is None or out is None:
         missing = "SCENARIO" if scenario is None else "--out DIR"
         raise InputError(f"{missing} is missing", remedy="see suave-des campaign --help")
     else:
         names = None if managers is None else [name.strip() for name in managers.split(",") if name.strip()]
-        with progress_bar(scenario) as show:
+        with progress(scenario, quiet=quiet) as show:
             result = run_campaign(
                 scenario,
                 names,
@@ -136,6 +147,7 @@ def campaign(
                 disabled_rules=disable_rule or (),
                 suave_format=also is Format.SUAVE,
                 time_out_s=time_out,
+                until_ci=until_ci,
                 confirmed=yes,
                 overwrite=overwrite,
                 command=command_line(),
@@ -143,6 +155,7 @@ def campaign(
             )
     console = output()
     print_summary(console, result)
+    print_stops(console, result)
     console.print(f"{result.done} missions are in {result.folder}/runs.csv", soft_wrap=True)
     exit_telling_failures(result)
 

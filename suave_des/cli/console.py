@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 
 if TYPE_CHECKING:
-    from suave_des.campaign.campaign import Progress
+    from suave_des.campaign.progress import OnProgress
 
 _PLAIN_WIDTH = 120
 
@@ -28,28 +27,8 @@ def errors() -> Console:
     return Console(stderr=True, highlight=False)
 
 
-@contextmanager
-def progress_bar(label: str) -> Iterator[Callable[[Progress], None] | None]:
-    """Shows missions done on a terminal; elsewhere there is nothing to call."""
-    console = errors()
-    if not console.is_terminal:
-        yield None
-        return
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
-    from rich.progress import Progress as Bar
+def progress(label: str, *, quiet: bool) -> AbstractContextManager[OnProgress | None]:
+    """Shows the progress of a campaign on standard error, unless nothing is to be said."""
+    from suave_des.campaign.display import shown
 
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[note]}"),
-    )
-    with Bar(*columns, console=console, transient=True) as bar:
-        task = bar.add_task(label, total=None, note="starting")
-
-        def show(progress: Progress) -> None:
-            note = f"{progress.failed} failed" if progress.failed else ""
-            bar.update(task, total=progress.total, completed=progress.done, note=note)
-
-        yield show
+    return shown(label, errors(), quiet=quiet)

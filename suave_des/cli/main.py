@@ -13,21 +13,22 @@ from typer.core import TyperGroup
 from suave_des import __version__
 from suave_des.cli import calibrate, campaign, figure, kb, reproduce, run, scenarios, schema, validate
 from suave_des.cli.options import remember_command_line
+from suave_des.cli.signals import exit_status, told_by_exceptions
 from suave_des.errors import InputError, SuaveDesError
 
-BAD_INPUT, MISSIONS_MISSING, INTERRUPTED = 2, 3, 130
-"""Exit statuses besides 0; 3: done, but missions have no row, because their manager raised or a worker was killed."""
+BAD_INPUT, MISSIONS_MISSING = 2, 3
+"""Exit statuses besides 0 and those of signals; 3: done, but missions have no row, because they failed."""
 
 
 class _Commands(TyperGroup):
-    """Takes Ctrl-C before typer does, which would say nothing of what is kept."""
+    """Takes interruptions before typer does, which would say nothing of what is kept."""
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command."""
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt as error:
-            raise typer.Exit(_tell(str(error) or "interrupted", INTERRUPTED)) from None
+            raise typer.Exit(_tell(str(error) or "interrupted", exit_status())) from None
 
 
 def _tell(message: str, status: int) -> int:
@@ -48,7 +49,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     help="SUAVE, the self-adaptive underwater vehicle exemplar, as a repeatable discrete-event simulation.",
-    epilog="Exit status: 0 done; 2 bad input; 3 done, but missions failed; 130 interrupted.",
+    epilog="Exit status: 0 done; 2 bad input; 3 done, but missions failed; 130 interrupted, 143 by kill.",
 )
 app.command("reproduce")(reproduce.reproduce)
 app.command("run")(run.run)
@@ -90,7 +91,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     abandoned = _abandoned()
     command = typer.main.get_command(app)
     try:
-        status = command.main(arguments, prog_name="suave-des", standalone_mode=False) or 0
+        with told_by_exceptions():
+            status = command.main(arguments, prog_name="suave-des", standalone_mode=False) or 0
     except SuaveDesError as error:
         status = _tell(str(error), BAD_INPUT if isinstance(error, InputError) else MISSIONS_MISSING)
     except Exception as error:

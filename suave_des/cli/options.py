@@ -33,6 +33,7 @@ Seed = Annotated[int, typer.Option("--seed", help="Seed of everything that is ra
 Workers = Annotated[
     int, typer.Option("--workers", help="Processes that run missions; any number gives the same bytes.")
 ]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace results that are in the output folder already.")]
 
 

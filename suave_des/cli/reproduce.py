@@ -14,6 +14,7 @@ from suave_des.cli.options import (
     Modes,
     Ontologies,
     Overwrite,
+    Quiet,
     Reasoner,
     RuleFiles,
     Seed,
@@ -41,6 +42,7 @@ def reproduce(
         Path | None, typer.Option("--out", metavar="DIR", help="Folder for result files; left out, none are written.")
     ] = None,
     overwrite: Overwrite = False,
+    quiet: Quiet = False,
     ontology: Ontologies = None,
     rules: RuleFiles = None,
     disable_rule: DisabledRules = None,
@@ -53,13 +55,13 @@ def reproduce(
     """
     from suave_des.campaign.campaign import run_campaign
     from suave_des.campaign.output import write_files
-    from suave_des.cli.console import output, progress_bar
+    from suave_des.cli.console import output, progress
     from suave_des.report.comparison import compare, csv_table, markdown_table
     from suave_des.report.published import published_figures
 
     published = published_figures()
     managers = list(dict.fromkeys(manager for manager, _ in published))
-    with progress_bar("reproduce") as show:
+    with progress("reproduce", quiet=quiet) as show:
         result = run_campaign(
             SCENARIO,
             managers,

@@ -9,12 +9,16 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from suave_des.campaign.summary import METRICS, SUMMARY_COLUMNS
+from suave_des.campaign.display import estimated
+from suave_des.campaign.early_stop import parse_until_ci
+from suave_des.campaign.plan import Group
+from suave_des.campaign.summary import METRIC_TITLES, METRICS, SUMMARY_COLUMNS
+from suave_des.campaign.sweep import cell_of
 
 if TYPE_CHECKING:
     from suave_des.campaign.campaign import CampaignResult
 
-METRIC_TITLES = {"search_time_s": "search time, s", "distance_inspected_m": "distance, m"}
+_STOPS_TOLD = 8
 
 
 def plain_table() -> Table:
@@ -37,38 +41,74 @@ def print_trimmed(console: Console, table: Table) -> None:
 
 
 def print_summary(console: Console, result: CampaignResult) -> None:
-    """Print what summary.csv says."""
+    """Print what summary.csv says; what does not fit into the console's width is broken up, then left out."""
+    for breaks_names, has_std in ((False, True), (True, True), (True, False)):
+        table = _summary(result, breaks_names=breaks_names, has_std=has_std)
+        if console.measure(table, options=console.options.update(width=1000)).maximum <= console.width:
+            break
+    title = f"{result.loaded.scenario.name}, seed {result.seed}: means ± half their 95% intervals"
+    print_table(console, f"{title}, standard deviations" if has_std else title, table)
+
+
+def _summary(result: CampaignResult, *, breaks_names: bool, has_std: bool) -> Table:
     table = plain_table()
-    swept = result.variation.sweep.parameters
-    for parameter in swept:
-        table.add_column(parameter, justify="right")
+    for parameter in result.variation.sweep.parameters:
+        table.add_column(parameter.replace(".", ".\n") if breaks_names else parameter, justify="right")
     table.add_column("manager", overflow="fold")
     for heading in ("missions", "found"):
         table.add_column(heading, justify="right")
     for metric in METRICS:
-        table.add_column(METRIC_TITLES[metric], justify="right")
-        table.add_column("95% interval", justify="right")
-        table.add_column("std", justify="right")
+        table.add_column(METRIC_TITLES[metric], justify="right", no_wrap=True)
+        if has_std:
+            table.add_column("std", justify="right", no_wrap=True)
     for row in result.summary:
         cells = dict(zip(SUMMARY_COLUMNS, row, strict=False))
         share = cells["found_share"]
+        manager = str(cells["manager"])
         table.add_row(
             *map(str, row[len(SUMMARY_COLUMNS) :]),
-            str(cells["manager"]),
+            manager.replace(":", ":\n") if breaks_names else manager,
             str(cells["n"]),
             "" if share is None else f"{float(share):.0%}",
-            *(text for metric in METRICS for text in _figures(cells, metric)),
+            *(text for metric in METRICS for text in _figures(cells, metric)[: 1 + has_std]),
         )
-    title = f"{result.loaded.scenario.name}, seed {result.seed}: means, their 95% intervals, standard deviations"
-    print_table(console, title, table)
+    return table
 
 
-def _figures(cells: Mapping[str, object], metric: str) -> tuple[str, str, str]:
-    return (
-        number(cells[f"{metric}_mean"]),
-        interval(cells[f"{metric}_ci95_low"], cells[f"{metric}_ci95_high"]),
-        number(cells[f"{metric}_std"]),
-    )
+def _figures(cells: Mapping[str, object], metric: str) -> tuple[str, str]:
+    mean, low, high = (cells[f"{metric}_{figure}"] for figure in ("mean", "ci95_low", "ci95_high"))
+    half_width = (high - low) / 2.0 if isinstance(low, float) and isinstance(high, float) else None
+    return estimated(mean if isinstance(mean, float) else None, half_width), number(cells[f"{metric}_std"])
+
+
+def print_stops(console: Console, result: CampaignResult) -> None:
+    """Say which managers were stopped early, and of which the interval is still too wide."""
+    if result.until_ci is None:
+        return
+    until = parse_until_ci(result.until_ci)
+    narrow = [stop for stop in result.stops if stop.reached]
+    if narrow:
+        told = ", ".join(f"{_group(result, stop.group)} after run {stop.last_run}" for stop in narrow[:_STOPS_TOLD])
+        told += f", and {len(narrow) - _STOPS_TOLD} more" if len(narrow) > _STOPS_TOLD else ""
+        console.print(f"stopped with {until.metric} ± less than {until.half_width:g}: {told}", soft_wrap=True)
+    wide = [stop for stop in result.stops if not stop.reached]
+    for stop in wide[:_STOPS_TOLD]:
+        width = "has no interval" if stop.half_width is None else f"± {stop.half_width:.4g}"
+        console.print(
+            f"not reached: {_group(result, stop.group)}: {until.metric} {width} after all {stop.last_run} runs,"
+            f" not less than {until.half_width:g}",
+            soft_wrap=True,
+        )
+    if len(wide) > _STOPS_TOLD:
+        console.print(f"not reached: {len(wide) - _STOPS_TOLD} more, all in {result.folder}/manifest.json")
+    if wide:
+        console.print(f"more runs: suave-des campaign --resume {result.folder} --runs N", soft_wrap=True)
+
+
+def _group(result: CampaignResult, group: Group) -> str:
+    point, manager = group
+    values = result.variation.sweep.values(point)
+    return " ".join([result.managers[manager], *(f"{name}={cell_of(value)}" for name, value in values.items())])
 
 
 def number(value: object) -> str:

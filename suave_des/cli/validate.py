@@ -13,6 +13,7 @@ from suave_des.cli.options import (
     Modes,
     Ontologies,
     Overwrite,
+    Quiet,
     Reasoner,
     RuleFiles,
     Seed,
@@ -68,6 +69,7 @@ def validate(
         bool, typer.Option("--strict", help=f"Exit with status {TARGETS_NOT_MET} unless every target is met.")
     ] = False,
     overwrite: Overwrite = False,
+    quiet: Quiet = False,
     ontology: Ontologies = None,
     rules: RuleFiles = None,
     disable_rule: DisabledRules = None,
@@ -75,7 +77,7 @@ def validate(
     reasoner: Reasoner = None,
 ) -> None:
     """Compare simulated missions with real ones: distributions, clusters, conclusions."""
-    from suave_des.cli.console import output, progress_bar
+    from suave_des.cli.console import output, progress
     from suave_des.cli.validation_tables import print_validation
     from suave_des.resources import find
     from suave_des.validation.runs import choose_managers, read_runs
@@ -105,7 +107,7 @@ def validate(
 
         _check_known(published, chosen)
         name = scenario or _SCENARIO
-        with progress_bar(name) as show:
+        with progress(name, quiet=quiet) as show:
             campaign = run_campaign(
                 name,
                 chosen,

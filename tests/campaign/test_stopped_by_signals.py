@@ -1,0 +1,114 @@
+"""A campaign that is told to stop, by Ctrl-C or by kill, keeps what is done and leaves no empty folder."""
+
+from __future__ import annotations
+
+import csv
+import signal
+import time
+from pathlib import Path
+
+import chaos
+import pytest
+
+from suave_des.campaign.campaign import resume_campaign, run_campaign
+from suave_des.campaign.store import NEW_STORE_FILE, STORE_FILE
+
+STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
+FILES = [STORE_FILE, "manifest.json", "runs.csv", "summary.csv"]
+
+
+@pytest.fixture
+def scenario(tmp_path: Path) -> Path:
+    path = tmp_path / "short.yaml"
+    path.write_text(chaos.SHORT)
+    return path
+
+
+def wait_for(path: Path, size: int = 0) -> None:
+    until = time.monotonic() + 60.0
+    while not (path.exists() and path.stat().st_size >= size):
+        assert time.monotonic() < until
+        time.sleep(0.002)
+
+
+@pytest.mark.parametrize("number", STATUS)
+@pytest.mark.parametrize("workers", [1, 2])
+def test_what_is_done_is_kept(number: signal.Signals, workers: int, scenario: Path, tmp_path: Path) -> None:
+    asked = [str(scenario), "--managers", "none", "--runs", "5000", "--workers", str(workers), "--out", "out"]
+    process = chaos.start(asked, tmp_path)
+    wait_for(tmp_path / "out" / f"{STORE_FILE}-wal", 50_000)
+    children = chaos.workers_of(process)
+    process.send_signal(number)
+    status, err = chaos.ended(process)
+    assert status == STATUS[number]
+    assert err.startswith("suave-des: interrupted; ")
+    assert err.endswith(" of 5000 missions are done, and kept in out; suave-des campaign --resume out does the rest\n")
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == FILES
+    with (tmp_path / "out" / "runs.csv").open(newline="") as file:
+        assert 0 < len(list(csv.DictReader(file))) < 5000
+    assert len(children) == (0 if workers == 1 else 2)
+    assert not any(Path(f"/proc/{child}").exists() for child in children)
+
+
+@pytest.mark.parametrize("number", STATUS)
+@pytest.mark.parametrize("moment", ["lock", "store", "later"])
+def test_no_empty_folder_is_left(number: signal.Signals, moment: str, scenario: Path, tmp_path: Path) -> None:
+    process = chaos.start([str(scenario), "--managers", "none", "--runs", "5000", "--out", "out"], tmp_path)
+    wait_for(tmp_path / "out" / (".campaign.lock" if moment == "lock" else STORE_FILE))
+    if moment == "later":
+        time.sleep(0.3)
+    process.send_signal(number)
+    status, err = chaos.ended(process)
+    assert status == STATUS[number]
+    if (tmp_path / "out").exists():
+        assert "--resume out does the rest" in err, list((tmp_path / "out").iterdir())
+        assert sorted(path.name for path in (tmp_path / "out").iterdir()) == FILES
+    else:
+        assert err == "suave-des: interrupted\n"
+
+
+def ctrl_c(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+class TestInterruptedAtAnAwkwardMoment:
+    @pytest.mark.parametrize(
+        "moment",
+        [
+            "suave_des.campaign.campaign.locked",
+            "suave_des.campaign.campaign.make_store",
+            "suave_des.campaign.store.remove_store",
+            "suave_des.campaign.campaign.Store.__init__",
+            "suave_des.campaign.campaign.make_executor",
+        ],
+    )
+    def test_before_the_first_mission_nothing_is_left(
+        self, moment: str, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(moment, ctrl_c)
+        with pytest.raises(KeyboardInterrupt):
+            run_campaign(scenario, ["none"], 2, 1, out=tmp_path / "out")
+        assert not (tmp_path / "out").exists()
+
+    def test_before_an_earlier_campaign_is_replaced_it_stays(
+        self, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        out = tmp_path / "out"
+        run_campaign(scenario, ["none"], 2, 1, out=out)
+        before = {path.name: path.read_bytes() for path in out.iterdir()}
+        monkeypatch.setattr("suave_des.campaign.store.remove_store", ctrl_c)
+        with pytest.raises(KeyboardInterrupt):
+            run_campaign(scenario, ["none"], 3, 1, out=out, overwrite=True)
+        assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+        assert not (out / NEW_STORE_FILE).exists()
+
+    def test_while_files_are_written_it_says_how_to_have_them(
+        self, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        out = tmp_path / "out"
+        with monkeypatch.context() as patch:
+            patch.setattr("suave_des.campaign.campaign.write_results", ctrl_c)
+            with pytest.raises(KeyboardInterrupt, match=r"nothing is lost: suave-des campaign --resume .* writes"):
+                run_campaign(scenario, ["none"], 2, 1, out=out)
+        assert resume_campaign(out).done == 2
+        assert sorted(path.name for path in out.iterdir()) == FILES
