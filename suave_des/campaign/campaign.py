@@ -7,7 +7,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from suave_des.campaign.executors import WorkerError, make_executor
+from suave_des.campaign.executors import Executor, WorkerError, check_place, executor
 from suave_des.campaign.lock import LOCK_FILE, locked
 from suave_des.campaign.outcomes import COLUMNS, Failure, Finished, Job, MissionRunner
 from suave_des.campaign.output import check_output_folder, make_output_folder, remove_parts
@@ -93,6 +93,7 @@ def run_campaign(
     overwrite: bool = False,
     command: Sequence[str] = (),
     on_progress: OnProgress | None = None,
+    scheduler: str | None = None,
 ) -> CampaignResult:
     """Run `runs` missions of a scenario under each manager.
 
@@ -118,6 +119,8 @@ def run_campaign(
         overwrite: whether results in the folder may be replaced.
         command: the command line, for the manifest.
         on_progress: called when missions are done.
+        scheduler: address of a Dask scheduler, such as tcp://127.0.0.1:8786: missions run on its workers, which get all
+            that they need by value, and `workers` must be left at 1.
 
     Raises:
         InputError: something given cannot be used; nothing is written then.
@@ -144,13 +147,19 @@ def run_campaign(
     if folder is not None:
         _check_new(folder, overwrite=overwrite)
     check_plan(managers, runs, workers)
+    check_place(workers, scheduler)
     check_time_out(time_out_s)
     loaded, inputs = _read(request)
-    return _Campaign(request, loaded, inputs, folder).run(workers, on_progress, resumed=False)
+    return _Campaign(request, loaded, inputs, folder).run(workers, on_progress, scheduler, resumed=False)
 
 
 def resume_campaign(
-    folder: str | Path, workers: int = 1, *, runs: int | None = None, on_progress: OnProgress | None = None
+    folder: str | Path,
+    workers: int = 1,
+    *,
+    runs: int | None = None,
+    on_progress: OnProgress | None = None,
+    scheduler: str | None = None,
 ) -> CampaignResult:
     """Go on with a campaign where it stopped; what it was asked is in its folder.
 
@@ -161,6 +170,7 @@ def resume_campaign(
         workers: as of run_campaign; it may be another number.
         runs: more runs than were asked for at first; left out: as many.
         on_progress: called when missions are done.
+        scheduler: as of run_campaign; it may be another, or none.
 
     Raises:
         InputError: there is no campaign, it is damaged or in use, or something that decides results has changed; the
@@ -172,6 +182,7 @@ def resume_campaign(
     if runs is not None:
         request = replace(request, runs=runs)
     check_plan(request.managers, request.runs, workers)
+    check_place(workers, scheduler)
     try:
         loaded, inputs = _read(request)
     except InputError as error:
@@ -179,7 +190,7 @@ def resume_campaign(
             raise
         remedy = f"the campaign was started in {request.folder}: resume it there"
         raise InputError(error.problem, file=error.file, place=error.place, remedy=remedy) from None
-    return _Campaign(request, loaded, inputs, folder).run(workers, on_progress, resumed=True)
+    return _Campaign(request, loaded, inputs, folder).run(workers, on_progress, scheduler, resumed=True)
 
 
 def _check_new(folder: Path, *, overwrite: bool) -> None:
@@ -256,11 +267,14 @@ class _Campaign:
         self.columns = COLUMNS
         self.total = len(request.managers) * request.runs
 
-    def run(self, workers: int, on_progress: OnProgress | None, *, resumed: bool) -> CampaignResult:
+    def run(
+        self, workers: int, on_progress: OnProgress | None, scheduler: str | None, *, resumed: bool
+    ) -> CampaignResult:
         """Run what is not done yet, and write the files."""
         if workers > 1:
             _compile(self.job)
         with ExitStack() as stack:
+            place = stack.enter_context(executor(workers, scheduler))
             if self.folder is not None:
                 if not self.folder.exists():
                     stack.callback(_remove_empty, self.folder)  # unless something is in it then
@@ -269,7 +283,7 @@ class _Campaign:
                 remove_parts(self.folder, FILES)
             store = self._store(resumed=resumed)
             try:
-                stopped = self._work(store, workers, on_progress)
+                stopped = self._work(store, place, on_progress)
                 is_empty = store.count() == 0
             finally:
                 if self.folder is not None:
@@ -318,7 +332,7 @@ class _Campaign:
         return store
 
     def _work(
-        self, store: Store, workers: int, on_progress: OnProgress | None
+        self, store: Store, place: Executor, on_progress: OnProgress | None
     ) -> KeyboardInterrupt | SuaveDesError | None:
         """Run missions until all are done; what stopped the campaign before that."""
         try:
@@ -326,7 +340,7 @@ class _Campaign:
             missions = plan(1, len(self.request.managers), self.request.runs, store.settled)
             left = self.total - done
             if left:
-                for finished in make_executor(workers).outcomes(self.job, missions, left):
+                for finished in place.outcomes(self.job, missions, left):
                     store.append(finished)
                     done += len(finished)
                     failed += sum(isinstance(outcome, Failure) for _, outcome in finished)

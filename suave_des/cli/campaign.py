@@ -15,7 +15,6 @@ from suave_des.cli.options import (
     Overwrite,
     Reasoner,
     RuleFiles,
-    Workers,
     command_line,
 )
 
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
 
 _FAILURES_TOLD = 20
 _MANAGERS, _RUNS, _SEED, _TIME_OUT = ("none", "random", "metacontrol"), 20, 1, "120"
+_WORKERS = 2
 
 
 class Format(StrEnum):
@@ -57,7 +57,22 @@ def campaign(
     runs: Annotated[
         int | None, typer.Option("--runs", help="Missions for each manager.", show_default=str(_RUNS))
     ] = None,
-    workers: Workers = 2,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            "--workers",
+            help="Processes that run missions; any number gives the same bytes.",
+            show_default=str(_WORKERS),
+        ),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            "--scheduler",
+            metavar="tcp://HOST:PORT",
+            help="Run missions on the workers of this Dask scheduler instead; the same bytes again.",
+        ),
+    ] = None,
     seed: Annotated[
         int | None, typer.Option("--seed", help="Seed of everything that is random.", show_default=str(_SEED))
     ] = None,
@@ -85,6 +100,8 @@ def campaign(
     from suave_des.cli.tables import print_summary
     from suave_des.errors import InputError
 
+    if workers is None:
+        workers = _WORKERS if scheduler is None else 1
     if resume is not None:
         fixed = {
             "SCENARIO": scenario,
@@ -107,7 +124,7 @@ def campaign(
                     remedy="leave it out, or start anew in another folder",
                 )
         with progress_bar(str(resume)) as show:
-            result = resume_campaign(resume, workers, runs=runs, on_progress=show)
+            result = resume_campaign(resume, workers, runs=runs, on_progress=show, scheduler=scheduler)
     elif scenario is None or out is None:
         missing = "SCENARIO" if scenario is None else "--out DIR"
         raise InputError(f"{missing} is missing", remedy="see suave-des campaign --help")
@@ -131,6 +148,7 @@ def campaign(
                 overwrite=overwrite,
                 command=command_line(),
                 on_progress=show,
+                scheduler=scheduler,
             )
     console = output()
     print_summary(console, result)
