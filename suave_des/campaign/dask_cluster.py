@@ -6,7 +6,9 @@ very version.
 
 from __future__ import annotations
 
+import asyncio
 import logging
+import math
 import pickle
 import re
 import threading
@@ -36,16 +38,20 @@ _CHECK_TIMEOUT_S = 120.0
 _STOP_TIMEOUT_S = 5.0
 _LOOK_PERIOD_S = 2.0
 """Time between looks at how many workers there are."""
+_TELL_AFTER_S = 10.0
+"""Time without any worker after which the user is told."""
 _AHEAD = 3
 """Chunks for each thread of a worker: one under way and some to go on with, wherever the scheduler puts them."""
 _FEWEST_THREADS = 2
 """Assumed while there are none, so that a cluster that grows when there is work to do does so."""
 _CHUNK_S = 1.0
-"""Work in a chunk: it costs Dask some 3 ms, and chunks under way are lost when a campaign is stopped."""
-_FIRST_CHUNK, _LARGEST_CHUNK = 10, 1000
+"""Work in a chunk; no more, as chunks under way are lost when a campaign is stopped."""
+_CHUNK_COST_S = 0.01
+"""Of the scheduler's and this process's time: with many threads chunks are larger, so that these keep up."""
+_FIRST_CHUNK, _LARGEST_CHUNK = 10, 10_000
 _SHARES = 4
 """Chunks that each thread gets of what is left, at least, so that all end together."""
-_ADDRESS = re.compile(r"(?:tcp|tls|ws|wss|ucx)://(?:\[[0-9A-Fa-f:.%]+\]|[^\s/:@\[\]]+):(\d{1,5})/?")
+_ADDRESS = re.compile(r"(?:tcp|tls)://(?:\[[0-9A-Fa-f:.%]+\]|[^\s/:@\[\]]+):(\d{1,5})/?")
 _NOISY = ("distributed", "dask", "tornado", "asyncio", "bokeh")
 
 _logger = logging.getLogger("suave_des")
@@ -93,14 +99,34 @@ def connected(scheduler: str) -> Iterator[DaskCluster]:
 
 
 def _client(distributed: Any, scheduler: str) -> Any:
+    # Asked first in our own way, as a Client waits for ever for one who takes the connection and says nothing.
+    kind = _in_time(lambda: asyncio.run(_kind(distributed, scheduler)), ANSWER_TIMEOUT_S + 1.0)
+    if kind not in (None, "Scheduler"):
+        raise InputError(f"scheduler: {scheduler} is a Dask {kind.lower()}", remedy="give its scheduler's address")
     try:
-        return distributed.Client(scheduler, timeout=ANSWER_TIMEOUT_S, set_as_default=False)
-    except (OSError, TimeoutError, ValueError, ImportError, RuntimeError) as error:
-        raise InputError(
-            f"scheduler: {scheduler} does not answer as a Dask scheduler within {ANSWER_TIMEOUT_S:g} s"
-            f" ({type(error).__name__})",
-            remedy="see that `dask scheduler` runs there, and that its port can be reached from here",
-        ) from None
+        if kind is not None:
+            return distributed.Client(scheduler, timeout=ANSWER_TIMEOUT_S, set_as_default=False)
+    except OSError:  # it ended in between
+        pass
+    raise InputError(
+        f"scheduler: {scheduler} does not answer as a Dask scheduler within {ANSWER_TIMEOUT_S:g} s",
+        remedy="see that `dask scheduler` runs there, and that its port can be reached from here",
+    )
+
+
+async def _kind(distributed: Any, address: str) -> str:
+    """What kind of part of a cluster is at an address."""
+
+    async def ask() -> str:
+        settings = distributed.Security().get_connection_args("client")
+        comm = await distributed.comm.connect(address, **settings)
+        try:
+            await comm.write({"op": "identity", "reply": True})
+            return str((await comm.read())["type"])
+        finally:
+            comm.abort()
+
+    return await asyncio.wait_for(ask(), ANSWER_TIMEOUT_S)
 
 
 @contextmanager
@@ -230,8 +256,9 @@ def _remote_forget() -> Callable[[str], None]:
 class DaskCluster:
     """Runs chunks of missions on whatever workers the cluster has at the time.
 
-    A worker that dies loses nothing: Dask gives its chunks to others. A chunk whose workers die again and again is
-    split into its missions, and a mission whose workers do has failed.
+    A worker that dies loses nothing: Dask gives its chunks to others. Where workers die again and again with a chunk,
+    Dask suspects all chunks that they had; then the missions of these are run alone, one after the other, and one with
+    which workers die even so has failed.
 
     Args:
         client: connected to the scheduler.
@@ -257,12 +284,14 @@ class _Flow:
         self._client, self._scheduler, self._job, self._missions = client, scheduler, job, missions
         self._left = total
         self._token = uuid.uuid4().hex
-        self._again: deque[Chunk] = deque()
+        self._suspects: deque[MissionKey] = deque()
+        self._suspect: Any = None
         self._under_way: dict[Any, Chunk] = {}
         self._ended: SimpleQueue[Any] = SimpleQueue()
         self._number = 0
         self._mission_s: float | None = None
-        self._threads, self._looked_s, self._told_none = 0, -_LOOK_PERIOD_S, False
+        self._threads, self._looked_s = 0, -_LOOK_PERIOD_S
+        self._alone_since_s: float | None = None
         self._run = _remote_run()
         order = tuple(Order(self._token, needs(), pickle.dumps(pack(job)), job.time_out_s))
         # As the result of a task, it can be made again wherever a worker died that had it, and is sent to each once.
@@ -290,18 +319,26 @@ class _Flow:
     def _hand_out(self) -> None:
         self._look()
         while len(self._under_way) < _AHEAD * max(self._threads, _FEWEST_THREADS):
-            chunk = self._again.popleft() if self._again else tuple(islice(self._missions, self._size()))
+            if self._suspects and self._suspect is None:
+                self._suspect = self._submit((self._suspects.popleft(),))
+                continue
+            chunk = tuple(islice(self._missions, self._size()))
             if not chunk:
                 return
-            self._number += 1
-            key = f"suave_des_missions-{self._token}-{self._number}"
-            future = self._client.submit(self._run, self._order, tuple(map(tuple, chunk)), key=key)
-            self._under_way[future] = chunk
-            future.add_done_callback(self._ended.put)
+            self._submit(chunk)
+
+    def _submit(self, chunk: Chunk) -> Any:
+        self._number += 1
+        key = f"suave_des_missions-{self._token}-{self._number}"
+        future = self._client.submit(self._run, self._order, tuple(map(tuple, chunk)), key=key)
+        self._under_way[future] = chunk
+        future.add_done_callback(self._ended.put)
+        return future
 
     def _size(self) -> int:
         fair = self._left // (_SHARES * max(self._threads, 1))
-        enough = _FIRST_CHUNK if self._mission_s is None else int(_CHUNK_S / max(self._mission_s, 1e-6))
+        chunk_s = max(_CHUNK_S, _CHUNK_COST_S * self._threads)
+        enough = _FIRST_CHUNK if self._mission_s is None else int(chunk_s / max(self._mission_s, 1e-6))
         return max(1, min(fair, enough, _LARGEST_CHUNK))
 
     def _wait(self) -> list[Any]:
@@ -326,9 +363,13 @@ class _Flow:
         except OSError:
             raise self._lost() from None
         self._looked_s = time.monotonic()
-        if self._threads == 0 and not self._told_none:
-            _logger.warning("suave-des: %s has no workers; waiting for some", self._scheduler)
-        self._told_none = self._threads == 0
+        if self._threads:
+            self._alone_since_s = None
+        elif self._alone_since_s is None:
+            self._alone_since_s = self._looked_s
+        elif self._looked_s > self._alone_since_s + _TELL_AFTER_S:
+            _logger.warning("suave-des: %s has no workers; waiting for some (Ctrl-C stops)", self._scheduler)
+            self._alone_since_s = math.inf  # told
 
     def _lost(self) -> WorkerError:
         return WorkerError(f"the connection to the scheduler {self._scheduler} is lost")
@@ -338,10 +379,19 @@ class _Flow:
     def _received(self, future: Any, chunk: Chunk) -> Iterator[Finished]:
         from distributed import KilledWorker
 
+        was_alone = future is self._suspect
+        if was_alone:
+            self._suspect = None
         try:
             worker, result = future.result()
         except KilledWorker as error:
-            yield from self._try_again(chunk, error)
+            if was_alone:
+                self._left -= 1
+                times = error.allowed_failures + 1
+                cause = f"the cluster's worker died with it, {times} times (killed, or out of memory?)"
+                yield self._job.failed(chunk[0], cause)
+            else:
+                self._suspects.extend(chunk)
             return
         except Exception as error:
             if future.cancelled() or self._client.status != "running":
@@ -368,15 +418,6 @@ class _Flow:
             yield from pickle.loads(part)
         for key, cause in report.lost:
             yield self._job.failed(MissionKey(*key), cause or time_out_cause(self._job.time_out_s))
-
-    def _try_again(self, chunk: Chunk, error: Any) -> Iterator[Finished]:
-        if len(chunk) > 1:
-            self._again.extend((key,) for key in chunk)
-        else:
-            self._left -= 1
-            times = error.allowed_failures + 1
-            cause = f"the worker of the cluster that ran it died, {times} times (killed, or out of memory?)"
-            yield self._job.failed(chunk[0], cause)
 
 
 def _trouble(where: str, trouble: Trouble) -> Exception:
