@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from suave_des.campaign.early_stop import RUNS_LIMIT_DEFAULT, parse_until_ci
-from suave_des.campaign.executors import WorkerError, make_executor
+from suave_des.campaign.executors import Executor, WorkerError, check_place, executor
 from suave_des.campaign.lock import LOCK_FILE, locked
 from suave_des.campaign.outcomes import Finished, Job, MissionRunner
 from suave_des.campaign.output import check_output_folder, make_output_folder, remove_parts
@@ -97,6 +97,7 @@ def run_campaign(
     overwrite: bool = False,
     command: Sequence[str] = (),
     on_progress: OnProgress | None = None,
+    scheduler: str | None = None,
 ) -> CampaignResult:
     """Run `runs` missions of a scenario under each manager, at each point of the sweep if there is one.
 
@@ -132,6 +133,8 @@ def run_campaign(
         overwrite: whether results in the folder may be replaced.
         command: the command line, for the manifest.
         on_progress: called when missions are done.
+        scheduler: address of a Dask scheduler, such as tcp://127.0.0.1:8786: missions run on its workers, which get all
+            that they need by value, and `workers` must be left at 1.
 
     Raises:
         InputError: something given cannot be used; nothing is written then.
@@ -169,6 +172,7 @@ def run_campaign(
         _check_new(folder, overwrite=overwrite)
     request = _with_until_ci(request, sheet)
     check_plan(request.managers, request.runs, workers)
+    check_place(workers, scheduler)
     check_time_out(request.time_out_s)
     campaign = _Campaign(request, *_read(request, sheet), folder)
     if suave_format and campaign.variation.sweep.points > 1:
@@ -178,7 +182,7 @@ def run_campaign(
         )
     if not confirmed:
         campaign.check_size(workers)
-    return campaign.run(workers, on_progress, resumed=False)
+    return campaign.run(workers, on_progress, scheduler, resumed=False)
 
 
 def resume_campaign(
@@ -188,6 +192,7 @@ def resume_campaign(
     runs: int | None = None,
     until_ci: str | None = None,
     on_progress: OnProgress | None = None,
+    scheduler: str | None = None,
 ) -> CampaignResult:
     """Go on with a campaign where it stopped; what it was asked is in its folder.
 
@@ -199,6 +204,7 @@ def resume_campaign(
         runs: more runs than were asked for at first; left out: as many.
         until_ci: the metric asked for at first with a smaller half-width; left out: as at first.
         on_progress: called when missions are done.
+        scheduler: as of run_campaign; it may be another, or none.
 
     Raises:
         InputError: there is no campaign, it is damaged or in use, or something that decides results has changed; the
@@ -217,13 +223,14 @@ def resume_campaign(
         sheet = read_sheet(request.scenario)
         request = replace(request, **said(sheet, request.of_file))
         check_plan(request.managers, request.runs, workers)
+        check_place(workers, scheduler)
         campaign = _Campaign(request, *_read(request, sheet), folder)
     except InputError as error:
         if str(Path.cwd()) == request.folder:
             raise
         remedy = f"the campaign was started in {request.folder}: resume it there"
         raise InputError(error.problem, file=error.file, place=error.place, remedy=remedy) from None
-    return campaign.run(workers, on_progress, resumed=True)
+    return campaign.run(workers, on_progress, scheduler, resumed=True)
 
 
 def _with_until_ci(request: Request, sheet: Sheet | None) -> Request:
@@ -350,11 +357,14 @@ class _Campaign:
         problem = f"{total:,} missions take about {_duration_text(expected_s)} with {workers} workers on this machine"
         raise InputError(problem, remedy="give --yes if that is meant")
 
-    def run(self, workers: int, on_progress: OnProgress | None, *, resumed: bool) -> CampaignResult:
+    def run(
+        self, workers: int, on_progress: OnProgress | None, scheduler: str | None, *, resumed: bool
+    ) -> CampaignResult:
         """Run what is not done yet, and write the files."""
         if workers > 1:
             _compile(self.job)
         with ExitStack() as stack:
+            place = stack.enter_context(executor(workers, scheduler))
             if self.folder is not None:
                 if not self.folder.exists():
                     stack.callback(_remove_empty, self.folder)  # unless something is in it then
@@ -365,7 +375,7 @@ class _Campaign:
                 stack.callback(self._remove_if_empty)
             store = self._store(resumed=resumed)
             try:
-                stopped = self._work(store, workers, on_progress)
+                stopped = self._work(store, place, on_progress)
                 is_empty = store.count() == 0
             finally:
                 if self.folder is not None:
@@ -411,7 +421,7 @@ class _Campaign:
         return store
 
     def _work(
-        self, store: Store, workers: int, on_progress: OnProgress | None
+        self, store: Store, place: Executor, on_progress: OnProgress | None
     ) -> KeyboardInterrupt | SuaveDesError | None:
         """Run missions until all are done; what stopped the campaign before that."""
         try:
@@ -421,7 +431,7 @@ class _Campaign:
             missions = plan(points, managers, self.request.runs, store.settled, watch.is_over)
             left = watch.total - watch.done
             if left:
-                for finished in make_executor(workers).outcomes(self.job, missions, left):
+                for finished in place.outcomes(self.job, missions, left):
                     store.append(finished)
                     watch.take(finished)
                     if on_progress is not None:

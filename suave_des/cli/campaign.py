@@ -16,7 +16,6 @@ from suave_des.cli.options import (
     Quiet,
     Reasoner,
     RuleFiles,
-    Workers,
     command_line,
 )
 
@@ -26,7 +25,8 @@ if TYPE_CHECKING:
 
 _FAILURES_TOLD = 20
 _MANAGERS, _RUNS, _SEED, _TIME_OUT = "none,random,metacontrol", "20", "1", "120"
-"""As in campaign.request, which is not imported for --help."""
+"""As in campaign.sheet, which is not imported for --help."""
+_WORKERS = 2
 
 
 class Format(StrEnum):
@@ -64,7 +64,22 @@ def campaign(
         int | None,
         typer.Option("--runs", help="Missions for each manager, at each point.", show_default=_RUNS),
     ] = None,
-    workers: Workers = 2,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            "--workers",
+            help="Processes that run missions; any number gives the same bytes.",
+            show_default=str(_WORKERS),
+        ),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            "--scheduler",
+            metavar="tcp://HOST:PORT",
+            help="Run missions on the workers of this Dask scheduler instead; the same bytes again.",
+        ),
+    ] = None,
     seed: Annotated[
         int | None, typer.Option("--seed", help="Seed of everything that is random.", show_default=_SEED)
     ] = None,
@@ -103,6 +118,8 @@ def campaign(
     from suave_des.cli.tables import print_stops, print_summary
     from suave_des.errors import InputError
 
+    if workers is None:
+        workers = _WORKERS if scheduler is None else 1
     if resume is not None:
         fixed = {
             "SCENARIO": scenario,
@@ -126,7 +143,9 @@ def campaign(
                     remedy="leave it out, or start anew in another folder",
                 )
         with progress(str(resume), quiet=quiet) as show:
-            result = resume_campaign(resume, workers, runs=runs, until_ci=until_ci, on_progress=show)
+            result = resume_campaign(
+                resume, workers, runs=runs, until_ci=until_ci, on_progress=show, scheduler=scheduler
+            )
     elif scenario is None or out is None:
         missing = "SCENARIO" if scenario is None else "--out DIR"
         raise InputError(f"{missing} is missing", remedy="see suave-des campaign --help")
@@ -152,6 +171,7 @@ def campaign(
                 overwrite=overwrite,
                 command=command_line(),
                 on_progress=show,
+                scheduler=scheduler,
             )
     console = output()
     print_summary(console, result)

@@ -45,6 +45,22 @@ def cache_folder() -> Path:
     return (Path(start) if start and Path(start).is_absolute() else Path.home() / ".cache") / "suave-des"
 
 
+def grown(sizes: dict[str, int]) -> dict[str, bytes]:
+    """What was added to the memories in the user's cache folder, by their digests.
+
+    Args:
+        sizes: how far each is known already, by its digest; brought up to date.
+    """
+    added = {}
+    for path in sorted((cache_folder() / "memory").glob(f"*{_SUFFIX}")):
+        content = path.read_bytes()
+        start = sizes.get(path.stem, 0)
+        if len(content) > start:
+            added[path.stem] = content[start:]
+        sizes[path.stem] = len(content)
+    return added
+
+
 class DiskMemory:
     """Inferred facts by key, in a file of the user's cache folder.
 
@@ -65,32 +81,50 @@ class DiskMemory:
 
     def load(self) -> dict[Key, frozenset[Fact]]:
         """All entries that can be trusted. A file in which others are is written anew without them."""
-        found: dict[Key, frozenset[Fact]] = {}
         if self._path is None:
-            return found
+            return {}
         try:
-            lines = self._path.read_bytes().split(b"\n")
+            content = self._path.read_bytes()
             os.utime(self._path)
         except OSError:
-            return found
-        is_ours = lines[0] == self._first.encode()
-        damaged = not is_ours
-        for line in lines[1:] if is_ours else ():
-            if line and line != self._first.encode():
-                entry = self._entry(line)
-                if entry is None:
-                    damaged = True
-                else:
-                    found[entry[0]] = entry[1]
+            return {}
+        is_ours = content.partition(b"\n")[0] == self._first.encode()
+        found, damaged = self._entries(content) if is_ours else ({}, True)
         if damaged:
             self._replace(found)
         return found
 
     def add(self, key: Key, facts: frozenset[Fact]) -> None:
         """Append an entry."""
+        self._append(self._line(key, facts))
+
+    def content(self) -> bytes:
+        """All entries that can be trusted, as another memory of the same digest takes them over, elsewhere."""
+        return b"".join(self._line(*entry) for entry in self.load().items())
+
+    def take_over(self, content: bytes) -> None:
+        """Append the entries of another memory of the same digest that this one does not have."""
+        known = self.load()
+        new = [self._line(key, facts) for key, facts in self._entries(content)[0].items() if key not in known]
+        if new:
+            self._append(b"".join(new))
+
+    def _entries(self, content: bytes) -> tuple[dict[Key, frozenset[Fact]], bool]:
+        """Entries that can be trusted, and whether there are others."""
+        found: dict[Key, frozenset[Fact]] = {}
+        damaged = False
+        for line in content.split(b"\n"):
+            if line and line != self._first.encode():
+                entry = self._entry(line)
+                if entry is None:
+                    damaged = True
+                else:
+                    found[entry[0]] = entry[1]
+        return found, damaged
+
+    def _append(self, lines: bytes) -> None:
         if self._path is None:
             return
-        line = self._line(key, facts)
         with suppress(OSError):  # a memory that cannot be written is a slower one, not a wrong one
             if not self._path.parent.is_dir():
                 self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -98,9 +132,9 @@ class DiskMemory:
             try:
                 size = os.fstat(handle).st_size
                 if size == 0:
-                    line = self._first.encode() + line
+                    lines = self._first.encode() + lines
                 if size < MAX_BYTES:
-                    os.write(handle, line)
+                    os.write(handle, lines)
             finally:
                 os.close(handle)
             if size == 0:

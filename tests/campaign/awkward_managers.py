@@ -94,3 +94,21 @@ class TellsItsProcess(NoManager):
 
     def task_requested(self, task: Task) -> None:
         raise RuntimeError(f"process {os.getpid()}")
+
+
+class KillsClusterWorkerInSome(_InRun):
+    """Ends the worker of the cluster that its process belongs to, in about one of ten runs."""
+
+    def adapt(self) -> None:
+        if self.draw < 0.1:
+            os.kill(os.getppid(), signal.SIGKILL)
+            time.sleep(60.0)
+
+
+class BlocksInSome(_InRun):
+    """Does not even hear the alarm of its time-out, in about one of ten runs."""
+
+    def adapt(self) -> None:
+        if self.draw < 0.1:
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGALRM})
+            time.sleep(60.0)

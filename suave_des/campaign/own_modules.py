@@ -1,0 +1,113 @@
+"""Which Python files of a user's own managers are made of, so that these can travel to machines without them."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import sys
+import sysconfig
+from collections.abc import Iterable, Iterator
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+
+import suave_des
+from suave_des.errors import InputError
+from suave_des.managing.registry import manager_class
+
+_INSTALLED = (
+    *(Path(sysconfig.get_path(kind)).resolve() for kind in ("stdlib", "platstdlib", "purelib", "platlib")),
+    Path(suave_des.__file__).resolve().parent,
+)
+_FOLDERS_OF_PACKAGES = ("site-packages", "dist-packages")
+
+
+def own_modules(managers: Iterable[str]) -> dict[str, Path]:
+    """Files that define managers, and what these import of the user's own: all that no package manager installed.
+
+    Imports are read from the source, so that one inside a function counts too; one by a computed name does not.
+
+    Args:
+        managers: names, or module:Class.
+
+    Returns:
+        Each file by its place below a folder of modules, such as "package/module.py".
+
+    Raises:
+        InputError: a manager's module cannot travel: it is a script or a notebook, or is compiled.
+    """
+    found: dict[str, Path] = {}
+    for manager in managers:
+        defined_in = manager_class(manager).__module__
+        for module in dict.fromkeys((manager.partition(":")[0] if ":" in manager else defined_in, defined_in)):
+            if module == "__main__":
+                raise InputError(
+                    f"manager {manager!r} is defined in a script or a notebook, which workers do not have",
+                    remedy="put the class into a module of its own, beside it",
+                )
+            _add(found, module)
+    return found
+
+
+def _add(found: dict[str, Path], module: str) -> None:
+    """Add a module, the packages that it is in, and what they import, if they are the user's own."""
+    parts = module.split(".")
+    for depth in range(1, len(parts) + 1):
+        name = ".".join(parts[:depth])
+        spec = _spec(name)
+        if spec is None or not _is_own(spec):
+            return
+        if not spec.has_location or spec.origin is None:
+            continue  # a folder without __init__.py
+        path = Path(spec.origin)
+        if path.suffix != ".py":
+            raise InputError(
+                "is compiled, so it cannot be taken to workers", file=path, remedy="install it there and here, by pip"
+            )
+        is_package = spec.submodule_search_locations is not None
+        place = "/".join(parts[:depth]) + ("/__init__.py" if is_package else ".py")
+        if place not in found:
+            found[place] = path
+            for imported in _imports(path, name if is_package else name.rpartition(".")[0]):
+                _add(found, imported)
+
+
+def _spec(name: str) -> ModuleSpec | None:
+    loaded = sys.modules.get(name)
+    if loaded is not None:
+        return loaded.__spec__
+    try:
+        return importlib.util.find_spec(name)
+    except (ImportError, AttributeError, ValueError):  # a name in a module rather than a module
+        return None
+
+
+def _is_own(spec: ModuleSpec) -> bool:
+    if spec.has_location and spec.origin is not None:
+        places = [spec.origin]
+    else:
+        places = list(spec.submodule_search_locations or ())
+    paths = [Path(place).resolve() for place in places]
+    return bool(paths) and not any(map(_is_installed, paths))
+
+
+def _is_installed(path: Path) -> bool:
+    in_packages = not set(path.parts).isdisjoint(_FOLDERS_OF_PACKAGES)
+    return in_packages or any(path.is_relative_to(folder) for folder in _INSTALLED)
+
+
+def _imports(path: Path, package: str) -> Iterator[str]:
+    """Names that a file imports; some of them may be names in modules."""
+    try:
+        tree = ast.parse(path.read_bytes())
+    except (SyntaxError, ValueError):  # an import that is not reached, or it would have been raised
+        return
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            name = node.module or ""
+            if node.level:
+                above = package.split(".")[: len(package.split(".")) + 1 - node.level]
+                name = ".".join([*above, *([name] if name else [])])
+            yield name
+            yield from (f"{name}.{alias.name}" for alias in node.names)

@@ -1,0 +1,265 @@
+"""Campaigns on a Dask cluster: the same bytes, all by value, whatever happens to workers and scheduler."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import signal
+import socket
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import chaos
+import pytest
+from clusters import Cluster, kill, wait_until
+
+from suave_des.campaign import dask_cluster
+from suave_des.campaign.campaign import CampaignInterrupted, Progress, resume_campaign, run_campaign
+from suave_des.campaign.executors import WorkerError
+from suave_des.campaign.store import STORE_FILE
+from suave_des.errors import InputError
+from suave_des.resources import shipped_folder
+
+MINE = "my_managers.careful:Careful"
+
+
+@pytest.fixture(scope="module")
+def users_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A user's own scenario, ontology, rules, table, modes and manager, which is made of several modules."""
+    folder = tmp_path_factory.mktemp("user")
+    for name in ("suave.owl", "tomasys.owl"):
+        shutil.copy(shipped_folder("ontology") / name, folder)
+    shutil.copy(shipped_folder("scenarios") / "suave_modes.yaml", folder / "own_modes.yaml")
+    (folder / "sea.csv").write_text("t_s,value\n0,3.0\n40,1.2\n90,2.6\n400,1.5\n")
+    (folder / "own.swrl").write_text(RULES)
+    (folder / "own.yaml").write_text(
+        "base: seams2023.yaml\n"
+        "mission: {time_limit_s: 120}\n"
+        "modes_file: own_modes.yaml\n"
+        "knowledge: {ontologies: [suave.owl], rules: [own.swrl]}\n"
+        "signals: {water_visibility: {kind: table, file: sea.csv}}\n"
+    )
+    package = folder / "my_managers"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "habits.py").write_text("PERIOD_S = 4.0\n")
+    (package / "careful.py").write_text(
+        "from suave_des.managing.metacontrol import Metacontrol\n"
+        "class Careful(Metacontrol):\n"
+        "    def __init__(self, system):\n"
+        "        super().__init__(system)\n"
+        "        from my_managers import habits\n"
+        "        self.period_s = habits.PERIOD_S\n"
+    )
+    return folder
+
+
+RULES = """\
+spare: hasQAvalue(?fg, ?q) ^ isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ lessThan(?v, 3.5)
+       -> fd_realisability(fd_spiral_high, false)
+"""
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory, users_folder: Path) -> Iterator[Cluster]:
+    cluster = Cluster(tmp_path_factory.mktemp("cluster"), users_folder)
+    try:
+        cluster.add_worker()
+        cluster.add_worker(threads=2)
+        yield cluster
+    finally:
+        cluster.stop()
+
+
+@pytest.fixture
+def short(tmp_path: Path) -> Path:
+    path = tmp_path / "short.yaml"
+    path.write_text(chaos.SHORT)
+    return path
+
+
+def test_a_worker_dies_and_another_comes_and_the_bytes_are_the_same(
+    cluster: Cluster, users_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(users_folder)
+    asked = ("own.yaml", ["metacontrol", MINE], 60, 1)
+    run_campaign(*asked, out=tmp_path / "here")
+    seen: list[int] = []
+
+    def kill_one(progress: Progress) -> None:
+        if not seen:
+            kill(cluster.workers.pop(0))
+            cluster.add_worker()
+        seen.append(progress.done)
+
+    run_campaign(*asked, out=tmp_path / "there", scheduler=cluster.address, on_progress=kill_one)
+    for name in ("runs.csv", "summary.csv", "manifest.json"):
+        assert (tmp_path / "there" / name).read_bytes() == (tmp_path / "here" / name).read_bytes()
+    assert seen[0] < 60  # or it died too late to matter
+    assert cluster.opened() == []
+
+
+def test_the_hook_that_watches_workers_would_tell(cluster: Cluster, users_folder: Path, tmp_path: Path) -> None:
+    (users_folder / "opens_a_file.py").write_text(
+        "from pathlib import Path\n"
+        "from suave_des.managing.simple import NoManager\n"
+        "class Reader(NoManager):\n"
+        "    def task_requested(self, task):\n"
+        f"        Path({str(users_folder / 'sea.csv')!r}).read_text()\n"
+    )
+    sys.path.append(str(users_folder))
+    try:
+        run_campaign("seams2023", ["opens_a_file:Reader"], 1, 1, scheduler=cluster.address)
+    finally:
+        sys.path.remove(str(users_folder))
+    assert set(cluster.opened()) == {str(users_folder / "sea.csv")}
+
+
+def test_managers_that_end_or_block_their_process_cost_their_own_missions_only(cluster: Cluster) -> None:
+    causes = {
+        "DiesInSome": "its worker process ended with status -9, 3 times (killed, or out of memory?)",
+        "HangsInSome": "not done after 3 s (time-out)",
+        "RaisesInHalf": "ValueError: I do not know what to do",
+    }
+    managers = [f"awkward_managers:{name}" for name in causes]
+    result = run_campaign("seams2023", managers, 8, 1, scheduler=cluster.address, time_out_s=3.0)
+    assert {failure.manager.partition(":")[2]: failure.cause for failure in result.failures} == causes
+    assert len(result.rows) + len(result.failures) == 24
+    idle = {row[2]: row[3:] for row in run_campaign("seams2023", ["none"], 8, 1).rows}
+    assert all(row[3:] == idle[row[2]] for row in result.rows)
+
+
+def test_ctrl_c_on_the_command_line(cluster: Cluster, short: Path, tmp_path: Path) -> None:
+    asked = ["short.yaml", "--managers", "none", "--runs", "100000", "--scheduler", cluster.address, "--out", "out"]
+    process = chaos.start(asked, tmp_path)
+    journal = tmp_path / "out" / f"{STORE_FILE}-wal"
+    wait_until(lambda: journal.exists() and journal.stat().st_size > 20_000)
+    process.send_signal(signal.SIGINT)
+    status, err = chaos.ended(process)
+    assert status == 130
+    assert err.startswith("suave-des: interrupted; ")
+    assert err.endswith("suave-des campaign --resume out does the rest\n")
+    assert err.count("\n") == 1
+    wait_until(lambda: not cluster.mission_processes(), 5.0)
+
+
+def test_interrupted_there_and_resumed_here(cluster: Cluster, short: Path, tmp_path: Path) -> None:
+    def stop(progress: Progress) -> None:
+        raise KeyboardInterrupt
+
+    asked = (short, ["none", "random"], 100, 1)
+    with pytest.raises(CampaignInterrupted, match=r"suave-des campaign --resume .* does the rest"):
+        run_campaign(*asked, out=tmp_path / "out", scheduler=cluster.address, on_progress=stop)
+    resume_campaign(tmp_path / "out")
+    run_campaign(*asked, out=tmp_path / "whole")
+    assert (tmp_path / "out" / "runs.csv").read_bytes() == (tmp_path / "whole" / "runs.csv").read_bytes()
+
+
+def test_another_version_on_a_worker_is_named_and_nothing_is_written(
+    cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = {**dask_cluster.needs(), "numpy": "1.0"}
+    monkeypatch.setattr(dask_cluster, "needs", lambda: here)
+    with pytest.raises(InputError, match=r"numpy is [\d.]+ on worker tcp://\S+, and 1.0 here, which could change"):
+        run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out", scheduler=cluster.address)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_scheduler_that_is_lost_in_the_middle(short: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    cluster = Cluster(tmp_path / "cluster", tmp_path / "nothing")
+    stopped_s = []
+
+    def kill_scheduler(progress: Progress) -> None:
+        if not stopped_s:
+            kill(cluster.scheduler)
+            stopped_s.append(time.monotonic())
+
+    try:
+        cluster.add_worker()
+        asked = (short, ["none", "random"], 200, 1)
+        with pytest.raises(WorkerError) as lost:
+            run_campaign(*asked, out=tmp_path / "out", scheduler=cluster.address, on_progress=kill_scheduler)
+        assert time.monotonic() < stopped_s[0] + 5.0
+    finally:
+        cluster.stop()
+    line = (
+        rf"the connection to the scheduler {cluster.address} is lost; \d+ of 400 missions are done, and kept in \S+; "
+    )
+    assert re.fullmatch(rf"{line}suave-des campaign --resume \S+ does the rest", str(lost.value))
+    assert capfd.readouterr().err == ""
+    resume_campaign(tmp_path / "out")
+    run_campaign(*asked, out=tmp_path / "whole")
+    assert (tmp_path / "out" / "runs.csv").read_bytes() == (tmp_path / "whole" / "runs.csv").read_bytes()
+
+
+def test_a_mission_with_which_workers_die_has_failed_and_no_other(tmp_path: Path) -> None:
+    cluster = Cluster(tmp_path / "cluster", tmp_path / "nothing", DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="0")
+    try:
+        cluster.add_worker(replaced=True)
+        manager = "awkward_managers:KillsClusterWorkerInSome"
+        result = run_campaign("seams2023", [manager], 9, 1, scheduler=cluster.address)
+    finally:
+        cluster.stop()
+    cause = "the cluster's worker died with it, 1 times (killed, or out of memory?)"
+    assert [(failure.run, failure.cause, failure.lasting) for failure in result.failures] == [(2, cause, False)]
+    assert [row[2] for row in result.rows] == [1, 3, 4, 5, 6, 7, 8, 9]
+
+
+class TestBadInput:
+    @pytest.mark.parametrize(
+        "address",
+        [
+            "foo",
+            "tcp://",
+            "tcp://:8786",
+            "tcp://here",
+            "tcp://here:0",
+            "tcp://here:99999",
+            "http://here:8786",
+            "",
+            "here:1",
+        ],
+    )
+    def test_what_is_no_address(self, address: str, tmp_path: Path) -> None:
+        with pytest.raises(InputError, match=r"is no address of a Dask scheduler \(give tcp://HOST:PORT"):
+            run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out", scheduler=address)
+        assert not (tmp_path / "out").exists()
+
+    @pytest.mark.parametrize("listens", [True, False])
+    def test_a_scheduler_that_does_not_answer(
+        self, listens: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    ) -> None:
+        assert dask_cluster.ANSWER_TIMEOUT_S == 10.0
+        monkeypatch.setattr(dask_cluster, "ANSWER_TIMEOUT_S", 1.0)
+        run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "earlier")
+        before = (tmp_path / "earlier" / "runs.csv").read_bytes()
+        with socket.socket() as silent:
+            silent.bind(("127.0.0.1", 0))
+            if listens:
+                silent.listen()
+            address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
+            for folder in ("out", "earlier"):
+                started_s = time.monotonic()
+                with pytest.raises(InputError, match=rf"{address} does not answer as a Dask scheduler within 1 s"):
+                    run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / folder, scheduler=address, overwrite=True)
+                assert time.monotonic() < started_s + 3.0
+        assert not (tmp_path / "out").exists()
+        assert (tmp_path / "earlier" / "runs.csv").read_bytes() == before
+        assert resume_campaign(tmp_path / "earlier").done == 1
+        assert capfd.readouterr().err == ""
+
+    def test_a_worker_s_address(self, cluster: Cluster) -> None:
+        worker = re.findall(r"worker at: *(tcp://[0-9.:]+)", cluster.log("dask_worker"))[-1]
+        with pytest.raises(InputError, match=rf"{worker} is a Dask worker \(give its scheduler's address"):
+            run_campaign("seams2023", ["none"], 1, 1, scheduler=worker)
+
+    def test_dask_is_not_installed(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setitem(sys.modules, "distributed", None)
+        with pytest.raises(InputError, match=r"\(pip install 'suave-des\[dask\]'\)"):
+            run_campaign("seams2023", ["none"], 1, 1, scheduler="tcp://127.0.0.1:8786")
+
+    def test_workers_besides_a_scheduler(self) -> None:
+        with pytest.raises(InputError, match=r"workers: 2 has no use with a scheduler"):
+            run_campaign("seams2023", ["none"], 1, 1, 2, scheduler="tcp://127.0.0.1:8786")
