@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import pytest
@@ -249,6 +250,20 @@ class TestCampaign:
         assert [each.time_s for each in scenario.thruster_events] == [35, 60]
         assert scenario.start.x_m == -17
 
+    def test_can_be_run(self, imported, tmp_path) -> None:
+        runner = RUNNER.replace('"num_runs": 20', '"num_runs": 6').replace('"metacontrol"', '"bt"')
+        imported(runner, MISSION_15.replace("300.0", "60.0"), campaign=True)
+        with pytest.raises(SystemExit) as ended:
+            main(["campaign", "campaign.yaml", "--workers", "1", "--out", "out"])
+        assert ended.value.code == 0
+        with Path("out/runs.csv").open(newline="") as file:
+            rows = list(csv.DictReader(file))
+        assert [row["manager"] for row in rows] == ["none"] * 6 + ["bt"] * 6
+        drawn = [tuple(row[key] for key in ("start.x_m", "start.y_m", "thruster_events.1.time_s")) for row in rows]
+        assert drawn[:6] == drawn[6:]  # all managers meet the same
+        assert len({*drawn[:5]}) == 1 and drawn[5] != drawn[4]  # five runs in a row share a draw
+        assert all(-18 <= float(x) <= -16 and 1.5 <= float(y) <= 2.5 and 55 <= float(t) <= 75 for x, y, t in drawn)
+
     def test_the_runner_s_values_count_over_the_mission_s(self, imported) -> None:
         result = imported(MISSION_2023, RUNNER, campaign=True)
         (note,) = notes_about(result, "given0.yaml: line 13")
@@ -324,7 +339,7 @@ class TestBadInput:
         [
             ("mission_node: [\n", "line 2", "not valid YAML"),
             ("- 1\n", "line 1", "not a mapping"),
-            ("mission_node: {time_limit: 300}\n", "line 1, /mission_node"[:8] + "mission_node", "no ros__parameters"),
+            ("mission_node: {time_limit: 300}\n", "line 1, mission_node", "no ros__parameters"),
             ("mission_node: {ros__parameters: [1]}\n", "line 1, mission_node.ros__parameters", "not a mapping"),
             ("mission_node: {ros__parameters: {time_limit: abc}}\n", "line 1, mission_node.time_limit", "'abc'"),
             ("mission_node: {ros__parameters: {time_limit: '300'}}\n", "line 1, mission_node.time_limit", "'300'"),
