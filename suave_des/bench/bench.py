@@ -33,7 +33,7 @@ class Bench:
         machine: what it was measured on.
         missions: of a campaign.
         took_s: time that measuring took.
-        campaigns: seconds, missions a second and memory of each campaign, by its name.
+        campaigns: seconds (wall and CPU), missions a second and memory of each campaign, by its name.
         cost: of a mission; see mission_cost.figures.
         stock: of the loop with stock owlready2 and Pellet; see stock_loop.figures.
     """
@@ -101,6 +101,7 @@ class _Lab:
             "missions": missions,
             "workers": workers,
             "wall_s": ended.wall_s,
+            "cpu_s": ended.cpu_s,
             "missions_a_second": missions / ended.wall_s,
             "parent_mb": ended.parent_mb,
             "worker_mb": ended.worker_mb,

@@ -33,12 +33,14 @@ class Ended:
 
     Attributes:
         wall_s: from its start to its end.
+        cpu_s: that it and its workers used.
         out: what it printed.
         parent_mb: greatest resident memory of its first process; none where the system does not tell.
         worker_mb: the same of the worker process that had most; none also where there was no worker.
     """
 
     wall_s: float
+    cpu_s: float
     out: str
     parent_mb: float | None
     worker_mb: float | None
@@ -60,7 +62,7 @@ def run(arguments: Sequence[str], folder: Path, environment: Mapping[str, str]) 
     path = os.pathsep.join(filter(None, [package, os.environ.get("PYTHONPATH")]))
     log = folder / "stderr.txt"
     with log.open("w") as errors:
-        begun = time.perf_counter()
+        begun, cpu_before_s = time.perf_counter(), _cpu_s()
         process = subprocess.Popen(
             [sys.executable, "-m", *arguments],
             cwd=folder,
@@ -77,7 +79,13 @@ def run(arguments: Sequence[str], folder: Path, environment: Mapping[str, str]) 
     if process.returncode:
         said = " ".join(log.read_text(errors="replace").split())[-400:]
         raise MeasurementError(f"{' '.join(arguments)} ended with status {process.returncode}: {said}")
-    return Ended(wall_s, out, memory.parent_mb(), memory.worker_mb())
+    return Ended(wall_s, _cpu_s() - cpu_before_s, out, memory.parent_mb(), memory.worker_mb())
+
+
+def _cpu_s() -> float:
+    """CPU time of all programs that were started here and have ended, and of those that they started."""
+    times = os.times()
+    return times.children_user + times.children_system
 
 
 @contextmanager

@@ -12,6 +12,8 @@ from typing import Any
 from suave_des import __version__
 
 _LIBRARIES = ("simpy", "numpy", "numba", "owlready2", "pydantic")
+_BUSY = 0.25
+"""Load for each core from which on a machine counts as busy."""
 
 
 def machine() -> dict[str, Any]:
@@ -32,6 +34,11 @@ def in_words(found: Mapping[str, Any]) -> str:
     libraries = ", ".join(f"{name} {found[name]}" for name in ("suave-des", *_LIBRARIES))
     cores, load = found["cores"], found["load"][0]
     return f"{found['processor']}, {cores} cores, load {load:.2f} at the start; {found['python']}, {libraries}"
+
+
+def is_busy(found: Mapping[str, Any]) -> bool:
+    """Whether others had so much of the machine before it began that what was measured is too slow."""
+    return bool(found["load"][0] > _BUSY * found["cores"])
 
 
 def _cores() -> int:

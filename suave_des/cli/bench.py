@@ -51,7 +51,7 @@ def bench(
 def _print(measured: Bench) -> None:
     from suave_des.bench.bench import MISSIONS
     from suave_des.bench.goals import MET, goal_rows, programs
-    from suave_des.bench.machine import in_words
+    from suave_des.bench.machine import in_words, is_busy
     from suave_des.cli.console import output
     from suave_des.cli.tables import plain_table, print_table
 
@@ -71,6 +71,10 @@ def _print(measured: Bench) -> None:
         others.add_row(each.what, _time(each.mission_s), _times(each.times_a_mission), each.note)
     console.print()
     print_table(console, "A mission in one process, and in two programs that one would write otherwise", others)
+    if is_busy(measured.machine):
+        console.print(
+            "\nThe machine was busy with other things before this began: what took time would take less alone."
+        )
     if measured.missions < MISSIONS:
         console.print(f"\n-: the goal is for {MISSIONS:,} missions", soft_wrap=True)
     console.print(f"\nmeasured in {measured.took_s:.0f} s", soft_wrap=True)

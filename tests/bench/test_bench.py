@@ -21,7 +21,7 @@ import suave_des
 from suave_des.bench.bench import Bench
 from suave_des.bench.children import MeasurementError, run
 from suave_des.bench.goals import goal_rows, programs
-from suave_des.bench.machine import in_words, machine
+from suave_des.bench.machine import in_words, is_busy, machine
 from suave_des.bench.mission_cost import MANAGER, SCENARIO, SEED, bare_program, count, kernel_ns_per_substep
 from suave_des.bench.stock_loop import TASKS, Known, Mission, Reasoner
 from suave_des.cli.main import main
@@ -33,7 +33,7 @@ NUMBER = {"type": "number"}
 CAMPAIGN = {
     "type": "object",
     "properties": {"wall_s": NUMBER, "missions_a_second": NUMBER, "workers": NUMBER, "missions": NUMBER},
-    "required": ["missions", "workers", "wall_s", "missions_a_second", "parent_mb", "worker_mb"],
+    "required": ["missions", "workers", "wall_s", "cpu_s", "missions_a_second", "parent_mb", "worker_mb"],
 }
 SCHEMA = {
     "type": "object",
@@ -331,6 +331,7 @@ class TestMeasuredPrograms:
 
     def test_what_it_prints_is_kept(self, tmp_path) -> None:
         ended = run(["suave_des", "--version"], tmp_path, {})
+        assert 0 < ended.cpu_s < 60
         assert ended.out == f"suave-des {suave_des.__version__}\n"
         assert ended.worker_mb is None
 
@@ -340,3 +341,8 @@ def test_the_machine_is_told_in_one_line() -> None:
     assert in_words(found).count("\n") == 0
     assert f"{found['cores']} cores" in in_words(found)
     assert json.loads(json.dumps(found)) == found
+
+
+@pytest.mark.parametrize(("load", "busy"), [(0.1, False), (1.5, True)])
+def test_a_busy_machine_is_told(load, busy) -> None:
+    assert is_busy({"load": [load, 0.0, 0.0], "cores": 2}) is busy
