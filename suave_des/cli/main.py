@@ -11,7 +11,19 @@ import typer
 from typer.core import TyperGroup
 
 from suave_des import __version__
-from suave_des.cli import calibrate, campaign, figure, kb, reproduce, run, scenarios, schema, validate
+from suave_des.cli import (
+    bench,
+    calibrate,
+    campaign,
+    figure,
+    import_config,
+    kb,
+    reproduce,
+    run,
+    scenarios,
+    schema,
+    validate,
+)
 from suave_des.cli.options import remember_command_line
 from suave_des.cli.signals import exit_status, told_by_exceptions
 from suave_des.errors import InputError, SuaveDesError
@@ -58,6 +70,8 @@ app.command("validate")(validate.validate)
 app.command("calibrate")(calibrate.calibrate)
 app.add_typer(kb.app, name="kb")
 app.command("figure")(figure.figure)
+app.command("import-config")(import_config.import_config)
+app.command("bench")(bench.bench)
 app.command("scenarios")(scenarios.scenarios)
 app.command("schema")(schema.schema)
 

@@ -101,7 +101,40 @@ def load_scenario(
         raise InputError(f"there is no reasoner {shown(reasoner)}", place="--reasoner", remedy=remedy)
     files = Files()
     path = find(name, "scenarios")
-    layer = scenario_layer(files, path)
+    return load_layer(
+        files,
+        scenario_layer(files, path),
+        path,
+        ontologies=ontologies,
+        modes_file=modes_file,
+        reasoner=reasoner,
+        rules=rules,
+        disabled_rules=disabled_rules,
+    )
+
+
+def load_layer(
+    files: Files,
+    layer: Layer,
+    path: Path,
+    *,
+    ontologies: Sequence[str | Path] = (),
+    modes_file: str | Path | None = None,
+    reasoner: str | None = None,
+    rules: Sequence[str | Path] = (),
+    disabled_rules: Sequence[str] = (),
+) -> LoadedScenario:
+    """Check a scenario that is merged over its base already, and read the other files that it names.
+
+    Args:
+        files: reader of the files.
+        layer: the scenario.
+        path: the scenario's file.
+        ontologies: as of load_scenario, likewise modes_file, reasoner, rules and disabled_rules.
+
+    Raises:
+        InputError: as load_scenario does.
+    """
     layer = Layer({**layer.data, "name": _name(layer, path)}, layer.places)
     try:
         scenario = Scenario.model_validate(layer.data)

@@ -1,0 +1,1 @@
+"""How fast missions are on this machine, beside what one would write otherwise."""

@@ -1,0 +1,173 @@
+"""Programs that are measured from outside, each in a process of its own: how long they take, and how much memory."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import suave_des
+from suave_des.errors import SuaveDesError
+
+_PROC = Path("/proc")
+_SAMPLE_S = 0.1
+_END_S = 10.0
+_WORKER = b"spawn_main"
+"""Stands on the command line of Python's worker processes."""
+
+
+class MeasurementError(SuaveDesError):
+    """A program that was to be measured failed."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """A program that has ended.
+
+    Attributes:
+        wall_s: from its start to its end.
+        cpu_s: that it and its workers used.
+        out: what it printed.
+        parent_mb: greatest resident memory of its first process; none where the system does not tell.
+        worker_mb: the same of the worker process that had most; none also where there was no worker.
+    """
+
+    wall_s: float
+    cpu_s: float
+    out: str
+    parent_mb: float | None
+    worker_mb: float | None
+
+
+def run(arguments: Sequence[str], folder: Path, environment: Mapping[str, str]) -> Ended:
+    """Run `python -m ARGUMENTS` to its end.
+
+    Args:
+        arguments: module and arguments.
+        folder: to run in, and for temporary files.
+        environment: variables besides those of this process.
+
+    Raises:
+        MeasurementError: it failed.
+        KeyboardInterrupt: Ctrl-C; the program and its workers have ended then.
+    """
+    package = str(Path(suave_des.__file__).resolve().parents[1])
+    path = os.pathsep.join(filter(None, [package, os.environ.get("PYTHONPATH")]))
+    log = folder / "stderr.txt"
+    with log.open("w") as errors:
+        begun, cpu_before_s = time.perf_counter(), _cpu_s()
+        process = subprocess.Popen(
+            [sys.executable, "-m", *arguments],
+            cwd=folder,
+            env={**os.environ, "PYTHONPATH": path, "TMPDIR": str(folder), **environment},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=errors,
+            text=True,
+            process_group=0,  # Ctrl-C reaches this process alone, which passes it on once
+        )
+        with _ended_at_last(process), _memory(process.pid) as memory:
+            out, _ = process.communicate()
+            wall_s = time.perf_counter() - begun
+    if process.returncode:
+        said = " ".join(log.read_text(errors="replace").split())[-400:]
+        raise MeasurementError(f"{' '.join(arguments)} ended with status {process.returncode}: {said}")
+    return Ended(wall_s, _cpu_s() - cpu_before_s, out, memory.parent_mb(), memory.worker_mb())
+
+
+def _cpu_s() -> float:
+    """CPU time of all programs that were started here and have ended, and of those that they started."""
+    times = os.times()
+    return times.children_user + times.children_system
+
+
+@contextmanager
+def _ended_at_last(process: subprocess.Popen[str]) -> Iterator[None]:
+    """Ends a process in which nobody is interested any more: as Ctrl-C does, so that it ends its workers."""
+    try:
+        yield
+    finally:
+        if process.poll() is None:
+            with _interrupts_held():
+                process.send_signal(signal.SIGINT)
+                try:
+                    process.communicate(timeout=_END_S)
+                except subprocess.TimeoutExpired:
+                    process.kill()
+                    process.communicate()
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Hold a second Ctrl-C back until all is tidied up."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _memory(pid: int) -> Iterator[_Memory]:
+    """Watches the memory of a process and of its workers as long as it lives."""
+    memory = _Memory(pid)
+    stop = threading.Event()
+
+    def watch() -> None:
+        while not stop.wait(_SAMPLE_S):
+            memory.look()
+
+    thread = threading.Thread(target=watch, daemon=True)
+    thread.start()
+    try:
+        yield memory
+    finally:
+        stop.set()
+        thread.join()
+
+
+class _Memory:
+    """Greatest resident memory of a process and of each of its children, as Linux counts it (VmHWM)."""
+
+    def __init__(self, pid: int) -> None:
+        self._pid = pid
+        self._peaks_mb: dict[int, float] = {}
+
+    def look(self) -> None:
+        """Take note of what the system tells now; the system itself keeps the greatest value."""
+        for pid in (self._pid, *self._workers()):
+            peak_mb = _peak_mb(pid)
+            if peak_mb is not None:
+                self._peaks_mb[pid] = peak_mb
+
+    def parent_mb(self) -> float | None:
+        """Of the process itself."""
+        return self._peaks_mb.get(self._pid)
+
+    def worker_mb(self) -> float | None:
+        """Of the worker that had most."""
+        return max((peak for pid, peak in self._peaks_mb.items() if pid != self._pid), default=None)
+
+    def _workers(self) -> Iterator[int]:
+        for task in _PROC.glob(f"{self._pid}/task/*/children"):
+            with suppress(OSError):
+                for child in task.read_text().split():
+                    with suppress(OSError):
+                        if _WORKER in (_PROC / child / "cmdline").read_bytes():
+                            yield int(child)
+
+
+def _peak_mb(pid: int) -> float | None:
+    """Greatest resident memory of a process so far; none if it is gone, or where there is no /proc."""
+    with suppress(OSError, ValueError):
+        for line in (_PROC / str(pid) / "status").read_text().splitlines():
+            if line.startswith("VmHWM:"):
+                return int(line.split()[1]) / 1024
+    return None

@@ -1,0 +1,348 @@
+"""What `suave-des bench` measures, tells and writes; how fast anything is plays no part here."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import ClassVar
+from unittest.mock import patch
+
+import jsonschema
+import pytest
+import simpy
+
+import suave_des
+from suave_des.bench.bench import Bench
+from suave_des.bench.children import MeasurementError, run
+from suave_des.bench.goals import goal_rows, programs
+from suave_des.bench.machine import in_words, is_busy, machine
+from suave_des.bench.mission_cost import MANAGER, SCENARIO, SEED, bare_program, count, kernel_ns_per_substep
+from suave_des.bench.stock_loop import TASKS, Known, Mission, Reasoner
+from suave_des.cli.main import main
+from suave_des.resources import shipped_folder
+from suave_des.scenario.loader import load_scenario
+from suave_des.simulation.simulator import Simulator
+
+NUMBER = {"type": "number"}
+CAMPAIGN = {
+    "type": "object",
+    "properties": {"wall_s": NUMBER, "missions_a_second": NUMBER, "workers": NUMBER, "missions": NUMBER},
+    "required": ["missions", "workers", "wall_s", "cpu_s", "missions_a_second", "parent_mb", "worker_mb"],
+}
+SCHEMA = {
+    "type": "object",
+    "properties": {
+        "format": {"const": 1},
+        "command": {"type": "array", "items": {"type": "string"}},
+        "machine": {"type": "object", "required": ["processor", "cores", "load", "system", "python", "simpy"]},
+        "missions": {"const": 20},
+        "took_s": NUMBER,
+        "campaigns": {
+            "type": "object",
+            "additionalProperties": CAMPAIGN,
+            "required": ["cold", "warm", "one_worker"],
+        },
+        "cost": {"type": "object", "additionalProperties": NUMBER},
+        "stock": {"type": "object", "additionalProperties": NUMBER},
+        "rows": {"type": "array", "items": {"type": "object", "required": ["what", "goal", "value", "unit", "met"]}},
+        "programs": {"type": "array", "items": {"type": "object", "required": ["what", "mission_s", "note"]}},
+    },
+    "additionalProperties": False,
+}
+SCHEMA["required"] = list(SCHEMA["properties"])
+
+SEARCHING_HIGH = {"f_maintain_motion": "fd_all_thrusters", "f_generate_search_path": "fd_spiral_high"}
+
+
+def started(*arguments: str, cwd: Path, temporary: Path) -> subprocess.Popen[str]:
+    path = os.pathsep.join([str(Path(suave_des.__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
+    return subprocess.Popen(
+        [sys.executable, "-m", "suave_des", "bench", *arguments],
+        cwd=cwd,
+        env={**os.environ, "PYTHONPATH": path, "TMPDIR": str(temporary)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def processes_in(folder: Path) -> list[str]:
+    """Processes whose current folder is within one."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            if (process / "cwd").readlink().is_relative_to(folder):
+                found.append(process.name)
+        except OSError:
+            continue
+    return found
+
+
+@pytest.fixture(scope="module")
+def quick(tmp_path_factory):
+    """A quick run: what it printed, what it said, its JSON file, and the folder for temporary files."""
+    folder, temporary = tmp_path_factory.mktemp("bench"), tmp_path_factory.mktemp("temporary")
+    process = started("--missions", "20", "--json", "figures.json", cwd=folder, temporary=temporary)
+    out, err = process.communicate(timeout=300)
+    assert process.returncode == 0, err
+    return out, err, json.loads((folder / "figures.json").read_text()), temporary
+
+
+@pytest.fixture(scope="module")
+def simulator():
+    return Simulator(load_scenario(SCENARIO))
+
+
+class TestCommand:
+    def test_tells_machine_goals_stand_ins_and_time(self, quick) -> None:
+        out, _, figures, _ = quick
+        assert out.splitlines()[0].startswith(figures["machine"]["processor"])
+        for row in figures["rows"]:
+            line = next(line for line in out.splitlines() if line.startswith(row["what"]))
+            assert row["goal"] in line
+        for program in ("suave-des, metacontrol", "bare SimPy loop", "SimPy with stock owlready2 and Pellet"):
+            assert program in out
+        assert "extrapolated from" in out
+        assert "measured in" in out
+        assert out.endswith("The figures are in figures.json\n")
+
+    def test_says_on_standard_error_what_it_is_at(self, quick) -> None:
+        lines = [line for line in quick[1].splitlines() if line.startswith("measuring, ")]
+        assert [line.split()[1] for line in lines] == ["1", "2", "3", "4", "5"]
+
+    def test_writes_figures_of_one_form(self, quick) -> None:
+        jsonschema.validate(quick[2], SCHEMA)
+
+    def test_figures_agree_with_one_another(self, quick) -> None:
+        figures = quick[2]
+        for campaign in figures["campaigns"].values():
+            assert campaign["missions"] / campaign["wall_s"] == pytest.approx(campaign["missions_a_second"])
+        cost = figures["cost"]
+        kernel_us = cost["substeps_a_mission"] * cost["kernel_ns_a_substep"] / 1000
+        assert cost["mission_cpu_us"] - kernel_us == pytest.approx(cost["mission_without_kernel_cpu_us"])
+
+    @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="this system does not tell")
+    def test_measures_memory_of_parent_and_workers(self, quick) -> None:
+        campaigns = quick[2]["campaigns"]
+        assert all(campaign["parent_mb"] > 10 for campaign in campaigns.values())
+        assert campaigns["warm"]["worker_mb"] > 10
+        assert campaigns["one_worker"]["worker_mb"] is None
+
+    def test_goals_for_more_missions_are_neither_met_nor_missed(self, quick) -> None:
+        met = {row["what"]: row["met"] for row in quick[2]["rows"]}
+        assert met["metacontrol missions a second, 2 workers, CSV written"] is None
+        assert met["vehicle kernel, a 6-DOF substep"] is not None
+
+    def test_leaves_no_temporary_files(self, quick) -> None:
+        assert list(quick[3].iterdir()) == []
+
+    @pytest.mark.skipif(not Path("/proc/self/cwd").exists(), reason="looks for processes in /proc")
+    @pytest.mark.parametrize("moment_s", [0.0, 2.5])
+    def test_ctrl_c_ends_everything(self, tmp_path, moment_s) -> None:
+        process = started("--json", "figures.json", cwd=tmp_path, temporary=tmp_path)
+        said = process.stderr.readline()
+        deadline_s = time.monotonic() + 30
+        while len(processes_in(tmp_path)) < 2 and time.monotonic() < deadline_s:  # bench itself, and a campaign
+            time.sleep(0.05)
+        time.sleep(moment_s)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+        assert said.startswith("measuring, 1 of ")
+        assert process.returncode == 130
+        assert (out, err) == ("", "suave-des: interrupted\n")
+        assert list(tmp_path.iterdir()) == []
+        assert processes_in(tmp_path) == []
+
+    @pytest.mark.parametrize(
+        ("arguments", "problem"),
+        [
+            (["--json", "nowhere/figures.json"], "no folder nowhere"),
+            (["--json", "."], "is a folder"),
+            (["--json", "there.json"], "is there already"),
+            (["--missions", "1"], "--missions"),
+            (["--missions", "many"], "valid integer"),
+        ],
+    )
+    def test_bad_input_is_one_line_before_anything_is_measured(
+        self, tmp_path, monkeypatch, capsys, arguments, problem
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        Path("there.json").write_text("kept")
+        with pytest.raises(SystemExit) as ended:
+            main(["bench", *arguments])
+        captured = capsys.readouterr()
+        assert ended.value.code == 2
+        assert captured.out == ""
+        assert len(captured.err.splitlines()) == 1
+        assert problem in captured.err
+        assert Path("there.json").read_text() == "kept"
+
+
+class TestCounting:
+    def test_leaves_missions_as_they_are(self, simulator) -> None:
+        before = simulator.run(MANAGER, 3, SEED).metrics
+        counted = count(lambda: simulator.run(MANAGER, 3, SEED))
+        assert simulator.run(MANAGER, 3, SEED).metrics == before
+        assert count(lambda: simulator.run(MANAGER, 3, SEED)) == counted
+
+    def test_a_shorter_mission_has_fewer_of_everything(self, simulator) -> None:
+        scenario = simulator.loaded.scenario
+        short = scenario.model_copy(update={"mission": scenario.mission.model_copy(update={"time_limit_s": 60.0})})
+        few = count(lambda: Simulator(replace(simulator.loaded, scenario=short)).run(MANAGER, 3, SEED))
+        many = count(lambda: simulator.run(MANAGER, 3, SEED))
+        assert few.events < many.events
+        assert few.substeps < many.substeps
+        assert few.substeps > 60 / 0.05
+
+    def test_nothing_to_count_is_an_error(self) -> None:
+        with pytest.raises(RuntimeError, match="without events"):
+            count(lambda: None)
+
+    @pytest.mark.parametrize(("events", "processes"), [(24, 12), (25, 12), (990, 12), (373, 40)])
+    def test_the_bare_program_has_as_many_events_and_processes(self, events, processes) -> None:
+        seen = []
+
+        class Watching(simpy.Environment):
+            def step(self):
+                super().step()  # raises at the end, when there is no event left
+                seen.append("event")
+
+            def process(self, generator):
+                seen.append("process")
+                return simpy.Process(self, generator)
+
+        with patch.object(simpy, "Environment", Watching):
+            bare_program(events, processes)
+        assert (seen.count("event"), seen.count("process")) == (events, processes)
+
+    def test_the_kernel_takes_some_time(self) -> None:
+        assert kernel_ns_per_substep() > 0
+
+
+class TestStockLoop:
+    """The stand-in decides as it should: once through what thruster and visibility can do."""
+
+    @pytest.mark.parametrize(
+        ("known", "designs"),
+        [
+            (Known(TASKS[0], 3.5), SEARCHING_HIGH),
+            (
+                Known(TASKS[0], 3.0, "FALSE", SEARCHING_HIGH),
+                {"f_maintain_motion": "fd_recover_thrusters", "f_generate_search_path": "fd_spiral_medium"},
+            ),
+        ],
+    )
+    def test_decisions(self, known, designs) -> None:
+        assert Reasoner(shipped_folder("ontology")).plan(known) == designs
+
+    def test_a_mission_finds_and_inspects_the_pipeline(self) -> None:
+        class Ready(Reasoner):
+            """Decides at once, without Java."""
+
+            def plan(self, known):
+                spiral = "high" if known.visibility_m >= 3.25 else "medium" if known.visibility_m >= 2.25 else "low"
+                motion = "recover" if known.thruster == "FALSE" else "all"
+                follow = {"f_follow_pipeline": "fd_follow_pipeline"} if "f_follow_pipeline" in known.functions else {}
+                return {
+                    "f_maintain_motion": f"fd_{motion}_thrusters",
+                    "f_generate_search_path": f"fd_spiral_{spiral}",
+                    **follow,
+                }
+
+        mission = Mission(Ready(shipped_folder("ontology")))
+        mission.run(300.0)
+        assert mission.inferences == 150
+        assert mission.found_s is not None and 20 < mission.found_s < 300
+        assert mission.inspected_m > 10
+
+
+class TestGoals:
+    CAMPAIGN: ClassVar = {
+        "missions": 10_000,
+        "wall_s": 5.0,
+        "missions_a_second": 2000.0,
+        "parent_mb": 200.0,
+        "worker_mb": 200.0,
+    }
+    COST: ClassVar = {
+        "mission_without_kernel_over_bare": 1.5,
+        "kernel_ns_a_substep": 70.0,
+        "mission_cpu_us": 1000.0,
+        "bare_cpu_us": 500.0,
+        "events_a_mission": 400.0,
+        "processes_a_mission": 12.0,
+    }
+    MUCH: ClassVar = {"memory of a worker, 10,000 missions", "  the same for few and many: worker"}
+    STOCK: ClassVar = {"inferences_measured": 10.0, "inferences_a_mission": 150.0, "mission_s": 150.0}
+
+    def bench(self, **changed) -> Bench:
+        campaigns = {
+            "cold": {**self.CAMPAIGN, "wall_s": 12.0},
+            "warm": self.CAMPAIGN,
+            "one_worker": {**self.CAMPAIGN, "wall_s": 9.8},
+            "small": {**self.CAMPAIGN, "missions": 1000},
+        }
+        return replace(Bench({}, 10_000, 60.0, campaigns, self.COST, self.STOCK), **changed)
+
+    def test_met(self) -> None:
+        assert {row.met for row in goal_rows(self.bench())} == {True}
+
+    @pytest.mark.parametrize(
+        ("campaign", "key", "value", "missed"),
+        [
+            ("warm", "missions_a_second", 1499.0, {"metacontrol missions a second, 2 workers, CSV written"}),
+            ("warm", "wall_s", 5.2, {"2 workers against 1"}),
+            ("warm", "wall_s", 8.1, {"2 workers against 1", "10,000 missions, filled memory and caches"}),
+            ("cold", "wall_s", 20.1, {"10,000 missions, cold start"}),
+            ("small", "parent_mb", 150.0, {"  the same for few and many: parent"}),
+            ("warm", "worker_mb", 401.0, MUCH),
+        ],
+    )
+    def test_missed(self, campaign, key, value, missed) -> None:
+        campaigns = dict(self.bench().campaigns)
+        campaigns[campaign] = {**campaigns[campaign], key: value}
+        assert {row.what for row in goal_rows(self.bench(campaigns=campaigns)) if not row.met} == missed
+
+    def test_memory_that_the_system_does_not_tell_is_left_open(self) -> None:
+        unknown = {"parent_mb": None, "worker_mb": None}
+        campaigns = {name: {**found, **unknown} for name, found in self.bench().campaigns.items()}
+        rows = [row for row in goal_rows(self.bench(campaigns=campaigns)) if "memory of" in row.what]
+        assert rows and all(row.met is None and row.measured == "not told by this system" for row in rows)
+
+    def test_programs_are_compared_with_a_mission_here(self) -> None:
+        assert [each.times_a_mission for each in programs(self.bench())] == [1.0, 0.5, 150_000.0]
+
+    def test_can_be_written_as_json(self) -> None:
+        assert json.loads(json.dumps(asdict(self.bench())))["missions"] == 10_000
+
+
+class TestMeasuredPrograms:
+    def test_one_that_fails_is_told_with_what_it_said(self, tmp_path) -> None:
+        with pytest.raises(
+            MeasurementError, match=r"suave_des campaign nowhere --out o ended with status 2: .*no such file"
+        ):
+            run(["suave_des", "campaign", "nowhere", "--out", "o"], tmp_path, {})
+
+    def test_what_it_prints_is_kept(self, tmp_path) -> None:
+        ended = run(["suave_des", "--version"], tmp_path, {})
+        assert 0 < ended.cpu_s < 60
+        assert ended.out == f"suave-des {suave_des.__version__}\n"
+        assert ended.worker_mb is None
+
+
+def test_the_machine_is_told_in_one_line() -> None:
+    found = machine()
+    assert in_words(found).count("\n") == 0
+    assert f"{found['cores']} cores" in in_words(found)
+    assert json.loads(json.dumps(found)) == found
+
+
+@pytest.mark.parametrize(("load", "busy"), [(0.1, False), (1.5, True)])
+def test_a_busy_machine_is_told(load, busy) -> None:
+    assert is_busy({"load": [load, 0.0, 0.0], "cores": 2}) is busy
