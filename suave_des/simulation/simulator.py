@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -47,10 +48,12 @@ class Simulator:
 
     Args:
         loaded: the scenario with its files.
+        runs_per_draw: how many runs in a row share the value drawn for a key path; one, if the path is not in it.
     """
 
-    def __init__(self, loaded: LoadedScenario) -> None:
+    def __init__(self, loaded: LoadedScenario, runs_per_draw: Mapping[str, int] = MappingProxyType({})) -> None:
         self.loaded = loaded
+        self.runs_per_draw = dict(runs_per_draw)
         pipeline = loaded.scenario.pipeline
         self.points = sample_points(pipeline.vertices_m, pipeline.points_per_piece)
         height = loaded.scenario.revision.monitors.detected_point_height_m
@@ -87,7 +90,7 @@ class _Mission:
         self.scenario = simulator.loaded.scenario
         self.revision = self.scenario.revision
         self.manager_name, self.run, self.seed = manager, run, seed
-        self.chance = Chance(seed, run)
+        self.chance = Chance(seed, run, simulator.runs_per_draw)
         self.env = simpy.Environment()
         self.recorder = Recorder(self.env, enabled=record)
         self.bus = DiagnosticsBus()
