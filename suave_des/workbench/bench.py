@@ -9,12 +9,12 @@ from pathlib import Path
 
 from suave_des.knowledge.base import KnowledgeBase as Ontologies
 from suave_des.knowledge.deliberation import Conclusion, Deliberation
+from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit, in_words
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import KnowledgeState, Number
 from suave_des.scenario.loader import load_scenario
 from suave_des.workbench.difference import PolicyDifference, compare
 from suave_des.workbench.explain import Explanation, explain
-from suave_des.workbench.limit import TIME_LIMIT_S, LimitedReasoner, TimeLimit, in_words
 from suave_des.workbench.policy import Policy, Space, make_policy
 from suave_des.workbench.query import QueryResult, run_query
 from suave_des.workbench.states import Loop, state_from
@@ -73,13 +73,12 @@ class KnowledgeBase:
         base = Ontologies.load(
             loaded.ontologies, values=values, rules=loaded.rules, disabled_rules=knowledge.disabled_rules
         )
-        return cls.of(base, Loop.of(loaded.scenario), knowledge.reasoner, TimeLimit(time_limit_s))
+        return cls.of(base, Loop.of(loaded.scenario), knowledge.reasoner, TimeLimit(time_limit_s, "--time-limit"))
 
     @classmethod
     def of(cls, base: Ontologies, loop: Loop, reasoner: str, limit: TimeLimit) -> KnowledgeBase:
         """A workbench on ontologies that are loaded already."""
-        inner = limit.run(lambda: make_reasoner(reasoner, base), "loading the ontologies")
-        return cls(base, loop, reasoner, limit, Deliberation(base, LimitedReasoner(inner, limit)))
+        return cls(base, loop, reasoner, limit, Deliberation(base, make_reasoner(reasoner, base, limit)))
 
     def state(
         self,
