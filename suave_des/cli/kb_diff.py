@@ -89,7 +89,7 @@ def _grouped(difference: PolicyDifference) -> dict[tuple[str, str, str, str], li
 
 def _where(pairs: list[CellPair]) -> Iterator[str]:
     """The measured values, and what components report in each; neighbouring regions are one."""
-    from suave_des.workbench.limit import in_words
+    from suave_des.knowledge.limit import in_words
 
     by_regions: dict[tuple[Any, ...], int] = {}
     for pair in pairs:

@@ -109,7 +109,7 @@ def _print_table(table: FunctionTable) -> None:
 
 
 def _summary(found: Policy) -> Iterator[str]:
-    from suave_des.workbench.limit import in_words
+    from suave_des.knowledge.limit import in_words
     from suave_des.workbench.policy import FLIP_FLOP, INCONSISTENT, NONE_LEFT
 
     most = found.max_failed

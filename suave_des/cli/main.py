@@ -119,7 +119,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _abandoned() -> int:
     """How often a reasoner was given up on in this process."""
-    limit = sys.modules.get("suave_des.workbench.limit")
+    limit = sys.modules.get("suave_des.knowledge.limit")
     return 0 if limit is None else int(limit.times_abandoned())
 
 

@@ -12,6 +12,7 @@ from typing import Final, Protocol
 
 from suave_des.errors import InputError
 from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.limit import LOADING, TimeLimit, reasoning_on
 from suave_des.knowledge.model import facts_of
 from suave_des.knowledge.situation import Triple
 from suave_des.knowledge.state import Inference, KnowledgeState
@@ -30,7 +31,8 @@ class Reasoner(Protocol):
 
         Raises:
             KnowledgeError: state and ontologies contradict one another, or Pellet does not use one of the
-                rules; the message names the individual and the property, or the rule.
+                rules; the message names the individual and the property, or the rule. Or it takes too long: the
+                message names the state.
         """
         ...
 
@@ -39,7 +41,7 @@ class _Remembering:
     """A backend with a bounded memory of exact states."""
 
     def __init__(
-        self, name: str, kb: KnowledgeBase, entailed: Callable[[tuple[Triple, ...]], Iterable[Triple]]
+        self, name: str, kb: KnowledgeBase, entailed: Callable[[KnowledgeState, tuple[Triple, ...]], Iterable[Triple]]
     ) -> None:
         self.name = name
         self._kb = kb
@@ -60,58 +62,67 @@ class _Remembering:
     def _infer(self, state: KnowledgeState) -> Inference:
         situation = self._kb.situation(state)
         asserted = self._kb.facts.union(facts_of(situation, self._kb.names))
-        entailed = facts_of(self._entailed(situation), self._kb.names)
+        entailed = facts_of(self._entailed(state, situation), self._kb.names)
         return Inference(state, asserted, frozenset(entailed) - asserted)
 
 
-def _pellet(kb: KnowledgeBase) -> Reasoner:
+def _pellet(kb: KnowledgeBase, limit: TimeLimit) -> Reasoner:
     from suave_des.knowledge.pellet import InProcessPellet
 
-    return _Remembering("pellet", kb, InProcessPellet(kb).infer)
+    pellet = limit.run(lambda: InProcessPellet(kb), LOADING)
+
+    def entailed(state: KnowledgeState, situation: tuple[Triple, ...]) -> Iterable[Triple]:
+        return limit.run(lambda: pellet.infer(situation), reasoning_on(state))
+
+    return _Remembering("pellet", kb, entailed)
 
 
-def _owlready2(kb: KnowledgeBase) -> Reasoner:
+def _owlready2(kb: KnowledgeBase, limit: TimeLimit) -> Reasoner:
     from suave_des.knowledge.pellet import InProcessPellet
     from suave_des.knowledge.stock import StockPellet
 
     stock = StockPellet(kb)
     checker: list[InProcessPellet] = []
 
-    def entailed(situation: tuple[Triple, ...]) -> Iterable[Triple]:
+    def entailed(state: KnowledgeState, situation: tuple[Triple, ...]) -> Iterable[Triple]:
         # owlready2 throws Pellet's log away, and with it the only word on a rule that was dropped, or on
         # what contradicts what. The Pellet in this process tells: once at the start, and for contradictions.
         if not checker:
-            checker.append(InProcessPellet(kb))
-        found = stock.infer(situation)
-        return checker[0].infer(situation) if found is None else found
+            checker.append(limit.run(lambda: InProcessPellet(kb), reasoning_on(state)))
+        try:
+            found = stock.infer(situation, limit.seconds)
+        except TimeoutError:
+            raise limit.exceeded(reasoning_on(state)) from None
+        return limit.run(lambda: checker[0].infer(situation), reasoning_on(state)) if found is None else found
 
     return _Remembering("owlready2", kb, entailed)
 
 
-def _remembered(kb: KnowledgeBase) -> Reasoner:
+def _remembered(kb: KnowledgeBase, limit: TimeLimit) -> Reasoner:
     from suave_des.knowledge.remembered import Remembered
 
-    return Remembered(kb)
+    return Remembered(kb, limit=limit)
 
 
-BACKENDS: Final[Mapping[str, Callable[[KnowledgeBase], Reasoner]]] = MappingProxyType(
+BACKENDS: Final[Mapping[str, Callable[[KnowledgeBase, TimeLimit], Reasoner]]] = MappingProxyType(
     {"owlready2": _owlready2, "pellet": _pellet, "remembered": _remembered}
 )
 
 
-def make_reasoner(name: str, kb: KnowledgeBase) -> Reasoner:
+def make_reasoner(name: str, kb: KnowledgeBase, limit: TimeLimit | None = None) -> Reasoner:
     """A reasoner by name.
 
     Args:
         name: "remembered" (asks Pellet once for each situation that the rules can tell apart), "pellet" (kept running
             in this process) or "owlready2" (stock, the reference).
         kb: the knowledge base.
+        limit: of the time that Pellet may take for one state, or to load the ontologies; None: a minute.
 
     Raises:
         InputError: the name is unknown, or there is no usable Java.
-        KnowledgeError: the ontologies are inconsistent by themselves, or Pellet drops a rule.
+        KnowledgeError: the ontologies are inconsistent by themselves, Pellet drops a rule, or it takes too long.
     """
     make = BACKENDS.get(name)
     if make is None:
         raise InputError(f"there is no reasoner {name!r}", remedy=f"one of {', '.join(sorted(BACKENDS))}")
-    return make(kb)
+    return make(kb, limit or TimeLimit())

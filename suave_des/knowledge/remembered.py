@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.limit import TimeLimit, reasoning_on
 from suave_des.knowledge.memory import DiskMemory
 from suave_des.knowledge.model import facts_of
 from suave_des.knowledge.regions import Key, regions_of
+from suave_des.knowledge.situation import Triple
 from suave_des.knowledge.state import Fact, Inference, KnowledgeState
 
 if TYPE_CHECKING:
@@ -32,12 +34,14 @@ class Remembered:
     Args:
         kb: the knowledge base.
         folder: of the memory on disk, in place of the user's cache folder.
+        limit: of the time that Pellet may take for one state; None: a minute.
     """
 
     name = "remembered"
 
-    def __init__(self, kb: KnowledgeBase, folder: Path | None = None) -> None:
+    def __init__(self, kb: KnowledgeBase, folder: Path | None = None, limit: TimeLimit | None = None) -> None:
         self._kb = kb
+        self._limit = limit or TimeLimit()
         self.regions = regions_of(kb)
         self._key = self.regions.key
         self._disk = DiskMemory(memory_digest(kb), folder)
@@ -48,7 +52,8 @@ class Remembered:
         """What Pellet adds to the state, asked or remembered.
 
         Raises:
-            KnowledgeError: state and ontologies contradict one another, or Pellet does not use one of the rules.
+            KnowledgeError: state and ontologies contradict one another, Pellet does not use one of the rules, or it
+                takes too long.
         """
         key = self._key(state)
         facts = self._memory.get(key)
@@ -56,18 +61,22 @@ class Remembered:
 
     def _ask(self, state: KnowledgeState, key: Key) -> Inference:
         situation = self._kb.situation(state)
-        if self._pellet is None:
-            from suave_des.knowledge.pellet import InProcessPellet
-
-            self._pellet = InProcessPellet(self._kb)
         asserted = self._kb.asserted(state)
-        facts = frozenset(facts_of(self._pellet.infer(situation), self._kb.names)) - asserted
+        entailed = self._limit.run(lambda: self._entailed(situation), reasoning_on(state))
+        facts = frozenset(facts_of(entailed, self._kb.names)) - asserted
         if not self._mentions_measured(state, facts):
             self._memory[key] = facts
             if len(self._memory) > CAPACITY:
                 del self._memory[next(iter(self._memory))]
             self._disk.add(key, facts)
         return Inference(state, asserted, facts)
+
+    def _entailed(self, situation: tuple[Triple, ...]) -> frozenset[Triple]:
+        if self._pellet is None:
+            from suave_des.knowledge.pellet import InProcessPellet
+
+            self._pellet = InProcessPellet(self._kb)
+        return self._pellet.infer(situation)
 
     def _mentions_measured(self, state: KnowledgeState, facts: frozenset[Fact]) -> bool:
         """Whether a measured value came back in what was inferred, which would be stale in another state."""

@@ -6,6 +6,7 @@ Slow (about a second each) and simple: the reference that the in-process backend
 from __future__ import annotations
 
 import io
+import subprocess
 from collections.abc import Iterator, Sequence
 from decimal import Decimal
 from pathlib import Path
@@ -13,6 +14,7 @@ from types import TracebackType
 from typing import Any, Final
 
 import owlready2
+import owlready2.reasoning
 from rdflib import Literal, URIRef
 from rdflib.namespace import OWL, RDF, RDFS
 from rdflib.term import Node
@@ -40,8 +42,14 @@ class StockPellet:
         self._properties = properties_to_read(kb.content)
         self._classes = sorted(kb.content.head_classes())
 
-    def infer(self, situation: Sequence[Triple]) -> frozenset[Triple] | None:
-        """What holds of the properties and classes to read; None when the situation contradicts itself."""
+    def infer(self, situation: Sequence[Triple], limit_s: float | None = None) -> frozenset[Triple] | None:
+        """What holds of the properties and classes to read; None when the situation contradicts itself.
+
+        Raises:
+            TimeoutError: it took longer than the limit; its Java process is ended.
+        """
+        # What owlready2 hands on to subprocess.run, which has no other way to be told.
+        owlready2.reasoning._subprocess_kargs["timeout"] = limit_s
         owlready2.JAVA_EXE = str(java_executable())
         world = owlready2.World()
         try:
@@ -96,6 +104,8 @@ def _reason(world: owlready2.World) -> bool:
         _remove_left_behind(error.__traceback__)
         if isinstance(error, owlready2.OwlReadyInconsistentOntologyError):
             return False
+        if isinstance(error, subprocess.TimeoutExpired):
+            raise TimeoutError from error
         if isinstance(error, owlready2.OwlReadyJavaError):
             reason = " ".join(str(error).split())[:400]
             raise KnowledgeError(f"Pellet, run by owlready2, failed: {reason}") from error

@@ -8,13 +8,13 @@ from pathlib import Path
 
 from suave_des.knowledge.base import KnowledgeBase as Ontologies
 from suave_des.knowledge.deliberation import Conclusion, Deliberation
+from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit, in_words
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import KnowledgeState, Number
 from suave_des.scenario.loader import load_scenario
 from suave_des.simulation.knowledge import open_base
 from suave_des.workbench.difference import PolicyDifference, compare
 from suave_des.workbench.explain import Explanation, explain
-from suave_des.workbench.limit import TIME_LIMIT_S, LimitedReasoner, TimeLimit, in_words
 from suave_des.workbench.policy import Policy, Space, make_policy
 from suave_des.workbench.query import QueryResult, run_query
 from suave_des.workbench.states import Loop, state_from
@@ -69,13 +69,12 @@ class KnowledgeBase:
             scenario, ontologies=ontologies, reasoner=reasoner, rules=rules, disabled_rules=disabled_rules
         )
         reasoner = loaded.scenario.knowledge.reasoner
-        return cls.of(open_base(loaded), Loop.of(loaded.scenario), reasoner, TimeLimit(time_limit_s))
+        return cls.of(open_base(loaded), Loop.of(loaded.scenario), reasoner, TimeLimit(time_limit_s, "--time-limit"))
 
     @classmethod
     def of(cls, base: Ontologies, loop: Loop, reasoner: str, limit: TimeLimit) -> KnowledgeBase:
         """A workbench on ontologies that are loaded already."""
-        inner = limit.run(lambda: make_reasoner(reasoner, base), "loading the ontologies")
-        return cls(base, loop, reasoner, limit, Deliberation(base, LimitedReasoner(inner, limit)))
+        return cls(base, loop, reasoner, limit, Deliberation(base, make_reasoner(reasoner, base, limit)))
 
     def state(
         self,

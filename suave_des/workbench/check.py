@@ -13,6 +13,7 @@ from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.catalogue import collect
 from suave_des.knowledge.checks import check_values
+from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.model import Names, build_model, expectations
 from suave_des.knowledge.ontology_file import OntologyFile
 from suave_des.knowledge.reasoners import make_reasoner
@@ -27,7 +28,6 @@ from suave_des.knowledge.triples import Content, merge
 from suave_des.knowledge.vocabulary import LANGUAGE_NAMESPACES, PERFORMANCE, RDF_TYPE, TOMASYS, local_name
 from suave_des.resources import shipped_folder
 from suave_des.workbench.findings import Finding, Level, fails, finding_of, in_order, shown_path
-from suave_des.workbench.limit import TIME_LIMIT_S, TimeLimit
 from suave_des.workbench.reachable import atom_text, dead_rules
 from suave_des.workbench.shapes import check_shapes
 
@@ -224,7 +224,7 @@ def _of_reasoner(subject: Subject) -> Iterator[Finding]:
         yield Finding(
             Level.INFO, f"inferences are remembered for equal measured values only, and so more slowly: {reason}"
         )
-    limit = TimeLimit(subject.time_limit_s)
+    limit = TimeLimit(subject.time_limit_s, "--time-limit")
     try:
         limit.run(lambda: make_reasoner("pellet", base), "reasoning on the ontologies alone")
     except InputError as error:

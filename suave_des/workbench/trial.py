@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from suave_des.campaign.knowledge_file import KNOWLEDGE_FILE, read_knowledge
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.base import KnowledgeBase as Ontologies
+from suave_des.knowledge.limit import TimeLimit
 from suave_des.knowledge.rule_files import RulesFile, hash_with_rules, with_rules
 from suave_des.knowledge.rule_parser import parse_rule, parse_rules
 from suave_des.knowledge.rules import Rule
@@ -21,7 +22,6 @@ from suave_des.resources import find
 from suave_des.scenario.models import Scenario
 from suave_des.simulation.result import KnowledgeRecord
 from suave_des.workbench.bench import KnowledgeBase
-from suave_des.workbench.limit import TimeLimit
 from suave_des.workbench.states import Loop
 from suave_des.workbench.tracing import Tracer
 
@@ -158,7 +158,7 @@ def _trial(
     else:
         name = str(disabled)
         other = _without(base, name)
-    loop, limit = Loop.of(scenario), TimeLimit(limit_s)
+    loop, limit = Loop.of(scenario), TimeLimit(limit_s, "--time-limit")
     before = KnowledgeBase.of(base, loop, reasoner or knowledge.reasoner, limit)
     after = KnowledgeBase.of(other, loop, reasoner or knowledge.reasoner, limit)
     records = read_knowledge(folder / KNOWLEDGE_FILE)

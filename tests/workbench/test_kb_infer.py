@@ -11,11 +11,20 @@ import pytest
 
 import suave_des
 from suave_des.errors import InputError, KnowledgeError
+from suave_des.knowledge.limit import TimeLimit
+from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import ObjectiveState
 from suave_des.workbench import KnowledgeBase
-from suave_des.workbench.limit import LimitedReasoner, TimeLimit
 
 HIGH = {"groundings": {"f_generate_search_path": "fd_spiral_high"}, "measurements": {"water_visibility": 1.8}}
+_BODY = " ^ ".join(f"isQAtype(?a{n}, ?b{n})" for n in range(12))
+EXPLOSION = f"explosion: {_BODY} -> o_updatable(o_generate_search_path, true)\n"
+
+
+def _python(*arguments):
+    environment = {**os.environ, "PYTHONPATH": str(Path(suave_des.__file__).parents[1])}
+    command = [sys.executable, *arguments]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
 
 
 def test_infers_the_error_and_plans_the_lower_spiral(bench):
@@ -109,34 +118,41 @@ def test_what_cannot_be_used_ends_in_one_line(command, words, said):
 
 class TestTimeLimit:
     def test_names_the_state_that_takes_too_long_and_refuses_more(self, bench, monkeypatch):
-        monkeypatch.setattr("suave_des.workbench.limit._abandoned", [])
-
-        class Slow:
-            name = "slow"
-
-            def infer(self, state):
-                time.sleep(5.0)
-
-        reasoner = LimitedReasoner(Slow(), TimeLimit(0.05))
-        with pytest.raises(KnowledgeError, match=r"fd_spiral_high, water_visibility = 1.8: not done after 0.05 s"):
+        monkeypatch.setattr("suave_des.knowledge.limit._abandoned", [])
+        monkeypatch.setattr("suave_des.knowledge.pellet.InProcessPellet.infer", lambda *_: time.sleep(5.0))
+        limit = TimeLimit()
+        reasoner = make_reasoner("pellet", bench.base, limit)
+        limit.seconds = 0.2
+        with pytest.raises(KnowledgeError, match=r"fd_spiral_high, water_visibility = 1.8: not done after 0.2 s"):
             reasoner.infer(bench.state(**HIGH))
         with pytest.raises(KnowledgeError, match="still reasoning"):
             reasoner.infer(bench.state())
 
+    @pytest.mark.parametrize("reasoner", ["remembered", "owlready2"])
+    def test_holds_for_a_mission_too(self, tmp_path, reasoner):
+        rules = tmp_path / "explosion.swrl"
+        rules.write_text(EXPLOSION)
+        program = f"""
+import sys
+from suave_des.knowledge import limit, stock
+limit.TimeLimit.__init__.__defaults__ = (1.0, None)
+if {reasoner == "owlready2"}:  # its own limit, without the check by the Pellet in this process
+    from suave_des.knowledge import pellet
+    pellet.InProcessPellet.__init__ = lambda self, kb: None
+from suave_des.cli.main import main
+main(["run", "seams2023", "--reasoner", {reasoner!r}, "--rules", {str(rules)!r}])
+"""
+        done = _python("-c", program)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert "reasoning on the state" in done.stderr
+        assert "not done after 1 s" in done.stderr
+        assert done.stderr.count("\n") == 1
+
     def test_a_rule_that_explodes_ends_in_a_message_and_the_process_ends_too(self, tmp_path):
         rules = tmp_path / "explosion.swrl"
-        body = " ^ ".join(f"isQAtype(?a{n}, ?b{n})" for n in range(12))
-        rules.write_text(f"explosion: {body} -> o_updatable(o_generate_search_path, true)\n")
-        command = [sys.executable, "-m", "suave_des", "kb", "infer", "--reasoner", "pellet", "--time-limit", "2"]
-        path = str(Path(suave_des.__file__).parents[1])
-        done = subprocess.run(
-            [*command, "--rules", str(rules)],
-            env={**os.environ, "PYTHONPATH": path},
-            capture_output=True,
-            text=True,
-            timeout=60,
-            check=False,
-        )
+        rules.write_text(EXPLOSION)
+        command = ["-m", "suave_des", "kb", "infer", "--reasoner", "pellet", "--time-limit", "2"]
+        done = _python(*command, "--rules", str(rules))
         assert done.returncode == 2
         assert "not done after 2 s" in done.stderr
         assert done.stderr.count("\n") == 1
@@ -160,7 +176,7 @@ class TestTimeLimit:
 import sys
 from suave_des.errors import KnowledgeError
 from suave_des.workbench import KnowledgeBase
-from suave_des.workbench.limit import TimeLimit
+from suave_des.knowledge.limit import TimeLimit
 bench = KnowledgeBase.load(reasoner="pellet")  # Java starts in another thread than this one
 state = bench.state(groundings={HIGH["groundings"]!r}, measurements={HIGH["measurements"]!r})
 assert bench.infer(state).plan.decisions
@@ -173,14 +189,5 @@ except KnowledgeError:
     pass
 sys.exit(5)
 """
-        path = str(Path(suave_des.__file__).parents[1])
-        environment = {**os.environ, "PYTHONPATH": path}
-        done = subprocess.run(
-            [sys.executable, "-c", program],
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=60,
-            check=False,
-        )
+        done = _python("-c", program)
         assert (done.returncode, done.stderr) == (5, "")

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import os
 import queue
 import threading
 from collections.abc import Callable
 from typing import Final, Generic, TypeVar
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.reasoners import Reasoner
-from suave_des.knowledge.state import Inference, KnowledgeState
+from suave_des.knowledge.state import KnowledgeState
 
 #: What a reasoner may take for one state, where nothing else is said.
 TIME_LIMIT_S: Final = 60.0
+#: What a reasoner does at first, for the message.
+LOADING: Final = "loading the ontologies"
 _Result = TypeVar("_Result")
 _abandoned: Final[list[str]] = []
 
@@ -54,11 +56,14 @@ class TimeLimit:
 
     Args:
         seconds: the limit of each piece of work.
+        option: of the command line, which allows more.
     """
 
-    def __init__(self, seconds: float = TIME_LIMIT_S) -> None:
+    def __init__(self, seconds: float = TIME_LIMIT_S, option: str | None = None) -> None:
         self.seconds = seconds
+        self._option = option
         self._jobs: queue.SimpleQueue[_Job[object]] | None = None
+        self._process = 0
         self._stuck: str | None = None
 
     def run(self, work: Callable[[], _Result], doing: str) -> _Result:
@@ -73,19 +78,24 @@ class TimeLimit:
         """
         if self._stuck is not None:
             raise KnowledgeError(f"the reasoner is still {self._stuck}", remedy="start anew, with other rules")
-        if self._jobs is None:
-            self._jobs = queue.SimpleQueue()
+        if self._jobs is None or self._process != os.getpid():  # a process that was forked has none of the threads
+            self._jobs, self._process = queue.SimpleQueue(), os.getpid()
             threading.Thread(target=_do_all, args=(self._jobs,), daemon=True, name="reasoner").start()
         job = _Job(work)
         self._jobs.put(job)  # type: ignore[arg-type]
         if not job.wait(self.seconds):
             self._stuck = doing
             _abandoned.append(doing)
-            raise KnowledgeError(
-                f"{doing}: not done after {self.seconds:g} s",
-                remedy="look for a rule that matches too many combinations, or allow more with --time-limit",
-            )
+            raise self.exceeded(doing)
         return job.result()
+
+    def exceeded(self, doing: str) -> KnowledgeError:
+        """The error for work that took too long."""
+        more = f", or allow more with {self._option}" if self._option else ""
+        return KnowledgeError(
+            f"{doing}: not done after {self.seconds:g} s",
+            remedy=f"look for a rule that matches too many combinations{more}",
+        )
 
 
 def _do_all(jobs: queue.SimpleQueue[_Job[object]]) -> None:
@@ -93,21 +103,9 @@ def _do_all(jobs: queue.SimpleQueue[_Job[object]]) -> None:
         jobs.get().do()
 
 
-class LimitedReasoner:
-    """A reasoner that is given up on after a time, with the state named."""
-
-    def __init__(self, reasoner: Reasoner, limit: TimeLimit) -> None:
-        self.name = reasoner.name
-        self._reasoner = reasoner
-        self._limit = limit
-
-    def infer(self, state: KnowledgeState) -> Inference:
-        """What the reasoner adds to the state.
-
-        Raises:
-            KnowledgeError: it takes too long; and as every reasoner.
-        """
-        return self._limit.run(lambda: self._reasoner.infer(state), f"reasoning on the state {in_words(state)}")
+def reasoning_on(state: KnowledgeState) -> str:
+    """What a reasoner does with a state, for the message."""
+    return f"reasoning on the state {in_words(state)}"
 
 
 def in_words(state: KnowledgeState) -> str:
