@@ -44,6 +44,7 @@ class Metacontrol(ManagingSubsystem):
         self._measurements: dict[str, Decimal] = {}
         self._cancelled: set[str] = set()
         self._told: frozenset[str] = frozenset()
+        self._without_design: frozenset[str] = frozenset()
         self._latency_stream = system.stream("metacontrol/inference")
         self.period_s = system.scenario.managers.metacontrol.reasoning_period_s
         self.starts_s = system.stream("metacontrol/phase").uniform(0.0, self.period_s)
@@ -135,6 +136,7 @@ class Metacontrol(ManagingSubsystem):
         for decision in decided.decisions:
             if decision.function in self._objectives and decision.function not in self._cancelled:
                 self._carry_out(decision)
+        self._without_design = frozenset(each.function for each in decided.decisions if each.design is None)
 
     def _settle(self, state: KnowledgeState) -> None:
         """A recovery is news once: it has been reasoned about, and from now on the component is as if never failed.
@@ -149,6 +151,8 @@ class Metacontrol(ManagingSubsystem):
     def _carry_out(self, decision: Decision) -> None:
         function, design = decision.function, decision.design
         if design is None:
+            if function in self._without_design:  # told already: only the measured values in the reasons are others
+                return
             self.system.log("no_design_left", f"{function}: {decision.reason}{_left_out(decision)}")
             return
         if self.system.change_mode(function, design):
