@@ -10,7 +10,7 @@ from pathlib import Path
 from suave_des.campaign.executors import WorkerError, make_executor
 from suave_des.campaign.lock import LOCK_FILE, locked
 from suave_des.campaign.outcomes import COLUMNS, Failure, Finished, Job, MissionRunner
-from suave_des.campaign.output import check_output_folder, make_output_folder, remove_parts
+from suave_des.campaign.output import check_output_folder, make_output_folder, remove_derived, remove_parts
 from suave_des.campaign.plan import MissionKey, check_plan, plan
 from suave_des.campaign.request import TIME_OUT_S, Request, check_same, check_time_out, deciding
 from suave_des.campaign.results import (
@@ -183,7 +183,7 @@ def resume_campaign(
 
 
 def _check_new(folder: Path, *, overwrite: bool) -> None:
-    check_output_folder(folder, overwrite=overwrite, left_over=_is_of_campaign)
+    check_output_folder(folder, "campaign", overwrite=overwrite, left_over=_is_of_campaign)
     if not overwrite and (folder / STORE_FILE).exists():
         raise InputError(
             "the output folder is not empty: it has a campaign in it",
@@ -305,6 +305,7 @@ class _Campaign:
         path = self.folder / STORE_FILE
         if not resumed:
             make_store(path, about)
+            remove_derived(self.folder)
         store = Store(path)
         try:
             if resumed:

@@ -68,7 +68,7 @@ def run_mission(
     """
     folder = None if out is None else Path(out)
     if folder is not None:
-        check_output_folder(folder, overwrite=overwrite)
+        check_output_folder(folder, "mission", overwrite=overwrite)
     if run < 1:
         raise InputError(f"run: {run} is out of range", remedy="runs count from 1")
     loaded = load_scenario(

@@ -33,7 +33,9 @@ Seed = Annotated[int, typer.Option("--seed", help="Seed of everything that is ra
 Workers = Annotated[
     int, typer.Option("--workers", help="Processes that run missions; any number gives the same bytes.")
 ]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace results that are in the output folder already.")]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Replace results of the same kind that are in the output folder already.")
+]
 
 
 _arguments: list[str] = []
