@@ -36,6 +36,8 @@ def test_columns_may_be_in_any_order_and_excel_may_have_written_it(write):
         ("t_s,value\ninf,1\n", "line 2", "t_s 'inf' is not finite"),
         ("t_s,value\n0,1\n60,2\n60,3\n", "line 4", "t_s 60 does not come after 60"),
         ("t_s,value\n0,1\n60,2\n30,3\n", "line 4", "t_s 30 does not come after 60"),
+        ("t_s,value\n0,1e300\n", "line 2", "value '1e300' is out of range"),
+        ("t_s,value\n1e10,1\n", "line 2", "t_s '1e10' is out of range"),
         (b"t_s,value\n0,\xff\n", "line 2", "is not UTF-8 text"),
         ('t_s,value\n0,"1\n', "line 2", "is not valid CSV"),
     ],
