@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from suave_des.scenario.distributions import Choice, Exponential, Normal, Uniform
+from suave_des.scenario.distributions import LONGEST_S, Choice, Exponential, Normal, Uniform
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.revision import Revision
 from suave_des.scenario.schema import field_docs
@@ -100,8 +100,9 @@ def value_text(field: FieldInfo) -> str:
 
 
 def bounds_text(marks: Iterable[Any]) -> str:
-    """A number's bounds, such as " > 0 and <= 6"."""
-    bounds = [f"{sign} {getattr(mark, key):g}" for mark in marks for key, sign in BOUNDS if hasattr(mark, key)]
+    """A number's bounds, such as " > 0 and <= 6", without those that the page gives once for all."""
+    found = [(sign, getattr(mark, key, None)) for mark in marks for key, sign in BOUNDS]
+    bounds = [f"{sign} {bound:g}" for sign, bound in found if bound is not None and abs(bound) < LONGEST_S]
     return " " + " and ".join(bounds) if bounds else ""
 
 

@@ -13,7 +13,7 @@ from suave_des.campaign.early_stop import RUNS_LIMIT_DEFAULT, parse_until_ci
 from suave_des.campaign.executors import Executor, WorkerError, check_place, executor
 from suave_des.campaign.lock import LOCK_FILE, locked
 from suave_des.campaign.outcomes import Finished, Job, MissionRunner
-from suave_des.campaign.output import check_output_folder, make_output_folder, remove_parts
+from suave_des.campaign.output import check_output_folder, make_output_folder, remove_derived, remove_parts
 from suave_des.campaign.plan import MissionKey, check_plan, plan
 from suave_des.campaign.progress import OnProgress, Progress, Watch
 from suave_des.campaign.request import Request, check_same, check_time_out, deciding
@@ -250,7 +250,7 @@ def _with_until_ci(request: Request, sheet: Sheet | None) -> Request:
 
 
 def _check_new(folder: Path, *, overwrite: bool) -> None:
-    check_output_folder(folder, overwrite=overwrite, left_over=_is_of_campaign)
+    check_output_folder(folder, "campaign", overwrite=overwrite, left_over=_is_of_campaign)
     if not overwrite and (folder / STORE_FILE).exists():
         raise InputError(
             "the output folder is not empty: it has a campaign in it",
@@ -408,6 +408,7 @@ class _Campaign:
         path = self.folder / STORE_FILE
         if not resumed:
             make_store(path, about)
+            remove_derived(self.folder)
         store = Store(path)
         try:
             if resumed:

@@ -16,6 +16,19 @@ from suave_des.errors import InputError
 _PIECE_ROWS = 1000
 _PART = ".part"
 
+DERIVED = (
+    *("paper_table.md", "paper_table.csv"),
+    *("validation.csv", "validation_pairs.csv", "validation_shares.csv", "validation_positions.csv"),
+    *("validation_targets.csv", "validation.json", "distributions.png", "detections.png"),
+)
+"""Files that reproduce and validate make of a campaign's, beside them."""
+FAMILIES: Mapping[str, tuple[str, ...]] = {
+    "mission": ("mission.json", "events.csv", "trajectory.csv", "knowledge.jsonl"),
+    "campaign": ("campaign.sqlite", "runs.csv", "summary.csv", "manifest.json", "suave_results.csv", *DERIVED),
+    "fit": ("fitted.yaml", "parameters.csv", "calibration.json", "profiles.png"),
+}
+"""Names of result files by what they tell of; a folder has those of one family, so that nothing in it is misread."""
+
 DECIMALS = 6
 """Digits after the point in result files."""
 
@@ -52,17 +65,19 @@ def json_text(content: Mapping[str, Any]) -> str:
 
 
 def check_output_folder(
-    folder: Path, *, overwrite: bool, left_over: Callable[[str], bool] = lambda name: False
+    folder: Path, family: str, *, overwrite: bool, left_over: Callable[[str], bool] = lambda name: False
 ) -> None:
     """See that results can go into a folder, without changing anything.
 
     Args:
         folder: where they are to go.
+        family: what they tell of, of FAMILIES.
         overwrite: whether there may be something in it.
         left_over: whether a file of some name counts as nothing.
 
     Raises:
-        InputError: it has something in it and `overwrite` is false, is a file, or cannot be written.
+        InputError: it has something in it and `overwrite` is false, has results of another family, is a file, or
+            cannot be written.
     """
     try:
         entries = [entry.name for entry in folder.iterdir()] if folder.is_dir() else []
@@ -70,6 +85,14 @@ def check_output_folder(
         is_there, has_parent = folder.exists() or folder.is_symlink(), folder.parent.is_dir()
     except OSError as error:
         raise _not_written(folder, error) from None
+    for other, names in FAMILIES.items():
+        known = min((name for name in names if name in entries), default=None)
+        if other != family and known is not None:
+            raise InputError(
+                f"the output folder has a {other}'s results in it ({known}), which this command does not replace",
+                file=folder,
+                remedy="give another folder, or remove them first",
+            )
     if found is not None and not overwrite:
         raise InputError(
             f"the output folder is not empty: it has {found}",
@@ -93,6 +116,19 @@ def make_output_folder(folder: Path) -> None:
     """
     try:
         folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise _not_written(folder, error) from None
+
+
+def remove_derived(folder: Path) -> None:
+    """Remove what was made of a campaign that is replaced.
+
+    Raises:
+        InputError: it cannot be removed.
+    """
+    try:
+        for name in DERIVED:
+            (folder / name).unlink(missing_ok=True)
     except OSError as error:
         raise _not_written(folder, error) from None
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, fields
 from pathlib import Path
 
@@ -42,6 +42,7 @@ def run_mission(
     disabled_rules: Sequence[str] = (),
     overwrite: bool = False,
     command: Sequence[str] = (),
+    on_time: Callable[[float, float], None] | None = None,
 ) -> MissionResult:
     """Run one mission and keep its events and trajectory.
 
@@ -61,6 +62,7 @@ def run_mission(
         disabled_rules: names of rules to switch off, besides the scenario's.
         overwrite: whether results in the folder may be replaced.
         command: the command line, for mission.json.
+        on_time: called each second of mission time with it and the time limit, in s.
 
     Raises:
         InputError: something given cannot be used; nothing is written then.
@@ -68,7 +70,7 @@ def run_mission(
     """
     folder = None if out is None else Path(out)
     if folder is not None:
-        check_output_folder(folder, overwrite=overwrite)
+        check_output_folder(folder, "mission", overwrite=overwrite)
     if run < 1:
         raise InputError(f"run: {run} is out of range", remedy="runs count from 1")
     loaded = load_scenario(
@@ -80,7 +82,7 @@ def run_mission(
         disabled_rules=disabled_rules,
     )
     inputs = check_knowledge(loaded, [manager], given=bool(ontologies or rules or disabled_rules))
-    result = Simulator(loaded).run(manager, run, seed, record=True)
+    result = Simulator(loaded).run(manager, run, seed, record=True, on_time=on_time)
     if folder is not None:
         make_output_folder(folder)
         write_files(folder, _files(loaded, result, inputs, command), stale=(KNOWLEDGE_FILE,))

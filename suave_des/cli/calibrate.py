@@ -45,7 +45,7 @@ def calibrate(
 
     problem, published = _problem(scenario, data, parameters, managers, runs, seed, ontology, modes, reasoner)
     if out is not None:
-        check_output_folder(out, overwrite=overwrite)
+        check_output_folder(out, "fit", overwrite=overwrite)
         make_output_folder(out)
     console = output()
     tried = fit(

@@ -34,7 +34,9 @@ Workers = Annotated[
     int, typer.Option("--workers", help="Processes that run missions; any number gives the same bytes.")
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace results that are in the output folder already.")]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Replace results of the same kind that are in the output folder already.")
+]
 
 
 _arguments: list[str] = []

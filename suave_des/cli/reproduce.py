@@ -120,6 +120,6 @@ def _table(figures: Sequence[Figure]) -> Table:
             number(figure.ours),
             interval(*(figure.ours_interval or (None, None))),
             "" if figure.difference is None else f"{figure.difference:+.2f}",
-            "" if figure.is_inside else MARK,
+            MARK if figure.is_inside is False else "",
         )
     return table

@@ -44,23 +44,26 @@ def run(
 ) -> None:
     """Run one mission and tell what happens in it."""
     from suave_des.campaign.single import run_mission
-    from suave_des.cli.console import output
+    from suave_des.cli.console import errors, output
+    from suave_des.cli.status import mission_status
     from suave_des.cli.timeline import print_timeline
 
-    result = run_mission(
-        scenario,
-        manager,
-        run_number,
-        seed,
-        out,
-        ontologies=ontology or (),
-        modes_file=modes,
-        reasoner=reasoner,
-        rules=rules or (),
-        disabled_rules=disable_rule or (),
-        overwrite=overwrite,
-        command=command_line(),
-    )
+    with mission_status(scenario, errors()) as show:
+        result = run_mission(
+            scenario,
+            manager,
+            run_number,
+            seed,
+            out,
+            ontologies=ontology or (),
+            modes_file=modes,
+            reasoner=reasoner,
+            rules=rules or (),
+            disabled_rules=disable_rule or (),
+            overwrite=overwrite,
+            command=command_line(),
+            on_time=show,
+        )
     console = output()
     print_timeline(console, result)
     if out is not None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -28,6 +30,8 @@ _STYLES = {
     "mode_requested": "dim",
 }
 """By event; one that is not here, such as an outside manager's, has none."""
+_LEAST_WIDTH = 72
+"""Lines are not wrapped shorter than this: a narrower terminal wraps them itself."""
 
 
 def print_timeline(console: Console, result: MissionResult) -> None:
@@ -41,16 +45,26 @@ def print_timeline(console: Console, result: MissionResult) -> None:
     sources = max((len(event.source) for event in result.events), default=0)
     names = max((len(event.event) for event in result.events), default=0)
     console.print(Text(f"{'time, s':>8}  {'source':<{sources}}  {'event':<{names}}  detail", "italic"), soft_wrap=True)
+    # Elsewhere an event is one line, for tools that search.
+    width = max(console.width, _LEAST_WIDTH) if console.is_terminal or "COLUMNS" in os.environ else None
     for event in result.events:
-        console.print(_line(event, sources, names), soft_wrap=True)
+        console.print(_line(event, sources, names, width), soft_wrap=True)
     console.print()
     print_trimmed(console, _metrics(metrics))
 
 
-def _line(event: Event, sources: int, names: int) -> Text:
+def _line(event: Event, sources: int, names: int, width: int | None) -> Text:
+    """An event; one that does not fit into a width has its detail in lines of its own."""
     source, name = event.source.replace("_", " "), event.event.replace("_", " ")
-    text = Text(f"{event.t_s:8.2f}  ", no_wrap=True)
-    text.append(f"{source:<{sources}}  {name:<{names}}  {event.detail}", _STYLES.get(event.event, ""))
+    time_text = f"{event.t_s:8.2f}  "
+    begin = f"{time_text}{source:<{sources}}  {name:<{names}}  "
+    line = f"{begin}{event.detail}"
+    if width is not None and len(line) > width:
+        indent = " " * (len(time_text) + 2)
+        detail = fill(event.detail, width, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)
+        line = f"{begin.rstrip()}\n{detail}"
+    text = Text(line, no_wrap=True)
+    text.stylize(_STYLES.get(event.event, ""), len(time_text))
     return text
 
 

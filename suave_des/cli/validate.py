@@ -162,7 +162,7 @@ def _recorded(
     check_one_scenario(recorded, None if scenario is None else load_scenario(scenario).scenario.name)
     check_same_managers(recorded, chosen)
     if out is not None:
-        check_output_folder(out, overwrite=overwrite)
+        check_output_folder(out, "campaign", overwrite=overwrite)
         make_output_folder(out)
     return recorded.frame, {"runs_file": _named(recorded)}
 

@@ -56,6 +56,7 @@ class Metacontrol(ManagingSubsystem):
         self._known: _Known | None = None
         self._cancelled: set[str] = set()
         self._told: frozenset[str] = frozenset()
+        self._without_design: frozenset[str] = frozenset()
         latency = system.scenario.latencies.inference_s
         self._inference_time_s: Callable[[], float] = (
             (lambda: latency)
@@ -215,6 +216,8 @@ class Metacontrol(ManagingSubsystem):
         for decision in conclusion.plan.decisions:
             if decision.function in self._objectives and decision.function not in self._cancelled:
                 self._carry_out(decision)
+        decisions = conclusion.plan.decisions
+        self._without_design = frozenset(each.function for each in decisions if each.design is None)
         # A recovery is news once: it has been reasoned about, and from now on the component is as if it had never
         # failed. Kept, it would make every objective updatable for ever, and in the exemplar's oldest files, where the
         # status says so, contradict the UNGROUNDED of each objective to come.
@@ -226,6 +229,8 @@ class Metacontrol(ManagingSubsystem):
     def _carry_out(self, decision: Decision) -> None:
         function, design = decision.function, decision.design
         if design is None:
+            if function in self._without_design:  # told already: only the measured values in the reasons are others
+                return
             self.system.log("no_design_left", f"{function}: {decision.reason}{_left_out(decision)}")
             return
         if self.system.change_mode(function, design):

@@ -52,10 +52,10 @@ class Figure:
         return None if self.ours is None else self.ours - self.published
 
     @property
-    def is_inside(self) -> bool:
-        """Whether ours lies in the 95% interval of the published one."""
+    def is_inside(self) -> bool | None:
+        """Whether ours lies in the 95% interval of the published one; none if there are too few missions."""
         low, high = self.published_interval
-        return self.ours is not None and low <= self.ours <= high
+        return None if self.ours is None else low <= self.ours <= high
 
 
 @dataclass(frozen=True)
@@ -74,14 +74,16 @@ class Comparison:
 
     def remarks(self) -> Iterator[str]:
         """What can be said of the comparison, in sentences."""
-        inside = sum(figure.is_inside for figure in self.figures)
+        told = [figure.is_inside for figure in self.figures if figure.is_inside is not None]
+        inside = sum(told)
         yield f"Paper: {_sizes(self.published)}. Here: {_sizes(self.ours)}. Difference: here less paper."
-        if inside == len(self.figures):
+        if not told:
+            yield "There are too few missions for any figure."
+        elif inside == len(told):
             yield f"All {inside} figures lie in the 95% intervals of the paper's."
         else:
             yield (
-                f"{inside} of {len(self.figures)} figures lie in the 95% intervals of the paper's; those marked"
-                f" {MARK} do not."
+                f"{inside} of {len(told)} figures lie in the 95% intervals of the paper's; those marked {MARK} do not."
             )
         yield (
             "Intervals: Student's t for means; chi-square for standard deviations, a rough guide only, because it"
@@ -153,7 +155,7 @@ def markdown_table(comparison: Comparison) -> str:
             _number(figure.ours),
             _interval(figure.ours_interval),
             "" if figure.difference is None else f"{figure.difference:+.2f}",
-            "" if figure.is_inside else f"\\{MARK}",
+            f"\\{MARK}" if figure.is_inside is False else "",
         )
         lines.append(f"| {' | '.join(cells)} |")
     # Each remark a paragraph; the mark is no emphasis.

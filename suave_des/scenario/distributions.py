@@ -25,11 +25,15 @@ def wrong(problem: str, remedy: str, *keys: str) -> PydanticCustomError:
     )
 
 
-Number = Annotated[float, Field(strict=True)]
+LARGEST = 1e12
+"""Greatest magnitude of a number of which nothing else is known, such as a measured value in a unit of one's own."""
+LONGEST_S = 1e9
+"""Longest time: 31 years, in other words never. A bound of this magnitude is told only to those who exceed it."""
+
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, strict=True)]
 """A number written as one: "80" in quotes and true are none."""
-Positive = Annotated[float, Field(gt=0, strict=True)]
-NotNegative = Annotated[float, Field(ge=0, strict=True)]
-Period = Annotated[float, Field(ge=0.001, strict=True)]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST, strict=True)]
+Period = Annotated[float, Field(ge=0.001, le=LONGEST_S, strict=True)]
 """Period of something that happens in mission time, in s; the limit keeps a slip from stopping the clock."""
 
 

@@ -13,11 +13,23 @@ from suave_des.scenario.distributions import (
     Distribution,
     Number,
     Period,
-    Positive,
     Strict,
     lower_bound,
     stated,
     wrong,
+)
+from suave_des.scenario.quantities import (
+    Coordinate,
+    CoordinateDistribution,
+    CurrentDistribution,
+    DelayDistribution,
+    Duration,
+    HeadingDistribution,
+    Length,
+    OffsetDistribution,
+    Speed,
+    TimeDistribution,
+    Within,
 )
 from suave_des.scenario.revision import Revision
 from suave_des.scenario.settings import (
@@ -62,7 +74,7 @@ REASONERS: tuple[str, ...] = get_args(Reasoner)
 SEA_BED_Z_M = -20.0
 SURFACE_Z_M = 0.0
 THRUSTERS = 6
-_LONGEST_S = 100_000.0
+_LONGEST_MISSION_S = 100_000.0
 
 
 def _not_negative(value: Any) -> Any:
@@ -75,20 +87,20 @@ def _not_negative(value: Any) -> Any:
 class Mission(Strict):
     """The coordinator's limit."""
 
-    time_limit_s: Annotated[float, Field(gt=0, le=_LONGEST_S, strict=True)] = 300.0
+    time_limit_s: Annotated[float, Field(gt=0, le=_LONGEST_MISSION_S, strict=True)] = 300.0
     """When the current task is cancelled and the metrics are taken."""
 
 
 class Start(Strict):
     """Pose at t = 0, in the world frame (x east, y north, z up; the sea bed is the plane z = -20)."""
 
-    x_m: Distribution = -17.0
+    x_m: CoordinateDistribution = -17.0
     """East."""
-    y_m: Distribution = 2.57
+    y_m: CoordinateDistribution = 2.57
     """North."""
-    z_m: Distribution = -18.5
+    z_m: Annotated[Distribution, Within(SEA_BED_Z_M, SURFACE_Z_M, "m")] = -18.5
     """Up; the sea bed is at -20, the surface at 0."""
-    heading_rad: Distribution = 0.0
+    heading_rad: HeadingDistribution = 0.0
     """Yaw, from east towards north."""
 
     @field_validator("z_m", mode="after")
@@ -104,18 +116,20 @@ class Start(Strict):
 class Current(Strict):
     """Velocity of the water in the world frame, drawn once a run and constant over it."""
 
-    x_m_per_s: Distribution = 0.0
+    x_m_per_s: CurrentDistribution = 0.0
     """Towards east."""
-    y_m_per_s: Distribution = 0.0
+    y_m_per_s: CurrentDistribution = 0.0
     """Towards north."""
-    z_m_per_s: Distribution = 0.0
+    z_m_per_s: CurrentDistribution = 0.0
     """Upwards."""
 
 
 class Pipeline(Strict):
     """The pipeline on the sea bed."""
 
-    vertices_m: Annotated[tuple[tuple[Number, Number, Number], ...], Field(min_length=2, max_length=1000)] = (
+    vertices_m: Annotated[
+        tuple[tuple[Coordinate, Coordinate, Coordinate], ...], Field(min_length=2, max_length=1000)
+    ] = (
         (-15.0, 0.0, -20.0),
         (-25.0, 0.0, -20.0),
         (-35.0, 0.0, -20.0),
@@ -138,7 +152,7 @@ class ThrusterEvent(Strict):
     """1 to 4 horizontal (front right, front left, rear right, rear left), 5 and 6 vertical (right, left)."""
     event: Literal["failure", "recovery"]
     """What happens to it."""
-    time_s: Distribution
+    time_s: TimeDistribution
     """When, drawn once a run; the revision says whether after the start or after the event before."""
 
     @model_validator(mode="before")
@@ -167,28 +181,28 @@ class ThrusterEvent(Strict):
 class Battery(Strict):
     """Battery of revision 1.5: falls linearly from 1.0, recharged at once near the station."""
 
-    discharge_time_s: Positive = 200.0
+    discharge_time_s: Duration = 200.0
     """Time from full (1.0) to empty (0.0)."""
     publishing_period_s: Period = 1.0
     """Period at which its level is published."""
-    station_x_m: Number = -3.0
+    station_x_m: Coordinate = -3.0
     """Recharge station, east."""
-    station_y_m: Number = -2.0
+    station_y_m: Coordinate = -2.0
     """Recharge station, north."""
-    station_radius_m: Positive = 0.5
+    station_radius_m: Length = 0.5
     """Half-width of the box in x and y within which the vehicle counts as docked."""
 
 
 class Latencies(Strict):
     """Mission time that software takes, drawn anew at every occurrence; never negative."""
 
-    task_start_s: Distribution = 0.0
+    task_start_s: DelayDistribution = 0.0
     """From guided mode to the request of the first task."""
-    guided_start_s: Distribution = 0.0
+    guided_start_s: DelayDistribution = 0.0
     """From guided mode to the moment at which the search node has noticed it and sends set-points."""
-    mode_change_s: Distribution = 0.0
+    mode_change_s: DelayDistribution = 0.0
     """From the mode manager's answer to the mode's effect."""
-    inference_s: Distribution = 1.0
+    inference_s: DelayDistribution = 1.0
     """One analyze and plan (stock Pellet starts a Java machine for each)."""
 
     @field_validator("*", mode="after")
@@ -200,23 +214,23 @@ class Latencies(Strict):
 class Calibration(Strict):
     """Parameters of vehicle, autopilot and simulator that the sources leave open, alike for every manager."""
 
-    position_gain_per_s: Positive = 0.48
+    position_gain_per_s: Annotated[float, Field(gt=0, le=100, strict=True)] = 0.48
     """Wanted speed for each metre to the set-point."""
-    horizontal_speed_limit_m_per_s: Positive = 0.34
+    horizontal_speed_limit_m_per_s: Speed = 0.34
     """Greatest horizontal speed that the autopilot wants."""
-    vertical_speed_limit_m_per_s: Positive = 0.36
+    vertical_speed_limit_m_per_s: Speed = 0.36
     """Greatest vertical speed that the autopilot wants."""
-    velocity_time_constant_s: Annotated[float, Field(ge=0.15, strict=True)] = 0.5
+    velocity_time_constant_s: Annotated[float, Field(ge=0.15, le=1000, strict=True)] = 0.5
     """Lag of the velocity behind the wanted one."""
-    altitude_error_m: Distribution = 0.0
+    altitude_error_m: OffsetDistribution = 0.0
     """Steady error of the autopilot's altitude, drawn once a run: it holds its set-point plus this."""
-    altitude_deadband_m: Distribution = 0.0
+    altitude_deadband_m: Annotated[Distribution, Within(None, 100.0, "m")] = 0.0
     """Distance short of its altitude set-point at which the autopilot stops, drawn once a run."""
-    drift_x_m: Distribution = 0.0
+    drift_x_m: CoordinateDistribution = 0.0
     """Way east from the spawning place to where guided mode begins, the origin of the local frame."""
-    drift_y_m: Distribution = 0.0
+    drift_y_m: CoordinateDistribution = 0.0
     """The same, north."""
-    real_time_factor_loss: Distribution = 0.0
+    real_time_factor_loss: Annotated[Distribution, Within(None, 1000.0)] = 0.0
     """The simulated world runs 1 / (1 + loss) as fast as the software's clock; drawn once a run."""
 
     @field_validator("real_time_factor_loss", "altitude_deadband_m", mode="after")

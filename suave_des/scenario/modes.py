@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from suave_des.errors import InputError
+from suave_des.scenario.quantities import FARTHEST_M
 from suave_des.scenario.wording import KeyPath, did_you_mean, shown
 from suave_des.scenario.yamlfile import YamlDocument, read_yaml
 
@@ -210,6 +212,10 @@ class _ModesFile:
             raise self.document.error(f"{shown(value)} is no number", path, f"{key} is a length in m, such as 2.0")
         if key in _POSITIVE_NUMBERS and value <= 0:
             raise self.document.error(f"{shown(value)} is not above 0", path, f"{key} is a length in m, such as 2.0")
+        if key in _POSITIVE_NUMBERS and FARTHEST_M < value < math.inf:
+            raise self.document.error(f"{shown(value)} is out of range", path, f"{key} is at most {FARTHEST_M:g} m")
+        if isinstance(value, float) and not math.isfinite(value):
+            raise self.document.error(f"{shown(value)} is not finite", path, "give a finite number")
         if not isinstance(value, bool | int | float | str):
             raise self.document.error(f"{shown(value)} is no value", path, "a number, text, true or false is needed")
         return value if isinstance(value, bool | str) else float(value)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import typing
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from types import UnionType
 from typing import Annotated, Any, Union
 
@@ -11,7 +11,7 @@ from pydantic import BaseModel, Tag, ValidationError
 from pydantic_core import ErrorDetails
 
 from suave_des.errors import InputError
-from suave_des.scenario.distributions import Distribution
+from suave_des.scenario.distributions import LONGEST_S, Choice, Distribution, Exponential, Normal, Uniform
 from suave_des.scenario.layers import Layer
 from suave_des.scenario.signals import Signal
 from suave_des.scenario.wording import KeyPath, did_you_mean, place_text, shown
@@ -50,6 +50,7 @@ _TEXTS: Mapping[str, tuple[str, str]] = {
 }
 
 
+_DISTRIBUTIONS = (Normal, Uniform, Exponential, Choice)
 _UNION_TAGS = {each for union in (Distribution, Signal) for each in _tags(union)}
 
 
@@ -105,8 +106,7 @@ def _said(detail: ErrorDetails, model: type[BaseModel]) -> tuple[str, str]:
     kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
     loc = detail["loc"]
     if kind == "extra_forbidden":
-        known = model_at(model, loc[:-1])
-        return f"unknown key {shown(loc[-1])}", did_you_mean(loc[-1], known.model_fields if known else ())
+        return f"unknown key {shown(loc[-1])}", _right_key(model, loc)
     if kind == "wrong":
         return str(context["problem"]), str(context["remedy"])
     if kind == "wrong_kind":
@@ -117,7 +117,8 @@ def _said(detail: ErrorDetails, model: type[BaseModel]) -> tuple[str, str]:
     if kind == "value_error":
         return str(context["error"]), "see docs/reference/scenario.md"
     if kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
-        return f"{shown(value)} is out of range", f"must be {_range_at(model, loc) or _bound(context)}"
+        exceeded = next(bound for key, bound in context.items() if key in _BOUNDS)
+        return f"{shown(value)} is out of range", f"must be {_range_at(model, loc, exceeded) or _bound(context)}"
     if kind == "float_type" and loc[-1] == "number":
         return f"{shown(value)} is no number", "give a number without quotes, or a distribution"
     if value is None and kind in ("dict_type", "model_type", "model_attributes_type"):
@@ -125,6 +126,35 @@ def _said(detail: ErrorDetails, model: type[BaseModel]) -> tuple[str, str]:
     problem, remedy = _TEXTS.get(kind, (f"{{value}}: {detail['msg']}", "see docs/reference/scenario.md"))
     facts = {"value": shown(value), **context}
     return problem.format(**facts), remedy.format(**facts)
+
+
+def _right_key(model: type[BaseModel], loc: tuple[int | str, ...]) -> str:
+    """Where a key that is known elsewhere belongs; else the nearest that is known here."""
+    if homes := list(dict.fromkeys(_homes(model, str(loc[-1]), ""))):
+        return f"it belongs {' or '.join(homes)}"
+    here = model_at(model, loc[:-1])
+    return did_you_mean(loc[-1], here.model_fields if here else ())
+
+
+def _homes(model: type[BaseModel], key: str, path: str) -> Iterator[str]:
+    """Places of mappings that have a key; the parameters of distributions do not count, which may stand anywhere."""
+    for name, field in model.model_fields.items():
+        if name == key:
+            yield f"under {path}" if path else "at the top level"
+        below = f"{path}.{name}" if path else name
+        for suffix, inner in _mappings(field.annotation):
+            if inner not in _DISTRIBUTIONS:
+                yield from _homes(inner, key, below + suffix)
+
+
+def _mappings(wanted: Any) -> Iterator[tuple[str, type[BaseModel]]]:
+    """Models that a type holds, with what stands for the name or number of an entry."""
+    if isinstance(wanted, type) and issubclass(wanted, BaseModel):
+        yield "", wanted
+        return
+    entry = {dict: ".NAME", tuple: "[]"}.get(typing.get_origin(wanted), "")
+    for argument in typing.get_args(wanted):
+        yield from ((entry + suffix, inner) for suffix, inner in _mappings(argument))
 
 
 def _wrong_kind(value: object, key: str, known: list[str], also: str) -> tuple[str, str]:
@@ -136,12 +166,13 @@ def _wrong_kind(value: object, key: str, known: list[str], also: str) -> tuple[s
     return f"{key} {shown(value[key])} is not known", did_you_mean(value[key], known)
 
 
-def _range_at(model: type[BaseModel], loc: tuple[int | str, ...]) -> str:
-    """The range that a number of the model must lie in, in words."""
+def _range_at(model: type[BaseModel], loc: tuple[int | str, ...], exceeded: float) -> str:
+    """The range that a number of the model must lie in, in words, without bounds that nobody is near."""
     owner = model_at(model, loc[:-1])
     marks = owner.model_fields[str(loc[-1])].metadata if owner else []
-    words = [_bound({key: getattr(mark, key, None) for key in _BOUNDS}) for mark in marks]
-    return " and ".join(filter(None, words))
+    bounds = {key: getattr(mark, key) for mark in marks for key in _BOUNDS if getattr(mark, key, None) is not None}
+    told = {key: bound for key, bound in bounds.items() if abs(bound) < LONGEST_S or bound == exceeded}
+    return _bound(told)
 
 
 def _bound(context: Mapping[str, Any]) -> str:

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import field_validator
+from pydantic import Field, field_validator
 
 from suave_des.scenario.distributions import (
     Distribution,
     NotNegative,
     Period,
-    Positive,
     Strict,
     lower_bound,
     upper_bound,
     wrong,
 )
+from suave_des.scenario.quantities import FARTHEST_M, Length, OffsetDistribution
 
 
 class CoordinatorRevision(Strict):
@@ -38,7 +38,7 @@ class SpiralRevision(Strict):
     """Where the spiral is centred: the local frame's origin, or the position at each activation."""
     restarts_on_activation: bool
     """Whether each activation starts the spiral afresh (else it goes on from the same counter)."""
-    workaround_step_m: Positive
+    workaround_step_m: Length
     """How much the commanded altitude is lowered each time that z alone is not reached."""
     workaround_cleared_on_activation: bool
     """Whether each activation starts without what was lowered before."""
@@ -47,7 +47,7 @@ class SpiralRevision(Strict):
 class FollowRevision(Strict):
     """The follow function's path."""
 
-    acceptance_m: Positive
+    acceptance_m: Length
     """A point is reached when dx and dy are both at most this."""
     poll_period_s: Period
     """Period at which it looks whether the point is reached."""
@@ -71,7 +71,7 @@ class MonitorsRevision(Strict):
     """What the time of a thruster event counts from: the event before, or the start of the mission."""
     visibility_publishing_period_s: Period
     """Period at which signals are measured that give none themselves."""
-    detected_point_height_m: NotNegative
+    detected_point_height_m: Annotated[float, Field(ge=0, le=FARTHEST_M, strict=True)]
     """Height above the pipeline's points at which the detection mock-up looks for them."""
 
 
@@ -80,11 +80,11 @@ class SetPointRevision(Strict):
 
     loss_probability: Distribution
     """Chance that a set-point is lost, drawn once a run: a publisher made for each call may publish undiscovered."""
-    node_frame_offset_x_m: Distribution
+    node_frame_offset_x_m: OffsetDistribution
     """Steady error of one node's frame against the simulator's, east; drawn once per node and run."""
-    node_frame_offset_y_m: Distribution
+    node_frame_offset_y_m: OffsetDistribution
     """The same, north."""
-    node_frame_offset_z_m: Distribution
+    node_frame_offset_z_m: OffsetDistribution
     """The same, up."""
 
     @field_validator("loss_probability", mode="after")

@@ -7,15 +7,14 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, Tag, model_validator
 
 from suave_des.scenario.distributions import (
-    Distribution,
     NotNegative,
     Number,
     Period,
-    Positive,
     Strict,
     one_of,
     ordered,
 )
+from suave_des.scenario.quantities import Duration, ShiftDistribution, ValueDistribution
 
 
 class _Signal(Strict):
@@ -23,7 +22,7 @@ class _Signal(Strict):
     """Period of the monitor that measures it; left out: the revision's visibility_publishing_period_s."""
     time_step_s: NotNegative = 1.0
     """Time is cut to multiples of this first (whole seconds in the exemplar); 0: not cut."""
-    noise: Distribution = 0.0
+    noise: ValueDistribution = 0.0
     """Added to each measurement, drawn anew each time."""
 
 
@@ -35,13 +34,13 @@ class SinusoidSignal(_Signal):
 
     kind: Literal["sinusoid"]
     """A cosine between minimum and maximum."""
-    period_s: Positive
+    period_s: Duration
     """Time from one maximum to the next."""
     minimum: Number
     """Smallest value."""
     maximum: Number
     """Greatest value, reached at t = -shift_s."""
-    shift_s: Distribution = 0.0
+    shift_s: ShiftDistribution = 0.0
     """Phase shift, drawn once a run."""
 
     @model_validator(mode="after")
@@ -55,7 +54,7 @@ class ConstantSignal(_Signal):
 
     kind: Literal["constant"]
     """The same value all the time."""
-    value: Distribution
+    value: ValueDistribution
     """The value, drawn once a run."""
 
 
@@ -64,7 +63,7 @@ class StepSignal(_Signal):
 
     kind: Literal["step"]
     """One value until a time, another from then on."""
-    time_s: Distribution
+    time_s: ShiftDistribution
     """Mission time of the step, drawn once a run."""
     before: Number
     """Value before the step."""

@@ -9,10 +9,12 @@ import math
 from pathlib import Path
 
 from suave_des.errors import InputError
+from suave_des.scenario.distributions import LARGEST, LONGEST_S
 from suave_des.scenario.wording import shown
 from suave_des.scenario.yamlfile import decode, read_bytes
 
 COLUMNS = ("t_s", "value")
+_LARGEST = {"t_s": LONGEST_S, "value": LARGEST}
 SIZE_LIMIT_BYTES = 20_000_000
 
 Table = tuple[tuple[float, ...], tuple[float, ...]]
@@ -64,6 +66,9 @@ def _numbers(path: Path, line: int, header: list[str], row: list[str]) -> tuple[
             raise _error(path, line, f"{column} {shown(cells[column])} is no number", "such as 12.5") from None
         if not math.isfinite(number):
             raise _error(path, line, f"{column} {shown(cells[column])} is not finite", "leave that row out")
+        if abs(number) > _LARGEST[column]:
+            remedy = f"must be at least {-_LARGEST[column]:g} and at most {_LARGEST[column]:g}"
+            raise _error(path, line, f"{column} {shown(cells[column])} is out of range", remedy)
         numbers.append(number)
     return numbers[0], numbers[1]
 

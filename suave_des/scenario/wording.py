@@ -14,9 +14,13 @@ def place_text(line: int, key_path: KeyPath) -> str:
     return f"line {line}, {keys}" if keys else f"line {line}"
 
 
+_WRITTEN = {"None": "nothing", "True": "true", "False": "false", "inf": ".inf", "-inf": "-.inf", "nan": ".nan"}
+"""How YAML writes what Python writes otherwise."""
+
+
 def shown(value: object, limit: int = 60) -> str:
     """A value as the user wrote it, cut to a readable length and one line."""
-    text = {"None": "nothing", "True": "true", "False": "false"}.get(repr(value), repr(value))
+    text = _WRITTEN.get(repr(value), repr(value))
     return text if len(text) <= limit else text[: limit - 3] + "..."
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import simpy
 
+from suave_des.clock import Process
 from suave_des.errors import SuaveDesError
 from suave_des.managed.coordinator import FOLLOW, MAINTAIN_MOTION, SEARCH, MissionCoordinator
 from suave_des.managed.detection import PipelineDetector, measured_at_rows
@@ -34,6 +35,8 @@ from suave_des.simulation.signals import build_signal
 from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle
 from suave_des.world.pipeline import SEA_BED_Z_M, SURFACE_Z_M, path_to_inspect, sample_points
+
+OnTime = Callable[[float, float], None]
 
 
 class Simulator:
@@ -60,7 +63,9 @@ class Simulator:
 
         return open_knowledge(self.loaded)
 
-    def run(self, manager: str, run: int, seed: int, *, record: bool = False) -> MissionResult:
+    def run(
+        self, manager: str, run: int, seed: int, *, record: bool = False, on_time: OnTime | None = None
+    ) -> MissionResult:
         """Run one mission.
 
         Args:
@@ -68,12 +73,22 @@ class Simulator:
             run: number of the run in its campaign; together with the seed it decides everything that is random.
             seed: seed of the campaign.
             record: whether to keep events and trajectory.
+            on_time: called each second of mission time with it and the time limit, in s.
 
         Raises:
             MissionError: the manager raised; the error names it, the run and the mission time.
             InputError: the manager or the knowledge base cannot be used.
         """
-        return _Mission(self, manager, run, seed, record=record).result()
+        mission = _Mission(self, manager, run, seed, record=record)
+        if on_time is not None:
+            mission.env.process(_tell_time(mission.env, on_time, self.loaded.scenario.mission.time_limit_s))
+        return mission.result()
+
+
+def _tell_time(env: simpy.Environment, on_time: OnTime, limit_s: float) -> Process:
+    while env.now <= limit_s:
+        on_time(env.now, limit_s)
+        yield env.timeout(1.0)
 
 
 class _Mission:

@@ -248,3 +248,20 @@ def test_the_exemplars_three_files_give_the_same_missions(tmp_path: Path, oldest
     ours = Simulator(load_scenario("seams2023"))
     for run in range(1, 9):
         assert theirs.run("metacontrol", run, 1).metrics == ours.run("metacontrol", run, 1).metrics
+
+
+@BOTH
+def test_that_no_design_is_left_is_told_once_until_there_is_one_again(name: str, tmp_path: Path) -> None:
+    """The measured value changes at every cycle, and with it the reasons in the event."""
+    levels = ["0,1.00", "6,1.05", "10,1.10", "20,1.5", "30,1.10", "36,1.15", "44,1.20", "50,1.6"]
+    (tmp_path / "murk.csv").write_text("t_s,value\n" + "\n".join(levels) + "\n")
+    scenario = tmp_path / "murky.yaml"
+    scenario.write_text(
+        f"base: {name}\nmission: {{time_limit_s: 60}}\n"
+        "signals: {water_visibility: {kind: table, file: murk.csv}}\nthruster_events: []\n"
+    )
+    found = Simulator(load_scenario(scenario)).run("metacontrol", 1, 1, record=True)
+    lines = [(each.t_s, each.detail) for each in found.events if each.event == "no_design_left"]
+    assert [t_s < 20.0 for t_s, _ in lines] == [True, False]
+    assert 30.0 <= lines[1][0] < 36.0
+    assert "water_visibility 1.00 measured < 1.25 expected" in lines[0][1]

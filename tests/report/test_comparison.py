@@ -82,11 +82,24 @@ def test_markdown_has_a_row_for_each_figure_and_marks_those_outside() -> None:
     assert [row.endswith("\\* |") for row in rows] == [not figure.is_inside for figure in comparison.figures]
 
 
+def test_managers_without_missions_do_not_count() -> None:
+    comparison = compare(frame(none=[140.0, 232.0], random=[], metacontrol=[]), published_figures())
+    remarks = list(comparison.remarks())
+    assert "Here: 2 missions of none, 0 missions of random, 0 missions of metacontrol." in remarks[0]
+    assert remarks[1].startswith("3 of 4 figures lie in the 95% intervals of the paper's; those marked * do not.")
+    assert markdown_table(comparison).count("\\* |") == 1
+    alike = list(compare(frame(none=[150.0, 210.0]), published_figures()).remarks())
+    assert alike[1] == "All 4 figures lie in the 95% intervals of the paper's."
+    assert list(compare(frame(bt=[150.0]), published_figures()).remarks())[1] == (
+        "There are too few missions for any figure."
+    )
+
+
 def test_csv_has_the_same_figures() -> None:
     comparison = compare(frame(none=[150.0, 250.0], random=[], metacontrol=[]), published_figures())
     rows = list(csv.DictReader(io.StringIO(csv_table(comparison))))
     assert rows[0]["ours"] == "200.0"
-    assert (rows[4]["ours"], rows[4]["difference"], rows[4]["inside_published_ci95"]) == ("", "", "False")
+    assert (rows[4]["ours"], rows[4]["difference"], rows[4]["inside_published_ci95"]) == ("", "", "")
 
 
 class TestEstimates:

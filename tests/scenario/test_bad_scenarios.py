@@ -56,7 +56,22 @@ def refused(write, content: str, **options: object) -> InputError:
         ),
         (HEAD + "name: my scenario\n", "line 2, name", "'my scenario' is no name", "use letters, digits"),
         (HEAD + "name: 15\n", "line 2, name", "15 is no text", "quotes"),
+        # keys in the wrong place
+        (HEAD + "time_limit_s: 300\n", "line 2, time_limit_s", "unknown key 'time_limit_s'", "belongs under mission"),
+        (HEAD + "reasoning_period_s: 1\n", "line 2, ", "unknown key", "it belongs under managers.metacontrol"),
+        (HEAD + "mission: {signals: {}}\n", "line 2, mission.signals", "unknown key", "belongs at the top level"),
+        (HEAD + "start: {time_limit_s: 3}\n", "line 2, start.time_limit_s", "unknown key", "belongs under mission"),
+        (HEAD + "acceptance_m: 3\n", "line 2, acceptance_m", "unknown key", "belongs under revision.follow"),
+        (HEAD + "period_s: 3\n", "line 2, period_s", "unknown key", "belongs under signals.NAME"),
+        (HEAD + "thruster: 3\n", "line 2, thruster", "unknown key", "belongs under thruster_events[]"),
+        (HEAD + "poll_period_s: 3\n", "line 2, ", "unknown", "under revision.coordinator or under revision.follow"),
+        (HEAD + "minimum: 3\n", "line 2, minimum", "unknown key 'minimum'", "belongs under signals.NAME"),
         # numbers
+        (HEAD + "start: {x_m: .inf}\n", "line 2, start.x_m", ".inf is not finite", "give a finite number"),
+        (HEAD + "mission: {time_limit_s: -.INF}\n", "line 2, ", "-.inf is not finite", "give a finite number"),
+        (HEAD + "knowledge: {values: {qa: .NaN}}\n", "line 2, knowledge.values.qa", ".nan is not finite", "finite"),
+        (HEAD + "pipeline: {points_per_piece: .inf}\n", "line 2, ", ".inf is no whole number", "such as 3"),
+        (VISIBILITY + "{noise: {distribution: normal, mean: 0, std: .nan}}\n", "line 3, ", ".nan is not", "finite"),
         (VISIBILITY + "{period_s: -80}\n", "line 3, signals.water_visibility.period_s", "-80", "greater than 0"),
         (VISIBILITY + "{period_s: 0}\n", "line 3, signals.water_visibility.period_s", "0 is out of", "greater than 0"),
         (VISIBILITY + "{period_s: '80'}\n", "line 3, ", "'80' is no number", "without quotes"),
@@ -64,7 +79,7 @@ def refused(write, content: str, **options: object) -> InputError:
         (VISIBILITY + "{period_s: }\n", "line 3, ", "nothing is no number", "such as"),
         (VISIBILITY + "{publishing_period_s: 0}\n", "line 3, ", "0 is out of range", "at least 0.001"),
         (HEAD + "mission: {time_limit_s: 1e9}\n", "line 2, mission.time_limit_s", "out of range", "at most 100000"),
-        (HEAD + "mission: {time_limit_s: " + "9" * 400 + "}\n", "line 2, ", "inf is not finite", "finite"),
+        (HEAD + "mission: {time_limit_s: " + "9" * 400 + "}\n", "line 2, ", ".inf is not finite", "finite"),
         (HEAD + "pipeline: {points_per_piece: 2.5}\n", "line 2, pipeline.", "2.5 is no whole number", "such as 3"),
         (HEAD + "knowledge: {values: {qa: much}}\n", "line 2, knowledge.values.qa", "'much' is no number", "such as"),
         # minimum and maximum
@@ -120,11 +135,12 @@ def refused(write, content: str, **options: object) -> InputError:
             "move or widen",
         ),
         (HEAD + "start: {x_m: {distribution: choice, values: []}}\n", "line 2, start.x_m.values", "has 0 entries", "1"),
-        (HEAD + "start: {z_m: -25}\n", "line 2, start.z_m", "-25 is not in the water", "-20"),
+        (HEAD + "start: {z_m: -20}\n", "line 2, start.z_m", "-20 is not in the water", "above the sea bed at -20 m"),
+        (HEAD + "start: {z_m: -25}\n", "line 2, start.z_m", "-25 is out of range", "at least -20 and at most 0 m"),
         (
             HEAD + "start: {z_m: {distribution: uniform, minimum: -3, maximum: 2}}\n",
             "line 2, start.z_m",
-            "2 is not in the water",
+            "2 is out of range",
             "at most 0",
         ),
         (HEAD + "latencies: {inference_s: -1}\n", "line 2, latencies.inference_s", "-1 is negative", "number >= 0"),
@@ -249,6 +265,70 @@ def test_a_wrong_scenario_is_refused_with_file_place_and_remedy(write, content, 
     assert (error.place or "").startswith(place)
     assert problem in error.problem
     assert remedy in (error.remedy or "")
+
+
+X, U = "start: {x_m: ", "distribution: uniform"
+
+
+@pytest.mark.parametrize(
+    ("content", "place", "value", "remedy"),
+    [
+        ("start: {x_m: 1e300}", "start.x_m", "1e+300", "at least -10000 and at most 10000 m"),
+        ("start: {y_m: -10001}", "start.y_m", "-10001", "at least -10000 and at most 10000 m"),
+        ("start: {heading_rad: 90}", "start.heading_rad", "90", "at least -6.3 and at most 6.3 rad"),
+        (X + "{" + U + ", minimum: 0, maximum: 1e5}}", "start.x_m.maximum", "100000", "at most 10000 m"),
+        (X + "{distribution: normal, mean: 1e5, std: 1}}", "start.x_m.mean", "100000", "at most 10000 m"),
+        (X + "{distribution: normal, mean: 0, std: 1e6}}", "start.x_m.std", "1e+06", "at most 20000 m"),
+        (X + "{distribution: exponential, mean: 1e6}}", "start.x_m.mean", "1e+06", "at most 20000 m"),
+        (X + "{distribution: choice, values: [1, 2e4]}}", "start.x_m.values", "20000", "at most 10000 m"),
+        ("current: {x_m_per_s: 1e6}", "current.x_m_per_s", "1e+06", "at least -10 and at most 10 m/s"),
+        ("current: {z_m_per_s: -11}", "current.z_m_per_s", "-11", "at least -10 and at most 10 m/s"),
+        ("mission: {time_limit_s: 1e12}", "mission.time_limit_s", "1000000000000.0", "greater than 0 and at most 1"),
+        ("pipeline: {vertices_m: [[0, 0, -20], [1e5, 0, -20]]}", "pipeline.vertices_m[1][0]", "1", "at most 10000"),
+        ("battery: {station_x_m: 1e5}", "battery.station_x_m", "100000.0", "at most 10000"),
+        ("battery: {discharge_time_s: 1e10}", "battery.discharge_time_s", "1", "at most 1e+09"),
+        ("latencies: {inference_s: 1e10}", "latencies.inference_s", "1e+10", "must be at most 1e+09 s"),
+        ("thruster_events: ['(1,failure,1e10)']", "thruster_events[0].time_s", "1", "at least 0 and at most 1e+09 s"),
+        ("thruster_events: ['(1,failure,-1)']", "thruster_events[0].time_s", "-1", "at least 0 and at most 1e+09 s"),
+        ("signals: {water_visibility: {maximum: 1e13}}", "signals.water_visibility.maximum", "1", "at most 1e+12"),
+        ("signals: {water_visibility: {noise: 1e13}}", "signals.water_visibility.noise", "1", "at most 1e+12"),
+        ("signals: {water_visibility: {period_s: 1e10}}", "signals.water_visibility.period_s", "1", "at most 1e+09"),
+        ("signals: {water_visibility: {publishing_period_s: 1e10}}", "signals.", "1", "at most 1e+09"),
+        ("calibration: {horizontal_speed_limit_m_per_s: 1e3}", "calibration.", "1000.0", "at most 100"),
+        ("calibration: {altitude_error_m: 1e3}", "calibration.altitude_error_m", "1000", "at most 100 m"),
+        ("calibration: {drift_x_m: 1e5}", "calibration.drift_x_m", "100000", "at most 10000 m"),
+        ("knowledge: {values: {qa_performance_low: 1e300}}", "knowledge.values.qa_performance_low", "1e+300", "1e+12"),
+        ("managers: {random: {adaptation_period_s: 1e300}}", "managers.random.", "1e+300", "at most 1e+09"),
+        ("revision: {follow: {acceptance_m: 1e300}}", "revision.follow.acceptance_m", "1e+300", "at most 10000"),
+        ("revision: {set_points: {node_frame_offset_x_m: 1e300}}", "revision.set_points.", "1e+300", "at most 100 m"),
+    ],
+)
+def test_a_value_beyond_what_can_be_meant_is_refused(write, content, place, value, remedy):
+    error = refused(write, HEAD + content + "\n")
+    assert (error.place or "").startswith(f"line 2, {place}")
+    assert error.problem.startswith(value)
+    assert error.problem.endswith(" is out of range")
+    assert remedy in (error.remedy or "")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "start: {x_m: 5000, y_m: -9999, heading_rad: 6.283185307179586}",
+        "start: {x_m: {distribution: normal, mean: -17, std: 300}}",
+        "current: {x_m_per_s: 8, y_m_per_s: -8}",
+        "mission: {time_limit_s: 86400}",
+        "battery: {discharge_time_s: 1e9}",
+        "latencies: {inference_s: {distribution: exponential, mean: 600}}",
+        "managers: {random: {adaptation_period_s: 1e6}}",
+        "signals: {atmospheric_pressure: {kind: constant, value: 1.013e5}, rate: {kind: constant, value: 1e9}}",
+        "signals: {water_visibility: {period_s: 1e6}}",
+        "thruster_events: ['(1,failure,0)', '(2,failure,1e6)']",
+        "pipeline: {vertices_m: [[0, 0, -20], [5000, 0, -20]]}",
+    ],
+)
+def test_a_generous_value_is_taken(write, content):
+    load_scenario(write("mine.yaml", HEAD + content + "\n"))
 
 
 def test_the_whole_message_is_one_readable_line(write):

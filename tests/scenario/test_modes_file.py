@@ -178,6 +178,9 @@ def test_asking_for_an_unknown_mode_or_function_names_the_nearest(write):
             "in m, such as 2.0",
         ),
         (changed("spiral_altitude: 3.0", "spiral_altitude: -3"), "line 16, ", "-3 is not above 0", "in m, such as 2.0"),
+        (changed("spiral_altitude: 3.0", "spiral_altitude: .inf"), "line 16, ", ".inf is not finite", "finite number"),
+        (changed("spiral_altitude: 3.0", "spiral_altitude: 1e300"), "line 16, ", "1e+300 is out of", "at most 10000 m"),
+        (changed("camera: true", "camera: .nan"), "line 16, ", ".nan is not finite", "finite number"),
         (changed("camera: true", "camera: [1]"), "line 16, ", "[1] is no value", "number, text, true or false"),
         (
             changed("low: {ros__parameters: {spiral_altitude: 1}}", "low: {spiral_altitude: 1}"),

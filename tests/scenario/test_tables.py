@@ -36,6 +36,8 @@ def test_columns_may_be_in_any_order_and_excel_may_have_written_it(write):
         ("t_s,value\ninf,1\n", "line 2", "t_s 'inf' is not finite"),
         ("t_s,value\n0,1\n60,2\n60,3\n", "line 4", "t_s 60 does not come after 60"),
         ("t_s,value\n0,1\n60,2\n30,3\n", "line 4", "t_s 30 does not come after 60"),
+        ("t_s,value\n0,1e300\n", "line 2", "value '1e300' is out of range"),
+        ("t_s,value\n1e10,1\n", "line 2", "t_s '1e10' is out of range"),
         (b"t_s,value\n0,\xff\n", "line 2", "is not UTF-8 text"),
         ('t_s,value\n0,"1\n', "line 2", "is not valid CSV"),
     ],
@@ -50,12 +52,8 @@ def test_a_wrong_table_is_refused_with_its_line(write, content, place, problem):
     assert caught.value.remedy
 
 
-@given(
-    rows=st.dictionaries(
-        st.floats(allow_nan=False, allow_infinity=False), st.floats(allow_nan=False, allow_infinity=False), min_size=1
-    )
-)
-def test_every_finite_table_is_read_back_exactly(tmp_path_factory, rows):
+@given(rows=st.dictionaries(st.floats(-1e9, 1e9), st.floats(-1e12, 1e12), min_size=1))
+def test_every_table_is_read_back_exactly(tmp_path_factory, rows):
     path = tmp_path_factory.mktemp("tables") / "t.csv"
     ordered = sorted(rows.items())
     path.write_text("t_s,value\n" + "".join(f"{time_s!r},{value!r}\n" for time_s, value in ordered))

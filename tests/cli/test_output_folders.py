@@ -1,0 +1,92 @@
+"""--overwrite replaces results of the same kind only: a folder never holds a mission beside a campaign."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from suave_des.campaign.output import FAMILIES
+from suave_des.cli.main import main
+
+RUN = ("run", "seams2023", "--manager", "none", "--out", "out")
+CAMPAIGN = ("campaign", "seams2023", "--managers", "none", "--runs", "1", "--workers", "1", "--out", "out")
+REPRODUCE = ("reproduce", "--runs", "2", "--workers", "1", "--out", "out")
+VALIDATE = ("validate", "--managers", "none", "--runs", "2", "--workers", "1", "--out", "out")
+
+
+@pytest.fixture
+def command(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+
+    def run(*arguments: str) -> tuple[int, str]:
+        with pytest.raises(SystemExit) as ended:
+            main(arguments)
+        return int(ended.value.code or 0), capsys.readouterr().err
+
+    return run
+
+
+def files() -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in Path("out").iterdir()}
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "found"),
+    [
+        (CAMPAIGN, RUN, "a campaign's results in it (campaign.sqlite)"),
+        (RUN, CAMPAIGN, "a mission's results in it (events.csv)"),
+        (RUN, REPRODUCE, "a mission's results in it (events.csv)"),
+        (RUN, VALIDATE, "a mission's results in it (events.csv)"),
+    ],
+)
+def test_results_of_another_kind_are_left_alone(command, first, second, found) -> None:
+    assert command(*first)[0] == 0
+    before = files()
+    status, error = command(*second, "--overwrite")
+    assert status == 2
+    assert f"out: the output folder has {found}, which this command does not replace" in error
+    assert "give another folder" in error
+    assert error.count("\n") == 1
+    assert files() == before
+
+
+@pytest.mark.parametrize("command_line", [RUN, CAMPAIGN])
+def test_a_fit_is_left_alone(command, command_line) -> None:
+    Path("out").mkdir()
+    Path("out/calibration.json").write_text("{}")
+    status, error = command(*command_line, "--overwrite")
+    assert (status, "a fit's results in it (calibration.json)" in error) == (2, True)
+
+
+@pytest.mark.parametrize("first", [REPRODUCE, VALIDATE])
+def test_a_new_campaign_takes_away_the_tables_of_the_one_that_it_replaces(command, first) -> None:
+    assert command(*first)[0] == 0
+    Path("out/notes.txt").write_text("mine")
+    assert command(*CAMPAIGN, "--overwrite")[0] == 0
+    assert set(files()) == {"campaign.sqlite", "runs.csv", "summary.csv", "manifest.json", "notes.txt"}
+
+
+def test_every_file_that_a_command_writes_is_known(command) -> None:
+    for arguments, family in (
+        (RUN, "mission"),
+        (CAMPAIGN, "campaign"),
+        (REPRODUCE, "campaign"),
+        (VALIDATE, "campaign"),
+    ):
+        here = (*arguments[:-1], f"{arguments[0]}-out")
+        assert command(*here)[0] == 0
+        assert {path.name for path in Path(here[-1]).iterdir()} <= set(FAMILIES[family])
+
+
+def test_the_known_files_are_those_of_the_modules_that_write_them() -> None:
+    from suave_des.calibration import report
+    from suave_des.campaign import knowledge_file, results, single, store
+    from suave_des.validation import files as validation
+
+    assert set(FAMILIES["fit"]) == set(report.FILES)
+    assert {store.STORE_FILE, *results.FILES, *validation.FILES} <= set(FAMILIES["campaign"])
+    mission = {single.MISSION_FILE, single.EVENTS_FILE, single.TRAJECTORY_FILE, knowledge_file.KNOWLEDGE_FILE}
+    assert set(FAMILIES["mission"]) == mission
