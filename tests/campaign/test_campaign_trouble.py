@@ -59,7 +59,9 @@ def test_when_all_missions_fail_there_are_no_rows(tmp_path: Path) -> None:
 @pytest.mark.parametrize("workers", [1, 2])
 def test_interrupted_finished_missions_are_kept(workers: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("AWKWARD_TARGET", "self" if workers == 1 else "parent")
-    managers = ["none", "awkward_managers:InterruptsInSome"]
+    monkeypatch.setenv("AWKWARD_ONCE", str(tmp_path / "once"))
+    (tmp_path / "once").touch()
+    managers = ["none", "awkward_managers:InterruptsOnce"]
     with pytest.raises(CampaignInterrupted, match=r"\d+ of 200 missions are done, and kept in ") as stopped:
         run_campaign("seams2023", managers, 100, 1, workers, tmp_path / "out")
     assert isinstance(stopped.value, KeyboardInterrupt)
