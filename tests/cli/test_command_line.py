@@ -274,7 +274,6 @@ OUT = ("--out", "out")
 
 
 def _matches(text: str, pattern: str) -> bool:
-
     assert text.count("\n") == 1, text
     return re.match(pattern, text) is not None
 
