@@ -164,7 +164,7 @@ def _body(seen: _Seen) -> Table:
 
 
 def _name(group: GroupProgress, groups: tuple[GroupProgress, ...]) -> str:
-    return f"{group.manager}, point {group.point + 1}" if groups[-1].point else group.manager
+    return f"{group.manager} at point {group.point + 1}" if groups[-1].point else group.manager
 
 
 # Lines.
@@ -215,7 +215,7 @@ class _Log:
         means = [
             f"{_name(group, seen.groups)} {estimated(group.mean, group.half_width)}"
             for group in seen.groups
-            if group.mean is not None
+            if group.mean is not None and not (group.point != seen.groups[-1].point and group.done == group.runs)
         ]
         parts = [
             f"{progress.done} of {progress.total} missions",

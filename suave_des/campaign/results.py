@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from suave_des.campaign.early_stop import FEWEST_RUNS, Stop, parse_until_ci
+from suave_des.campaign.frames import pieces, typed_frame
 from suave_des.campaign.outcomes import COLUMNS, Failure, Finished, Row
 from suave_des.campaign.output import csv_pieces, csv_text, json_text, rounded, write_files
 from suave_des.campaign.plan import Group
@@ -18,7 +19,6 @@ from suave_des.campaign.summary import SUMMARY_COLUMNS, Tally
 from suave_des.campaign.sweep import cell_of
 from suave_des.campaign.variation import Variation
 from suave_des.scenario.loader import LoadedScenario
-from suave_des.simulation.result import MissionMetrics
 
 if TYPE_CHECKING:
     import pandas
@@ -73,12 +73,37 @@ class CampaignResult:
         return tuple(self.stream())
 
     def frame(self) -> pandas.DataFrame:
-        """The rows as a data frame with the columns of runs.csv; what is empty there is nan here."""
-        import pandas
+        """The rows as a data frame with the columns of runs.csv, typed as typed_frame has it."""
+        return self._frame(self.stream())
 
-        # Without a value in any row, a column would not be known to hold numbers.
-        kinds = {field.name: "float64" for field in fields(MissionMetrics) if "float" in str(field.type)}
-        return pandas.DataFrame.from_records(self.rows, columns=list(self.columns)).astype(kinds)
+    def frames(self, size: int) -> Iterator[pandas.DataFrame]:
+        """The same in pieces of so many rows, read as they are asked for."""
+        return map(self._frame, pieces(self.stream(), size))
+
+    def _frame(self, rows: Iterable[Row]) -> pandas.DataFrame:
+        return typed_frame(rows, self.columns, self.loaded.scenario.name, self.managers, self.seed)
+
+    def told(self) -> dict[str, Any]:
+        """How many missions were run, where managers were stopped, and what failed, as in manifest.json."""
+        return {
+            "missions": {
+                "planned": self.planned,
+                "done": self.done,
+                "failed": len(self.failures),
+                "left_out": self.planned - self.done - len(self.failures),
+            },
+            "until_ci": _told_stops(self),
+            "failures": [_told(failure, self.variation) for failure in self.failures],
+        }
+
+    def summary_told(self) -> list[dict[str, Any]]:
+        """The rows of summary.csv by its columns."""
+        return [dict(zip(self.summary_columns, row, strict=True)) for row in self.summary]
+
+    @property
+    def summary_columns(self) -> tuple[str, ...]:
+        """Columns of summary.csv."""
+        return (*SUMMARY_COLUMNS, *self.variation.sweep.parameters)
 
     def kept(self) -> str:
         """How many missions are done, and where they are."""
@@ -149,7 +174,7 @@ def write_results(result: CampaignResult, request: Request, inputs: Mapping[str,
     assert result.folder is not None
     files: dict[str, str | bytes | Iterable[str]] = {
         RUNS_FILE: csv_pieces(result.columns, map(_exact, result.stream())),
-        SUMMARY_FILE: csv_text((*SUMMARY_COLUMNS, *result.variation.sweep.parameters), result.summary),
+        SUMMARY_FILE: csv_text(result.summary_columns, result.summary),
         MANIFEST_FILE: json_text(_manifest(result, request, inputs)),
     }
     if request.suave_format:
@@ -165,14 +190,7 @@ def _manifest(result: CampaignResult, request: Request, inputs: Mapping[str, str
         "runs": result.runs,
         "seed": result.seed,
         **_varied(result, request),
-        "missions": {
-            "planned": result.planned,
-            "done": result.done,
-            "failed": len(result.failures),
-            "left_out": result.planned - result.done - len(result.failures),
-        },
-        "until_ci": _told_stops(result),
-        "failures": [_told(failure, result.variation) for failure in result.failures],
+        **result.told(),
         **provenance(result.loaded, inputs, request.command),
     }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 from command import suave_des_command
 
+from suave_des.campaign.early_stop import RUNS_LIMIT_DEFAULT
 from suave_des.cli.main import main
 
 
@@ -42,6 +44,8 @@ def rows_of(path: Path) -> list[dict[str, str]]:
     with path.open(newline="") as file:
         return list(csv.DictReader(file))
 
+
+FILE = "campaign: 1\nscenario: seams2023\nmanagers: [none]\n"
 
 MANAGER = """
 from suave_des.managing.simple import NoManager
@@ -113,6 +117,84 @@ class TestResume:
         assert (ended.status, ended.out) == (2, "")
         assert words in ended.err
         assert ended.err.count("\n") == 1
+
+
+class TestUntilCi:
+    def test_says_where_each_manager_was_stopped(self, command, tmp_path: Path) -> None:
+        arguments = ("--managers", "none,random", "--until-ci", "search_time_s:25", "--workers", "1", *OUT)
+        ended = command("campaign", "seams2023", *arguments)
+        assert (ended.status, ended.err) == (0, "")
+        told = re.search(
+            r"stopped with search_time_s ± less than 25: none after run 20, random after run (\d+)", ended.out
+        )
+        assert told
+        manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
+        assert [each["last_run"] for each in manifest["until_ci"]["managers"]] == [20, int(told[1])]
+        assert manifest["runs"] == RUNS_LIMIT_DEFAULT
+
+    def test_says_which_limit_was_not_reached_and_what_to_do(self, command) -> None:
+        arguments = ("--managers", "none", "--until-ci", "search_time_s:0.5", "--runs", "21", "--workers", "1", *OUT)
+        ended = command("campaign", "seams2023", *arguments)
+        assert ended.status == 0
+        assert re.search(
+            r"not reached: none: search_time_s ± \d+\.\d+ after all 21 runs, not less than 0.5\n", ended.out
+        )
+        assert "more runs: suave-des campaign --resume out --runs N\n" in ended.out
+
+    def test_may_stand_in_a_campaign_file(self, command, tmp_path: Path) -> None:
+        (tmp_path / "file.yaml").write_text(f"{FILE}until_ci: search_time_s:25\n")
+        assert "after run 20" in command("campaign", "file.yaml", "--workers", "1", *OUT).out
+        (tmp_path / "wrong.yaml").write_text(f"{FILE}until_ci: search_time:25\n")
+        ended = command("campaign", "wrong.yaml", "--out", "other")
+        assert ended.status == 2
+        assert ended.err.startswith("suave-des: wrong.yaml: line 4, until_ci: ")
+        assert "did you mean search_time_s?" in ended.err
+
+    def test_each_point_of_a_sweep_is_stopped_by_itself(self, command, tmp_path: Path) -> None:
+        text = f"{FILE}until_ci: search_time_s:25\nsweep: {{start.x_m: [-17, -10]}}\n"
+        (tmp_path / "file.yaml").write_text(text)
+        ended = command("campaign", "file.yaml", "--workers", "1", *OUT)
+        assert "none start.x_m=-17 after run 20, none start.x_m=-10 after run 20" in ended.out
+        told = json.loads((tmp_path / "out" / "manifest.json").read_text())["until_ci"]["managers"]
+        assert [each["start.x_m"] for each in told] == [-17, -10]
+
+
+class TestProgress:
+    @pytest.mark.parametrize("quiet", [(), ("--quiet",)])
+    @pytest.mark.parametrize(
+        "arguments",
+        [
+            ("campaign", "seams2023", "--managers", "none", "--out", "out"),
+            ("reproduce",),
+            ("validate", "--managers", "none"),
+        ],
+        ids=lambda arguments: arguments[0],
+    )
+    def test_is_on_stderr_unless_quiet(
+        self, arguments: tuple[str, ...], quiet: tuple[str, ...], command, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("suave_des.campaign.display._FIRST_LINE_S", 0.0)
+        ended = command(*arguments, "--runs", "2", "--workers", "1", *quiet)
+        assert ended.status == 0
+        assert ("missions" in ended.err) == (not quiet)
+        assert not re.search(r"\d of \d+ missions", ended.out)
+
+
+class TestSummary:
+    @pytest.mark.parametrize("width", [80, 100])
+    def test_fits(self, width: int, command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+        monkeypatch.setenv("COLUMNS", str(width))
+        (tmp_path / "mine_with_a_long_name.py").write_text(MANAGER)
+        (tmp_path / "file.yaml").write_text(
+            "campaign: 1\nscenario: seams2023\nruns: 3\nmanagers: [metacontrol, mine_with_a_long_name:Mine]\n"
+            "sweep: {visibility.period_s: [40, 80]}\n"
+        )
+        for number, arguments in enumerate((("seams2023", "--runs", "3"), ("file.yaml",))):
+            ended = command("campaign", *arguments, "--workers", "1", "--out", f"out{number}")
+            lines = ended.out.splitlines()
+            assert max(map(len, lines)) <= width
+            assert "…" not in ended.out
+            assert re.search(r"^ *(40  )?metacontrol +3 +\d+% +\d+\.\d\d ± \d+\.\d\d ", ended.out, re.MULTILINE)
 
 
 class TestRun:
@@ -192,8 +274,6 @@ OUT = ("--out", "out")
 
 
 def _matches(text: str, pattern: str) -> bool:
-    import re
-
     assert text.count("\n") == 1, text
     return re.match(pattern, text) is not None
 

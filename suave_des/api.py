@@ -1,0 +1,193 @@
+"""Campaigns for scripts and notebooks: their results as pandas data frames.
+
+What `suave_des` offers by itself is here and in the modules named in its __init__; see docs/reference/python-api.md.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+
+from suave_des.campaign import campaign as campaigns
+from suave_des.campaign.progress import OnProgress
+from suave_des.campaign.results import CampaignResult
+from suave_des.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas
+
+
+class CampaignOptions(TypedDict, total=False):
+    """What a campaign may be given by name; see run_campaign."""
+
+    sweep: Mapping[str, Any] | None
+    perturbations: Mapping[str, Any] | None
+    runs_per_draw: int | None
+    until_ci: str | None
+    time_out_s: float | None
+    ontologies: Sequence[str | Path]
+    modes_file: str | Path | None
+    reasoner: str | None
+    rules: Sequence[str | Path]
+    disabled_rules: Sequence[str]
+    suave_format: bool
+    confirmed: bool
+    overwrite: bool
+
+
+def run_campaign(
+    scenario: str | Path,
+    managers: Sequence[str] | None = None,
+    runs: int | None = None,
+    seed: int | None = None,
+    workers: int = 1,
+    out: str | Path | None = None,
+    *,
+    progress: bool | None = None,
+    **options: Unpack[CampaignOptions],
+) -> pandas.DataFrame:
+    """Run missions of a scenario under each manager; a row for each mission, with the columns of runs.csv.
+
+    The rows are the same for any number of workers. Columns scenario and manager are categories, the managers in the
+    order given; run, seed and adaptations int64, pipeline_found bool, other metrics float64, nan if not measured.
+
+    `frame.attrs` has, as plain values, `missions`, `until_ci` and `failures` as in manifest.json, `summary` (a mapping
+    for each row of summary.csv), `interrupted`, and `folder`, which may be None. When missions fail, a warning says so.
+
+    Ctrl-C in a notebook or at a prompt gives the missions that are done, with a warning; elsewhere it goes on as
+    CampaignInterrupted, a KeyboardInterrupt, whose `result.frame()` has them.
+
+    Args:
+        scenario: path of a scenario file or of a campaign file, or name of a shipped scenario.
+        managers: names, or module:Class; left out, as is the rest: as in the campaign file, or none, random and
+            metacontrol.
+        runs: missions for each manager, at each point of a sweep: 20.
+        seed: of everything that is random: 1.
+        workers: processes; with 1 the missions run in this one. With more, a script must guard itself with
+            `if __name__ == "__main__":`, because worker processes import it; a notebook need not.
+        out: folder for runs.csv, summary.csv and manifest.json, from which the campaign can be resumed. None: no files.
+        progress: whether to show how far it is; left out: in a notebook and on a terminal.
+        options: sweep, perturbations and runs_per_draw: as in a campaign file. until_ci: "METRIC:HALF_WIDTH", when a
+            manager needs no more runs. time_out_s: that a mission may take, in s of the clock on the wall. ontologies,
+            modes_file, reasoner: in place of the scenario's; rules, disabled_rules: besides them. suave_format: also
+            write the exemplar's results file. confirmed: more than a million missions are meant. overwrite: results in
+            the folder may be replaced.
+
+    Raises:
+        InputError: something given cannot be used; nothing is written then.
+        WorkerError: worker processes end again and again; finished missions are kept.
+        StoreError: the disk is full, or the folder was removed.
+    """
+    result, attrs = _watched(
+        str(scenario),
+        progress,
+        lambda show: campaigns.run_campaign(scenario, managers, runs, seed, workers, out, on_progress=show, **options),
+    )
+    return _with_attrs(result.frame(), attrs)
+
+
+def stream_campaign(
+    scenario: str | Path,
+    managers: Sequence[str] | None = None,
+    runs: int | None = None,
+    seed: int | None = None,
+    workers: int = 1,
+    out: str | Path | None = None,
+    *,
+    chunk_rows: int = 10_000,
+    progress: bool | None = None,
+    **options: Unpack[CampaignOptions],
+) -> Iterator[pandas.DataFrame]:
+    """The same for campaigns whose rows are too many to be in memory: data frames of `chunk_rows` rows, in order.
+
+    The campaign runs at once; its rows are kept on disk, in a temporary file without `out`, and read as they are asked
+    for. Each piece has the types and attrs of the whole.
+
+    Raises:
+        InputError: chunk_rows is less than 1; and as run_campaign.
+        WorkerError, StoreError: as run_campaign.
+    """
+    if chunk_rows < 1:
+        raise InputError(f"chunk_rows: {chunk_rows} is out of range", remedy="give 1 or more")
+    result, attrs = _watched(
+        str(scenario),
+        progress,
+        lambda show: campaigns.run_campaign(scenario, managers, runs, seed, workers, out, on_progress=show, **options),
+    )
+    return (_with_attrs(frame, attrs) for frame in result.frames(chunk_rows))
+
+
+def resume_campaign(
+    folder: str | Path,
+    workers: int = 1,
+    *,
+    runs: int | None = None,
+    until_ci: str | None = None,
+    progress: bool | None = None,
+) -> pandas.DataFrame:
+    """Go on with the campaign in a folder where it stopped, and give its rows as run_campaign does.
+
+    Args:
+        folder: its output folder.
+        workers: processes; it may be another number.
+        runs: more runs than at first; left out: as many.
+        until_ci: the metric given at first with a smaller half-width; left out: as at first.
+        progress: whether to show how far it is; left out: in a notebook and on a terminal.
+
+    Raises:
+        InputError: there is no campaign, or something that decides results has changed; the difference is named.
+        WorkerError, StoreError: as run_campaign.
+    """
+    result, attrs = _watched(
+        str(folder),
+        progress,
+        lambda show: campaigns.resume_campaign(folder, workers, runs=runs, until_ci=until_ci, on_progress=show),
+    )
+    return _with_attrs(result.frame(), attrs)
+
+
+_Attrs = dict[str, Any]
+
+
+def _watched(
+    label: str, progress: bool | None, run: Callable[[OnProgress | None], CampaignResult]
+) -> tuple[CampaignResult, _Attrs]:
+    """Run a campaign and show how far it is; its result, and what is told of it besides rows."""
+    interrupted = False
+    try:
+        with _shown(label, progress) as show:
+            result = run(show)
+    except campaigns.CampaignInterrupted as stopped:
+        if not _is_interactive():
+            raise
+        result, interrupted = stopped.result, True
+        warnings.warn(str(stopped), stacklevel=3)
+    if result.failures:
+        problem = f"{len(result.failures)} of {result.planned} missions failed, see attrs['failures']: "
+        warnings.warn(f"{problem}{result.failures[0]}", stacklevel=3)
+    folder = None if result.folder is None else str(result.folder)
+    return result, {**result.told(), "summary": result.summary_told(), "interrupted": interrupted, "folder": folder}
+
+
+def _shown(label: str, progress: bool | None) -> AbstractContextManager[OnProgress | None]:
+    from rich.console import Console
+
+    from suave_des.campaign.display import shown
+
+    console = Console(stderr=True, highlight=False)
+    is_wanted = console.is_jupyter or console.is_terminal if progress is None else progress
+    return shown(label, console, quiet=not is_wanted)
+
+
+def _is_interactive() -> bool:
+    """Whether somebody sits at a prompt or a notebook: both have this."""
+    return hasattr(sys, "ps1")
+
+
+def _with_attrs(frame: pandas.DataFrame, attrs: _Attrs) -> pandas.DataFrame:
+    frame.attrs.update(attrs)
+    return frame
