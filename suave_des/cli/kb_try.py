@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from suave_des.cli.kb_options import Format, Formats, TimeLimitS, print_json
-from suave_des.cli.options import Ontologies, Reasoner
+from suave_des.cli.options import DisabledRules, Ontologies, Reasoner, RuleFiles
 
 if TYPE_CHECKING:
     from suave_des.workbench.trial import Firing, MissionTrial, Moment
@@ -18,11 +18,22 @@ if TYPE_CHECKING:
 
 def try_rule(
     on: Annotated[
-        Path, typer.Option("--on", metavar="DIR", help="Output folder of run, or a folder that has such folders in it.")
+        Path,
+        typer.Option(
+            "--on",
+            metavar="DIR",
+            help="Output folder of run, or of a campaign that recorded its knowledge, or a folder that has such in it.",
+        ),
     ],
     rule: Annotated[str | None, typer.Argument(metavar="RULE", help='As "name: body -> head".')] = None,
     disable: Annotated[str | None, typer.Option("--disable", metavar="NAME", help="Try to do without a rule.")] = None,
     ontology: Ontologies = None,
+    scenario: Annotated[
+        str | None,
+        typer.Option("--scenario", metavar="SCENARIO", help="In place of the scenario that was recorded."),
+    ] = None,
+    rules: RuleFiles = None,
+    disable_rule: DisabledRules = None,
     reasoner: Reasoner = None,
     time_limit: TimeLimitS = 60.0,
     form: Formats = Format.TEXT,
@@ -32,20 +43,36 @@ def try_rule(
     Nothing is run again: each recorded state is reasoned about with and without the rule. What another decision would
     have led to, only a new run tells.
     """
+    from suave_des.workbench.trial import Change
     from suave_des.workbench.trial import try_rule as tried
 
-    found = tried(on, rule, disable, ontology or (), reasoner, time_limit)
+    change = Change(rule, disable, ontology or (), scenario, rules or (), disable_rule or (), reasoner, time_limit)
+    found = list(tried(on, change))
     if form is Format.JSON:
         print_json([_as_json(mission) for mission in found])
         return
     for mission in found:
-        for line in _lines(mission):
-            print(line)
+        if mission.moments or len(found) == 1:
+            for line in _lines(mission):
+                print(line)
+    if len(found) > 1:
+        print(_total(found))
+
+
+def _total(missions: list[MissionTrial]) -> str:
+    firing = sum(any(moment.firings for moment in mission.moments) for mission in missions)
+    others = [sum(len(moment.otherwise) for moment in mission.moments) for mission in missions]
+    clashes = sum(any(moment.problem for moment in mission.moments) for mission in missions)
+    return (
+        f"{len(missions)} missions: fires in {firing}, other decisions in {sum(map(bool, others))} ({sum(others)} of "
+        f"them), contradictions in {clashes}"
+    )
 
 
 def _lines(mission: MissionTrial) -> Iterator[str]:
     firing = [moment for moment in mission.moments if moment.firings]
-    yield f"{mission.folder}: fires in {len(firing)} of {mission.cycles} recorded states"
+    which = f": {mission.mission}" if mission.mission else ""
+    yield f"{mission.folder}{which}: fires in {len(firing)} of {mission.cycles} recorded states"
     for key, moments in _grouped(firing).items():
         yield f"  {_times(moments)}: {key}"
     yield f"  decisions that would have been others: {sum(len(moment.otherwise) for moment in mission.moments)}"
@@ -89,6 +116,7 @@ def _as_json(mission: MissionTrial) -> dict[str, Any]:
 
     return {
         "folder": str(mission.folder),
+        "mission": mission.mission,
         "states": mission.cycles,
         "moments": [
             {

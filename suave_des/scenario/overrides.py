@@ -30,7 +30,7 @@ def with_values(loaded: LoadedScenario, values: Mapping[str, Any]) -> LoadedScen
     """
     data = loaded.scenario.model_dump(mode="json")
     for path, value in values.items():
-        _set(data, path, value)
+        set_value(data, path, value)
     layer = Layer(data, {(): Place(0, 1, loaded.path)})
     try:
         scenario = Scenario.model_validate(data)
@@ -62,7 +62,12 @@ def value_at(loaded: LoadedScenario, path: str) -> Any:
     return here
 
 
-def _set(data: dict[str, Any], path: str, value: Any) -> None:
+def set_value(data: dict[str, Any], path: str, value: Any) -> None:
+    """Replace the value at a key path of a scenario as plain data.
+
+    Raises:
+        InputError: the path leads nowhere.
+    """
     *parents, last = path.split(".")
     here: Any = data
     for depth, part in enumerate(parents):

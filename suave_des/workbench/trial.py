@@ -11,14 +11,16 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from suave_des.campaign.knowledge_file import KNOWLEDGE_FILE, read_knowledge
+from suave_des.campaign.knowledge_lines import CAMPAIGN_KNOWLEDGE_FILE, read_missions
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.base import KnowledgeBase as Ontologies
-from suave_des.knowledge.limit import TimeLimit
+from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.rule_files import RulesFile, hash_with_rules, with_rules
 from suave_des.knowledge.rule_parser import parse_rule, parse_rules
 from suave_des.knowledge.rules import Rule
 from suave_des.knowledge.state import Fact, KnowledgeState, Value
 from suave_des.resources import find
+from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import Scenario
 from suave_des.simulation.result import KnowledgeRecord
 from suave_des.workbench.bench import KnowledgeBase
@@ -82,89 +84,95 @@ class MissionTrial:
     """A rule's dry run on one mission.
 
     Attributes:
-        folder: the mission's output folder.
+        folder: the mission's output folder, or its campaign's.
+        mission: which of the campaign's; empty for a mission with a folder of its own.
         cycles: recorded states.
         moments: those at which the rule fires or changes something, in order of time.
     """
 
     folder: Path
+    mission: str
     cycles: int
     moments: tuple[Moment, ...]
 
 
-def try_rule(
-    folder: Path,
-    text: str | None,
-    disabled: str | None,
-    ontologies: Sequence[Path],
-    reasoner: str | None,
-    limit_s: float,
-) -> tuple[MissionTrial, ...]:
-    """Try a rule, or the lack of one, on recorded missions.
+@dataclass(frozen=True)
+class Change:
+    """What to try, and what it is tried on.
+
+    Attributes:
+        text: the rule, as "name: body -> head"; it takes the place of those of its name. None: without a rule.
+        disabled: in its place the name of a rule to do without.
+        ontologies: in place of those of the missions' scenario.
+        scenario: file or name of a scenario in place of that of the missions.
+        rules: files of rules as text, besides the scenario's.
+        disabled_rules: names of rules to switch off with and without the change.
+        reasoner: in place of the scenario's.
+        limit_s: of the reasoner, for one state.
+    """
+
+    text: str | None = None
+    disabled: str | None = None
+    ontologies: Sequence[Path] = ()
+    scenario: str | None = None
+    rules: Sequence[Path] = ()
+    disabled_rules: Sequence[str] = ()
+    reasoner: str | None = None
+    limit_s: float = TIME_LIMIT_S
+
+
+@dataclass(frozen=True)
+class _Recorded:
+    folder: Path
+    mission: str
+    scenario: Scenario
+    records: tuple[KnowledgeRecord, ...]
+
+
+def try_rule(folder: Path, change: Change) -> Iterator[MissionTrial]:
+    """Try a rule, or the lack of one, on recorded missions, one after the other.
 
     Only the recorded states are reasoned about: what would have followed from another decision is not simulated.
 
     Args:
-        folder: output folder of a mission, or a folder of such folders.
-        text: the rule, as "name: body -> head"; it takes the place of those of its name.
-        disabled: in its place the name of a rule to do without.
-        ontologies: in place of those of the missions' scenario.
-        reasoner: in place of the scenario's.
-        limit_s: of the reasoner, for one state.
+        folder: output folder of a mission or of a campaign that recorded its knowledge, or a folder of such folders.
+        change: what to try.
 
     Raises:
         InputError: there is no recorded mission, or the rule cannot be used.
         KnowledgeError: the ontologies cannot be reasoned with.
     """
-    if (text is None) == (disabled is None):
+    if (change.text is None) == (change.disabled is None):
         raise InputError("give a rule, or --disable NAME", remedy="one of the two")
-    return tuple(_trial(each, text, disabled, ontologies, reasoner, limit_s) for each in _missions(folder))
+    pair: _Pair | None = None
+    for recorded in _recorded(folder):
+        if pair is None or pair.scenario != recorded.scenario:
+            pair = _Pair(recorded.scenario, change)
+        moments = [pair.moment(record) for record in recorded.records]
+        found = tuple(each for each in moments if each is not None)
+        yield MissionTrial(recorded.folder, recorded.mission, len(recorded.records), found)
 
 
-def _missions(folder: Path) -> list[Path]:
+def _recorded(folder: Path) -> Iterator[_Recorded]:
     if not folder.is_dir():
         raise InputError("no such folder", file=folder, remedy="give the folder that suave-des run --out wrote")
-    found = [path.parent for path in sorted(folder.glob(f"*/{KNOWLEDGE_FILE}"))]
-    if (folder / KNOWLEDGE_FILE).is_file():
-        found.insert(0, folder)
-    if not found:
+    folders = [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]
+    any_found = False
+    for each in folders:
+        if (each / KNOWLEDGE_FILE).is_file():
+            any_found = True
+            yield _Recorded(each, "", _scenario(each / _MISSION_FILE), read_knowledge(each / KNOWLEDGE_FILE))
+        if (each / CAMPAIGN_KNOWLEDGE_FILE).is_file():
+            any_found = True
+            for one in read_missions(each / CAMPAIGN_KNOWLEDGE_FILE):
+                point = f", point {one.point}" if one.point else ""
+                yield _Recorded(each, f"{one.manager}, run {one.run}{point}", one.scenario, one.records)
+    if not any_found:
         raise InputError(
-            f"has no {KNOWLEDGE_FILE}, nor has a folder in it",
+            f"has no {KNOWLEDGE_FILE} or {CAMPAIGN_KNOWLEDGE_FILE}, nor has a folder in it",
             file=folder,
             remedy="suave-des run --manager metacontrol --out records what is reasoned about",
         )
-    return found
-
-
-def _trial(
-    folder: Path,
-    text: str | None,
-    disabled: str | None,
-    ontologies: Sequence[Path],
-    reasoner: str | None,
-    limit_s: float,
-) -> MissionTrial:
-    scenario = _scenario(folder / _MISSION_FILE)
-    knowledge = scenario.knowledge
-    base = Ontologies.load(
-        ontologies or [find(each, "ontology") for each in knowledge.ontologies],
-        values={name: Decimal(repr(value)) for name, value in knowledge.values.items()},
-        rules=[find(each, "ontology") for each in knowledge.rules],
-        disabled_rules=knowledge.disabled_rules,
-    )
-    if text is not None:
-        name = parse_rule(text, "the rule to try").name
-        other = _with(base, text)
-    else:
-        name = str(disabled)
-        other = _without(base, name)
-    loop, limit = Loop.of(scenario), TimeLimit(limit_s, "--time-limit")
-    before = KnowledgeBase.of(base, loop, reasoner or knowledge.reasoner, limit)
-    after = KnowledgeBase.of(other, loop, reasoner or knowledge.reasoner, limit)
-    records = read_knowledge(folder / KNOWLEDGE_FILE)
-    firing_in = before if text is None else after
-    moments = [_moment(record, before, after, name, firing_in) for record in records]
-    return MissionTrial(folder, len(records), tuple(each for each in moments if each is not None))
 
 
 def _scenario(path: Path) -> Scenario:
@@ -191,28 +199,57 @@ def _without(base: Ontologies, name: str) -> Ontologies:
     )
 
 
-def _moment(
-    record: KnowledgeRecord, before: KnowledgeBase, after: KnowledgeBase, name: str, firing_in: KnowledgeBase
-) -> Moment | None:
-    state: KnowledgeState = record.state
-    recorded, _ = _decisions(before, state)
-    then, problem = _decisions(after, state)
-    firings: tuple[Firing, ...] = ()
-    if problem is None:
-        tracer = Tracer(firing_in.base, state)
-        less = after if firing_in is before else before
-        without = less.infer(state).inference
-        known = without.facts | without.asserted
-        rules = [rule for rule in firing_in.base.content.enabled_rules if rule.name == name]
-        firings = tuple(_firings(tracer, rules, known))
-    otherwise = tuple(
-        Otherwise(function, recorded.get(function), then.get(function))
-        for function in sorted(recorded.keys() | then.keys())
-        if problem is None and recorded.get(function) != then.get(function)
-    )
-    if not firings and not otherwise and problem is None:
-        return None
-    return Moment(record.t_s, state, firings, otherwise, problem)
+class _Pair:
+    """The knowledge base of a scenario, without the change and with it."""
+
+    def __init__(self, scenario: Scenario, change: Change) -> None:
+        self.scenario = scenario
+        if change.scenario is not None:
+            loaded = load_scenario(change.scenario)
+            used, ontologies, rules = loaded.scenario, loaded.ontologies, loaded.rules
+        else:
+            used = scenario
+            named = () if change.ontologies else used.knowledge.ontologies
+            ontologies = tuple(find(each, "ontology") for each in named)
+            rules = tuple(find(each, "ontology") for each in used.knowledge.rules)
+        base = Ontologies.load(
+            change.ontologies or ontologies,
+            values={name: Decimal(repr(value)) for name, value in used.knowledge.values.items()},
+            rules=[*rules, *change.rules],
+            disabled_rules=[*used.knowledge.disabled_rules, *change.disabled_rules],
+        )
+        if change.text is not None:
+            self.rule = parse_rule(change.text, "the rule to try").name
+            other = _with(base, change.text)
+        else:
+            self.rule = str(change.disabled)
+            other = _without(base, self.rule)
+        loop, limit = Loop.of(used), TimeLimit(change.limit_s, "--time-limit")
+        reasoner = change.reasoner or used.knowledge.reasoner
+        self.before = KnowledgeBase.of(base, loop, reasoner, limit)
+        self.after = KnowledgeBase.of(other, loop, reasoner, limit)
+        self.has_rule, self.lacks_it = self.after, self.before
+        if change.text is None:
+            self.has_rule, self.lacks_it = self.before, self.after
+        self.rules = [rule for rule in self.has_rule.base.content.enabled_rules if rule.name == self.rule]
+
+    def moment(self, record: KnowledgeRecord) -> Moment | None:
+        """What the change does at a recorded reasoning cycle; None: nothing."""
+        state: KnowledgeState = record.state
+        recorded, _ = _decisions(self.before, state)
+        then, problem = _decisions(self.after, state)
+        firings: tuple[Firing, ...] = ()
+        if problem is None:
+            without = self.lacks_it.infer(state).inference
+            firings = tuple(_firings(Tracer(self.has_rule.base, state), self.rules, without.facts | without.asserted))
+        otherwise = tuple(
+            Otherwise(function, recorded.get(function), then.get(function))
+            for function in sorted(recorded.keys() | then.keys())
+            if problem is None and recorded.get(function) != then.get(function)
+        )
+        if not firings and not otherwise and problem is None:
+            return None
+        return Moment(record.t_s, state, firings, otherwise, problem)
 
 
 def _firings(tracer: Tracer, rules: Sequence[Rule], known: frozenset[Fact]) -> Iterator[Firing]:

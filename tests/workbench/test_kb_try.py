@@ -7,9 +7,11 @@ import json
 import pytest
 
 from suave_des.campaign.knowledge_file import KNOWLEDGE_FILE, knowledge_text, read_knowledge
+from suave_des.campaign.knowledge_lines import CAMPAIGN_KNOWLEDGE_FILE, mission_line, read_missions, scenario_line
 from suave_des.campaign.single import run_mission
 from suave_des.errors import InputError
-from suave_des.workbench.trial import try_rule
+from suave_des.scenario.models import Scenario
+from suave_des.workbench.trial import Change, try_rule
 
 SEARCH = "f_generate_search_path"
 NEAR = (
@@ -51,7 +53,7 @@ def test_adaptations_tell_why_the_other_designs_were_left_out(mission):
 
 def test_a_rule_fires_exactly_where_its_body_holds(mission):
     folder, result = mission
-    (trial,) = try_rule(folder, NEAR, None, (), None, 60.0)
+    (trial,) = try_rule(folder, Change(NEAR))
     expected = [
         record.t_s
         for record in result.knowledge
@@ -67,7 +69,7 @@ def test_a_rule_fires_exactly_where_its_body_holds(mission):
 
 def test_doing_without_a_rule_undoes_the_decisions_that_it_called_for(mission):
     folder, result = mission
-    (trial,) = try_rule(folder, None, "QAWaterVisibility", (), None, 60.0)
+    (trial,) = try_rule(folder, Change(disabled="QAWaterVisibility"))
     lost = [each for moment in trial.moments for each in moment.otherwise]
     adapted = [event for event in result.events if event.event == "adaptation" and "IN_ERROR_NFR" in event.detail]
     assert len(lost) == len(adapted) > 0
@@ -78,7 +80,7 @@ def test_doing_without_a_rule_undoes_the_decisions_that_it_called_for(mission):
 def test_a_rule_that_contradicts_others_is_told_with_its_time(mission, command):
     folder, _ = mission
     clash = NEAR.replace("near:", "clash:").replace("IN_ERROR_NFR", "IN_ERROR_FR").replace("2.5", "4")
-    (trial,) = try_rule(folder, clash, None, (), None, 60.0)
+    (trial,) = try_rule(folder, Change(clash))
     problems = [moment for moment in trial.moments if moment.problem]
     assert problems
     assert all("by the rules QAWaterVisibility, clash" in moment.problem for moment in problems)
@@ -92,6 +94,72 @@ def test_a_folder_of_missions_is_tried_one_by_one(mission, command):
     status, printed, _ = command("try", NEAR, "--on", folder.parent, "--format", "json")
     assert status == 0
     assert [each["folder"] for each in json.loads(printed)] == [str(folder)]
+
+
+@pytest.fixture(scope="module")
+def campaign(mission, tmp_path_factory):
+    """Two points of a sweep, each the mission: at the second the design that sees furthest is expected to see less."""
+    folder, result = mission
+    scenario = Scenario.model_validate(json.loads((folder / "mission.json").read_text())["scenario"])
+    lines = [
+        scenario_line(scenario),
+        mission_line("metacontrol", 0, 1, result.knowledge),
+        mission_line("metacontrol", 1, 1, result.knowledge, {"knowledge.values": {"qa_water_visibility_high": 1.3}}),
+    ]
+    campaign = tmp_path_factory.mktemp("campaign")
+    (campaign / CAMPAIGN_KNOWLEDGE_FILE).write_text("".join(lines))
+    return campaign
+
+
+def test_a_campaign_keeps_the_same_states_in_less_room(mission, campaign):
+    folder, result = mission
+    path = campaign / CAMPAIGN_KNOWLEDGE_FILE
+    first, second = read_missions(path)
+    assert knowledge_text(first.records) == knowledge_text(second.records) == knowledge_text(result.knowledge)
+    assert (first.manager, first.point, first.run, second.point) == ("metacontrol", 0, 1, 1)
+    line = path.read_text().splitlines()[1]
+    assert len(line) < len((folder / KNOWLEDGE_FILE).read_text()) / 2
+
+
+def test_a_campaign_is_tried_mission_by_mission_each_with_what_was_swept(mission, campaign, command):
+    alone = next(try_rule(mission[0], Change(disabled="QAWaterVisibility")))
+    first, second = try_rule(campaign, Change(disabled="QAWaterVisibility"))
+    assert (first.mission, second.mission) == ("metacontrol, run 1", "metacontrol, run 1, point 1")
+    assert first.moments == alone.moments
+    assert second.moments != first.moments
+    status, text, _ = command("try", "--disable", "QAWaterVisibility", "--on", campaign)
+    assert status == 0
+    assert "metacontrol, run 1: fires in" in text
+    assert text.splitlines()[-1].startswith("2 missions: fires in ")
+
+
+def test_the_options_change_what_is_tried_against(mission, tmp_path, command):
+    folder, _ = mission
+    rules = tmp_path / "near.swrl"
+    rules.write_text(NEAR)
+    status, text, _ = command("try", NEAR, "--on", folder, "--rules", rules)
+    assert status == 0
+    assert "(known without it)" in text and "others: 0" in text
+    status, text, _ = command("try", NEAR, "--on", folder, "--scenario", "paper_table_values", "--disable-rule", "S1a")
+    assert status == 0
+    status, _, error = command("try", NEAR, "--on", folder, "--disable-rule", "S1x")
+    assert (status, error.count("\n")) == (2, 1)
+    assert "there is no rule S1x" in error
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("", "line 1: is damaged"),
+        ("{}\n{", "line 1: is damaged"),
+        ('{"scenario": 1}\n{"swept": {}}', "line 2: is damaged"),
+    ],
+)
+def test_a_damaged_record_of_a_campaign_is_told(tmp_path, command, line, said):
+    (tmp_path / CAMPAIGN_KNOWLEDGE_FILE).write_text(line + "\n")
+    status, _, error = command("try", NEAR, "--on", tmp_path)
+    assert (status, error.count("\n")) == (2, 1)
+    assert f"knowledge_states.jsonl: {said}" in error
 
 
 @pytest.mark.parametrize(
@@ -112,11 +180,11 @@ def test_what_cannot_be_tried_is_told(mission, command, words, said):
 
 
 def test_folders_and_files_that_are_no_record_are_told(mission, tmp_path):
-    with pytest.raises(InputError, match=r"has no knowledge\.jsonl"):
-        try_rule(tmp_path, NEAR, None, (), None, 60.0)
+    with pytest.raises(InputError, match=r"has no knowledge\.jsonl or knowledge_states\.jsonl"):
+        list(try_rule(tmp_path, Change(NEAR)))
     (tmp_path / KNOWLEDGE_FILE).write_text('{"t_s": 1}\n')
     with pytest.raises(InputError, match=r"mission\.json: cannot be read"):
-        try_rule(tmp_path, NEAR, None, (), None, 60.0)
+        list(try_rule(tmp_path, Change(NEAR)))
     (tmp_path / "mission.json").write_bytes((mission[0] / "mission.json").read_bytes())
     with pytest.raises(InputError, match=r"knowledge\.jsonl: line 1: is damaged"):
-        try_rule(tmp_path, NEAR, None, (), None, 60.0)
+        list(try_rule(tmp_path, Change(NEAR)))
