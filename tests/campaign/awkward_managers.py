@@ -51,7 +51,7 @@ class InterruptsOnce(_InRun):
 
     def adapt(self) -> None:
         with suppress(FileNotFoundError):
-            os.unlink(os.environ["AWKWARD_ONCE"])
+            Path(os.environ["AWKWARD_ONCE"]).unlink()
             own = os.environ.get("AWKWARD_TARGET", "self") == "self"
             os.kill(os.getpid() if own else os.getppid(), signal.SIGINT)
 
