@@ -75,11 +75,11 @@ class TestInterruptedAtAnAwkwardMoment:
     @pytest.mark.parametrize(
         "moment",
         [
-            "suave_des.campaign.campaign.locked",
-            "suave_des.campaign.campaign.make_store",
+            "suave_des.campaign.running.locked",
+            "suave_des.campaign.running.make_store",
             "suave_des.campaign.store.remove_store",
-            "suave_des.campaign.campaign.Store.__init__",
-            "suave_des.campaign.campaign.make_executor",
+            "suave_des.campaign.running.Store.__init__",
+            "suave_des.campaign.running.executor",
         ],
     )
     def test_before_the_first_mission_nothing_is_left(
@@ -107,7 +107,7 @@ class TestInterruptedAtAnAwkwardMoment:
     ) -> None:
         out = tmp_path / "out"
         with monkeypatch.context() as patch:
-            patch.setattr("suave_des.campaign.campaign.write_results", ctrl_c)
+            patch.setattr("suave_des.campaign.running.write_results", ctrl_c)
             with pytest.raises(KeyboardInterrupt, match=r"nothing is lost: suave-des campaign --resume .* writes"):
                 run_campaign(scenario, ["none"], 2, 1, out=out)
         assert resume_campaign(out).done == 2
