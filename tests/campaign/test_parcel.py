@@ -106,10 +106,9 @@ class TestOnAWorker:
     def test_a_mission_that_hears_no_alarm_is_ended_from_outside(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(dask_worker, "_MARGIN_S", 1.0)
-        found, report = self.run(job("awkward_managers:BlocksInSome", time_out_s=1.0), range(1, 4), tmp_path, "blocks")
-        assert report.lost == [((0, 0, 2), None)]
-        assert set(found) == {MissionKey(0, 0, 1), MissionKey(0, 0, 3)}
+        monkeypatch.setattr(dask_worker, "_MARGIN_S", 0.5)
+        found, report = self.run(job("awkward_managers:BlocksInSome", time_out_s=3.0), range(2, 3), tmp_path, "blocks")
+        assert (found, report.lost) == ({}, [((0, 0, 2), None)])
 
     def test_what_reasoners_learn_comes_home(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setenv("SUAVE_DES_CACHE_DIR", str(tmp_path / "cache"))
