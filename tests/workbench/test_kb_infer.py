@@ -141,8 +141,46 @@ class TestTimeLimit:
         assert "not done after 2 s" in done.stderr
         assert done.stderr.count("\n") == 1
 
+    def test_a_process_that_started_java_within_the_limit_ends(self):
+        command = [sys.executable, "-m", "suave_des", "kb", "infer", "--reasoner", "pellet"]
+        path = str(Path(suave_des.__file__).parents[1])
+        environment = {**os.environ, "PYTHONPATH": path}
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
+        assert (done.returncode, done.stderr) == (0, "")
+
     def test_passes_on_results_and_errors(self):
         limit = TimeLimit(5.0)
         assert limit.run(lambda: 3, "counting") == 3
         with pytest.raises(ZeroDivisionError):
             limit.run(lambda: 1 // 0, "dividing")
+
+    @pytest.mark.parametrize("given_up_on", [False, True])
+    def test_a_program_ends_with_its_own_status_whatever_java_does(self, given_up_on):
+        program = f"""
+import sys
+from suave_des.errors import KnowledgeError
+from suave_des.workbench import KnowledgeBase
+from suave_des.workbench.limit import TimeLimit
+bench = KnowledgeBase.load(reasoner="pellet")  # Java starts in another thread than this one
+state = bench.state(groundings={HIGH["groundings"]!r}, measurements={HIGH["measurements"]!r})
+assert bench.infer(state).plan.decisions
+def for_ever():
+    while True:
+        bench.explain(state)
+try:
+    {given_up_on} and TimeLimit(0.5).run(for_ever, "explaining")
+except KnowledgeError:
+    pass
+sys.exit(5)
+"""
+        path = str(Path(suave_des.__file__).parents[1])
+        environment = {**os.environ, "PYTHONPATH": path}
+        done = subprocess.run(
+            [sys.executable, "-c", program],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+        assert (done.returncode, done.stderr) == (5, "")
