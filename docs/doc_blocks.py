@@ -4,7 +4,8 @@ What a block is follows from its language and the words after it, which readers 
 
 - `console`: commands after `$ `, each followed by what it prints. `head=N` and `tail=N` keep the first and last lines
   of each output; `status=2` says how the last command ends; `test="--runs 4"` gives an option another value in quick
-  tests; `picture=NAME` says that the block draws docs/images/NAME. `console setup` is not run.
+  tests; `picture=NAME` says that the block draws docs/images/NAME. `console setup` is not run. Commands of `console
+  background` go on while the rest of the page runs, at a free port in place of 8786; they show nothing.
 - `python`: a script; the `text` block after it is what it prints.
 - Any language with `title=FILE` is a file, and with `insert=FILE` and `before=LINE` or `after=LINE` an addition to one.
 - `bibtex` is neither run nor checked.
@@ -21,6 +22,7 @@ import os
 import re
 import shlex
 import shutil
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -45,6 +47,8 @@ IMAGES = ROOT / "docs" / "images"
 _FENCE = re.compile(r"```(\w+)(.*)")
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 _UNRUN = ("bibtex",)
+_PORT = "8786"
+"""Of a Dask scheduler, on the pages."""
 
 
 @dataclass(frozen=True)
@@ -96,15 +100,19 @@ def run_page(page: Path, folder: Path, *, quick: bool) -> Iterator[tuple[Block, 
         shutil.copytree(ROOT / name, folder / name)
     printed = ""
     names: dict[str, Any] = {"__name__": "__main__"}
-    with _inside(folder):
+    port = _free_port()
+    with _inside(folder), contextlib.ExitStack() as background:
         for block in blocks_of(page):
             shown = block.text
             if "title" in block.marks:
                 Path(block.marks["title"]).write_text(block.text, encoding="utf-8")
             elif "insert" in block.marks:
                 _insert(block)
+            elif "background" in block.marks:
+                for command in _commands(block, port):
+                    background.enter_context(_going_on(command))
             elif block.language == "console" and "setup" not in block.marks:
-                shown = _run_console(block, quick=quick)
+                shown = _run_console(block, port, quick=quick)
             elif block.language == "python":
                 printed = _printed_by(block, names)
             elif block.language == "text":
@@ -178,13 +186,42 @@ def _printed_by(block: Block, names: dict[str, Any]) -> str:
     return output.getvalue()
 
 
-def _run_console(block: Block, *, quick: bool) -> str:
+def _free_port() -> str:
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        return str(found.getsockname()[1])
+
+
+def _commands(block: Block, port: str) -> list[str]:
+    lines = [line.removeprefix("$ ") for line in block.text.splitlines() if line.startswith("$ ")]
+    return [line.replace(_PORT, port) for line in lines]
+
+
+@contextlib.contextmanager
+def _going_on(command: str) -> Iterator[None]:
+    """Have a command run until the end."""
+    process = subprocess.Popen(
+        ["bash", "-c", f"exec {command}"],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env=os.environ | _where_things_are(),
+    )
+    try:
+        yield
+    finally:
+        process.terminate()
+        try:
+            process.wait(20.0)
+        finally:
+            process.kill()
+
+
+def _run_console(block: Block, port: str, *, quick: bool) -> str:
     shown, status = "", 0
-    for line in block.text.splitlines():
-        if not line.startswith("$ "):
-            continue
-        command = line.removeprefix("$ ")
+    for command in _commands(block, port):
         output, status = _run(_shortened(command, block.marks.get("test", "")) if quick else command, status)
+        line = f"$ {command}".replace(port, _PORT)
         shown += f"{line}\n{_cut(output, block.marks)}"
     if status != int(block.marks.get("status", 0)):
         raise RuntimeError(f"{block.place}: ended with status {status}:\n{shown}")
@@ -220,18 +257,21 @@ def _run(command: str, status_before: int) -> tuple[str, int]:
     return (output.getvalue(), status) if not rest else _shell(rest, output.getvalue())
 
 
-def _shell(command: str, given: str) -> tuple[str, int]:
-    here = {
+def _where_things_are() -> dict[str, str]:
+    return {
         "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
         "PYTHONPATH": str(Path(suave_des.__file__).parent.parent),
     }
+
+
+def _shell(command: str, given: str) -> tuple[str, int]:
     done = subprocess.run(
         ["bash", "-c", command],
         input=given,
         text=True,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
-        env=os.environ | here,
+        env=os.environ | _where_things_are(),
         check=False,
     )
     return done.stdout, done.returncode

@@ -220,7 +220,7 @@ def _remote_same() -> Callable[[bytes], bytes]:
 
 
 def _remote_run() -> Callable[..., tuple[str, Any]]:
-    def suave_des_missions(order: bytes, chunk: tuple[tuple[int, int, int], ...]) -> tuple[str, Any]:
+    def suave_des_missions(order: bytes, chunk: bytes) -> tuple[str, Any]:
         import pickle
 
         from distributed import get_worker
@@ -230,7 +230,7 @@ def _remote_run() -> Callable[..., tuple[str, Any]]:
             from suave_des.campaign.dask_worker import Order, run
         except ImportError as error:
             return worker.address, error
-        return worker.address, run(Order(*pickle.loads(order)), chunk, worker.local_directory)
+        return worker.address, run(Order(*pickle.loads(order)), pickle.loads(chunk), worker.local_directory)
 
     return suave_des_missions
 
@@ -330,7 +330,7 @@ class _Flow:
     def _submit(self, chunk: Chunk) -> Any:
         self._number += 1
         key = f"suave_des_missions-{self._token}-{self._number}"
-        future = self._client.submit(self._run, self._order, tuple(map(tuple, chunk)), key=key)
+        future = self._client.submit(self._run, self._order, pickle.dumps(tuple(map(tuple, chunk))), key=key)
         self._under_way[future] = chunk
         future.add_done_callback(self._ended.put)
         return future

@@ -144,7 +144,7 @@ class _Crew:
 
     def run(self, chunk: Sequence[Key]) -> Report | Trouble:
         report = Report(missions=len(chunk))
-        done, attempts, starts, singly = 0, 0, 0, False
+        done, attempts, starts, singly = 0, 0, 0, len(chunk) == 1
         while done < len(chunk) and not self._is_over:
             before = done
             process = self._take()

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from suave_des.campaign.outcomes import Failure, Finished, Job
 from suave_des.campaign.own_modules import own_modules
@@ -17,6 +19,8 @@ from suave_des.scenario.loader import LoadedScenario
 
 MODULES_FOLDER = "modules"
 _FILES_FOLDER = "files"
+_KNOWLEDGE_BASES, _POINTS_LOOKED_AT = 16, 10_000
+"""What reasoners remember is taken along for so many knowledge bases, each of which takes half a second to read."""
 
 
 @dataclass(frozen=True)
@@ -66,15 +70,34 @@ def _with_imports(loaded: LoadedScenario) -> list[Path]:
 
 
 def _memories(job: Job) -> dict[str, bytes]:
-    if job.loaded.scenario.knowledge.reasoner != "remembered" or not any(
-        manager_class(name).needs_knowledge for name in job.managers
-    ):
+    if not any(manager_class(name).needs_knowledge for name in job.managers):
         return {}
     from suave_des.knowledge.remembered import memory_digest
-    from suave_des.simulation.knowledge import open_knowledge
+    from suave_des.simulation.knowledge import open_base
 
-    digest = memory_digest(open_knowledge(job.loaded).base)
-    return {digest: DiskMemory(digest).content()}
+    digests = []
+    for loaded in _knowledge_bases(job):
+        if loaded.scenario.knowledge.reasoner == "remembered":
+            with suppress(InputError):  # told by the missions that reason with it
+                digests.append(memory_digest(open_base(loaded)))
+    return {digest: DiskMemory(digest).content() for digest in digests}
+
+
+def _knowledge_bases(job: Job) -> Iterator[LoadedScenario]:
+    """The scenario, once for each knowledge base that a sweep makes of it, as far as these are few."""
+    variation = job.variation
+    varied = [name for name, path in variation.paths.items() if path.startswith("knowledge.")]
+    if not varied:
+        yield job.loaded
+        return
+    seen: list[list[Any]] = []
+    for point in range(min(variation.sweep.points, _POINTS_LOOKED_AT)):
+        values = variation.sweep.values(point)
+        if (its := [values[name] for name in varied]) not in seen:
+            seen.append(its)
+            yield variation.simulator(job.loaded, point).loaded
+            if len(seen) == _KNOWLEDGE_BASES:
+                return
 
 
 @dataclass(frozen=True)

@@ -149,11 +149,15 @@ def test_interrupted_there_and_resumed_here(cluster: Cluster, short: Path, tmp_p
     def stop(progress: Progress) -> None:
         raise KeyboardInterrupt
 
-    asked = (short, ["none", "random"], 100, 1)
+    asked = (short, ["none", "random"], 50, 1)
+    varied = {
+        "sweep": {"visibility.period_s": [40, 80]},
+        "perturbations": {"start.y_m": {"distribution": "normal", "mean": 0.0, "std": 1.0}},
+    }
     with pytest.raises(CampaignInterrupted, match=r"suave-des campaign --resume .* does the rest"):
-        run_campaign(*asked, out=tmp_path / "out", scheduler=cluster.address, on_progress=stop)
+        run_campaign(*asked, out=tmp_path / "out", scheduler=cluster.address, on_progress=stop, **varied)
     resume_campaign(tmp_path / "out")
-    run_campaign(*asked, out=tmp_path / "whole")
+    run_campaign(*asked, out=tmp_path / "whole", **varied)
     assert (tmp_path / "out" / "runs.csv").read_bytes() == (tmp_path / "whole" / "runs.csv").read_bytes()
 
 
