@@ -29,6 +29,7 @@ class CampaignOptions(TypedDict, total=False):
     runs_per_draw: int | None
     until_ci: str | None
     time_out_s: float | None
+    scheduler: str | None
     ontologies: Sequence[str | Path]
     modes_file: str | Path | None
     reasoner: str | None
@@ -127,6 +128,7 @@ def resume_campaign(
     *,
     runs: int | None = None,
     until_ci: str | None = None,
+    scheduler: str | None = None,
     progress: bool | None = None,
 ) -> pandas.DataFrame:
     """Go on with the campaign in a folder where it stopped, and give its rows as run_campaign does.
@@ -136,6 +138,7 @@ def resume_campaign(
         workers: processes; it may be another number.
         runs: more runs than at first; left out: as many.
         until_ci: the metric given at first with a smaller half-width; left out: as at first.
+        scheduler: address of a Dask scheduler whose workers run the missions, instead of processes here.
         progress: whether to show how far it is; left out: in a notebook and on a terminal.
 
     Raises:
@@ -145,7 +148,9 @@ def resume_campaign(
     result, attrs = _watched(
         str(folder),
         progress,
-        lambda show: campaigns.resume_campaign(folder, workers, runs=runs, until_ci=until_ci, on_progress=show),
+        lambda show: campaigns.resume_campaign(
+            folder, workers, runs=runs, until_ci=until_ci, on_progress=show, scheduler=scheduler
+        ),
     )
     return _with_attrs(result.frame(), attrs)
 

@@ -146,7 +146,7 @@ def test_killed_at_random_moments_the_bytes_are_the_same(scenario: Path, tmp_pat
 
     with pytest.raises(CampaignInterrupted):
         run_campaign(scenario, ["none", "random"], 5000, 1, out=out, until_ci=limit, on_progress=ctrl_c)
-    done = chaos.survive_forked(8, random.Random(3), lambda resumes: resume_campaign(out), out)
+    done = chaos.survive_forked(8, random.Random(3), lambda resumes, told: resume_campaign(out, on_progress=told), out)
     resume_campaign(out)
     assert done == sorted(done)
     assert files_of(out) == files_of(tmp_path / "whole")
