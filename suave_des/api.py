@@ -73,7 +73,8 @@ def run_campaign(
         out: folder for runs.csv, summary.csv and manifest.json, from which the campaign can be resumed. None: no files.
         progress: whether to show how far it is; left out: in a notebook and on a terminal.
         options: sweep, perturbations and runs_per_draw: as in a campaign file. until_ci: "METRIC:HALF_WIDTH", when a
-            manager needs no more runs. time_out_s: that a mission may take, in s of the clock on the wall. ontologies,
+            manager needs no more runs. time_out_s: that a mission may take, in s of the clock on the wall. scheduler:
+            address of a Dask scheduler whose workers run the missions, instead of processes here. ontologies,
             modes_file, reasoner: in place of the scenario's; rules, disabled_rules: besides them. suave_format: also
             write the exemplar's results file. confirmed: more than a million missions are meant. overwrite: results in
             the folder may be replaced.

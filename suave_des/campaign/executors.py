@@ -74,9 +74,13 @@ def executor(workers: int, scheduler: str | None = None) -> Iterator[Executor]:
         with connected(scheduler) as cluster:
             yield cluster
         return
-    from suave_des.campaign.pool import ProcessPool
+    if workers == 1:
+        yield InProcess()
+        return
+    from suave_des.campaign.pool import process_pool
 
-    yield InProcess() if workers == 1 else ProcessPool(workers)
+    with process_pool(workers) as pool:
+        yield pool
 
 
 class InProcess:

@@ -56,6 +56,10 @@ class _Worker:
     since_s: float = 0.0
     overdue: bool = False
 
+    def begin(self, job: Job) -> None:
+        with suppress(BrokenPipeError, ConnectionResetError):  # it is gone, which receiving from it tells
+            self.connection.send(job)
+
     def give(self, task: _Task) -> None:
         if not self.tasks:
             self.since_s = time.monotonic()
@@ -71,48 +75,57 @@ class ProcessPool:
     before its work is done (killed, out of memory, a Java machine that crashed) is replaced, and its missions are run
     again one by one. A mission during which that happens _ATTEMPTS times has failed; so has one that its own time-out
     does not end.
+    """
+
+    def __init__(self, workers: list[_Worker]) -> None:
+        self._workers = workers
+        self.is_done = False
+
+    def outcomes(self, job: Job, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
+        """Outcomes chunk by chunk; see Executor."""
+        for worker in self._workers:
+            worker.begin(job)
+        size = chunk_size(total, len(self._workers))
+        yield from _Crew(self._workers, job, (_Task(chunk) for chunk in chunked(missions, size))).outcomes()
+        self.is_done = True
+
+
+@contextmanager
+def process_pool(workers: int) -> Iterator[ProcessPool]:
+    """A pool whose workers start now: what they import, they import while this process prepares their work.
+
+    They are stopped at the end; at once, if not all outcomes were asked for.
 
     Args:
         workers: number of processes.
     """
-
-    def __init__(self, workers: int) -> None:
-        self._workers = workers
-
-    def outcomes(self, job: Job, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
-        """Outcomes chunk by chunk; see Executor."""
-        size = chunk_size(total, self._workers)
-        crew = _Crew(job, (_Task(chunk) for chunk in chunked(missions, size)))
-        with crew.working(min(self._workers, -(-total // size))):
-            yield from crew.outcomes()
+    started: list[_Worker] = []
+    try:
+        for _ in range(workers):
+            started.append(_started())
+        pool = ProcessPool(started)
+        yield pool
+        if pool.is_done:
+            for worker in started:
+                with suppress(BrokenPipeError, ConnectionResetError):  # its work is done: no matter if it is gone
+                    worker.connection.send(None)
+            for worker in started:
+                worker.process.join(_STOP_TIMEOUT_S)
+    finally:
+        for worker in started:
+            worker.connection.close()
+            worker.process.kill()
+        for worker in started:
+            _end(worker.process)
 
 
 class _Crew:
-    def __init__(self, job: Job, tasks: Iterator[_Task]) -> None:
+    def __init__(self, workers: list[_Worker], job: Job, tasks: Iterator[_Task]) -> None:
+        self._workers = workers
         self._job = job
         self._tasks = tasks
         self._again: deque[_Task] = deque()
-        self._workers: list[_Worker] = []
         self._in_a_row = 0
-
-    @contextmanager
-    def working(self, workers: int) -> Iterator[None]:
-        """Workers start at the beginning, and are stopped at the end; at once if it comes by an exception."""
-        try:
-            for _ in range(workers):
-                self._workers.append(_started(self._job))
-            yield
-            for worker in self._workers:
-                with suppress(BrokenPipeError, ConnectionResetError):  # its work is done: no matter if it is gone
-                    worker.connection.send(None)
-            for worker in self._workers:
-                worker.process.join(_STOP_TIMEOUT_S)
-        finally:
-            for worker in self._workers:
-                worker.connection.close()
-                worker.process.kill()
-            for worker in self._workers:
-                _end(worker.process)
 
     def outcomes(self) -> Iterator[list[Finished]]:
         self._hand_out()
@@ -178,7 +191,8 @@ class _Crew:
         suspect, *others = worker.tasks
         yield from self._try_again(suspect, status, overdue=worker.overdue)
         self._again.extend(others)
-        self._workers[self._workers.index(worker)] = _started(self._job)
+        self._workers[self._workers.index(worker)] = fresh = _started()
+        fresh.begin(self._job)
         self._hand_out()
 
     def _try_again(self, task: _Task, status: int | None, *, overdue: bool) -> Iterator[list[Finished]]:
@@ -194,10 +208,10 @@ class _Crew:
             yield [self._job.failed(task.chunk[0], cause)]
 
 
-def _started(job: Job) -> _Worker:
+def _started() -> _Worker:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
-    process: BaseProcess = context.Process(target=_work, args=(theirs, job), daemon=True)
+    process: BaseProcess = context.Process(target=_work, args=(theirs,), daemon=True)
     with _interrupts_held():
         process.start()
     theirs.close()
@@ -221,9 +235,12 @@ def _interrupts_held() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _work(connection: Connection, job: Job) -> None:
-    """Life of a worker process: chunks in, outcomes out, until there are no more or the parent is gone."""
+def _work(connection: Connection) -> None:
+    """Life of a worker process: a job and chunks in, outcomes out, until there are no more or the parent is gone."""
     try:
+        job: Job | None = connection.recv()
+        if job is None:
+            return
         runner = MissionRunner(job)
         while (chunk := connection.recv()) is not None:
             connection.send(runner.run(chunk))

@@ -82,17 +82,19 @@ class Campaign:
         began_s = time.perf_counter()
         runner.run(few)
         expected_s = (time.perf_counter() - began_s) / len(few) * total / workers
-        problem = f"{total:,} missions take about {_duration_text(expected_s)} with {workers} workers on this machine"
+        by = f"{workers} worker{'s' if workers > 1 else ''}"
+        problem = f"{total:,} missions take about {_duration_text(expected_s)} with {by} on this machine"
         raise InputError(problem, remedy="give --yes if that is meant")
 
     def run(
         self, workers: int, on_progress: OnProgress | None, scheduler: str | None, *, resumed: bool
     ) -> CampaignResult:
         """Run what is not done yet, and write the files."""
-        if workers > 1:
-            _compile(self.job)
+        workers = min(workers, max(1, self.watch.total))
         with ExitStack() as stack:
             place = stack.enter_context(executor(workers, scheduler))
+            if workers > 1:
+                _compile(self.job)
             if self.folder is not None:
                 if not self.folder.exists():
                     stack.callback(_remove_empty, self.folder)  # unless something is in it then
