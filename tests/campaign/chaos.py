@@ -22,10 +22,10 @@ SHORT = "base: seams2023.yaml\nmission: {time_limit_s: 60}\n"
 
 
 def start(arguments: Sequence[str], cwd: Path) -> subprocess.Popen[str]:
-    """Start `suave-des campaign ARGUMENTS`."""
+    """Start `suave-des campaign ARGUMENTS`; on a slow machine too, it says nothing of its progress."""
     path = os.pathsep.join([str(Path(suave_des.__file__).parents[1]), str(_HERE), os.environ.get("PYTHONPATH", "")])
     return subprocess.Popen(
-        [sys.executable, "-m", "suave_des", "campaign", *arguments],
+        [sys.executable, "-m", "suave_des", "campaign", "--quiet", *arguments],
         cwd=cwd,
         env={**os.environ, "PYTHONPATH": path},
         stdout=subprocess.PIPE,

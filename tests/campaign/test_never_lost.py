@@ -268,7 +268,7 @@ class TestDisk:
             "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
             "from suave_des.cli.main import main\n"
             f"main(['campaign', {str(scenario)!r}, '--managers', 'none,random', '--runs', '400', '--workers', '1',"
-            " '--out', 'out'])\n"
+            " '--quiet', '--out', 'out'])\n"
         )
         ended = subprocess.run(
             [sys.executable, "-c", code],

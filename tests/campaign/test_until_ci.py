@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from suave_des.campaign.campaign import CampaignInterrupted, Progress, resume_campaign, run_campaign
 from suave_des.campaign.early_stop import FEWEST_RUNS, METRICS, Standing
 from suave_des.campaign.outcomes import COLUMNS, Failure, Outcome
+from suave_des.campaign.progress import OnProgress
 from suave_des.errors import InputError
 from suave_des.estimates import Running, estimate
 
@@ -140,14 +141,15 @@ def test_killed_at_random_moments_the_bytes_are_the_same(scenario: Path, tmp_pat
     out, limit = tmp_path / "out", "initial_y_m:0.0006"
     run_campaign(scenario, ["none", "random"], 5000, 1, out=tmp_path / "whole", until_ci=limit)
 
-    def ctrl_c(progress: Progress) -> None:
-        if progress.done >= 300:
-            raise KeyboardInterrupt
+    def run(resumes: bool, on_progress: OnProgress) -> None:
+        if resumes:
+            resume_campaign(out, on_progress=on_progress)
+        else:
+            run_campaign(scenario, ["none", "random"], 5000, 1, out=out, until_ci=limit, on_progress=on_progress)
 
-    with pytest.raises(CampaignInterrupted):
-        run_campaign(scenario, ["none", "random"], 5000, 1, out=out, until_ci=limit, on_progress=ctrl_c)
-    done = chaos.survive_forked(8, random.Random(3), lambda resumes, told: resume_campaign(out, on_progress=told), out)
+    done = chaos.survive_forked(8, random.Random(3), run, out)
     resume_campaign(out)
+    assert max(done) > 0
     assert done == sorted(done)
     assert files_of(out) == files_of(tmp_path / "whole")
 

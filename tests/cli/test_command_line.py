@@ -338,7 +338,7 @@ class TestCampaign:
     def test_lists_failures_keeps_the_others_and_ends_with_status_3(self, tmp_path: Path) -> None:
         (tmp_path / "clumsy.py").write_text(MANAGER)
         managers = "clumsy:Raises,none"
-        arguments = ("--managers", managers, "--runs", "2", "--workers", "2", *OUT)
+        arguments = ("--managers", managers, "--runs", "2", "--workers", "2", "--quiet", *OUT)
         ended = suave_des_command("campaign", "seams2023", *arguments, cwd=tmp_path)
         assert ended.returncode == 3
         lines = ended.stderr.splitlines()
@@ -359,7 +359,7 @@ class TestCampaign:
             "        super().task_requested(task)\n"
         )
         (tmp_path / "impatient.py").write_text(manager)
-        arguments = ("--managers", "none,impatient:CtrlC", "--runs", "100", *OUT)
+        arguments = ("--managers", "none,impatient:CtrlC", "--runs", "100", "--quiet", *OUT)
         ended = suave_des_command("campaign", "seams2023", *arguments, cwd=tmp_path)
         assert ended.returncode == 130
         assert _matches(ended.stderr, r"suave-des: interrupted; \d+ of 200 missions are done, and kept in out")
@@ -368,7 +368,7 @@ class TestCampaign:
 
 class TestReproduce:
     def test_prints_the_papers_table_beside_ours_and_writes_it(self, tmp_path: Path) -> None:
-        ended = suave_des_command("reproduce", "--runs", "2", "--seed", "1", *OUT, cwd=tmp_path)
+        ended = suave_des_command("reproduce", "--runs", "2", "--seed", "1", "--quiet", *OUT, cwd=tmp_path)
         assert (ended.returncode, ended.stderr) == (0, "")
         for figure in ("187.85", "42.40", "31.40", "13.00", "180.15", "82.05", "3.88", "3.19"):
             assert figure in ended.stdout
