@@ -2,7 +2,7 @@
 
 The first line has the scenario, each further one a mission: the distinct states without their measured values in a
 table, and for each reasoning cycle whose state differs from the one before its time, the number of its state in that
-table, and the measured values as text, so that they stay exact. That takes a fifth of the room that knowledge.jsonl does.
+table, and the measured values as text, so that they stay exact. That takes a fifth of the room of knowledge.jsonl.
 """
 
 from __future__ import annotations
