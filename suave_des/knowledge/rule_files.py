@@ -73,6 +73,7 @@ def with_rules(content: Content, more: Iterable[Sequence[Rule]], disabled: Colle
     for name in sorted(set(disabled) - known):
         raise KnowledgeError(
             f"there is no rule {name} to switch off",
+            place=f"disabled_rules.{name}",
             remedy=nearest(name, known) or f"rules: {', '.join(sorted(known)) or 'none'}",
         )
     return replace(

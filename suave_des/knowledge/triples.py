@@ -32,6 +32,7 @@ from suave_des.knowledge.vocabulary import (
     TOMASYS,
     XSD,
     local_name,
+    nearest,
 )
 from suave_des.resources import shipped_folder
 
@@ -124,8 +125,9 @@ def _override(triples: tuple[Triple, ...], values: Mapping[str, Decimal]) -> tup
     known = {local_name(triple[0]) for triple in triples if triple[1] == _HAS_VALUE}
     for name in sorted(values.keys() - known):
         raise KnowledgeError(
-            f"values: there is no individual {name} with a hasValue in the ontology",
-            remedy=f"known: {', '.join(sorted(known)) or 'none'}",
+            f"the ontology has no individual {name} with a hasValue",
+            place=f"values.{name}",
+            remedy=nearest(name, known) or f"known: {', '.join(sorted(known)) or 'none'}",
         )
     return tuple(
         (subject, predicate, Lit(format(values[local_name(subject)], "f"), XSD + "decimal"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from suave_des.errors import InputError
 from suave_des.resources import find
 from suave_des.scenario.bases import Files, find_named, scenario_layer
 from suave_des.scenario.layers import Layer
-from suave_des.scenario.models import ManagerSettings, Scenario, TableSignal
+from suave_des.scenario.models import REASONERS, ManagerSettings, Scenario, TableSignal
 from suave_des.scenario.modes import UNGROUND_MODE, ModeTable, modes_of
 from suave_des.scenario.problems import input_error
 from suave_des.scenario.tables import Table, read_table
@@ -40,6 +40,7 @@ class LoadedScenario:
         modes_path: the modes file.
         tables: times (s) and values of each table signal, by the signal's name.
         inputs: SHA-256 of each file read, by its name as shown to the user.
+        layer: what stands in the scenario's files, and where.
         rules: files of rules as text, in the order in which they count.
     """
 
@@ -50,7 +51,25 @@ class LoadedScenario:
     modes_path: Path
     tables: Mapping[str, Table]
     inputs: Mapping[str, str]
+    layer: Layer = field(repr=False)
     rules: tuple[Path, ...] = ()
+
+    def located(self, error: InputError) -> InputError:
+        """An error about a name that only the ontology could judge, with the file and line in which the name stands.
+
+        Args:
+            error: with a place such as "values.NAME" or "disabled_rules.NAME"; any other comes back as it is.
+        """
+        part, _, name = (error.place or "").partition(".")
+        if error.file is not None or part not in ("values", "disabled_rules"):
+            return error
+        key_path: KeyPath = ("knowledge", part, name)
+        if part == "disabled_rules":
+            in_file = self.layer.data.get("knowledge", {}).get(part, [])
+            if name not in in_file:
+                return InputError(error.problem, place="--disable-rule", remedy=error.remedy)
+            key_path = ("knowledge", part, in_file.index(name))
+        return self.layer.error(error.problem, key_path, error.remedy)
 
 
 def load_scenario(
@@ -77,6 +96,9 @@ def load_scenario(
     Raises:
         InputError: a file that cannot be read, or a value that cannot be right, with file and line.
     """
+    if reasoner is not None and reasoner not in REASONERS:
+        remedy = did_you_mean(reasoner, REASONERS)
+        raise InputError(f"there is no reasoner {shown(reasoner)}", place="--reasoner", remedy=remedy)
     files = Files()
     path = find(name, "scenarios")
     layer = scenario_layer(files, path)
@@ -119,7 +141,7 @@ def load_scenario(
             files.note(table_path, digest)
 
     scenario = _overridden(scenario, ontologies, modes_file, reasoner, rules, disabled_rules)
-    return LoadedScenario(scenario, path, ontology_paths, modes, modes_path, tables, files.inputs, rules_paths)
+    return LoadedScenario(scenario, path, ontology_paths, modes, modes_path, tables, files.inputs, layer, rules_paths)
 
 
 def _overridden(

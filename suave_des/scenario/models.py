@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, field_validator, model_validator
 
@@ -55,6 +55,9 @@ __all__ = [
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_.-]*$", max_length=100)]
 FileName = Annotated[str, Field(min_length=1)]
+
+Reasoner = Literal["remembered", "pellet", "owlready2"]
+REASONERS: tuple[str, ...] = get_args(Reasoner)
 
 SEA_BED_Z_M = -20.0
 SURFACE_Z_M = 0.0
@@ -256,8 +259,8 @@ class Knowledge(Strict):
     """Rules to switch off, by name."""
     values: dict[str, Number] = Field(default_factory=dict)
     """New value (hasValue) of named individuals of QAvalue, such as qa_water_visibility_low: 0.5."""
-    reasoner: str = "remembered"
-    """Which reasoner analyzes: remembered, pellet, or owlready2 (the reference, slow)."""
+    reasoner: Reasoner = "remembered"
+    """Which reasoner analyzes; owlready2 is the reference, and slow."""
 
 
 _DEFAULT_MODES = {"f_generate_search_path": "fd_spiral_low", "f_follow_pipeline": "fd_follow_pipeline"}

@@ -6,7 +6,7 @@ from decimal import Decimal
 from functools import lru_cache
 from pathlib import Path
 
-from suave_des.errors import InputError
+from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.deliberation import Deliberation
 from suave_des.knowledge.reasoners import make_reasoner
@@ -20,12 +20,15 @@ def open_base(loaded: LoadedScenario) -> KnowledgeBase:
         KnowledgeError: the ontologies or rules cannot be read.
     """
     knowledge = loaded.scenario.knowledge
-    return KnowledgeBase.load(
-        loaded.ontologies,
-        values={name: Decimal(repr(value)) for name, value in knowledge.values.items()},
-        rules=loaded.rules,
-        disabled_rules=knowledge.disabled_rules,
-    )
+    try:
+        return KnowledgeBase.load(
+            loaded.ontologies,
+            values={name: Decimal(repr(value)) for name, value in knowledge.values.items()},
+            rules=loaded.rules,
+            disabled_rules=knowledge.disabled_rules,
+        )
+    except KnowledgeError as error:
+        raise loaded.located(error) from None
 
 
 def open_knowledge(loaded: LoadedScenario) -> Deliberation:
@@ -37,14 +40,17 @@ def open_knowledge(loaded: LoadedScenario) -> Deliberation:
     """
     knowledge = loaded.scenario.knowledge
     values = tuple((name, Decimal(repr(value))) for name, value in sorted(knowledge.values.items()))
-    deliberation = _open(
-        loaded.ontologies,
-        tuple(sorted(loaded.inputs.items())),
-        values,
-        loaded.rules,
-        knowledge.disabled_rules,
-        knowledge.reasoner,
-    )
+    try:
+        deliberation = _open(
+            loaded.ontologies,
+            tuple(sorted(loaded.inputs.items())),
+            values,
+            loaded.rules,
+            knowledge.disabled_rules,
+            knowledge.reasoner,
+        )
+    except KnowledgeError as error:
+        raise loaded.located(error) from None
     base = deliberation.base
     base.check(MISSION_FUNCTIONS)
     for function in MISSION_FUNCTIONS:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from decimal import Decimal
 from pathlib import Path
 
 from suave_des.knowledge.base import KnowledgeBase as Ontologies
@@ -13,6 +12,7 @@ from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit, in_words
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import KnowledgeState, Number
 from suave_des.scenario.loader import load_scenario
+from suave_des.simulation.knowledge import open_base
 from suave_des.workbench.difference import PolicyDifference, compare
 from suave_des.workbench.explain import Explanation, explain
 from suave_des.workbench.policy import Policy, Space, make_policy
@@ -68,12 +68,9 @@ class KnowledgeBase:
         loaded = load_scenario(
             scenario, ontologies=ontologies, reasoner=reasoner, rules=rules, disabled_rules=disabled_rules
         )
-        knowledge = loaded.scenario.knowledge
-        values = {name: Decimal(repr(value)) for name, value in knowledge.values.items()}
-        base = Ontologies.load(
-            loaded.ontologies, values=values, rules=loaded.rules, disabled_rules=knowledge.disabled_rules
-        )
-        return cls.of(base, Loop.of(loaded.scenario), knowledge.reasoner, TimeLimit(time_limit_s, "--time-limit"))
+        reasoner = loaded.scenario.knowledge.reasoner
+        limit = TimeLimit(time_limit_s, "--time-limit")
+        return cls.of(open_base(loaded), Loop.of(loaded.scenario), reasoner, limit)
 
     @classmethod
     def of(cls, base: Ontologies, loop: Loop, reasoner: str, limit: TimeLimit) -> KnowledgeBase:

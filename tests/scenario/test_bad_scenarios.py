@@ -173,6 +173,12 @@ def refused(write, content: str, **options: object) -> InputError:
         (HEAD + "managers: {metacontroll: {}}\n", "line 2, managers.metacontroll", "no manager", "mean 'metacontrol'?"),
         (HEAD + "managers: {'mine:Manager': 3}\n", "line 2, managers.mine:Manager", "3 is not a mapping", "key: value"),
         (HEAD + "knowledge: {ontologies: suave.owl}\n", "line 2, knowledge.ontologies", "is no list", "['suave.owl']"),
+        (
+            HEAD + "knowledge:\n  reasoner: pelet\n",
+            "line 3, knowledge.reasoner",
+            "'pelet' is not allowed",
+            "did you mean 'pellet'? allowed: remembered, pellet, owlready2",
+        ),
         (HEAD + "knowledge: {ontologies: []}\n", "line 2, knowledge.ontologies", "has 0 entries", "at least 1"),
         # revisions
         (HEAD + "revision: 2024\n", "line 2, revision", "no revision '2024'", "shipped: 1.5, 2023"),
@@ -350,6 +356,20 @@ def test_a_name_that_cannot_be_a_file_is_refused(write, name):
 def test_a_missing_ontology_or_modes_file_of_the_command_line_is_named(write):
     assert refused(write, HEAD, ontologies=["nowhere.owl"]).file == "nowhere.owl"
     assert refused(write, HEAD, modes_file="nowhere.yaml").file == "nowhere.yaml"
+
+
+def test_an_unknown_reasoner_of_the_command_line_is_refused_before_anything_is_opened(write):
+    error = refused(write, HEAD, reasoner="pelet")
+    assert str(error) == (
+        "--reasoner: there is no reasoner 'pelet' (did you mean 'pellet'? known: remembered, pellet, owlready2)"
+    )
+
+
+def test_the_reasoners_of_scenarios_are_those_that_there_are():
+    from suave_des.knowledge.reasoners import BACKENDS
+    from suave_des.scenario.models import REASONERS
+
+    assert sorted(REASONERS) == sorted(BACKENDS)
 
 
 def _places(data: object, path: tuple[str | int, ...] = ()) -> list[tuple[str | int, ...]]:

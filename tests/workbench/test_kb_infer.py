@@ -157,6 +157,13 @@ main(["run", "seams2023", "--reasoner", {reasoner!r}, "--rules", {str(rules)!r}]
         assert "not done after 2 s" in done.stderr
         assert done.stderr.count("\n") == 1
 
+    def test_a_process_that_started_java_within_the_limit_ends(self):
+        command = [sys.executable, "-m", "suave_des", "kb", "infer", "--reasoner", "pellet"]
+        path = str(Path(suave_des.__file__).parents[1])
+        environment = {**os.environ, "PYTHONPATH": path}
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
+        assert (done.returncode, done.stderr) == (0, "")
+
     def test_passes_on_results_and_errors(self):
         limit = TimeLimit(5.0)
         assert limit.run(lambda: 3, "counting") == 3
