@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -68,6 +69,7 @@ def check(
             ontologies=loaded.ontologies,
             rules=loaded.rules,
             disabled_rules=loaded.scenario.knowledge.disabled_rules,
+            values={name: Decimal(repr(value)) for name, value in loaded.scenario.knowledge.values.items()},
             shapes=shapes or (),
             modes={name: loaded.modes.modes(name) for name in loaded.modes.functions},
             needed=MISSION_FUNCTIONS,

@@ -69,7 +69,8 @@ class KnowledgeBase:
             scenario, ontologies=ontologies, reasoner=reasoner, rules=rules, disabled_rules=disabled_rules
         )
         reasoner = loaded.scenario.knowledge.reasoner
-        return cls.of(open_base(loaded), Loop.of(loaded.scenario), reasoner, TimeLimit(time_limit_s, "--time-limit"))
+        limit = TimeLimit(time_limit_s, "--time-limit")
+        return cls.of(open_base(loaded), Loop.of(loaded.scenario), reasoner, limit)
 
     @classmethod
     def of(cls, base: Ontologies, loop: Loop, reasoner: str, limit: TimeLimit) -> KnowledgeBase:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from decimal import Decimal
+from itertools import islice
 from pathlib import Path
 from typing import Final
 
@@ -24,15 +26,19 @@ from suave_des.knowledge.rule_names import Vocabulary, rule_from_text
 from suave_des.knowledge.rule_syntax import Named
 from suave_des.knowledge.rules import Rule
 from suave_des.knowledge.situation import Model, Triple
+from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.knowledge.triples import Content, merge
 from suave_des.knowledge.vocabulary import LANGUAGE_NAMESPACES, PERFORMANCE, RDF_TYPE, TOMASYS, local_name
 from suave_des.resources import shipped_folder
 from suave_des.workbench.findings import Finding, Level, fails, finding_of, in_order, shown_path
 from suave_des.workbench.reachable import atom_text, dead_rules
+from suave_des.workbench.regions import matters, numbers_in, regions_between
 from suave_des.workbench.shapes import check_shapes
 
 #: Modes that are no function design: the one that a cancelled task sets, and the one that a file starts with.
 _NO_DESIGNS: Final = {"fd_unground", "__DEFAULT__"}
+#: States that Pellet is asked about; `kb policy` goes through all.
+MAX_STATES: Final = 300
 _ADD_MODE: Final = "add the mode, or remove the design"
 
 
@@ -44,6 +50,7 @@ class Subject:
         ontologies: files; without any, the shipped suave.owl.
         rules: files of rules as text.
         disabled_rules: names of rules to switch off.
+        values: replaces the hasValue of named QAvalue individuals.
         shapes: files of SHACL shapes, besides the shipped ones.
         modes: names of the modes by function; None leaves out what is checked against them.
         needed: functions that the mission cannot do without.
@@ -53,6 +60,7 @@ class Subject:
     ontologies: Sequence[Path] = ()
     rules: Sequence[Path] = ()
     disabled_rules: Collection[str] = ()
+    values: Mapping[str, Decimal] = field(default_factory=dict)
     shapes: Sequence[Path] = ()
     modes: Mapping[str, Collection[str]] | None = None
     needed: Collection[str] = ()
@@ -78,7 +86,7 @@ def check(subject: Subject) -> tuple[Finding, ...]:
         except KnowledgeError as error:
             findings.append(finding_of(error))
 
-    content = merge(sources, {})
+    content = merge(sources, subject.values)
     attempt(lambda: check_values(content, sources))
     built: list[tuple[Model, Content]] = []
     attempt(lambda: built.append(build_model(content, Names(content), sources)))
@@ -219,13 +227,34 @@ def _facts(content: Content) -> Iterator[Triple]:
 
 def _of_reasoner(subject: Subject) -> Iterator[Finding]:
     """What comes to light when the knowledge base is used: contradictions, rules that Pellet drops."""
-    base = KnowledgeBase.load(subject.ontologies, rules=subject.rules, disabled_rules=subject.disabled_rules)
+    base = KnowledgeBase.load(
+        subject.ontologies, values=subject.values, rules=subject.rules, disabled_rules=subject.disabled_rules
+    )
     for reason in regions_of(base).reasons:
         yield Finding(
             Level.INFO, f"inferences are remembered for equal measured values only, and so more slowly: {reason}"
         )
     limit = TimeLimit(subject.time_limit_s, "--time-limit")
     try:
-        limit.run(lambda: make_reasoner("pellet", base), "reasoning on the ontologies alone")
+        pellet = make_reasoner("pellet", base, limit)
+        for state in islice(_plain_states(base), MAX_STATES):
+            pellet.infer(state)
     except InputError as error:
         yield finding_of(error)
+
+
+def _plain_states(base: KnowledgeBase) -> Iterator[KnowledgeState]:
+    """Each design in use, with one attribute measured in each region that makes a difference; with none at first."""
+    attributes = [name for name in base.quality_attributes if matters(base, name)]
+    regions = regions_between(numbers_in(base))
+    measured: list[tuple[str, Decimal]] = [
+        (name, value) for name in attributes for region in regions if (value := region.value()) is not None
+    ]
+    for measurements in ({}, *({name: value} for name, value in measured)):
+        for function in base.functions:
+            for design in base.designs(function):
+                yield KnowledgeState.of(
+                    [ObjectiveState(function)],
+                    groundings={function: design},
+                    measurements=measurements,
+                )

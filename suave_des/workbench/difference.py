@@ -54,11 +54,14 @@ def compare(one: Policy, other: Policy) -> PolicyDifference:
         if (cell.regions, cell.state, cell.asked) in there
     ]
     designs = [{design for cell in policy.cells for _, design in cell.state.groundings} for policy in (one, other)]
-    differing = tuple(pair for pair in pairs if pair.functions or pair.one.marks != pair.other.marks)
+    differing: list[CellPair] = []
+    alike: list[CellPair] = []
+    for pair in pairs:
+        (differing if pair.functions or pair.one.marks != pair.other.marks else alike).append(pair)
     return PolicyDifference(
         compared=sum(pair.one.reports.combinations for pair in pairs),
-        differing=differing,
-        reported=tuple(pair for pair in pairs if pair not in differing and pair.one.statuses != pair.other.statuses),
+        differing=tuple(differing),
+        reported=tuple(pair for pair in alike if pair.one.statuses != pair.other.statuses),
         only_one=tuple(sorted(designs[0] - designs[1])),
         only_other=tuple(sorted(designs[1] - designs[0])),
         computing=tuple(sorted({*one.computing, *other.computing})),

@@ -18,8 +18,11 @@ from suave_des.knowledge.state import Decision, Fact, KnowledgeState
 from suave_des.knowledge.vocabulary import objective_name
 from suave_des.scenario.wording import did_you_mean, shown
 from suave_des.workbench.derivation import Clash, Derivation
+from suave_des.workbench.nearest import near_rules
 from suave_des.workbench.tracing import Tracer
 
+#: Rules that are named for a fact that does not follow.
+NEAREST: Final = 3
 _WHY: Final = re.compile(r"why\s+(not\s+)?([\w.-]+)\s*\??", re.IGNORECASE)
 _ATOM: Final = re.compile(r"([^\s(]+)\s*\(\s*([^,()]+?)\s*(?:,\s*(.+?)\s*)?\)")
 _FORMS: Final = (
@@ -134,11 +137,13 @@ class _Teller:
             raise InputError(f"there is nothing named {shown(subject)} in this state", remedy=_near(subject, known))
         there = sorted(_text(fact) for fact in self.triples if (fact.property, fact.subject) == (name, subject))
         properties = sorted({fact.property for fact in self.triples})
-        if not there and value is not None and name not in properties:
+        iri = next(triple[0] for fact, triple in self.triples.items() if fact.subject == subject)
+        near = near_rules(self.base, name, iri, wanted, self.tracer.known)
+        if not near and not there and value is not None and name not in properties:
             raise InputError(f"nothing has a {shown(name)} in this state", remedy=_near(name, properties))
         raise InputError(
             f"{property_name}({subject}{', ' + wanted if value is not None else ''}) does not follow in this state",
-            remedy=f"{name} of {subject}: {', '.join(there) or 'none'}",
+            remedy="; ".join([f"{name} of {subject}: {', '.join(there) or 'none'}", *map(str, near[:NEAREST])]),
         )
 
     def design(self, design: str, *, wanted: bool) -> DecisionExplanation:

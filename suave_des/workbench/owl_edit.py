@@ -245,9 +245,9 @@ def _with(rule: Rule) -> Callable[[list[_Said]], list[_Said]]:
     return lambda rules: [*rules, *_said((rule,))]
 
 
-def _rest(file: OntologyFile) -> tuple[set[Any], Counter[Any]]:
+def _rest(file: OntologyFile, rules: tuple[Rule, ...]) -> tuple[set[Any], Counter[Any]]:
     """What a file says besides its rules: triples, and those with nodes that have no name without these."""
-    inside = {triple for rule in rules_of(file) for triple in rule.triples}
+    inside = {triple for rule in rules for triple in rule.triples}
     triples = [triple for triple in file.graph if triple not in inside and not _declares_for_rules(triple)]
     named = {triple for triple in triples if not any(isinstance(term, BNode) for term in triple)}
     unnamed = Counter(
@@ -275,8 +275,9 @@ def _finish(file: OntologyFile, content: bytes, change: Callable[[list[_Said]], 
     def order(said: _Said) -> tuple[str, str]:
         return said.name, str(said.sides)
 
-    wanted = sorted(change(_said(rules_of(file))), key=order)
-    if sorted(_said(rules_of(result)), key=order) != wanted or _rest(result) != _rest(file):
+    before, after = rules_of(file), rules_of(result)
+    wanted = sorted(change(_said(before)), key=order)
+    if sorted(_said(after), key=order) != wanted or _rest(result, after) != _rest(file, before):
         raise _cannot(file.path)
     path = file.path.resolve()
     try:

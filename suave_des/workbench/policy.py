@@ -128,18 +128,18 @@ class Space:
         return cls(attributes, numbers_in(base), alike(base), statuses(base))
 
     def common(self, other: Space) -> Space:
-        """What makes a difference here or there; components are alike only if they are in both."""
+        """What makes a difference here or there; components are alike only if they are so in both that have them."""
         groups: dict[tuple[int, int], list[str]] = {}
         for number, group in enumerate(self.alike):
             for name in group:
                 there = next((place for place, each in enumerate(other.alike) if name in each), -1)
                 groups.setdefault((number, there), []).append(name)
         known = {name for group in self.alike for name in group}
-        lone = [(name,) for group in other.alike for name in group if name not in known]
+        only_there = (tuple(name for name in group if name not in known) for group in other.alike)
         return Space(
             tuple(sorted({*self.attributes, *other.attributes})),
             tuple(sorted({*self.numbers, *other.numbers})),
-            (*map(tuple, groups.values()), *lone),
+            (*map(tuple, groups.values()), *filter(None, only_there)),
             tuple(sorted({*self.words, *other.words})),
         )
 
@@ -162,10 +162,16 @@ def make_policy(
 
     Raises:
         InputError: max_failed is negative, or there would be too many states.
-        KnowledgeError: the reasoner takes too long.
+        KnowledgeError: there is nothing to decide, or the reasoner takes too long.
     """
     if max_failed < 0:
         raise InputError(f"{max_failed} components cannot fail", remedy="give 0 or more")
+    if not any(map(base.designs, base.functions)):
+        raise KnowledgeError(
+            "no function has a function design, so there is nothing to decide",
+            file=", ".join(map(str, base.files)),
+            remedy="give an ontology that uses TOMASys as suave.owl does",
+        )
     space = space or Space.of(base, loop)
     attributes = space.attributes
     between = regions_between(space.numbers)

@@ -94,7 +94,7 @@ class Tracer:
                 start = matched(atom, triple, {})
                 if start is None:
                     continue
-                for binding, body in sorted(matches(rule.body, start, (), self._all), key=str):
+                for binding, body in sorted(matches(rule.body, start, (), self.known), key=str):
                     if above.isdisjoint(body) and triple in self._step(rule, frozenset(body)):
                         premises = [self._derive(each, above) for each in body]
                         if None not in premises:
@@ -106,7 +106,7 @@ class Tracer:
 
     def _by_schema(self, triple: Triple, above: frozenset[Triple]) -> Iterator[Derivation]:
         """What follows from one other fact about the same thing: a class by a domain, an inverse, a sub-property."""
-        for other in self._all:
+        for other in self.known:
             about = {triple[0], triple[2]} & {other[0], other[2]}
             if about and other not in above and triple in self._schema_adds(other, triple):
                 premise = self._derive(other, above)
@@ -139,8 +139,8 @@ class Tracer:
         return {canonical_triple(triple): triple for triple in sorted(filter(is_fact, self.asserted), key=str)}
 
     @cached_property
-    def _all(self) -> tuple[Triple, ...]:
-        """All that follows and rules ask for, in canonical form and in a fixed order."""
+    def known(self) -> tuple[Triple, ...]:
+        """All that follows and that rules ask for, in canonical form and in a fixed order."""
         text = self.base.content.n_triples() + "".join(map(n_triple, self.situation))
         asked = [atom for rule in self.base.content.enabled_rules for atom in rule.atoms]
         entailed = self.entailed().union(values_of(load_n_triples(text), asked))
@@ -150,7 +150,7 @@ class Tracer:
     def firings(self, rule: Rule) -> Iterator[tuple[tuple[tuple[str, Value], ...], tuple[Fact, ...]]]:
         """Every way in which a rule fires: the bindings, and what it concludes."""
         with one_at_a_time:
-            for binding, body in sorted(matches(rule.body, {}, (), self._all), key=str):
+            for binding, body in sorted(matches(rule.body, {}, (), self.known), key=str):
                 concluded = self._step(rule, frozenset(body))
                 if concluded:
                     bound = tuple((name, value_of(binding[name], self.base.names)) for name in sorted(binding))

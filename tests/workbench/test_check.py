@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from decimal import Decimal
 from pathlib import Path
 
 import pytest
 
 from suave_des.cli.main import main
+from suave_des.errors import KnowledgeError
 from suave_des.resources import shipped_folder
 from suave_des.workbench.check import Subject, check
 from suave_des.workbench.findings import Finding, Level, fails
@@ -247,6 +249,26 @@ def test_another_ontology_altogether_lacks_what_the_mission_needs(
     )
     assert command("--ontology", str(path)) == 1
     assert "there is no function f_maintain_motion, which the mission needs" in capsys.readouterr().out
+
+
+def test_rules_that_clash_in_a_state_are_an_error_though_the_ontologies_are_consistent(tmp_path: Path) -> None:
+    high = "fd_spiral_high"
+    rules = f"""
+one: typeFD(?fg, {high}) ^ hasQAvalue(?fg, ?q) ^ hasValue(?q, ?v) ^ lessThan(?v, 2.2) -> fg_status(?fg, "IN_ERROR_FR")
+"""
+    (error,) = errors(found(tmp_path, rules))  # QAWaterVisibility says that it is IN_ERROR_NFR
+    assert "contradiction" in error.message
+    assert "by the rules QAWaterVisibility, one" in error.message
+
+
+def test_values_of_the_scenario_are_used(tmp_path: Path) -> None:
+    body = "typeFD(?fg, fd_spiral_low) ^ hasValue(qa_water_visibility_low, ?v) ^ lessThan(?v, 0.2)"
+    rules = "".join(f'{name}: {body} -> fg_status(?fg, "IN_ERROR_{name}")\n' for name in ("FR", "NFR"))
+    assert errors(found(tmp_path, rules)) == []
+    (error,) = errors(found(tmp_path, rules, values={"qa_water_visibility_low": Decimal("0.125")}))
+    assert "by the rules FR, NFR" in error.message
+    with pytest.raises(KnowledgeError, match="qa_water_visibility_lo"):
+        found(tmp_path, values={"qa_water_visibility_lo": Decimal(1)})
 
 
 def test_a_reasoner_that_takes_too_long_is_given_up_on(tmp_path: Path) -> None:

@@ -169,6 +169,26 @@ def test_a_question_that_has_no_answer_is_told_so(bench, in_error, question, sai
     assert said in str(error.value)
 
 
+def test_a_fact_that_does_not_follow_names_the_rule_that_comes_nearest(bench, command):
+    clear = ("--set", "water_visibility=3.5", "--ground", f"{SEARCH}=fd_spiral_high")
+    status, _, error = command("explain", "fg_status(fg_spiral_high, IN_ERROR_NFR)", *clear)
+    assert (status, error.count("\n")) == (2, 1)
+    assert (
+        "does not follow in this state (fg_status of fg_spiral_high: none; rule QAWaterVisibility: lessThan(" in error
+    )
+    first = error.partition("rule QAWaterVisibility: ")[2].partition("; ")[0]
+    assert "does not hold with " in first
+    assert "?fg = fg_spiral_high" in first and "= 3.5" in first and "= 3.25" in first
+
+
+def test_before_a_measurement_the_rule_lacks_it(bench):
+    state = bench.state(groundings={SEARCH: "fd_spiral_high"})
+    with pytest.raises(InputError) as error:
+        bench.explain(state, "fg_status(fg_spiral_high, IN_ERROR_NFR)")
+    assert "rule QAWaterVisibility: " in str(error.value)
+    assert "hasQAvalue(" in str(error.value)
+
+
 def test_a_contradiction_names_the_rules_and_derives_both_sides(tmp_path):
     rules = tmp_path / "clash.swrl"
     rules.write_text(CLASH)

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import random
+from dataclasses import replace
 from decimal import Decimal
 
 import pytest
@@ -229,6 +230,11 @@ class TestDiff:
         assert f"{SEARCH}, now fd_spiral_high: A fd_spiral_medium, B stays\n  3 <= . < 3.25: 6 states\n" in text
         _, printed, _ = command("diff", empty, file, "--max-failed", "0", "--format", "json")
         assert json.loads(printed)["states"] == 6
+
+    def test_components_that_only_one_side_has_are_still_alike(self, bench):
+        mine = Space.of(bench.base, bench.loop)
+        none = replace(mine, alike=())
+        assert mine.common(none).alike == none.common(mine).alike == mine.alike
 
     def test_a_file_that_is_missing_is_told(self, command, edited):
         status, _, error = command("diff", edited(""), "nowhere.owl")

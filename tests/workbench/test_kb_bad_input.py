@@ -1,0 +1,154 @@
+"""Every kb command on what it cannot use: one line or a finding, the right exit status, and the file as it was."""
+
+from pathlib import Path
+
+import pytest
+
+from suave_des.campaign.knowledge_file import KNOWLEDGE_FILE, knowledge_text
+from suave_des.knowledge.state import KnowledgeState, ObjectiveState
+from suave_des.resources import shipped_folder
+from suave_des.scenario.loader import load_scenario
+from suave_des.simulation.result import KnowledgeRecord
+
+SEARCH = "f_generate_search_path"
+RULE = 'near: FunctionGrounding(?fg) -> fg_status(?fg, "IN_ERROR_NFR")'
+STATE = ("--set", "water_visibility=1.8", "--ground", f"{SEARCH}=fd_spiral_low")
+ASKING = {
+    "rules": (),
+    "check": (),
+    "infer": STATE,
+    "explain": STATE,
+    "policy": ("--max-failed", "0"),
+    "query": ("SELECT ?s WHERE { ?s a ?t } LIMIT 1", "--inferred"),
+    "try": (RULE, "--on", "flown"),
+}
+EDITING = {"add-rule": (RULE,), "remove-rule": ("S1a",), "enable-rule": ("S1a",), "disable-rule": ("S1a",)}
+NAMESPACES = (
+    'xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#" xmlns:owl="http://www.w3.org/2002/07/owl#" '
+    'xmlns="http://x.org/wine#"'
+)
+
+
+def document(content, doctype=""):
+    return f'<?xml version="1.0"?>{doctype}<rdf:RDF {NAMESPACES}>{content}</rdf:RDF>'
+
+
+def importing(name, other):
+    return document(
+        f'<owl:Ontology rdf:about="http://x.org/{name}"><owl:imports rdf:resource="http://x.org/{other}"/></owl:Ontology>'
+    )
+
+
+def nested(levels):
+    entities = "".join(f'<!ENTITY e{n} "{f"&e{n - 1};" * 10 if n else "lol"}">' for n in range(levels))
+    return document(f"&e{levels - 1};" + " " * 10_000_000, f"<!DOCTYPE rdf [{entities}]>")
+
+
+#: What no command can read, with what is said of it.
+UNREADABLE = {
+    "empty": ("", "the file is empty"),
+    "truncated": (None, "not well-formed XML"),
+    "nested entities": (nested(12), "entity e1 refers to other entities"),
+    "external entity": (
+        document("&x;", '<!DOCTYPE rdf [<!ENTITY x SYSTEM "file:///etc/passwd">]>'),
+        "entity x is external",
+    ),
+}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with a recorded state, and the current one."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "flown").mkdir()
+    state = KnowledgeState.of([ObjectiveState(SEARCH)], groundings={SEARCH: "fd_spiral_low"})
+    (tmp_path / "flown" / KNOWLEDGE_FILE).write_text(knowledge_text([KnowledgeRecord(1.0, state)]))
+    scenario = load_scenario("seams2023").scenario.model_dump_json()
+    (tmp_path / "flown" / "mission.json").write_text(f'{{"scenario": {scenario}}}')
+    return tmp_path
+
+
+def files_in(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+
+
+def refused(command, name, arguments, said):
+    before = files_in(Path())
+    status, text, error = command(name, *arguments)
+    assert (status, text) == (2, ""), name
+    assert error.startswith("suave-des: ") and error.count("\n") == 1, name
+    assert said in error, name
+    assert files_in(Path()) == before, name
+
+
+@pytest.mark.parametrize("kind", UNREADABLE)
+def test_no_command_takes_a_file_that_cannot_be_read(folder, command, kind):
+    content, said = UNREADABLE[kind]
+    suave = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
+    Path("bad.owl").write_text(suave[: len(suave) // 2] if content is None else content, encoding="utf-8")
+    for name, arguments in ASKING.items():
+        refused(command, name, (*arguments, "--ontology", "bad.owl"), said)
+    refused(command, "diff", ("bad.owl", "bad.owl"), said)
+    for name, arguments in EDITING.items():
+        refused(command, name, ("bad.owl", *arguments), said)
+
+
+@pytest.mark.parametrize("kind", ["another ontology", "an import cycle"])
+def test_an_ontology_of_something_else_is_told_apart_from_a_broken_one(folder, command, kind):
+    wine = document('<owl:Ontology rdf:about="http://x.org/wine"/><owl:Class rdf:about="http://x.org/wine#Wine"/>')
+    Path("wine.owl").write_text(wine if kind == "another ontology" else importing("wine", "b"))
+    Path("b.owl").write_text(importing("b", "wine"))
+    assert command("rules", "--ontology", "wine.owl")[0] == 0
+    status, text, error = command("check", "--ontology", "wine.owl")
+    assert (status, error) == (1, "")
+    assert "there is no function f_follow_pipeline" in text
+    for name, said in {
+        "infer": "there is no quality attribute 'water_visibility'",
+        "explain": "there is no quality attribute 'water_visibility'",
+        "policy": "no function has a function design",
+        "try": "FunctionGrounding is not defined",
+    }.items():
+        refused(command, name, (*ASKING[name], "--ontology", "wine.owl"), said)
+    refused(command, "diff", ("wine.owl", "wine.owl", "--max-failed", "0"), "no function has a function design")
+    for name, arguments in EDITING.items():
+        said = "FunctionGrounding is not defined" if name == "add-rule" else "there is no rule S1a (its rules: none)"
+        refused(command, name, ("wine.owl", *arguments), said)
+
+
+def test_a_rule_with_unbalanced_parentheses_is_refused_with_its_column(folder, command):
+    bad, said = RULE.replace("?fg)", "?fg", 1), "line 1, column 29: expected , or ) instead of -"
+    Path("bad.swrl").write_text(bad)
+    Path("suave.owl").write_bytes((shipped_folder("ontology") / "suave.owl").read_bytes())
+    for name in ("rules", "infer", "explain", "policy", "query", "try"):
+        refused(command, name, (*ASKING[name], "--rules", "bad.swrl"), f"bad.swrl: {said}")
+    refused(command, "add-rule", ("suave.owl", bad), said)
+    refused(command, "try", (bad, "--on", "flown"), said)
+    status, text, error = command("check", "--rules", "bad.swrl")
+    assert (status, error) == (1, "")
+    assert f"ERROR  bad.swrl: {said}" in text
+
+
+def test_names_that_are_not_ascii_are_names(folder, command):
+    suave = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
+    Path("suave.owl").write_text(suave.replace("fd_spiral_high", "fd_spirale_größte"), encoding="utf-8")
+    rule = 'größer: typeFD(?größe, fd_spirale_größte) -> fg_status(?größe, "IN_ERROR_FR")'
+    assert command("add-rule", "suave.owl", rule)[0] == 0
+    assert rule in command("rules", "--ontology", "suave.owl")[1]
+    state = ("--ground", f"{SEARCH}=fd_spirale_größte")
+    status, text, _ = command("explain", "fg_status(fg_spirale_größte, IN_ERROR_FR)", "--ontology", "suave.owl", *state)
+    assert status == 0
+    assert "by rule größer with ?größe = fg_spirale_größte" in text
+    assert command("remove-rule", "suave.owl", "größer")[0] == 0
+
+
+def test_rules_that_contradict_each_other_are_named(folder, command):
+    clash = RULE.replace("near", "clash").replace("IN_ERROR_NFR", "IN_ERROR_FR")
+    Path("clash.swrl").write_text(f"{RULE}\n{clash}\n")
+    rules = ("--rules", "clash.swrl")
+    refused(command, "infer", (*STATE, *rules), "by the rules clash, near")
+    status, text, _ = command("check", *rules)
+    assert status == 1
+    assert "by the rules clash, near" in text
+    status, text, _ = command("explain", *STATE, *rules)
+    assert status == 0
+    assert "contradiction" in text and "by rule clash" in text and "by rule near" in text
