@@ -118,10 +118,11 @@ class ManagingSubsystem:
         """Between which measured values calls of `adapt` would do nothing, until the manager is told something.
 
         Asked after each `adapt` that returned None. The calls are then left out until a value is published that is not
-        between its bounds, or a task or diagnostic hook is called; `adapt` comes again at the first of its times from
-        then on. An attribute without bounds may have any value. A record is to show what every call does: a mission
-        that is recorded leaves none out. What holds for a class need not hold for one derived from it, which is asked
-        only if it has this method of its own.
+        between its bounds, or the manager is told of a task or a component's status; `adapt` comes again at the first
+        of its times from then on. An attribute without bounds may have any value.
+
+        A record is to show what every call does: a mission that is recorded leaves none out. What holds for a class
+        need not hold for one derived from it, which is asked only if it has this method of its own.
 
         Returns:
             Bounds, or None: `adapt` is to be called after the next period.

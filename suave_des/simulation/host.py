@@ -12,7 +12,7 @@ from suave_des.errors import InputError, MissionError, SuaveDesError
 from suave_des.managed.coordinator import Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
 from suave_des.managing.registry import manager_class
-from suave_des.monitor.diagnostics import DiagnosticsBus
+from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
 
 RAISED = (Exception, SystemExit)
 """What a manager may raise: one that calls sys.exit must not end a campaign, or a mission as if all were well."""
@@ -49,7 +49,7 @@ class ManagerHost:
             raise self.mission_error(error) from error
         self._may_rest = may_rest and "rests_while" in vars(kind)
         if kind.diagnostic is not ManagingSubsystem.diagnostic:
-            bus.subscribe(lambda diagnostic: self._tell(self.manager.diagnostic, diagnostic), kind.hears)
+            bus.subscribe(self._diagnostic, kind.hears)
         period_s = self.manager.period_s
         if period_s is not None:
             if not period_s > 0.0:
@@ -64,6 +64,12 @@ class ManagerHost:
         """A task is over."""
         self._modes.task_over(task.functions)
         self._tell(self.manager.task_cancelled, task)
+
+    def _diagnostic(self, diagnostic: Diagnostic) -> None:
+        if diagnostic.kind == Kind.QA_STATUS:
+            self._guarded(self.manager.diagnostic, diagnostic)  # a rest has bounds of the values to wake up for
+        else:
+            self._tell(self.manager.diagnostic, diagnostic)
 
     def mission_error(self, error: BaseException) -> SuaveDesError:
         """What a manager raised, as the error that ends its mission."""

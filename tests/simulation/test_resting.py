@@ -140,9 +140,13 @@ def with_another_signal(name: str) -> LoadedScenario:
     mode_change_s=st.sampled_from([0.0, 0.5, 1.0]),
     fault_s=TIMES_S,
     run=st.integers(1, 1000),
+    manager=st.sampled_from(["metacontrol", "bt", "bt_extended"]),
+    battery=st.none() | st.builds(lambda s: {"discharge_time_s": s}, st.floats(30.0, 300.0)),
 )
-@settings(max_examples=40, deadline=None)
-def test_resting_changes_no_result(name, signal, other, inference_s, mode_change_s, fault_s, run) -> None:
+@settings(max_examples=60, deadline=None)
+def test_resting_changes_no_result(
+    name, signal, other, inference_s, mode_change_s, fault_s, run, manager, battery
+) -> None:
     values = {
         "mission.time_limit_s": 120.0,
         "signals.water_visibility": signal,
@@ -150,8 +154,10 @@ def test_resting_changes_no_result(name, signal, other, inference_s, mode_change
         "latencies.mode_change_s": mode_change_s,
         "thruster_events": [{"thruster": 1, "event": "failure", "time_s": fault_s}],
     }
+    if battery is not None:
+        values["battery"] = battery
     if other is not None:
         values["signals.performance"] = other
     simulator = Simulator(with_values(LOADED[name] if other is None else with_another_signal(name), values))
-    with_all = simulator.run("metacontrol", run, 1, record=True)
-    assert simulator.run("metacontrol", run, 1).metrics == with_all.metrics
+    with_all = simulator.run(manager, run, 1, record=True)
+    assert simulator.run(manager, run, 1).metrics == with_all.metrics
