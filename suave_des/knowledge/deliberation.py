@@ -10,6 +10,7 @@ from typing import Final
 from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.planning import plan
 from suave_des.knowledge.reasoners import Reasoner
+from suave_des.knowledge.regions import Regions
 from suave_des.knowledge.state import Inference, KnowledgeState, Plan
 
 #: Conclusions that are remembered.
@@ -37,11 +38,15 @@ class Deliberation:
     Args:
         base: the knowledge base.
         reasoner: does the analysis.
+
+    Attributes:
+        regions: the regions of measured values that the reasoner takes as one; none if it tells all values apart.
     """
 
     def __init__(self, base: KnowledgeBase, reasoner: Reasoner) -> None:
         self.base = base
         self.reasoner = reasoner
+        self.regions: Regions | None = getattr(reasoner, "regions", None)
         self._memory: OrderedDict[tuple[KnowledgeState, bool], Conclusion] = OrderedDict()
 
     def conclude(self, state: KnowledgeState, *, improve_exceeded: bool = False) -> Conclusion:

@@ -12,6 +12,8 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
 from decimal import Decimal
+from functools import cached_property
+from math import inf
 from typing import Any, Final
 
 from suave_des.knowledge.base import KnowledgeBase
@@ -57,6 +59,21 @@ class Regions:
     def region(self, value: Decimal) -> int:
         """Number of a value's region: odd for a threshold itself, even for the gap before the next one."""
         return bisect_left(self.thresholds, value) + bisect_right(self.thresholds, value)
+
+    def around(self, value: float) -> tuple[float, float]:
+        """Bounds of a value: all numbers between them are in its region. Equal bounds: only an equal number surely is.
+
+        Numbers are exact, and floats are not; but what is less as a float is less as the decimal that it stands for.
+        """
+        floats = self._floats
+        place = bisect_left(floats, value, 1)
+        if self.reasons or floats[place] == value:
+            return value, value
+        return floats[place - 1], floats[place]
+
+    @cached_property
+    def _floats(self) -> tuple[float, ...]:
+        return (-inf, *map(float, self.thresholds), inf)
 
     def key(self, state: KnowledgeState) -> Key:
         """What a state is to the rules: equal keys entail the same."""

@@ -21,6 +21,8 @@ from suave_des.scenario.models import Scenario
 from suave_des.scenario.modes import UNGROUND_MODE
 
 AdaptationProcess = Generator[simpy.Event, None, None]
+Bounds = Mapping[str, tuple[float, float]]
+"""By quality attribute: a value that a measured one must be above, and one that it must be below."""
 
 
 @dataclass(frozen=True)
@@ -110,4 +112,19 @@ class ManagingSubsystem:
 
     def adapt(self) -> AdaptationProcess | None:
         """Called every `period_s`; a call that would come while an earlier one still runs is left out."""
+        return None
+
+    def rests_while(self) -> Bounds | None:
+        """Between which measured values calls of `adapt` would do nothing, until the manager is told something.
+
+        Asked after each `adapt` that returned None. The calls are then left out until a value is published that is not
+        between its bounds, or the manager is told of a task or a component's status; `adapt` comes again at the first
+        of its times from then on. An attribute without bounds may have any value.
+
+        A record is to show what every call does: a mission that is recorded leaves none out. What holds for a class
+        need not hold for one derived from it, which is asked only if it has this method of its own.
+
+        Returns:
+            Bounds, or None: `adapt` is to be called after the next period.
+        """
         return None

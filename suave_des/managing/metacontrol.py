@@ -16,12 +16,15 @@ from suave_des.clock import tick_at_or_after, until
 from suave_des.knowledge.deliberation import REMEMBERED, Conclusion, Deliberation
 from suave_des.knowledge.state import Decision, KnowledgeState, ObjectiveState
 from suave_des.managed.coordinator import SEARCH, Task
-from suave_des.managing.base import AdaptationProcess, ManagedSystem, ManagingSubsystem
+from suave_des.managing.base import AdaptationProcess, Bounds, ManagedSystem, ManagingSubsystem
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, Kind
 from suave_des.scenario.distributions import draw
 from suave_des.scenario.modes import UNGROUND_MODE
 
 UNGROUNDED = "UNGROUNDED"
+
+_NO_VALUE = (0.0, 0.0)
+"""Bounds that no value is between."""
 
 _Values = tuple[float | None, ...]
 _Known = dict[_Values, Conclusion]
@@ -54,10 +57,13 @@ class Metacontrol(ManagingSubsystem):
         self._listens_since_s = 0.0
         self._heard_before: dict[str, float | None] = {}
         self._known: _Known | None = None
+        self._on_the_bridge = 0
         self._cancelled: set[str] = set()
         self._told: frozenset[str] = frozenset()
         self._without_design: frozenset[str] = frozenset()
         latency = system.scenario.latencies.inference_s
+        # A cycle that draws its latency draws each time, and may last for more than a period.
+        self._regions = self._deliberation.regions if isinstance(latency, float) else None
         self._inference_time_s: Callable[[], float] = (
             (lambda: latency)
             if isinstance(latency, float)
@@ -110,6 +116,18 @@ class Metacontrol(ManagingSubsystem):
             return None  # and it will be over before the next cycle
         return self._execute(conclusion, latency_s)
 
+    def rests_while(self) -> Bounds | None:
+        """While measured values stay in their regions a cycle concludes what this one did, and changes nothing."""
+        regions = self._regions
+        if regions is None or self._on_the_bridge:
+            return None
+        bounds = {
+            attribute: _NO_VALUE if (value := self.measured(attribute)) is None else regions.around(value)
+            for attribute in self._attributes
+        }
+        # Of two values in one gap between thresholds rules can tell which is the greater.
+        return bounds if len(set(bounds.values())) == len(bounds) else None
+
     def _listens(self) -> bool:
         return bool(self._objectives) or not self._revision.ignores_diagnostics_without_objective
 
@@ -155,8 +173,9 @@ class Metacontrol(ManagingSubsystem):
     def _over_the_bridge(self, task: Task, *, requested: bool) -> AdaptationProcess:
         period_s = self._revision.task_bridge_period_s
         if period_s > 0.0:
-            tick_s = tick_at_or_after(self.system.now_s, self._bridge_phase_s, period_s)
-            yield until(self.system.env, tick_s)
+            self._on_the_bridge += 1
+            yield until(self.system.env, tick_at_or_after(self.system.now_s, self._bridge_phase_s, period_s))
+            self._on_the_bridge -= 1
         if requested:
             self._add_objectives(task.functions)
         else:

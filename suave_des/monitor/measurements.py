@@ -34,6 +34,9 @@ class Measured(Protocol):
     def published(self, t_s: float) -> int:
         """How many values are published until mission time t, which must not lie in the future."""
 
+    def leaves_at_s(self, t_s: float, above: float, below: float) -> float:
+        """Time of the first value after t that is, or may be, not between two bounds; inf: there is none."""
+
 
 @dataclass(frozen=True, slots=True)
 class Measurements:
@@ -52,6 +55,13 @@ class Measurements:
     def published(self, t_s: float) -> int:
         """How many values are published until mission time t."""
         return bisect_right(self.times_s, t_s)
+
+    def leaves_at_s(self, t_s: float, above: float, below: float) -> float:
+        """Time of the first value after mission time t that is not between two bounds; inf: there is none."""
+        for place in range(self.published(t_s), len(self.values)):
+            if not above < self.values[place] < below:
+                return self.times_s[place]
+        return math.inf
 
     def next_message_s(self, t_s: float) -> float:
         """Time of the first message, changed or not, at or after t."""
@@ -143,3 +153,8 @@ class BatteryLevel:
             self.values.append(max(0.0, 1.0 - (self._next_s - self._full_at_s) / self._discharge_time_s))
             self._next_s += self.period_s
         return bisect_right(self.times_s, t_s)
+
+    def leaves_at_s(self, t_s: float, above: float, below: float) -> float:
+        """Time of the first value after t, which is now: what it will be depends on where the vehicle goes."""
+        self.published(t_s)
+        return self._next_s

@@ -12,7 +12,7 @@ from suave_des.errors import InputError, MissionError, SuaveDesError
 from suave_des.managed.coordinator import Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
 from suave_des.managing.registry import manager_class
-from suave_des.monitor.diagnostics import DiagnosticsBus
+from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
 
 RAISED = (Exception, SystemExit)
 """What a manager may raise: one that calls sys.exit must not end a campaign, or a mission as if all were well."""
@@ -26,17 +26,20 @@ class ManagerHost:
         run: number of the run, for errors.
         system: the manager's view of the managed subsystem.
         bus: whose diagnostics the manager hears.
+        may_rest: whether calls of `adapt` that would do nothing may be left out.
 
     Raises:
         MissionError: the manager raised; here, or in any hook later.
         InputError: there is no such manager, or it cannot work with the mission's input.
     """
 
-    def __init__(self, name: str, run: int, system: ManagedSystem, bus: DiagnosticsBus) -> None:
+    def __init__(self, name: str, run: int, system: ManagedSystem, bus: DiagnosticsBus, *, may_rest: bool) -> None:
         self._name = name
         self._run = run
         self._env = system.env
         self._modes = system.modes
+        self._measurements = system.measurements
+        self._rests = False
         kind = manager_class(name)
         try:
             self.manager = kind(system)
@@ -44,22 +47,29 @@ class ManagerHost:
             raise  # such as an ontology that cannot be used: it concerns every mission
         except RAISED as error:
             raise self.mission_error(error) from error
+        self._may_rest = may_rest and "rests_while" in vars(kind)
         if kind.diagnostic is not ManagingSubsystem.diagnostic:
-            bus.subscribe(lambda diagnostic: self._guarded(self.manager.diagnostic, diagnostic), kind.hears)
+            bus.subscribe(self._diagnostic, kind.hears)
         period_s = self.manager.period_s
         if period_s is not None:
             if not period_s > 0.0:
                 raise self.mission_error(ValueError(f"period_s is {period_s}; it must be above 0, or None"))
-            self._env.process(self._adapt_periodically(period_s))
+            self._adapting = self._env.process(self._adapt_periodically(period_s))
 
     def request(self, task: Task) -> None:
         """A task begins."""
-        self._guarded(self.manager.task_requested, task)
+        self._tell(self.manager.task_requested, task)
 
     def cancel(self, task: Task) -> None:
         """A task is over."""
         self._modes.task_over(task.functions)
-        self._guarded(self.manager.task_cancelled, task)
+        self._tell(self.manager.task_cancelled, task)
+
+    def _diagnostic(self, diagnostic: Diagnostic) -> None:
+        if diagnostic.kind == Kind.QA_STATUS:
+            self._guarded(self.manager.diagnostic, diagnostic)  # a rest has bounds of the values to wake up for
+        else:
+            self._tell(self.manager.diagnostic, diagnostic)
 
     def mission_error(self, error: BaseException) -> SuaveDesError:
         """What a manager raised, as the error that ends its mission."""
@@ -69,15 +79,47 @@ class ManagerHost:
         return MissionError(self._name, self._run, float(self._env.now), cause)
 
     def _adapt_periodically(self, period_s: float) -> Process:
-        yield until(self._env, self.manager.starts_s)
-        due_s = self._env.now
+        env = self._env
+        yield until(env, self.manager.starts_s)
+        due_s = env.now
         while True:
             adaptation = self._guarded(self.manager.adapt)
             if adaptation is not None:
                 yield from self._guarded_steps(adaptation)
-            while due_s <= self._env.now:
+            while due_s <= env.now:
                 due_s += period_s
-            yield until(self._env, due_s)
+            tick_s = self._after_rest_s(due_s, period_s) if adaptation is None and self._may_rest else due_s
+            self._rests = tick_s > due_s
+            try:
+                yield until(env, tick_s)
+            except simpy.Interrupt:  # told something
+                while due_s < env.now:
+                    due_s += period_s
+                yield until(env, due_s)
+            self._rests = False
+
+    def _after_rest_s(self, due_s: float, period_s: float) -> float:
+        """The first time from `due_s` on, in steps of the period, that a measured value is out of its bounds."""
+        now_s = self._env.now
+        bounds = self._guarded(self.manager.rests_while)
+        if bounds is None:
+            return due_s
+        leaves_s = [
+            measured.leaves_at_s(now_s, *bounds[attribute])
+            for attribute, measured in self._measurements.items()
+            if attribute in bounds
+        ]
+        # Not beyond twice the present time: only until there the clock surely comes to this time, and no rounded one.
+        end_s = min([2.0 * now_s - period_s, *leaves_s])
+        while due_s < end_s:
+            due_s += period_s
+        return due_s
+
+    def _tell(self, hook: Callable[[Any], None], news: Any) -> None:
+        self._guarded(hook, news)
+        if self._rests:
+            self._rests = False
+            self._adapting.interrupt()
 
     def _guarded_steps(self, adaptation: Process) -> Process:
         value = None

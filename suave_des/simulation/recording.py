@@ -28,19 +28,19 @@ class Recorder:
 
     def __init__(self, env: simpy.Environment, *, enabled: bool) -> None:
         self._env = env
-        self._enabled = enabled
+        self.enabled = enabled
         self.events: list[Event] = []
         self.knowledge: list[KnowledgeRecord] = []
         self._modes: list[tuple[float, str]] = [(0.0, "")]
 
     def log(self, source: str, event: str, detail: str) -> None:
         """Keep an event."""
-        if self._enabled:
+        if self.enabled:
             self.events.append(Event(float(self._env.now), source, event, detail))
 
     def reasoned(self, state: Any) -> None:
         """Keep a state that is reasoned about, if it differs from the one before."""
-        if self._enabled and (not self.knowledge or self.knowledge[-1].state != state):
+        if self.enabled and (not self.knowledge or self.knowledge[-1].state != state):
             self.knowledge.append(KnowledgeRecord(float(self._env.now), state))
 
     def diagnostic_of(self, thresholds: Sequence[float]) -> Callable[[Diagnostic], None]:
@@ -66,12 +66,12 @@ class Recorder:
 
     def mode_effect(self, function: str, mode: Mode) -> None:
         """Keep the mode of the function that moves the vehicle, for the trajectory."""
-        if self._enabled and function != MAINTAIN_MOTION:
+        if self.enabled and function != MAINTAIN_MOTION:
             self._modes.append((float(self._env.now), mode.name))
 
     def trajectory(self, vehicle: Vehicle, visibility: Measurements) -> tuple[TrajectoryPoint, ...]:
         """The vehicle's way until now, with the mode in force and the visibility measured at each point."""
-        if not self._enabled:
+        if not self.enabled:
             return ()
         points = []
         mode_times = [t_s for t_s, _ in self._modes]

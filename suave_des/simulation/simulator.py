@@ -330,4 +330,4 @@ class _Mission:
             reasoned=self.recorder.reasoned,
             measurements=self.signals if self.battery is None else {**self.signals, self.battery.key: self.battery},
         )
-        return ManagerHost(name, self.run, system, self.bus)
+        return ManagerHost(name, self.run, system, self.bus, may_rest=not self.recorder.enabled)

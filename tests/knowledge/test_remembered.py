@@ -20,9 +20,9 @@ from suave_des.errors import KnowledgeError
 from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.memory import DiskMemory
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
-from suave_des.knowledge.regions import regions_of
+from suave_des.knowledge.regions import Regions, regions_of
 from suave_des.knowledge.remembered import Remembered, memory_digest
-from suave_des.knowledge.state import Inference, KnowledgeState, ObjectiveState
+from suave_des.knowledge.state import Inference, KnowledgeState, ObjectiveState, exact
 from suave_des.resources import shipped_folder
 
 MORE_DESIGNS = "".join(
@@ -154,6 +154,23 @@ def test_stock_owlready2_agrees(name: str, monkeypatch: pytest.MonkeyPatch) -> N
             measurements={"water_visibility": visibility, "battery_level": battery},
         )
         assert outcome(stock, state) == outcome(pellet, state) == outcome(remembered, state)
+
+
+@given(
+    data=st.data(), numbers=st.lists(st.decimals(-4, 4, places=1) | st.sampled_from([Decimal("0.1000000000000000001")]))
+)
+def test_all_floats_between_the_bounds_of_a_value_are_in_its_region(data: st.DataObject, numbers: list) -> None:
+    regions = Regions(tuple(sorted(set(numbers))), ())
+    value = data.draw(st.floats(-5, 5) | st.sampled_from([0.1, *map(float, numbers)]))
+    above, below = regions.around(value)
+    assert above < value < below or (above == below == value and value in map(float, numbers))
+    if above < below:
+        other = data.draw(st.floats(max(above, -9.0), min(below, 9.0), exclude_min=True, exclude_max=True))
+        assert regions.region(exact(other)) == regions.region(exact(value))
+
+
+def test_where_regions_do_not_tell_enough_only_an_equal_value_is_the_same() -> None:
+    assert Regions((Decimal(1), Decimal(2)), ("rules compute",)).around(1.5) == (1.5, 1.5)
 
 
 def test_rules_that_only_compare_need_regions_only() -> None:

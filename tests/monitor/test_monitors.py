@@ -1,12 +1,13 @@
 """Monitors: what they publish on the diagnostics bus, and when."""
 
 import itertools
+import math
 
 import pytest
 import simpy
 
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
-from suave_des.monitor.measurements import BatteryLevel, measure
+from suave_des.monitor.measurements import BatteryLevel, Measurements, measure
 from suave_des.monitor.monitors import ThrusterFault, battery_monitor, signal_monitor, thruster_monitor
 from suave_des.world.signals import constant, sinusoid, step
 
@@ -53,6 +54,15 @@ def test_rounding_errors_of_a_timer_do_not_shift_a_step() -> None:
     assert 0.1 + 3 * 0.3 < 1.0  # by a rounding error
     measured = measure("v", lambda t_s: t_s, 1.9, period_s=0.3, phase_s=0.1, time_step_s=1.0)
     assert (measured.times_s, measured.values) == ((0.1, pytest.approx(1.0)), (0.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("above", "below", "leaves_s"),
+    [(2.5, 3.5, 4.0), (2.0, 3.5, 5.0), (2.5, 4.0, 4.0), (2.5, 3.0, 3.0), (-1.0, 9.0, math.inf)],
+)
+def test_a_value_leaves_its_bounds_when_it_is_on_one_or_beyond(above: float, below: float, leaves_s: float) -> None:
+    measured = Measurements("v", (1.0, 2.0, 3.0, 4.0, 5.0), (9.0, 2.7, 3.0, 2.4, 1.0), 1.0, 1.0)
+    assert measured.leaves_at_s(2.0, above, below) == leaves_s
 
 
 def test_a_constant_is_published_once() -> None:

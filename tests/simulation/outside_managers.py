@@ -2,7 +2,7 @@
 
 from suave_des.managed.coordinator import Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
-from suave_des.monitor.diagnostics import Diagnostic
+from suave_des.monitor.diagnostics import Diagnostic, Kind
 
 
 class Deliberate(ManagingSubsystem):
@@ -95,3 +95,46 @@ class NeverAdvances(ManagingSubsystem):
     def __init__(self, system: ManagedSystem) -> None:
         super().__init__(system)
         self.period_s = 0.0
+
+
+class Resting(ManagingSubsystem):
+    """Has nothing to do while the visibility is between 2 and 3 m, and notes the times of its calls."""
+
+    hears = (Kind.COMPONENT_STATUS,)
+
+    def __init__(self, system: ManagedSystem) -> None:
+        super().__init__(system)
+        self.period_s, self.starts_s = 2.0, 1.0
+        self.bounds = {"water_visibility": (2.0, 3.0), "salinity": (0.0, 1.0)}
+        self.called_s = CALLED_S
+        self.called_s.clear()
+
+    def diagnostic(self, diagnostic: Diagnostic) -> None:
+        """What it hears may change what it does."""
+
+    def adapt(self) -> None:
+        self.called_s.append(self.system.now_s)
+
+    def rests_while(self):
+        return self.bounds
+
+
+class WatchesTheBattery(Resting):
+    def rests_while(self):
+        return {"battery_level": (0.0, 2.0)}
+
+
+class NotResting(Resting):
+    """Derived from one that rests: what it does in adapt may be anything."""
+
+
+class NeverIdle(Resting):
+    rests_while = Resting.rests_while
+
+    def adapt(self):
+        super().adapt()
+        yield self.system.env.timeout(0.0)
+
+
+CALLED_S: list[float] = []
+"""When the last mission's manager was called."""

@@ -1,0 +1,163 @@
+"""Calls of adapt that would do nothing are left out, and the results are those of a mission with all of them."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import outside_managers
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from suave_des.managing.metacontrol import Metacontrol
+from suave_des.scenario.loader import LoadedScenario, load_scenario
+from suave_des.scenario.models import ConstantSignal
+from suave_des.scenario.overrides import with_values
+from suave_des.simulation.simulator import Simulator
+
+NO_FAULTS = {"thruster_events": [], "mission.time_limit_s": 60.0}
+LOADED = {name: load_scenario(name) for name in ("seams2023", "release15")}
+
+
+def steps(before: float, after: float, time_s: float) -> dict:
+    return {"signals.water_visibility": {"kind": "step", "time_s": time_s, "before": before, "after": after}}
+
+
+def called_s(values: dict, manager: str = "Resting", *, record: bool = False) -> list[float]:
+    """Times at which the manager's adapt is called, once the first task is under way."""
+    simulator = Simulator(with_values(LOADED["seams2023"], {**NO_FAULTS, **values}))
+    simulator.run(f"outside_managers:{manager}", 1, 1, record=record)
+    return [t_s for t_s in outside_managers.CALLED_S if t_s > 10.0]
+
+
+EVERY_S = pytest.approx([11.0 + 2.0 * count for count in range(25)], abs=1e-9)
+
+
+@pytest.mark.parametrize(("manager", "record"), [("Resting", True), ("NotResting", False), ("NeverIdle", False)])
+def test_no_call_is_left_out(manager: str, record: bool) -> None:
+    """Of a mission that is recorded, a class that does not say so itself, or an adapt that took time."""
+    assert called_s(steps(2.5, 2.6, 30.0), manager, record=record) == EVERY_S
+
+
+def test_it_is_called_at_the_first_of_its_times_at_which_a_value_is_out_of_its_bounds() -> None:
+    rested = called_s(steps(2.5, 3.5, 31.5))
+    assert 33.0 in rested and len([t_s for t_s in rested if t_s < 33.0]) <= 2
+
+
+def test_a_value_on_a_bound_is_out_of_it() -> None:
+    assert 33.0 in called_s(steps(2.5, 3.0, 31.5))
+
+
+def test_it_is_called_after_a_diagnostic() -> None:
+    fault = [{"thruster": 1, "event": "failure", "time_s": 40.0}]
+    rested = called_s({**steps(2.5, 2.6, 30.0), "thruster_events": fault})
+    quiet = called_s(steps(2.5, 2.6, 30.0))
+    assert [t_s for t_s in rested if t_s not in quiet] == [41.0]
+
+
+def test_the_batterys_level_is_not_foreseen() -> None:
+    times_s = called_s({"battery": {"publishing_period_s": 5.0}}, "WatchesTheBattery")
+    assert {late - early for early, late in pairwise(times_s)} == {4.0, 6.0}
+
+
+@pytest.fixture
+def calls(monkeypatch) -> list[float]:
+    """Times of metacontrol's cycles."""
+    times_s: list[float] = []
+    adapt = Metacontrol.adapt
+
+    def counted(self: Metacontrol):
+        times_s.append(self.system.now_s)
+        return adapt(self)
+
+    monkeypatch.setattr(Metacontrol, "adapt", counted)
+    return times_s
+
+
+def test_metacontrol_reasons_when_something_has_changed(calls) -> None:
+    simulator = Simulator(LOADED["seams2023"])
+    simulator.run("metacontrol", 1, 1)
+    resting = len(calls)
+    simulator.run("metacontrol", 1, 1, record=True)
+    assert len(calls) - resting == 150 and resting < 60
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"latencies.inference_s": {"distribution": "uniform", "minimum": 0.5, "maximum": 3.0}},
+        {"knowledge.reasoner": "pellet"},
+    ],
+    ids=["drawn latency", "reasoner that tells all values apart"],
+)
+def test_metacontrol_leaves_no_cycle_out_with(values: dict, calls) -> None:
+    several = Simulator(with_values(LOADED["seams2023"], {"mission.time_limit_s": 30.0, **values}))
+    several.run("metacontrol", 1, 1)
+    rested = calls.copy()
+    calls.clear()
+    several.run("metacontrol", 1, 1, record=True)
+    assert rested == calls
+
+
+VALUES = st.sampled_from([1.0, 1.25, 1.2500000000000002, 2.0, 2.25, 3.0, 3.25, 3.75]) | st.floats(0.5, 4.5)
+TIMES_S = st.floats(5.0, 110.0)
+SIGNALS = st.one_of(
+    st.builds(lambda value: {"kind": "constant", "value": value}, VALUES),
+    st.builds(
+        lambda before, after, time_s: {"kind": "step", "before": before, "after": after, "time_s": time_s},
+        VALUES,
+        VALUES,
+        TIMES_S,
+    ),
+    st.builds(
+        lambda low, more, period_s, shift_s, step_s: {
+            "kind": "sinusoid",
+            "minimum": low,
+            "maximum": low + more,
+            "period_s": period_s,
+            "shift_s": shift_s,
+            "time_step_s": step_s,
+        },
+        VALUES,
+        st.floats(0.1, 3.0),
+        st.floats(5.0, 120.0),
+        st.floats(0.0, 80.0),
+        st.sampled_from([0.0, 1.0]),
+    ),
+)
+
+
+def with_another_signal(name: str) -> LoadedScenario:
+    scenario = LOADED[name].scenario
+    signals = {**scenario.signals, "performance": ConstantSignal(kind="constant", value=1.0)}
+    return replace(LOADED[name], scenario=scenario.model_copy(update={"signals": signals}))
+
+
+@given(
+    name=st.sampled_from(sorted(LOADED)),
+    signal=SIGNALS,
+    other=st.none() | SIGNALS,
+    inference_s=st.sampled_from([0.0, 1.0, 2.5]),
+    mode_change_s=st.sampled_from([0.0, 0.5, 1.0]),
+    fault_s=TIMES_S,
+    run=st.integers(1, 1000),
+    manager=st.sampled_from(["metacontrol", "bt", "bt_extended"]),
+    battery=st.none() | st.builds(lambda s: {"discharge_time_s": s}, st.floats(30.0, 300.0)),
+)
+@settings(max_examples=60, deadline=None)
+def test_resting_changes_no_result(
+    name, signal, other, inference_s, mode_change_s, fault_s, run, manager, battery
+) -> None:
+    values = {
+        "mission.time_limit_s": 120.0,
+        "signals.water_visibility": signal,
+        "latencies.inference_s": inference_s,
+        "latencies.mode_change_s": mode_change_s,
+        "thruster_events": [{"thruster": 1, "event": "failure", "time_s": fault_s}],
+    }
+    if battery is not None:
+        values["battery"] = battery
+    if other is not None:
+        values["signals.performance"] = other
+    simulator = Simulator(with_values(LOADED[name] if other is None else with_another_signal(name), values))
+    with_all = simulator.run(manager, run, 1, record=True)
+    assert simulator.run(manager, run, 1).metrics == with_all.metrics
