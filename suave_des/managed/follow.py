@@ -12,13 +12,14 @@ from suave_des.clock import Process
 from suave_des.managed.node import SetPointSender
 from suave_des.managed.travel import TravellingNode
 from suave_des.scenario.revision import FollowRevision
-from suave_des.vehicle.model import Array
 from suave_des.vehicle.vehicle import Vehicle, Watch
 from suave_des.world.pipeline import SEA_BED_Z_M
 
 ALTITUDE_M = 1.25
 Z_M = SEA_BED_Z_M + ALTITUDE_M
 POLLS_BEFORE_RESENDING = 10
+POINTS_AHEAD = 8
+"""Points whose set-points are sent at a time: enough to pay, few enough that little is lost when control changes."""
 
 Path = Sequence[tuple[float, float]]
 
@@ -83,18 +84,17 @@ class FollowPipeline(TravellingNode):
             self.env.now, rules.poll_period_s, rules.acceptance_m, math.inf, 0, POLLS_BEFORE_RESENDING
         )
         self._poll = self._sent_at = 0
-        places = np.array([(x_m, y_m, Z_M) for x_m, y_m in path])
         try:
             while self._next < len(path):
                 self._sender.send(*path[self._next], Z_M)
                 self._sent_at = first = self._poll
-                while not (yield from self._go_on(path, places, watch, first)):
+                while not (yield from self._go_on(path, watch, first)):
                     first = max(first, self._poll + 1, watch.first_tick_from(self.env.now))
         except simpy.Interrupt:
             return
         self.finished.succeed()
 
-    def _go_on(self, path: Path, places: Array, watch: Watch, first: int) -> Generator[simpy.Event, None, bool]:
+    def _go_on(self, path: Path, watch: Watch, first: int) -> Generator[simpy.Event, None, bool]:
         """Go on from point to point, until there is one to send: the next one, or again one that ten polls did not see.
 
         Polls lie on a grid that began with the activation. Instead of stopping at each, the points' set-points are sent
@@ -102,15 +102,15 @@ class FollowPipeline(TravellingNode):
 
         Args:
             path: the points.
-            places: the same as an array with z, shape (n, 3).
             watch: the polls.
             first: first poll to look at.
 
         Returns:
             False if the vehicle's control changes before that.
         """
+        places = np.array([(x_m, y_m, Z_M) for x_m, y_m in path[self._next : self._next + POINTS_AHEAD]])
         reached_at, act_at = self._sender.send_ahead(
-            places[self._next :], Z_M, watch, first=first, last=self._sent_at + POLLS_BEFORE_RESENDING
+            places, Z_M, watch, first=first, last=self._sent_at + POLLS_BEFORE_RESENDING
         )
         for poll in reached_at:
             if poll > self._poll and not (yield from self._sleep(watch, poll)):

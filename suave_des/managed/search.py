@@ -24,7 +24,7 @@ REACHED_BOX_M = 0.4
 TICKS_BEFORE_RESENDING = 10
 INITIAL_ALTITUDE_M = 2.0
 """The node's altitude parameter before any mode is set."""
-SET_POINTS_AHEAD = 8
+SET_POINTS_AHEAD = 5
 """Set-points that are sent ahead: enough to pay, few enough that little is lost when a mode or a sight ends them."""
 
 
@@ -129,7 +129,7 @@ class GenerateSearchPath(TravellingNode):
             while True:
                 self._tick()
                 self._foresee(watch)
-                while not (yield from self._sleep(watch, self._wake)):
+                while not (yield from self._sleep(watch, self._wake)) or self._all_reached():
                     self._catch_up()
                     self._foresee(watch)
                 self._catch_up()
@@ -151,6 +151,10 @@ class GenerateSearchPath(TravellingNode):
         self._reached_at, self._wake = self._sender.send_ahead(
             self._places, self._commanded_z_m(), watch, first=first, last=last
         )
+
+    def _all_reached(self) -> bool:
+        """Whether set-points were sent ahead and all reached: then those after them are sent at the same tick."""
+        return self._places is not None and len(self._reached_at) == len(self._places) > 1
 
     def _catch_up(self) -> None:
         """Take in what the ticks until now have done, without the one at which there is more to do."""

@@ -54,14 +54,14 @@ def advance(
         first: row to start from.
         last: last row to fill.
         step_s: time between rows, as the simulated world counts it.
-        set_point: x, y, z in m and heading in rad, world frame, shape (4,).
+        set_point: x, y, z in m, and cosine and sine of half the heading, world frame, shape (5,).
         parameters: vehicle and autopilot constants in the places named above.
         allocation: thrusts for a demanded wrench, shape (6 thrusters, 6).
         effectiveness: wrench for thrusts with each thruster's health folded in, shape (6, 6 thrusters).
     """
     prm = parameters
     mass, ixx, iyy, izz = prm[MASS], prm[IXX], prm[IYY], prm[IZZ]
-    heading_w, heading_z = math.cos(set_point[3] / 2.0), math.sin(set_point[3] / 2.0)
+    heading_w, heading_z = set_point[3], set_point[4]
     x, y, z, qw, qx, qy, qz, u, v, w, p, q, r, ix, iy, iz, ir = track[first, :ROW]
     h = step_s
     t0 = t1 = t2 = t3 = t5 = 0.0

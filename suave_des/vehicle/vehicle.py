@@ -128,7 +128,7 @@ class _Course(NamedTuple):
     Attributes:
         watch: their ticks.
         given_at: ticks at which the set-points of places 1, 2, ... are given.
-        before: set-point until then, shape (4,).
+        before: set-point until then, shape (5,).
         places_m: the places, x, y, z in the first three columns.
         sent_as_m: what is added to x and y, and z in place of theirs.
     """
@@ -144,7 +144,7 @@ class _Course(NamedTuple):
         return self.given_at[-1] > self.watch.last_tick_until(t_s)
 
     def set_point(self, tick: int) -> Array:
-        """The set-point in force after a tick, shape (4,)."""
+        """The set-point in force after a tick, shape (5,)."""
         place = bisect_right(self.given_at, tick)
         if place > 0:
             x_m, y_m, z_m = self.sent_as_m
@@ -197,7 +197,7 @@ class Vehicle:
         self.track[0, kernel.POSITION] = (start.x_m, start.y_m, start.z_m)
         self.track[0, kernel.ATTITUDE] = quaternion(start.roll_rad, start.pitch_rad, start.yaw_rad)
         self.computed_row = 0
-        self._set_point = np.array([start.x_m, start.y_m, start.z_m, 0.0])
+        self._set_point = np.array([start.x_m, start.y_m, start.z_m, 1.0, 0.0])  # heading 0, see kernel.advance
         self._course: _Course | None = None
         self.control_listeners: list[Callable[[int], None]] = []
         """Each is called with the row from which on the future is another one."""
