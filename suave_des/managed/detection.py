@@ -12,7 +12,8 @@ from suave_des.vehicle.vehicle import STEP_S, Vehicle
 from suave_des.world.pipeline import first_detection
 
 _LOOK_AHEAD_ROWS = 22
-"""Little more than the second after which the search sends its next set-point, which makes the way another one."""
+_MARGIN_ROWS = 2
+"""How far to look beyond what others have foreseen: where that ends, the way mostly becomes another one."""
 _FARTHEST_LOOK_AHEAD_ROWS = 200
 
 
@@ -61,7 +62,7 @@ class PipelineDetector:
         self._look_anew(0)
 
     def _look_anew(self, row: int) -> None:
-        self._look_ahead(row, _LOOK_AHEAD_ROWS)
+        self._look_ahead(row, max(_LOOK_AHEAD_ROWS, self._vehicle.computed_row + _MARGIN_ROWS - row))
 
     def _look_ahead(self, row: int, rows: int) -> None:
         self._version += 1

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import simpy
 
 from suave_des.scenario.modes import Mode
-from suave_des.vehicle.vehicle import Vehicle
+from suave_des.vehicle.model import Array
+from suave_des.vehicle.vehicle import Vehicle, Watch
 
 Log = Callable[[str, str, str], None]
 """Called with source, event and detail of something worth telling."""
@@ -54,6 +55,26 @@ class SetPointSender:
         if self._stream is not None and self._stream.random() < self._loss_probability:
             return
         self._vehicle.command(self._env.now, x_m + self._frame.x_m, y_m + self._frame.y_m, z_m + self._frame.z_m)
+
+    def send_ahead(self, places_m: Array, z_m: float, watch: Watch, *, first: int, last: int) -> tuple[list[int], int]:
+        """Send set-points of which each follows the one before when that is found reached; see `Vehicle.give_ahead`.
+
+        The first one was sent already; where messages can be lost, nothing is sent before its time.
+
+        Args:
+            places_m: the places, world frame: x, y, z in the first three columns, shape (n, at least 3).
+            z_m: the set-points' z.
+            watch: the node's ticks, and when a place is reached.
+            first: first tick to look at.
+            last: last tick to look at for the first place.
+
+        Returns:
+            The ticks at which places are reached, and the tick at which the node has to act again.
+        """
+        if self._stream is not None and self._loss_probability > 0.0:
+            places_m = places_m[:1]
+        sent_as_m = (self._frame.x_m, self._frame.y_m, z_m + self._frame.z_m)
+        return self._vehicle.give_ahead(self._env.now, places_m, sent_as_m, watch, first=first, last=last)
 
 
 class FunctionNode:

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 
+import numpy as np
 import simpy
 
 from suave_des.clock import Process, tick_at_or_after, until
-from suave_des.managed.node import FunctionNode, SetPointSender
+from suave_des.compiling import compiled
+from suave_des.managed.node import SetPointSender
+from suave_des.managed.travel import TravellingNode
 from suave_des.scenario.modes import Mode
 from suave_des.scenario.revision import SpiralRevision
-from suave_des.vehicle.vehicle import Vehicle
+from suave_des.vehicle.model import Array
+from suave_des.vehicle.vehicle import Vehicle, Watch
 from suave_des.world.pipeline import SEA_BED_Z_M, VIEW_TANGENT
 
 TICK_PERIOD_S = 1.0
@@ -19,9 +24,34 @@ REACHED_BOX_M = 0.4
 TICKS_BEFORE_RESENDING = 10
 INITIAL_ALTITUDE_M = 2.0
 """The node's altitude parameter before any mode is set."""
+SET_POINTS_AHEAD = 5
+"""Set-points that are sent ahead: enough to pay, few enough that little is lost when a mode or a sight ends them."""
 
 
-class GenerateSearchPath(FunctionNode):
+@compiled
+def spiral(count: int, radius_m: float, altitude_m: float, centre_m: tuple[float, float], places: Array) -> None:
+    """Set-points of the spiral.
+
+    Args:
+        count: the spiral's counter before the first of them.
+        radius_m: its radius before the first of them.
+        altitude_m: altitude above the sea bed; a turn widens the spiral by what the camera sees from there.
+        centre_m: x and y of its centre.
+        places: shape (n, 4); x, y, z and the spiral's radius are written into it, in m.
+    """
+    for n in range(places.shape[0]):
+        if count > 0:
+            turn_width = 2.0 * altitude_m * VIEW_TANGENT
+            radius_m += turn_width * ANGLE_STEP_RAD / (2.0 * math.pi)
+        angle = ANGLE_STEP_RAD * count
+        places[n, 0] = centre_m[0] + radius_m * math.cos(angle)
+        places[n, 1] = centre_m[1] + radius_m * math.sin(angle)
+        places[n, 2] = SEA_BED_Z_M + altitude_m
+        places[n, 3] = radius_m
+        count += 1
+
+
+class GenerateSearchPath(TravellingNode):
     """The search function; once a second while active it looks whether its set-point is reached, and sends the next.
 
     Args:
@@ -44,23 +74,26 @@ class GenerateSearchPath(FunctionNode):
         phase_s: float,
         ready_s: float = 0.0,
     ) -> None:
-        super().__init__(env)
-        self._vehicle = vehicle
-        self._sender = sender
+        super().__init__(env, vehicle, sender)
         self._revision = revision
         self._phase_s = phase_s
         self._ready_s = ready_s
         self._centre_m = origin_m
-        self._process: simpy.Process | None = None
         self.altitude_m = INITIAL_ALTITUDE_M
         self._lowered_m = 0.0
+        self._watch: Watch | None = None
+        self._ticked = self._wake = 0
         self._restart()
 
     def configure(self, mode: Mode) -> None:
         """Take over the mode's spiral_altitude; the spiral itself goes on."""
         altitude = mode.parameters.get("spiral_altitude")
-        if altitude is not None:
+        if altitude is not None and altitude != self.altitude_m:
+            self._catch_up()
             self.altitude_m = float(altitude)
+            if self._watch is not None:
+                self._vehicle.drop_ahead(self.env.now, self._watch, self._ticked)
+                self._control_changed(0)
 
     def activated(self) -> None:
         """Start ticking; revision 1.5 begins a new spiral here."""
@@ -74,25 +107,69 @@ class GenerateSearchPath(FunctionNode):
 
     def deactivated(self) -> None:
         """Stop ticking."""
-        if self._process is not None:
-            self._process.interrupt()
-            self._process = None
+        self._catch_up()
+        self._stop(self._watch, self._ticked)
+        self._watch = None
 
     def _restart(self) -> None:
         self._count = 0
         self._radius_m = 0.0
         self._last_altitude_m: float | None = None
-        self._set_point: tuple[float, float, float] | None = None
+        self._places: Array | None = None
+        self._reached_at: list[int] = []
         self._waited_ticks = 0
 
     def _tick_while_active(self) -> Process:
         try:
             yield until(self.env, tick_at_or_after(max(self.env.now, self._ready_s), self._phase_s, TICK_PERIOD_S))
+            self._ticked = self._wake = 0
+            self._watch = watch = Watch(
+                self.env.now, TICK_PERIOD_S, REACHED_BOX_M, REACHED_BOX_M, 1, TICKS_BEFORE_RESENDING + 1
+            )
             while True:
                 self._tick()
-                yield self.env.timeout(TICK_PERIOD_S)
+                self._foresee(watch)
+                while not (yield from self._sleep(watch, self._wake)) or self._all_reached():
+                    self._catch_up()
+                    self._foresee(watch)
+                self._catch_up()
+                self._ticked = self._wake
         except simpy.Interrupt:
             return
+
+    def _foresee(self, watch: Watch) -> None:
+        """Send the set-points of coming ticks ahead, as far as the tick at which there is more to do."""
+        first = self._ticked + 1
+        if self._places is None or self.altitude_m != self._last_altitude_m:
+            self._wake = first
+            return
+        present = self._places[0]
+        self._places = np.empty((1 + SET_POINTS_AHEAD, 4))
+        self._places[0] = present
+        spiral(self._count, self._radius_m, self.altitude_m, self._centre_m, self._places[1:])
+        last = self._ticked + TICKS_BEFORE_RESENDING + 1 - self._waited_ticks
+        self._reached_at, self._wake = self._sender.send_ahead(
+            self._places, self._commanded_z_m(), watch, first=first, last=last
+        )
+
+    def _all_reached(self) -> bool:
+        """Whether set-points were sent ahead and all reached: then those after them are sent at the same tick."""
+        return self._places is not None and len(self._reached_at) == len(self._places) > 1
+
+    def _catch_up(self) -> None:
+        """Take in what the ticks until now have done, without the one at which there is more to do."""
+        if self._watch is None:
+            return
+        tick = min(self._watch.last_tick_until(self.env.now), self._wake - 1)
+        reached = bisect_right(self._reached_at, tick)
+        if reached and self._places is not None:
+            self._count += reached
+            self._places = self._places[reached:]
+            self._radius_m = self._places.item(0, 3)
+            self._ticked, self._waited_ticks = self._reached_at[reached - 1], 0
+        self._reached_at = []
+        self._waited_ticks += tick - self._ticked
+        self._ticked = tick
 
     def _tick(self) -> None:
         if self.altitude_m != self._last_altitude_m:
@@ -111,28 +188,26 @@ class GenerateSearchPath(FunctionNode):
             self._send()
 
     def _near_set_point(self) -> tuple[bool, bool]:
-        if self._set_point is None:
+        if self._places is None:
             return True, True
         x, y, z = self._vehicle.position(self.env.now)
-        near_xy = abs(x - self._set_point[0]) <= REACHED_BOX_M and abs(y - self._set_point[1]) <= REACHED_BOX_M
-        return near_xy, abs(z - self._set_point[2]) <= REACHED_BOX_M
+        x_set, y_set, z_set, _ = self._places[0].tolist()
+        near_xy = abs(x - x_set) <= REACHED_BOX_M and abs(y - y_set) <= REACHED_BOX_M
+        return near_xy, abs(z - z_set) <= REACHED_BOX_M
 
     def _issue_next(self) -> None:
-        angle = ANGLE_STEP_RAD * self._count
-        if self._count > 0:
-            turn_width = 2.0 * self.altitude_m * VIEW_TANGENT
-            self._radius_m += turn_width * ANGLE_STEP_RAD / (2.0 * math.pi)
-        self._set_point = (
-            self._centre_m[0] + self._radius_m * math.cos(angle),
-            self._centre_m[1] + self._radius_m * math.sin(angle),
-            SEA_BED_Z_M + self.altitude_m,
-        )
+        self._places = np.empty((1, 4))
+        spiral(self._count, self._radius_m, self.altitude_m, self._centre_m, self._places)
+        self._radius_m = self._places.item(0, 3)
         self._count += 1
         self._waited_ticks = 0
         self._send()
 
     def _send(self) -> None:
+        if self._places is not None:
+            x, y, _, _ = self._places[0].tolist()
+            self._sender.send(x, y, self._commanded_z_m())
+
+    def _commanded_z_m(self) -> float:
         # A set-point sent again has the present altitude, though "reached" is judged against the one it was made with.
-        if self._set_point is not None:
-            x, y, _ = self._set_point
-            self._sender.send(x, y, SEA_BED_Z_M + self.altitude_m - self._lowered_m)
+        return SEA_BED_Z_M + self.altitude_m - self._lowered_m

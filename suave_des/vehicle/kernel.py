@@ -18,7 +18,7 @@ import math
 import numpy as np
 
 from suave_des.compiling import compiled
-from suave_des.vehicle.model import Array
+from suave_des.vehicle.model import Array, Ticks
 
 ROW = 17
 POSITION, ATTITUDE, VELOCITY, INTEGRAL = slice(0, 3), slice(3, 7), slice(7, 13), slice(13, 17)
@@ -54,14 +54,14 @@ def advance(
         first: row to start from.
         last: last row to fill.
         step_s: time between rows, as the simulated world counts it.
-        set_point: x, y, z in m and heading in rad, world frame, shape (4,).
+        set_point: x, y, z in m, and cosine and sine of half the heading, world frame, shape (5,).
         parameters: vehicle and autopilot constants in the places named above.
         allocation: thrusts for a demanded wrench, shape (6 thrusters, 6).
         effectiveness: wrench for thrusts with each thruster's health folded in, shape (6, 6 thrusters).
     """
     prm = parameters
     mass, ixx, iyy, izz = prm[MASS], prm[IXX], prm[IYY], prm[IZZ]
-    heading_w, heading_z = math.cos(set_point[3] / 2.0), math.sin(set_point[3] / 2.0)
+    heading_w, heading_z = set_point[3], set_point[4]
     x, y, z, qw, qx, qy, qz, u, v, w, p, q, r, ix, iy, iz, ir = track[first, :ROW]
     h = step_s
     t0 = t1 = t2 = t3 = t5 = 0.0
@@ -190,7 +190,7 @@ def advance(
 
 
 @compiled
-def first_tick_in_box(
+def follow_places(
     track: Array,
     computed: int,
     step_s: float,
@@ -198,30 +198,56 @@ def first_tick_in_box(
     parameters: Array,
     allocation: Array,
     effectiveness: Array,
-    box: tuple[float, float, float],
+    places: Array,
+    sent_as: tuple[float, float, float],
+    box: tuple[float, float],
     timer: tuple[float, float, float],
-    first: int,
-    last: int,
+    window: tuple[int, int, int, int],
+    ticks: Ticks,
 ) -> tuple[int, int]:
-    """First tick of a timer at which the vehicle is in a box, -1 if at none; and the last row that is filled now.
+    """Ticks of a timer at which places are found reached, each that is making the next one the set-point.
 
     Args:
-        track: as for `advance`, likewise step_s, set_point, parameters, allocation and effectiveness.
+        track: as for `advance`, likewise step_s, parameters, allocation and effectiveness.
         computed: last row that is filled.
-        box: x and y of its centre and half its width, m.
+        set_point: as for `advance`; ends as the set-point that was given last.
+        places: x, y and z in the first three columns, m, shape (n, at least 3). The first one's set-point is given
+            already.
+        sent_as: what is added to a place's x and y in its set-point, and the set-points' z, m.
+        box: half the width and half the height of the box around a place in which it is reached, m.
         timer: time of tick 0, time between ticks, and time between rows, s.
-        first: first tick to look at.
-        last: last tick to look at; ticks beyond the track do not count.
+        window: first tick to look at, last one for the first place, and fewest and most ticks from place to place.
+        ticks: shape (n,); the ticks are written into it.
+
+    Returns:
+        How many places were reached, and the last row that is filled now. Ticks beyond the track do not count.
     """
-    x, y, half_width = box
+    half_width, half_height = box
     began_s, period_s, grid_s = timer
-    for tick in range(first, last + 1):
+    tick, last, fewest, most = window
+    reached = 0
+    while tick <= last:
         row = int(np.rint((began_s + tick * period_s) / grid_s))
         if row >= track.shape[0]:
             break
         if row > computed:
             advance(track, computed, row, step_s, set_point, parameters, allocation, effectiveness)
             computed = row
-        if abs(track[row, 0] - x) <= half_width and abs(track[row, 1] - y) <= half_width:
-            return tick, computed
-    return -1, computed
+        if (
+            abs(track[row, 0] - places[reached, 0]) > half_width
+            or abs(track[row, 1] - places[reached, 1]) > half_width
+            or abs(track[row, 2] - places[reached, 2]) > half_height
+        ):
+            tick += 1
+            continue
+        ticks[reached] = tick
+        reached += 1
+        if reached == places.shape[0]:
+            break
+        set_point[0] = places[reached, 0] + sent_as[0]
+        set_point[1] = places[reached, 1] + sent_as[1]
+        set_point[2] = sent_as[2]
+        computed = row  # what was filled beyond is another way now
+        last = tick + most
+        tick += fewest
+    return reached, computed

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Ticks = NDArray[np.int64]
 GRAVITY_M_PER_S2 = 9.80665
 
 

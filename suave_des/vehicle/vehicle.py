@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -87,6 +89,69 @@ def _parameters(
     return vector
 
 
+class Watch(NamedTuple):
+    """When it is looked whether the vehicle has reached a place, and what counts as reached.
+
+    Attributes:
+        began_s: time of tick 0.
+        period_s: time between ticks.
+        half_width_m: greatest difference in x and in y.
+        half_height_m: greatest difference in z.
+        fewest_ticks: from the tick that finds a place reached to the first look at the next one.
+        most_ticks: from there to the last look at it.
+    """
+
+    began_s: float
+    period_s: float
+    half_width_m: float
+    half_height_m: float
+    fewest_ticks: int
+    most_ticks: int
+
+    def time_s(self, tick: int) -> float:
+        """Time of a tick."""
+        return self.began_s + tick * self.period_s
+
+    def last_tick_until(self, t_s: float) -> int:
+        """Number of the last tick until time t; one at t counts, as it was due before what else happens then."""
+        tick = math.floor((t_s - self.began_s) / self.period_s + 1e-9)
+        return tick if self.time_s(tick) <= t_s else tick - 1
+
+    def first_tick_from(self, t_s: float) -> int:
+        """Number of the first tick that is not before time t; a rounding error counts as on time."""
+        return math.ceil((t_s - self.began_s) / self.period_s - 1e-9)
+
+
+class _Course(NamedTuple):
+    """Set-points given ahead.
+
+    Attributes:
+        watch: their ticks.
+        given_at: ticks at which the set-points of places 1, 2, ... are given.
+        before: set-point until then, shape (5,).
+        places_m: the places, x, y, z in the first three columns.
+        sent_as_m: what is added to x and y, and z in place of theirs.
+    """
+
+    watch: Watch
+    given_at: list[int]
+    before: Array
+    places_m: Array
+    sent_as_m: tuple[float, float, float]
+
+    def is_under_way(self, t_s: float) -> bool:
+        """Whether there is a set-point to come at time t."""
+        return self.given_at[-1] > self.watch.last_tick_until(t_s)
+
+    def set_point(self, tick: int) -> Array:
+        """The set-point in force after a tick, shape (5,)."""
+        place = bisect_right(self.given_at, tick)
+        if place > 0:
+            x_m, y_m, z_m = self.sent_as_m
+            self.before[:3] = self.places_m[place, 0] + x_m, self.places_m[place, 1] + y_m, z_m
+        return self.before
+
+
 class Vehicle:
     """The vehicle of one mission.
 
@@ -132,14 +197,15 @@ class Vehicle:
         self.track[0, kernel.POSITION] = (start.x_m, start.y_m, start.z_m)
         self.track[0, kernel.ATTITUDE] = quaternion(start.roll_rad, start.pitch_rad, start.yaw_rad)
         self.computed_row = 0
-        self._set_point = np.array([start.x_m, start.y_m, start.z_m, 0.0])
+        self._set_point = np.array([start.x_m, start.y_m, start.z_m, 1.0, 0.0])  # heading 0, see kernel.advance
+        self._course: _Course | None = None
         self.control_listeners: list[Callable[[int], None]] = []
         """Each is called with the row from which on the future is another one."""
 
     def command(self, t_s: float, x_m: float, y_m: float, z_m: float) -> None:
         """Give the autopilot a new position set-point; it replaces the one before."""
         row = row_at(t_s)
-        self._change_control(row)
+        self._change_control(row, t_s)
         self._set_point[0] = x_m
         self._set_point[1] = y_m
         self._set_point[2] = z_m + self._altitude_error_m
@@ -150,7 +216,7 @@ class Vehicle:
         it.
         """
         row = row_at(t_s)
-        self._change_control(row)
+        self._change_control(row, t_s)
         self._health[thruster - 1] = health
         self._effectiveness[:] = self._B * self._health
         self._tell(row)
@@ -201,21 +267,46 @@ class Vehicle:
             )
             self.computed_row = row
 
-    def first_tick_in_box(
-        self, x_m: float, y_m: float, half_width_m: float, *, began_s: float, period_s: float, first: int, last: int
-    ) -> int | None:
-        """First tick at which the vehicle will be in a box in x and y, if control does not change; none if at none.
+    def give_ahead(
+        self,
+        t_s: float,
+        places_m: Array,
+        sent_as_m: tuple[float, float, float],
+        watch: Watch,
+        *,
+        first: int,
+        last: int,
+    ) -> tuple[list[int], int]:
+        """Give set-points ahead: each place that is found reached at a tick will be followed by the next one.
+
+        A change of control drops the set-points that are still to come then. While there are some already, nothing is
+        given, and only the first place is looked at.
 
         Args:
-            x_m: the box's centre.
-            y_m: the box's centre.
-            half_width_m: half the box's width.
-            began_s: time of tick 0.
-            period_s: time between ticks.
+            t_s: mission time.
+            places_m: where the vehicle is to come, one after the other: x, y, z in the first three columns, shape
+                (n, at least 3). The first one's set-point is commanded already; what comes after the last is for the
+                caller to command.
+            sent_as_m: what is added to a place's x and y in its set-point, and the set-points' z.
+            watch: the ticks, and when a place is reached.
             first: first tick to look at.
-            last: last tick to look at; ticks after the mission's end do not count.
+            last: last tick to look at for the first place; ticks after the mission's end do not count.
+
+        Returns:
+            The tick at which each place will be found reached, as far as it will if control does not change; and the
+            tick at which the caller has to see to it again: the last place is reached then, or one not in time.
         """
-        tick, self.computed_row = kernel.first_tick_in_box(
+        course = self._course
+        if course is not None:
+            if course.is_under_way(t_s):
+                places_m = places_m[:1]
+            else:
+                self._course = course = None
+        x_m, y_m, z_m = sent_as_m
+        sent_as_m = (x_m, y_m, z_m + self._altitude_error_m)
+        before = self._set_point.copy()
+        ticks = np.empty(len(places_m), dtype=np.int64)
+        reached, self.computed_row = kernel.follow_places(
             self.track,
             self.computed_row,
             self._step_s,
@@ -223,16 +314,44 @@ class Vehicle:
             self._parameters,
             self._allocation,
             self._effectiveness,
-            (x_m, y_m, half_width_m),
-            (float(began_s), period_s, STEP_S),
-            first,
-            last,
+            places_m,
+            sent_as_m,
+            (watch.half_width_m, watch.half_height_m),
+            (watch.began_s, watch.period_s, STEP_S),
+            (first, last, watch.fewest_ticks, watch.most_ticks),
+            ticks,
         )
-        return None if tick < 0 else tick
+        found: list[int] = ticks[:reached].tolist()
+        if reached and len(places_m) > 1:
+            self._course = _Course(watch, found[: len(places_m) - 1], before, places_m, sent_as_m)
+            self._tell(row_at(t_s))
+        if reached == len(places_m):
+            return found, found[-1]
+        return found, found[-1] + watch.most_ticks if found else last
 
-    def _change_control(self, row: int) -> None:
+    def drop_ahead(self, t_s: float, watch: Watch, tick: int) -> None:
+        """At time t, drop what was given ahead with a watch for ticks after `tick`; nothing, if it is dropped already.
+
+        Args:
+            t_s: mission time.
+            watch: the one that was passed to `give_ahead`.
+            tick: its last tick until now.
+        """
+        if self._course is not None and self._course.watch is watch:
+            row = row_at(t_s)
+            self._cut(row, self._course.set_point(tick))
+            self._tell(row)
+
+    def _change_control(self, row: int, t_s: float) -> None:
+        course = self._course
+        self._cut(row, self._set_point if course is None else course.set_point(course.watch.last_tick_until(t_s)))
+
+    def _cut(self, row: int, set_point: Array) -> None:
+        """Fill the track up to a row, and no further; from there on there is one set-point."""
         self.look_ahead(row)
         self.computed_row = row
+        self._set_point = set_point
+        self._course = None
 
     def _tell(self, row: int) -> None:
         for listener in self.control_listeners:

@@ -10,6 +10,8 @@ from suave_des.managed.node import Frame, SetPointSender
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.modes import Mode
 from suave_des.scenario.revision import Revision
+from suave_des.vehicle.model import Array
+from suave_des.vehicle.vehicle import Watch
 
 Place = tuple[float, float, float]
 START = (-17.0, 2.0, -18.5)
@@ -42,14 +44,26 @@ class PlacedVehicle:
     def position(self, t_s: float) -> Place:
         return self.place
 
-    def first_tick_in_box(
-        self, x_m: float, y_m: float, half_width_m: float, *, began_s: float, period_s: float, first: int, last: int
-    ) -> int | None:
+    def give_ahead(
+        self,
+        t_s: float,
+        places_m: Array,
+        sent_as_m: tuple[float, float, float],
+        watch: Watch,
+        *,
+        first: int,
+        last: int,
+    ) -> tuple[list[int], int]:
+        """Tells of the first place only: it cannot tell where a set-point to come will take it."""
+        half_widths_m = (watch.half_width_m, watch.half_width_m, watch.half_height_m)
         for tick in range(first, last + 1):
-            x, y, _ = self.position(began_s + tick * period_s)
-            if abs(x - x_m) <= half_width_m and abs(y - y_m) <= half_width_m:
-                return tick
-        return None
+            errors_m = [abs(a - b) for a, b in zip(self.position(watch.time_s(tick)), places_m[0, :3], strict=True)]
+            if all(error_m <= half_m for error_m, half_m in zip(errors_m, half_widths_m, strict=True)):
+                return [tick], tick
+        return [], last
+
+    def drop_ahead(self, t_s: float, watch: Watch, tick: int) -> None:
+        """There are never set-points to come."""
 
     def command(self, t_s: float, x_m: float, y_m: float, z_m: float) -> None:
         self.commands.append((t_s, (x_m, y_m, z_m)))

@@ -10,7 +10,7 @@ from stand_ins import ACTIVE, INACTIVE, MovingVehicle, PlacedVehicle, revision, 
 
 from suave_des.managed.follow import FollowPipeline
 from suave_des.vehicle.bluerov2 import BLUEROV2
-from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle
+from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle, row_at
 
 BOTH = pytest.mark.parametrize("name", ["2023", "1.5"])
 LINE = [(-0.5 * n, 0.0) for n in range(21)]
@@ -248,18 +248,10 @@ def test_the_real_vehicle_follows_a_straight_line_at_the_observed_speed(env: sim
 
 
 def real_follow(name: str, disturbances: list, *, polling: bool) -> tuple[list, float]:
-    """Set-points that a disturbed vehicle gets, and the distance; by the node or by plain polling."""
+    """Way of a disturbed vehicle, and the distance; by the node or by plain polling."""
     env = simpy.Environment()
     autopilot = Autopilot(0.48, 0.34, 0.36, 0.5)
     vehicle = Vehicle(BLUEROV2, autopilot, Pose(1.0, 0.3, -18.75, 0.0, 0.0, 0.0), 80.0)
-    told: list[tuple[float, float]] = []
-    command = vehicle.command
-
-    def note(t_s: float, x_m: float, y_m: float, z_m: float) -> None:
-        told.append((round(t_s, 6), x_m))
-        command(t_s, x_m, y_m, z_m)
-
-    vehicle.command = note
     way = [0.0]
     rules = revision(name).follow
 
@@ -270,11 +262,11 @@ def real_follow(name: str, disturbances: list, *, polling: bool) -> tuple[list, 
     def poll_plainly():
         before = None
         for point in LINE:
-            note(env.now, *point, -18.75)
+            vehicle.command(env.now, *point, -18.75)
             polls = 0
             while not near(point):
                 if polls == 10:
-                    note(env.now, *point, -18.75)
+                    vehicle.command(env.now, *point, -18.75)
                     polls = 0
                 yield env.timeout(rules.poll_period_s)
                 polls += 1
@@ -286,7 +278,7 @@ def real_follow(name: str, disturbances: list, *, polling: bool) -> tuple[list, 
         if what < 6:
             vehicle.set_thruster_health(env.now, what + 1, 0.0)
         else:
-            command(env.now, 3.0, 1.0, -18.0)
+            vehicle.command(env.now, 3.0, 1.0, -18.0)
 
     follow = follow_of(env, name, vehicle)
     if polling:
@@ -296,7 +288,8 @@ def real_follow(name: str, disturbances: list, *, polling: bool) -> tuple[list, 
     for t_s, what in disturbances:
         env.process(disturb(t_s, what))
     env.run(until=75.0)
-    return told, way[0] if polling else follow.distance_m
+    vehicle.look_ahead(row_at(75.0))
+    return vehicle.track[: row_at(75.0)].tolist(), way[0] if polling else follow.distance_m
 
 
 @BOTH

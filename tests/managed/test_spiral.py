@@ -4,9 +4,13 @@ import math
 
 import pytest
 import simpy
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from stand_ins import INACTIVE, START, PlacedVehicle, revision, sender, spiral_at
 
 from suave_des.managed.search import GenerateSearchPath
+from suave_des.vehicle.bluerov2 import BLUEROV2
+from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle, row_at
 
 ORIGIN = (-17.0, 2.3)
 PHASE_S = 0.25
@@ -207,3 +211,84 @@ def test_revision_15_starts_afresh_where_it_is_when_activated_again() -> None:
 
 def test_before_any_mode_the_altitude_parameter_is_2_m() -> None:
     assert Search("1.5", PlacedVehicle()).node.altitude_m == 2.0
+
+
+# Sending set-points ahead is the same as looking at each tick
+
+
+class PlainSpiral:
+    """The rules of revision 2023's node, one tick after the other."""
+
+    def __init__(self, env: simpy.Environment, vehicle: Vehicle) -> None:
+        self.env, self.vehicle = env, vehicle
+        self.active, self.altitude_m, self.last_altitude_m = False, 2.0, None
+        self.count, self.radius_m, self.waited, self.lowered_m = 0, 0.0, 0, 0.0
+        self.place = None
+        env.process(self.tick_each_second())
+
+    def set_mode(self, altitude_m: float | None) -> None:
+        self.active = altitude_m is not None
+        self.altitude_m = altitude_m or self.altitude_m
+
+    def tick_each_second(self):
+        yield self.env.timeout(PHASE_S)
+        while True:
+            if self.active:
+                self.tick()
+            yield self.env.timeout(1.0)
+
+    def tick(self) -> None:
+        self.count += self.altitude_m != self.last_altitude_m
+        self.last_altitude_m = self.altitude_m
+        near = [True] * 3
+        if self.place is not None:
+            near = [abs(a - b) <= 0.4 for a, b in zip(self.vehicle.position(self.env.now), self.place, strict=True)]
+        self.waited += 1
+        if all(near):
+            self.waited = 0
+            self.radius_m += TURN_WIDTH_PER_M * self.altitude_m * 0.1 / (2.0 * math.pi) if self.count else 0.0
+            angle = 0.1 * self.count
+            x_m, y_m = ORIGIN[0] + self.radius_m * math.cos(angle), ORIGIN[1] + self.radius_m * math.sin(angle)
+            self.place = (x_m, y_m, -20.0 + self.altitude_m)
+            self.count += 1
+        elif self.waited <= 10:
+            return
+        else:
+            self.waited = 0
+            self.lowered_m += 0.5 if near[0] and near[1] else 0.0
+        self.vehicle.command(self.env.now, *self.place[:2], -20.0 + self.altitude_m - self.lowered_m)
+
+
+def real_search(happenings: list, *, plainly: bool) -> list:
+    """Way of a vehicle whose search mode, health and set-point change meanwhile; by the node or tick by tick."""
+    env = simpy.Environment()
+    autopilot = Autopilot(0.48, 0.34, 0.36, 0.5, altitude_deadband_m=0.3)
+    vehicle = Vehicle(BLUEROV2, autopilot, Pose(*ORIGIN, -18.75, 0.0, 0.0, 0.0), 80.0)
+    plain = PlainSpiral(env, vehicle) if plainly else None
+    node = GenerateSearchPath(env, vehicle, sender(env, vehicle), revision("2023").spiral, ORIGIN, PHASE_S)
+
+    def happen(t_s: float, what: int):
+        yield env.timeout(t_s + 0.013)  # never at the very time of a tick
+        if what < 4:
+            altitude_m = [None, 1.0, 2.0, 3.0][what]
+            if plain is None:
+                node.apply(INACTIVE if altitude_m is None else spiral_at(altitude_m))
+            else:
+                plain.set_mode(altitude_m)
+        elif what < 7:
+            vehicle.set_thruster_health(env.now, what - 3, 0.5)
+        else:
+            vehicle.command(env.now, -15.0, 3.0, -18.0)
+
+    for t_s, what in [(-0.013, 3), *happenings]:
+        env.process(happen(t_s, what))
+    env.run(until=75.0)
+    vehicle.look_ahead(row_at(75.0))
+    return vehicle.track[: row_at(75.0), :3].tolist()
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.tuples(st.integers(1, 70), st.integers(0, 7)), max_size=6, unique_by=lambda each: each[0]))
+def test_sending_set_points_ahead_is_the_same_as_looking_at_each_tick(happenings: list) -> None:
+    ahead, plainly = real_search(happenings, plainly=False), real_search(happenings, plainly=True)
+    assert [pytest.approx(place, abs=1e-9) for place in plainly] == ahead
