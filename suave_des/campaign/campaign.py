@@ -11,7 +11,7 @@ from suave_des.campaign.executors import WorkerError, make_executor
 from suave_des.campaign.lock import LOCK_FILE, locked
 from suave_des.campaign.outcomes import COLUMNS, Failure, Finished, Job, MissionRunner
 from suave_des.campaign.output import check_output_folder, make_output_folder, remove_derived, remove_parts
-from suave_des.campaign.plan import MissionKey, check_plan, plan
+from suave_des.campaign.plan import MissionKey, check_plan, check_seed, plan
 from suave_des.campaign.request import TIME_OUT_S, Request, check_same, check_time_out, deciding
 from suave_des.campaign.results import (
     FILES,
@@ -144,6 +144,7 @@ def run_campaign(
     if folder is not None:
         _check_new(folder, overwrite=overwrite)
     check_plan(managers, runs, workers)
+    check_seed(seed)
     check_time_out(time_out_s)
     loaded, inputs = _read(request)
     return _Campaign(request, loaded, inputs, folder).run(workers, on_progress, resumed=False)
