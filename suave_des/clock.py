@@ -18,7 +18,8 @@ def tick_at_or_after(t_s: float, phase_s: float, period_s: float) -> float:
 
 def until(env: simpy.Environment, t_s: float) -> simpy.Timeout:
     """An event at mission time t, or now if t has passed."""
-    return env.timeout(max(0.0, t_s - env.now))
+    delay_s = t_s - env.now
+    return simpy.Timeout(env, delay_s if delay_s > 0.0 else 0.0)
 
 
 def call_at(env: simpy.Environment, t_s: float, callback: Callable[[Any], None], value: Any) -> None:

@@ -9,11 +9,12 @@ from typing import NamedTuple
 
 from suave_des.campaign.output import rounded
 from suave_des.campaign.plan import Chunk, MissionKey
+from suave_des.campaign.sweep import cell_of
 from suave_des.campaign.time_limit import Limit, TimeOut, time_limits
+from suave_des.campaign.variation import Variation
 from suave_des.errors import MissionError
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.simulation.result import MissionMetrics
-from suave_des.simulation.simulator import Simulator
 
 COLUMNS = tuple(field.name for field in fields(MissionMetrics))
 """Columns of runs.csv that every campaign has."""
@@ -39,6 +40,7 @@ class Failure(NamedTuple):
         cause: what the manager raised, or what else ended the mission.
         lasting: whether the mission itself failed; a time-out or a worker that was killed may not happen again, so a
             resumed campaign runs such a mission once more.
+        point: of the sweep, from 0.
     """
 
     manager: str
@@ -46,6 +48,7 @@ class Failure(NamedTuple):
     time_s: float | None
     cause: str
     lasting: bool = True
+    point: int = 0
 
     def __str__(self) -> str:
         """In one line, with all that is known."""
@@ -64,19 +67,21 @@ class Job:
 
     Attributes:
         loaded: the scenario with its files.
+        variation: what differs between missions besides manager and run.
         managers: names, in the campaign's order.
         seed: the campaign's.
         time_out_s: time that a mission may take.
     """
 
     loaded: LoadedScenario
+    variation: Variation
     managers: tuple[str, ...]
     seed: int
     time_out_s: float
 
     def failed(self, key: MissionKey, cause: str) -> Finished:
         """The outcome of a mission that was ended from outside."""
-        return key, Failure(self.managers[key.manager], key.run, None, cause, lasting=False)
+        return key, Failure(self.managers[key.manager], key.run, None, cause, lasting=False, point=key.point)
 
 
 class MissionRunner:
@@ -88,7 +93,8 @@ class MissionRunner:
 
     def __init__(self, job: Job) -> None:
         self._job = job
-        self._simulator = Simulator(job.loaded)
+        self._drawn = tuple(job.variation.drawn)
+        self._go_to(0)
 
     def run(self, chunk: Chunk) -> list[Finished]:
         """The outcome of each mission, in order.
@@ -105,15 +111,23 @@ class MissionRunner:
                 yield key, self._outcome(key, limit)
 
     def _outcome(self, key: MissionKey, limit: Limit) -> Outcome:
+        if key.point != self._point:
+            self._go_to(key.point)
         manager = self._job.managers[key.manager]
         try:
             with limit(self._job.time_out_s):
                 result = self._simulator.run(manager, key.run, self._job.seed)
         except MissionError as error:
-            return Failure(error.manager, error.run, error.time_s, error.cause)
+            return Failure(error.manager, error.run, error.time_s, error.cause, point=key.point)
         except TimeOut:
             return self._job.failed(key, time_out_cause(self._job.time_out_s))[1]
-        return row_of(result.metrics)
+        return (*row_of(result.metrics), *self._swept, *(result.drawn[path] for path in self._drawn))
+
+    def _go_to(self, point: int) -> None:
+        """Have the simulator of a point; one is kept, as missions come point by point."""
+        variation = self._job.variation
+        self._point, self._simulator = point, variation.simulator(self._job.loaded, point)
+        self._swept = tuple(map(cell_of, variation.sweep.values(point).values()))
 
 
 def time_out_cause(time_out_s: float) -> str:

@@ -7,7 +7,7 @@ import inspect
 import platform
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +17,6 @@ from suave_des.managing.registry import manager_class
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.wording import shown
 
-TIME_OUT_S = 120.0
-"""Time that a mission may take, unless another is asked for."""
 _LONGEST_TIME_OUT_S = 1e6
 
 
@@ -27,7 +25,7 @@ class Request:
     """What was asked of a campaign, as given.
 
     Attributes:
-        scenario: path of a scenario file, or name of a shipped one.
+        scenario: path of a scenario or campaign file, or name of a shipped scenario.
         managers: names, or module:Class.
         runs: missions for each manager.
         seed: of everything that is random.
@@ -38,6 +36,10 @@ class Request:
         disabled_rules: names of rules to switch off, besides the scenario's.
         suave_format: whether the exemplar's results file is written too.
         time_out_s: time that a mission may take.
+        sweep: values by key path; see variation.vary.
+        perturbations: distribution by key path.
+        runs_per_draw: how many runs in a row share what is drawn.
+        of_file: names of those above that the campaign file decides, or else what is usual.
         folder: where relative paths begin.
         command: the command line, for the manifest.
     """
@@ -52,7 +54,11 @@ class Request:
     rules: tuple[str, ...] = ()
     disabled_rules: tuple[str, ...] = ()
     suave_format: bool = False
-    time_out_s: float = TIME_OUT_S
+    time_out_s: float = 120.0
+    sweep: Mapping[str, Any] = field(default_factory=dict)
+    perturbations: Mapping[str, Any] = field(default_factory=dict)
+    runs_per_draw: int = 1
+    of_file: tuple[str, ...] = ()
     folder: str = ""
     command: tuple[str, ...] = ()
 
@@ -96,6 +102,9 @@ def deciding(request: Request, loaded: LoadedScenario, inputs: Mapping[str, str]
         "manager_code_sha256": {name: _code(name) for name in request.managers},
         "runs": request.runs,
         "time_out_s": request.time_out_s,
+        "sweep": request.sweep,
+        "perturbations": request.perturbations,
+        "runs_per_draw": request.runs_per_draw,
         "scenario": loaded.scenario.model_dump(mode="json"),
         # The scenario's own files are compared by what they say: another comment in them decides nothing.
         "files_sha256": {

@@ -7,13 +7,15 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from suave_des.campaign.outcomes import Failure, Finished, Row
+from suave_des.campaign.outcomes import COLUMNS, Failure, Finished, Row
 from suave_des.campaign.output import csv_pieces, csv_text, json_text, write_files
 from suave_des.campaign.plan import Group
 from suave_des.campaign.provenance import provenance
 from suave_des.campaign.request import Request
 from suave_des.campaign.suave_format import SUAVE_FILE, suave_pieces
 from suave_des.campaign.summary import SUMMARY_COLUMNS, Tally
+from suave_des.campaign.sweep import cell_of
+from suave_des.campaign.variation import Variation
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.simulation.result import MissionMetrics
 
@@ -33,11 +35,12 @@ class CampaignResult:
         managers: in the order given.
         runs: planned for each manager.
         seed: the campaign's.
+        variation: what differs between missions besides manager and run.
         columns: of runs.csv.
         planned: number of missions that were to be run.
         done: number of missions that have a row.
         failures: missions that have no row because they failed, in the order of the missions.
-        summary: rows of summary.csv.
+        summary: rows of summary.csv: for each manager, at each point that was reached.
         folder: where the files are; none if there are none.
         outcomes: reads the outcomes of all missions, in order.
     """
@@ -46,6 +49,7 @@ class CampaignResult:
     managers: tuple[str, ...]
     runs: int
     seed: int
+    variation: Variation
     columns: tuple[str, ...]
     planned: int
     done: int
@@ -82,30 +86,45 @@ class CampaignResult:
 def gather(
     request: Request,
     loaded: LoadedScenario,
-    columns: tuple[str, ...],
+    variation: Variation,
     folder: Path | None,
     outcomes: Callable[[], Iterator[Finished]],
 ) -> CampaignResult:
     """Count what is in a store."""
-    tallies: dict[Group, Tally] = {(0, manager): Tally() for manager in range(len(request.managers))}
-    failures = []
-    done = 0
+    failures: list[Failure] = []
+    summary: list[Row] = []
+    done = reached = 0
+    tally = Tally()
+
+    def conclude(group: Group) -> None:
+        """Sum up the groups before this one that are not summed up yet; the tally is of the first of them."""
+        nonlocal tally
+        while (next_group := divmod(len(summary), len(request.managers))) < group:
+            point, manager = next_group
+            swept = map(cell_of, variation.sweep.values(point).values())
+            summary.append((request.managers[manager], *tally.figures(), *swept))
+            tally = Tally()
+
     for key, outcome in outcomes():
+        conclude((key.point, key.manager))
+        reached = key.point
         if isinstance(outcome, Failure):
             failures.append(outcome)
         else:
             done += 1
-            tallies[key.point, key.manager].add(outcome)
+            tally.add(outcome)
+    conclude((reached + 1, 0))
     return CampaignResult(
         loaded=loaded,
         managers=request.managers,
         runs=request.runs,
         seed=request.seed,
-        columns=columns,
-        planned=len(request.managers) * request.runs,
+        variation=variation,
+        columns=(*COLUMNS, *variation.columns),
+        planned=variation.sweep.points * len(request.managers) * request.runs,
         done=done,
         failures=tuple(failures),
-        summary=tuple((request.managers[manager], *tally.figures()) for (_, manager), tally in tallies.items()),
+        summary=tuple(summary),
         folder=folder,
         outcomes=outcomes,
     )
@@ -119,8 +138,8 @@ def write_results(result: CampaignResult, request: Request, inputs: Mapping[str,
     """
     assert result.folder is not None
     files: dict[str, str | bytes | Iterable[str]] = {
-        RUNS_FILE: csv_pieces(result.columns, result.stream()),
-        SUMMARY_FILE: csv_text(SUMMARY_COLUMNS, result.summary),
+        RUNS_FILE: csv_pieces(result.columns, map(_exact, result.stream())),
+        SUMMARY_FILE: csv_text((*SUMMARY_COLUMNS, *result.variation.sweep.parameters), result.summary),
         MANIFEST_FILE: json_text(_manifest(result, request, inputs)),
     }
     if request.suave_format:
@@ -135,19 +154,39 @@ def _manifest(result: CampaignResult, request: Request, inputs: Mapping[str, str
         "managers": result.managers,
         "runs": result.runs,
         "seed": result.seed,
+        **_varied(result, request),
         "missions": {
             "planned": result.planned,
             "done": result.done,
             "failed": len(result.failures),
             "left_out": result.planned - result.done - len(result.failures),
         },
-        "failures": [_told(failure) for failure in result.failures],
+        "failures": [_told(failure, result.variation) for failure in result.failures],
         **provenance(result.loaded, inputs, request.command),
     }
 
 
-def _told(failure: Failure) -> dict[str, Any]:
-    return {"manager": failure.manager, "run": failure.run, "time_s": failure.time_s, "cause": failure.cause}
+def _exact(row: Row) -> Row:
+    """A row with what varies in full, so that it can be given again; figures are rounded."""
+    varied = (repr(value) if isinstance(value, float) else value for value in row[len(COLUMNS) :])
+    return (*row[: len(COLUMNS)], *varied)
+
+
+def _varied(result: CampaignResult, request: Request) -> dict[str, Any]:
+    variation = result.variation
+    if not variation.columns:
+        return {}
+    return {
+        "sweep": variation.sweep.plain(),
+        "points": variation.sweep.points,
+        "perturbations": dict(request.perturbations),
+        "runs_per_draw": request.runs_per_draw,
+    }
+
+
+def _told(failure: Failure, variation: Variation) -> dict[str, Any]:
+    where = {"manager": failure.manager, "run": failure.run, **variation.sweep.values(failure.point)}
+    return {**where, "time_s": failure.time_s, "cause": failure.cause}
 
 
 def _numbered(result: CampaignResult) -> Iterator[tuple[int, Row]]:

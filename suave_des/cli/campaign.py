@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 
 _FAILURES_TOLD = 20
-_MANAGERS, _RUNS, _SEED, _TIME_OUT = ("none", "random", "metacontrol"), 20, 1, "120"
+_MANAGERS, _RUNS, _SEED, _TIME_OUT = "none,random,metacontrol", "20", "1", "120"
+"""As in campaign.request, which is not imported for --help."""
 
 
 class Format(StrEnum):
@@ -36,7 +37,11 @@ class Format(StrEnum):
 def campaign(
     scenario: Annotated[
         str | None,
-        typer.Argument(metavar="[SCENARIO]", help="A scenario file, or the name of a shipped one.", show_default=False),
+        typer.Argument(
+            metavar="[SCENARIO]",
+            help="A scenario or campaign file, or the name of a shipped scenario.",
+            show_default=False,
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="DIR", help="Folder for runs.csv, summary.csv and manifest.json.")
@@ -51,15 +56,16 @@ def campaign(
             "--managers",
             metavar="NAME,...",
             help="Managing subsystems: names, or module:Class.",
-            show_default=",".join(_MANAGERS),
+            show_default=_MANAGERS,
         ),
     ] = None,
     runs: Annotated[
-        int | None, typer.Option("--runs", help="Missions for each manager.", show_default=str(_RUNS))
+        int | None,
+        typer.Option("--runs", help="Missions for each manager, at each point.", show_default=_RUNS),
     ] = None,
     workers: Workers = 2,
     seed: Annotated[
-        int | None, typer.Option("--seed", help="Seed of everything that is random.", show_default=str(_SEED))
+        int | None, typer.Option("--seed", help="Seed of everything that is random.", show_default=_SEED)
     ] = None,
     time_out: Annotated[
         float | None,
@@ -69,6 +75,7 @@ def campaign(
         Format | None, typer.Option("--format", help="Write the exemplar's own suave_results.csv besides.")
     ] = None,
     overwrite: Overwrite = False,
+    yes: Annotated[bool, typer.Option("--yes", help="More than a million missions are meant.")] = False,
     ontology: Ontologies = None,
     rules: RuleFiles = None,
     disable_rule: DisabledRules = None,
@@ -77,10 +84,10 @@ def campaign(
 ) -> None:
     """Run many missions and write their results.
 
+    A campaign file has all of it, and says what is swept or drawn anew in each run; options go before what it says.
     What is done is kept while the campaign runs; after an interruption, --resume DIR does the rest.
     """
     from suave_des.campaign.campaign import resume_campaign, run_campaign
-    from suave_des.campaign.request import TIME_OUT_S
     from suave_des.cli.console import output, progress_bar
     from suave_des.cli.tables import print_summary
     from suave_des.errors import InputError
@@ -94,6 +101,7 @@ def campaign(
             "--time-out": time_out,
             "--format": also,
             "--overwrite": overwrite,
+            "--yes": yes,
             "--ontology": ontology,
             "--modes": modes,
             "--reasoner": reasoner,
@@ -112,13 +120,13 @@ def campaign(
         missing = "SCENARIO" if scenario is None else "--out DIR"
         raise InputError(f"{missing} is missing", remedy="see suave-des campaign --help")
     else:
-        names = _MANAGERS if managers is None else [name.strip() for name in managers.split(",") if name.strip()]
+        names = None if managers is None else [name.strip() for name in managers.split(",") if name.strip()]
         with progress_bar(scenario) as show:
             result = run_campaign(
                 scenario,
                 names,
-                _RUNS if runs is None else runs,
-                _SEED if seed is None else seed,
+                runs,
+                seed,
                 workers,
                 out,
                 ontologies=ontology or (),
@@ -127,7 +135,8 @@ def campaign(
                 rules=rules or (),
                 disabled_rules=disable_rule or (),
                 suave_format=also is Format.SUAVE,
-                time_out_s=TIME_OUT_S if time_out is None else time_out,
+                time_out_s=time_out,
+                confirmed=yes,
                 overwrite=overwrite,
                 command=command_line(),
                 on_progress=show,

@@ -39,6 +39,9 @@ def print_trimmed(console: Console, table: Table) -> None:
 def print_summary(console: Console, result: CampaignResult) -> None:
     """Print what summary.csv says."""
     table = plain_table()
+    swept = result.variation.sweep.parameters
+    for parameter in swept:
+        table.add_column(parameter, justify="right")
     table.add_column("manager", overflow="fold")
     for heading in ("missions", "found"):
         table.add_column(heading, justify="right")
@@ -47,9 +50,10 @@ def print_summary(console: Console, result: CampaignResult) -> None:
         table.add_column("95% interval", justify="right")
         table.add_column("std", justify="right")
     for row in result.summary:
-        cells = dict(zip(SUMMARY_COLUMNS, row, strict=True))
+        cells = dict(zip(SUMMARY_COLUMNS, row, strict=False))
         share = cells["found_share"]
         table.add_row(
+            *map(str, row[len(SUMMARY_COLUMNS) :]),
             str(cells["manager"]),
             str(cells["n"]),
             "" if share is None else f"{float(share):.0%}",

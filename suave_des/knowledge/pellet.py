@@ -80,6 +80,7 @@ class InProcessPellet:
             self._known = self._collections(self._base)
             self._always = frozenset(self._read(self._base))
             self._refuse_dropped_rules()
+        jvm.make_archive_later()
 
     def infer(self, situation: Sequence[Triple]) -> frozenset[Triple]:
         """All values of the properties to read, and members of the classes to read, in a situation.

@@ -7,18 +7,20 @@ import simpy
 from numpy.typing import NDArray
 
 from suave_des.clock import call_at
-from suave_des.monitor.monitors import Measurements
-from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at
+from suave_des.monitor.measurements import Measurements
+from suave_des.vehicle.vehicle import STEP_S, Vehicle
 from suave_des.world.pipeline import first_detection
 
-_LOOK_AHEAD_ROWS = 40
+_LOOK_AHEAD_ROWS = 22
+"""Little more than the second after which the search sends its next set-point, which makes the way another one."""
+_FARTHEST_LOOK_AHEAD_ROWS = 200
 
 
 def measured_at_rows(measurements: Measurements, rows: int) -> NDArray[np.float64]:
     """Last measured value at each row of a track, shape (rows,); nan before the first measurement."""
-    changes = [row_at(t_s) for t_s in measurements.times_s]
-    lengths = np.diff(np.minimum([0, *changes, rows], rows))
-    return np.repeat(np.array([np.nan, *measurements.values]), lengths)
+    changes = np.rint(np.array(measurements.times_s) / STEP_S)  # rounded as Vehicle does
+    ends = np.concatenate(([0], np.minimum(changes, rows), [rows])).astype(np.int64)
+    return np.repeat(np.array([np.nan, *measurements.values]), ends[1:] - ends[:-1])
 
 
 class PipelineDetector:
@@ -55,27 +57,30 @@ class PipelineDetector:
         self.detected = env.event()
         self.first_point: int | None = None
         self.detected_s: float | None = None
-        vehicle.control_listeners.append(self._look_ahead)
-        self._look_ahead(0)
+        vehicle.control_listeners.append(self._look_anew)
+        self._look_anew(0)
 
-    def _look_ahead(self, row: int) -> None:
+    def _look_anew(self, row: int) -> None:
+        self._look_ahead(row, _LOOK_AHEAD_ROWS)
+
+    def _look_ahead(self, row: int, rows: int) -> None:
         self._version += 1
-        last = min(row + _LOOK_AHEAD_ROWS, self._vehicle.last_row)
+        last = min(row + rows, self._vehicle.last_row)
         if row >= last:
             return
         self._vehicle.look_ahead(last)
         seen_row, point = first_detection(self._vehicle.track, row, last, self._visibility_m, self._points)
         wake_s = (seen_row if point >= 0 else last) * STEP_S
-        call_at(self._env, wake_s, self._arrive, (self._version, point, last))
+        call_at(self._env, wake_s, self._arrive, (self._version, point, last, rows))
 
-    def _arrive(self, foreseen: tuple[int, int, int]) -> None:
-        version, point, last = foreseen
+    def _arrive(self, foreseen: tuple[int, int, int, int]) -> None:
+        version, point, last, rows = foreseen
         if version != self._version:
             return
         if point < 0:
-            self._look_ahead(last)
+            self._look_ahead(last, min(2 * rows, _FARTHEST_LOOK_AHEAD_ROWS))
             return
-        self._vehicle.control_listeners.remove(self._look_ahead)
+        self._vehicle.control_listeners.remove(self._look_anew)
         self.first_point = point
         self.detected_s = float(self._env.now)
         self.detected.succeed()

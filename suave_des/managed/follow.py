@@ -81,52 +81,55 @@ class FollowPipeline(FunctionNode):
 
     def _follow(self, path: Path) -> Process:
         started_s = self.env.now
+        poll = 0
         try:
             while self._next < len(path):
                 point = path[self._next]
                 self._send(point)
-                yield from self._wait_until_reached(point, started_s)
+                poll = yield from self._reached_at(point, started_s, poll)
                 self._arrive(point)
         except simpy.Interrupt:
             return
         self.finished.succeed()
 
-    def _wait_until_reached(self, point: tuple[float, float], started_s: float) -> Process:
+    def _reached_at(self, point: tuple[float, float], started_s: float, poll: int) -> Generator[simpy.Event, None, int]:
         """Wait for the poll that finds the point reached, sending it again whenever ten polls did not.
 
         Polls lie on a grid that began with the activation. Instead of stopping at each, the vehicle is asked where it
         will be at the coming ones; should its control change meanwhile, it is asked anew.
+
+        Args:
+            point: where to go.
+            started_s: time of poll 0.
+            poll: number of the present poll.
+
+        Returns:
+            The number of the poll.
         """
+        x_m, y_m = point
         period_s = self._revision.poll_period_s
-        poll = _polls_until(self.env.now, started_s, period_s) + 1
-        last = poll + POLLS_BEFORE_RESENDING - 1
-        if self._is_at(point):
-            return
+        first, last = poll, poll + POLLS_BEFORE_RESENDING
         while True:
             reached = self._vehicle.first_tick_in_box(
-                *point, self._revision.acceptance_m, began_s=started_s, period_s=period_s, first=poll, last=last
+                x_m, y_m, self._revision.acceptance_m, began_s=started_s, period_s=period_s, first=first, last=last
             )
+            if reached == poll:
+                return poll
             wake = last if reached is None else reached
-            if (yield from self._sleep_until(started_s + wake * period_s)):
-                poll = max(poll, _polls_until(self.env.now, started_s, period_s))
-            elif reached is not None:
-                return
-            else:
-                self._send(point)
-                poll, last = wake + 1, wake + POLLS_BEFORE_RESENDING
-
-    def _sleep_until(self, t_s: float) -> Generator[simpy.Event, None, bool]:
-        """Wait until a mission time; returns at once, and true, if the vehicle's control changes."""
-        self._asleep = True
-        try:
-            yield until(self.env, t_s)
-        except simpy.Interrupt as interrupt:
-            if interrupt.cause is not _CONTROL_CHANGE:
-                raise
-            return True
-        finally:
-            self._asleep = False
-        return False
+            self._asleep = True
+            try:
+                yield until(self.env, started_s + wake * period_s)
+            except simpy.Interrupt as interrupt:
+                if interrupt.cause is not _CONTROL_CHANGE:
+                    raise
+                first = max(first, poll + 1, _polls_until(self.env.now, started_s, period_s))
+                continue
+            finally:
+                self._asleep = False
+            if reached is not None:
+                return reached
+            self._send(point)
+            first, last = last + 1, last + POLLS_BEFORE_RESENDING
 
     def _control_changed(self, row: int) -> None:
         if self._asleep and self._process is not None:
@@ -135,11 +138,6 @@ class FollowPipeline(FunctionNode):
 
     def _send(self, point: tuple[float, float]) -> None:
         self._sender.send(point[0], point[1], SEA_BED_Z_M + ALTITUDE_M)
-
-    def _is_at(self, point: tuple[float, float]) -> bool:
-        x, y, _ = self._vehicle.position(self.env.now)
-        box = self._revision.acceptance_m
-        return abs(x - point[0]) <= box and abs(y - point[1]) <= box
 
     def _arrive(self, point: tuple[float, float]) -> None:
         self._next += 1

@@ -32,7 +32,7 @@ class SetPointSender:
         vehicle: whose autopilot gets the set-points.
         frame: the node's frame error.
         loss_probability: chance that a message is lost on its way.
-        stream: decides which.
+        stream: decides which; not needed if none can be.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class SetPointSender:
         vehicle: Vehicle,
         frame: Frame,
         loss_probability: float,
-        stream: random.Random,
+        stream: random.Random | None = None,
     ) -> None:
         self._env = env
         self._vehicle = vehicle
@@ -51,7 +51,7 @@ class SetPointSender:
 
     def send(self, x_m: float, y_m: float, z_m: float) -> None:
         """Send a set-point, world frame; whether it arrived nobody is told."""
-        if self._loss_probability and self._stream.random() < self._loss_probability:
+        if self._stream is not None and self._stream.random() < self._loss_probability:
             return
         self._vehicle.command(self._env.now, x_m + self._frame.x_m, y_m + self._frame.y_m, z_m + self._frame.z_m)
 

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from operator import itemgetter
+from typing import Any
+
+import numpy as np
 import simpy
 
 from suave_des.managed.coordinator import MAINTAIN_MOTION
 from suave_des.managed.recharge import RECHARGE
 from suave_des.managed.search import INITIAL_ALTITUDE_M
-from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
-from suave_des.monitor.monitors import Measurements
+from suave_des.monitor.diagnostics import FAILED, Diagnostic
+from suave_des.monitor.measurements import Measured, Measurements
 from suave_des.scenario.models import ReactionMetric
 from suave_des.scenario.modes import Mode
 
@@ -20,73 +25,130 @@ class ReactionMeter:
     not fit the search altitude, until the fitting altitude is set; the battery is low, until the recharge path is
     active. An event that is never answered does not count.
 
-    The altitude is compared at every visibility message of the whole mission, except while the battery is low. A
-    mismatch ends only when the expected altitude is set, not when the visibility comes back.
+    During the mission it only takes notes; what was measured meanwhile is read from its tables in the end.
 
     Args:
         env: the mission's clock.
         settings: thresholds and altitudes.
-        visibility: says when the next visibility message comes, changed or not.
+        visibility: the measured visibility.
+        battery: the battery's level; none without a battery.
     """
 
-    def __init__(self, env: simpy.Environment, settings: ReactionMetric, visibility: Measurements) -> None:
+    def __init__(
+        self,
+        env: simpy.Environment,
+        settings: ReactionMetric,
+        visibility: Measurements,
+        battery: Measured | None = None,
+    ) -> None:
         self._env = env
         self._settings = settings
         self._visibility = visibility
+        self._battery = battery
+        self._noted: list[_Happening] = []
+
+    def diagnostic(self, diagnostic: Diagnostic) -> None:
+        """Take note of a component's status."""
+        if diagnostic.value == FAILED:
+            self._noted.append((self._env.now, _Open.failure, None))
+
+    def mode_effect(self, function: str, mode: Mode) -> None:
+        """Take note that a mode has taken effect."""
+        if mode.active:
+            self._noted.append((self._env.now, _Open.mode_effect, (function, mode)))
+
+    def reactions_s(self) -> list[float]:
+        """The reactions completed by now, in the order of their completion."""
+        reactions = _Open(self._visibility.next_message_s)
+        happenings = [*self._fitting_altitudes(), *self._low_battery(), *self._noted]
+        for t_s, what, value in sorted(happenings, key=itemgetter(0)):
+            what(reactions, t_s, value)
+        return reactions.completed_s
+
+    def mean_s(self) -> float | None:
+        """Mean of the completed reactions; none if there was none."""
+        reactions_s = self.reactions_s()
+        return sum(reactions_s) / len(reactions_s) if reactions_s else None
+
+    def _fitting_altitudes(self) -> Iterator[_Happening]:
+        """The messages from which on another altitude fits than before."""
+        rising_m = self._settings.visibility_thresholds_m[::-1]
+        altitudes_m = (None, *self._settings.expected_altitudes_m[::-1])
+        published = self._visibility.published(self._env.now)
+        bands = np.searchsorted(rising_m, self._visibility.values[:published], side="right")
+        before = -1
+        for message, band in enumerate(bands.tolist()):
+            if band != before:
+                before = band
+                yield self._visibility.times_s[message], _Open.expect, altitudes_m[band]
+
+    def _low_battery(self) -> Iterator[_Happening]:
+        if self._battery is not None:
+            for message in range(self._battery.published(self._env.now)):
+                low = self._battery.values[message] < self._settings.battery_limit
+                yield self._battery.times_s[message], _Open.battery, low
+
+
+class _Open:
+    """Events that wait for their adaptation, and the times of those that were answered.
+
+    The altitude is compared at every visibility message of the whole mission, except while the battery is low. A
+    mismatch ends only when the expected altitude is set, not when the visibility comes back.
+
+    Args:
+        next_message_s: says when the next visibility message comes, changed or not.
+    """
+
+    def __init__(self, next_message_s: Callable[[float], float]) -> None:
+        self._next_message_s = next_message_s
         self._altitude_m = INITIAL_ALTITUDE_M
         self._expected_m: float | None = None
         self._battery_low = False
         self._failure_since_s: float | None = None
         self._mismatch_since_s: float | None = None
         self._low_battery_since_s: float | None = None
-        self.reactions_s: list[float] = []
+        self.completed_s: list[float] = []
 
-    @property
-    def mean_s(self) -> float | None:
-        """Mean of the completed reactions; none if there was none."""
-        return sum(self.reactions_s) / len(self.reactions_s) if self.reactions_s else None
+    def failure(self, t_s: float, _: None) -> None:
+        """A thruster failure is reported."""
+        if self._failure_since_s is None:
+            self._failure_since_s = t_s
 
-    def diagnostic(self, diagnostic: Diagnostic) -> None:
-        """Take a diagnostic from the bus."""
-        if diagnostic.kind == Kind.COMPONENT_STATUS:
-            if diagnostic.value == FAILED and self._failure_since_s is None:
-                self._failure_since_s = self._env.now
-        elif diagnostic.key == "battery_level":
-            self._battery(low=float(diagnostic.value) < self._settings.battery_limit)
-        elif diagnostic.key == "water_visibility":
-            self._expected_m = self._fitting_altitude_m(float(diagnostic.value))
-            self._compare_at(self._env.now)
+    def expect(self, t_s: float, altitude_m: float | None) -> None:
+        """From this visibility message on another altitude fits; none: no altitude does."""
+        self._expected_m = altitude_m
+        self._compare_at(t_s)
 
-    def _battery(self, *, low: bool) -> None:
+    def battery(self, t_s: float, low: bool) -> None:
+        """A message of the battery's level."""
         if low and self._low_battery_since_s is None:
-            self._low_battery_since_s = self._env.now
-        if low and self._mismatch_since_s is not None and self._mismatch_since_s > self._env.now:
+            self._low_battery_since_s = t_s
+        if low and self._mismatch_since_s is not None and self._mismatch_since_s > t_s:
             self._mismatch_since_s = None  # the message that would have shown it comes too late
         if self._battery_low and not low:
             self._battery_low = False
-            self._compare_at(self._visibility.next_message_s(self._env.now))
+            self._compare_at(self._next_message_s(t_s))
         self._battery_low = low
 
-    def mode_effect(self, function: str, mode: Mode) -> None:
-        """Take note that a mode has taken effect."""
-        if not mode.active:
-            return
+    def mode_effect(self, t_s: float, effect: tuple[str, Mode]) -> None:
+        """An active mode has taken effect."""
+        function, mode = effect
         if function == MAINTAIN_MOTION and self._failure_since_s is not None:
-            self._complete(self._failure_since_s)
+            self.completed_s.append(t_s - self._failure_since_s)
             self._failure_since_s = None
         elif function == RECHARGE and self._low_battery_since_s is not None:
-            self._complete(self._low_battery_since_s)
+            self.completed_s.append(t_s - self._low_battery_since_s)
             self._low_battery_since_s = None
         altitude = mode.parameters.get("spiral_altitude")
         if altitude is not None:
             self._altitude_m = float(altitude)
             if self._mismatch_since_s is not None and self._altitude_m == self._expected_m:
-                if self._mismatch_since_s < self._env.now:
-                    self._complete(self._mismatch_since_s)
+                if self._mismatch_since_s < t_s:
+                    self.completed_s.append(t_s - self._mismatch_since_s)
                 self._mismatch_since_s = None
             else:
                 # The next message finds the mismatch, if there is one, though its value may not be new.
-                self._compare_at(self._visibility.next_message_s(self._env.now))
+                self._compare_at(self._next_message_s(t_s))
 
     def _compare_at(self, message_s: float) -> None:
         if self._battery_low or self._expected_m is None:
@@ -97,9 +159,6 @@ class ReactionMeter:
         elif fits and self._mismatch_since_s is not None and self._mismatch_since_s >= message_s:
             self._mismatch_since_s = None
 
-    def _complete(self, since_s: float) -> None:
-        self.reactions_s.append(self._env.now - since_s)
 
-    def _fitting_altitude_m(self, visibility_m: float) -> float | None:
-        pairs = zip(self._settings.visibility_thresholds_m, self._settings.expected_altitudes_m, strict=True)
-        return next((altitude for threshold, altitude in pairs if visibility_m >= threshold), None)
+_Happening = tuple[float, Callable[[_Open, float, Any], None], Any]
+"""Time, what happens to the open events, and a value."""

@@ -7,15 +7,16 @@ or register it by name as an entry point of the group `suave_des.managers`.
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Generator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Generator, Mapping
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import simpy
 
 from suave_des.managed.coordinator import Task
 from suave_des.managed.mode_manager import ModeManager
-from suave_des.monitor.diagnostics import Diagnostic
+from suave_des.monitor.diagnostics import Diagnostic, Kind
+from suave_des.monitor.measurements import Measured
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.modes import UNGROUND_MODE
 
@@ -36,6 +37,7 @@ class ManagedSystem:
         log: takes an event and its detail for the mission's record.
         knowledge: gives the knowledge base with its reasoner (a Deliberation), opened on the first call.
         reasoned: takes each KnowledgeState that is reasoned about, for the mission's record.
+        measurements: what monitors have measured, by quality attribute; see `measured`.
     """
 
     env: simpy.Environment
@@ -47,11 +49,26 @@ class ManagedSystem:
     log: Callable[[str, str], None]
     knowledge: Callable[[], Any]
     reasoned: Callable[[Any], None] = lambda state: None
+    measurements: Mapping[str, Measured] = field(default_factory=dict)
 
     @property
     def now_s(self) -> float:
         """Mission time."""
         return float(self.env.now)
+
+    def measured(self, attribute: str, since_s: float = 0.0) -> float | None:
+        """Value of a quality attribute that was published last, none if there is none.
+
+        A repetition of the value before is not a publication.
+
+        Args:
+            attribute: name of the quality attribute, such as water_visibility.
+            since_s: publications before this mission time do not count.
+        """
+        measurements = self.measurements.get(attribute)
+        if measurements is None or not (published := measurements.published(self.env.now)):
+            return None
+        return measurements.values[published - 1] if measurements.times_s[published - 1] >= since_s else None
 
     def change_mode(self, function: str, mode: str) -> bool:
         """Request a mode of a function; the effect comes later. False if there is no such mode."""
@@ -68,9 +85,12 @@ class ManagingSubsystem:
         period_s: time between calls of `adapt`; none: never called.
         starts_s: mission time of the first call of `adapt`.
         needs_knowledge: whether missions need the knowledge base, so that it is checked before the first one.
+        hears: kinds of diagnostics that `diagnostic` is called with. Telling of every measured value takes time: a
+            manager that looks at `system.measured` when it adapts does without.
     """
 
     needs_knowledge: ClassVar[bool] = False
+    hears: ClassVar[Collection[Kind]] = tuple(Kind)
 
     def __init__(self, system: ManagedSystem) -> None:
         self.system = system

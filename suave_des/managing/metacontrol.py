@@ -7,13 +7,14 @@ name.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from decimal import Decimal
+from collections.abc import Callable, Collection, Iterable
+from functools import partial
 from typing import ClassVar
+from weakref import WeakKeyDictionary
 
 from suave_des.clock import tick_at_or_after, until
-from suave_des.knowledge.deliberation import Deliberation
-from suave_des.knowledge.state import Decision, KnowledgeState, ObjectiveState, Plan
+from suave_des.knowledge.deliberation import REMEMBERED, Conclusion, Deliberation
+from suave_des.knowledge.state import Decision, KnowledgeState, ObjectiveState
 from suave_des.managed.coordinator import SEARCH, Task
 from suave_des.managing.base import AdaptationProcess, ManagedSystem, ManagingSubsystem
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, Kind
@@ -21,6 +22,13 @@ from suave_des.scenario.distributions import draw
 from suave_des.scenario.modes import UNGROUND_MODE
 
 UNGROUNDED = "UNGROUNDED"
+
+_Values = tuple[float | None, ...]
+_Known = dict[_Values, Conclusion]
+"""Conclusions by measured values, while all else that is known stays the same."""
+
+_memories: WeakKeyDictionary[Deliberation, dict[object, _Known]] = WeakKeyDictionary()
+"""What was concluded, by all else that is known: so that a state is built only for what is new."""
 
 
 class Metacontrol(ManagingSubsystem):
@@ -32,24 +40,35 @@ class Metacontrol(ManagingSubsystem):
     """
 
     needs_knowledge: ClassVar[bool] = True
+    hears: ClassVar[Collection[Kind]] = (Kind.COMPONENT_STATUS,)
 
     def __init__(self, system: ManagedSystem) -> None:
         super().__init__(system)
         self._revision = system.scenario.revision.metacontrol
         self._deliberation: Deliberation = system.knowledge()
-        self._awaited = self._attributes_to_await()
         self._objectives: dict[str, str | None] = {}
         self._groundings: dict[str, str] = {}
         self._components: dict[str, str] = {}
-        self._measurements: dict[str, Decimal] = {}
+        self._attributes = tuple(sorted(system.measurements))
+        self._awaited = self._attributes_to_await()
+        self._listens_since_s = 0.0
+        self._heard_before: dict[str, float | None] = {}
+        self._known: _Known | None = None
         self._cancelled: set[str] = set()
         self._told: frozenset[str] = frozenset()
         self._without_design: frozenset[str] = frozenset()
-        self._latency_stream = system.stream("metacontrol/inference")
-        self.period_s = system.scenario.managers.metacontrol.reasoning_period_s
-        self.starts_s = system.stream("metacontrol/phase").uniform(0.0, self.period_s)
-        bridge_period_s = self._revision.task_bridge_period_s
-        self._bridge_phase_s = system.stream("metacontrol/bridge").uniform(0.0, bridge_period_s)
+        latency = system.scenario.latencies.inference_s
+        self._inference_time_s: Callable[[], float] = (
+            (lambda: latency)
+            if isinstance(latency, float)
+            else partial(draw, latency, system.stream("metacontrol/inference"))
+        )
+        self._cycle_s = system.scenario.managers.metacontrol.reasoning_period_s
+        self.period_s = self._cycle_s
+        self.starts_s = system.stream("metacontrol/phase").uniform(0.0, self._cycle_s)
+        if self._revision.task_bridge_period_s > 0.0:
+            bridge_period_s = self._revision.task_bridge_period_s
+            self._bridge_phase_s = system.stream("metacontrol/bridge").uniform(0.0, bridge_period_s)
         self._add_objectives(system.lasting_functions)
         if self._revision.objectives_at_launch:
             self._add_objectives([SEARCH])
@@ -63,26 +82,76 @@ class Metacontrol(ManagingSubsystem):
         self.system.env.process(self._over_the_bridge(task, requested=False))
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
-        """Monitor: update what is known of components and quality attributes."""
-        if self._revision.ignores_diagnostics_without_objective and not self._objectives:
-            return
-        if diagnostic.kind == Kind.COMPONENT_STATUS:
+        """Monitor: update what is known of components."""
+        if self._listens() and diagnostic.kind == Kind.COMPONENT_STATUS:
             self._components[diagnostic.key] = str(diagnostic.value)
-        else:
-            self._measurements[diagnostic.key] = Decimal(repr(float(diagnostic.value)))
+            self._known = None
 
-    def adapt(self) -> AdaptationProcess:
+    def measured(self, attribute: str) -> float | None:
+        """Monitor: the value of a quality attribute that is known now, none if there is none."""
+        if self._listens():
+            value = self.system.measured(attribute, self._listens_since_s)
+            if value is not None:
+                return value
+        return self._heard_before.get(attribute)
+
+    def adapt(self) -> AdaptationProcess | None:
         """Analyze and plan on the state as it is now; execute when the reasoner has taken its time."""
-        if not self._objectives or self._waits_for_measurement():
-            return
-        state = self._state()
+        if not self._objectives:
+            return None
+        values = tuple([self.measured(attribute) for attribute in self._attributes])
+        if any(values[place] is None for place in self._awaited):
+            return None
         self._cancelled.clear()
-        self.system.reasoned(state)
-        conclusion = self._deliberation.conclude(state, improve_exceeded=self._revision.search_improves_when_exceeded)
-        yield self.system.env.timeout(draw(self.system.scenario.latencies.inference_s, self._latency_stream))
-        self._tell(conclusion.statuses)
-        self._execute(conclusion.plan)
-        self._settle(state)
+        conclusion = self._conclude(values)
+        self.system.reasoned(conclusion.inference.state)
+        latency_s = self._inference_time_s()
+        if self._changes_nothing(conclusion) and latency_s < self._cycle_s:
+            return None  # and it will be over before the next cycle
+        return self._execute(conclusion, latency_s)
+
+    def _listens(self) -> bool:
+        return bool(self._objectives) or not self._revision.ignores_diagnostics_without_objective
+
+    def _conclude(self, values: _Values) -> Conclusion:
+        if self._known is None:
+            self._known = self._known_in_situation()
+        conclusion = self._known.get(values)
+        if conclusion is None:
+            if len(self._known) >= REMEMBERED:
+                self._known.clear()
+            conclusion = self._known[values] = self._deliberation.conclude(
+                self._state(values), improve_exceeded=self._revision.search_improves_when_exceeded
+            )
+        return conclusion
+
+    def _known_in_situation(self) -> _Known:
+        memory = _memories.setdefault(self._deliberation, {})
+        if sum(map(len, memory.values())) >= REMEMBERED:
+            memory.clear()
+        situation = (
+            self._revision.search_always_improves,
+            self._revision.search_improves_when_exceeded,
+            self._attributes,
+            *map(tuple, (self._objectives.items(), self._groundings.items(), self._components.items())),
+        )
+        return memory.setdefault(situation, {})
+
+    def _changes_nothing(self, conclusion: Conclusion) -> bool:
+        return (
+            conclusion.statuses == self._told
+            and not self._without_design
+            and RECOVERED not in self._components.values()
+            and all(self._is_carried_out(decision) for decision in conclusion.plan.decisions)
+        )
+
+    def _is_carried_out(self, decision: Decision) -> bool:
+        function, design = decision.function, decision.design
+        return (
+            design is not None
+            and self._groundings.get(function) == design == self.system.modes.current_mode(function)
+            and self._objectives[function] is None
+        )
 
     def _over_the_bridge(self, task: Task, *, requested: bool) -> AdaptationProcess:
         period_s = self._revision.task_bridge_period_s
@@ -91,20 +160,31 @@ class Metacontrol(ManagingSubsystem):
             yield until(self.system.env, tick_s)
         if requested:
             self._add_objectives(task.functions)
-            return
-        for function in task.functions:
-            self._objectives.pop(function, None)
-            self._groundings.pop(function, None)
-            self._cancelled.add(function)
-            self.system.change_mode(function, UNGROUND_MODE)
+        else:
+            self._remove_objectives(task.functions)
 
     def _add_objectives(self, functions: Iterable[str]) -> None:
+        if not self._listens():
+            self._listens_since_s = self.system.now_s
+        self._known = None
         for function in functions:
             if function not in self._objectives:
                 self._objectives[function] = UNGROUNDED
                 self.system.log("objective", f"{function} {UNGROUNDED}")
 
-    def _state(self) -> KnowledgeState:
+    def _remove_objectives(self, functions: Iterable[str]) -> None:
+        heard = {attribute: self.measured(attribute) for attribute in self._attributes}
+        for function in functions:
+            self._objectives.pop(function, None)
+            self._groundings.pop(function, None)
+            self._cancelled.add(function)
+            self.system.change_mode(function, UNGROUND_MODE)
+        self._known = None
+        if not self._listens():
+            self._heard_before = heard
+
+    def _state(self, values: _Values) -> KnowledgeState:
+        known = zip(self._attributes, values, strict=True)
         always = self._revision.search_always_improves
         return KnowledgeState.of(
             objectives=[
@@ -113,13 +193,13 @@ class Metacontrol(ManagingSubsystem):
             ],
             groundings=self._groundings,
             components=self._components,
-            measurements=self._measurements,
+            measurements={attribute: value for attribute, value in known if value is not None},
         )
 
-    def _attributes_to_await(self) -> frozenset[str]:
-        """Attributes that some function design expects a value of and that this mission measures."""
+    def _attributes_to_await(self) -> list[int]:
+        """Places of the measured attributes that some function design expects a value of."""
         if not self._revision.waits_for_first_measurement:
-            return frozenset()
+            return []
         base = self._deliberation.base
         expected = {
             attribute
@@ -127,26 +207,24 @@ class Metacontrol(ManagingSubsystem):
             for design in base.designs(function)
             for attribute in base.expected(design)
         }
-        return frozenset(expected.intersection(self.system.scenario.signals))
+        signals = self.system.scenario.signals
+        return [place for place, name in enumerate(self._attributes) if name in expected and name in signals]
 
-    def _waits_for_measurement(self) -> bool:
-        return not self._awaited <= self._measurements.keys()
-
-    def _execute(self, decided: Plan) -> None:
-        for decision in decided.decisions:
+    def _execute(self, conclusion: Conclusion, latency_s: float) -> AdaptationProcess:
+        recovered = [component for component, status in self._components.items() if status == RECOVERED]
+        yield self.system.env.timeout(latency_s)
+        self._tell(conclusion.statuses)
+        for decision in conclusion.plan.decisions:
             if decision.function in self._objectives and decision.function not in self._cancelled:
                 self._carry_out(decision)
-        self._without_design = frozenset(each.function for each in decided.decisions if each.design is None)
-
-    def _settle(self, state: KnowledgeState) -> None:
-        """A recovery is news once: it has been reasoned about, and from now on the component is as if never failed.
-
-        Kept, it would make every objective updatable for ever, and in the exemplar's oldest files, where the status
-        says so, contradict the UNGROUNDED of each objective to come.
-        """
-        for component, status in state.components:
-            if status == RECOVERED and self._components.get(component) == RECOVERED:
+        self._without_design = frozenset(each.function for each in conclusion.plan.decisions if each.design is None)
+        # A recovery is news once: it has been reasoned about, and from now on the component is as if it had never
+        # failed. Kept, it would make every objective updatable for ever, and in the exemplar's oldest files, where the
+        # status says so, contradict the UNGROUNDED of each objective to come.
+        for component in recovered:
+            if self._components.get(component) == RECOVERED:
                 del self._components[component]
+        self._known = None
 
     def _carry_out(self, decision: Decision) -> None:
         function, design = decision.function, decision.design

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -32,16 +32,21 @@ Subscriber = Callable[[Diagnostic], None]
 
 
 class DiagnosticsBus:
-    """Hands each diagnostic to every subscriber at once, in the order of subscription."""
+    """Hands each diagnostic at once to those who want its kind, in the order of subscription."""
 
     def __init__(self) -> None:
-        self._subscribers: list[Subscriber] = []
+        self._subscribers: dict[Kind, list[Subscriber]] = {kind: [] for kind in Kind}
 
-    def subscribe(self, subscriber: Subscriber) -> None:
-        """Have every later diagnostic passed to `subscriber`."""
-        self._subscribers.append(subscriber)
+    def subscribe(self, subscriber: Subscriber, kinds: Collection[Kind] = tuple(Kind)) -> None:
+        """Have every later diagnostic of some kinds passed to `subscriber`."""
+        for kind in kinds:
+            self._subscribers[kind].append(subscriber)
+
+    def has_listeners(self, kind: Kind) -> bool:
+        """Whether anybody wants diagnostics of a kind."""
+        return bool(self._subscribers[kind])
 
     def publish(self, diagnostic: Diagnostic) -> None:
-        """Pass a diagnostic to all subscribers."""
-        for subscriber in self._subscribers:
+        """Pass a diagnostic to those who want its kind."""
+        for subscriber in self._subscribers[diagnostic.kind]:
             subscriber(diagnostic)

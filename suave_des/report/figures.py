@@ -1,4 +1,4 @@
-"""Figures of a folder of results: a mission's map, or a campaign's distributions."""
+"""Figures of a folder of results: a mission's map, a campaign's distributions, or what a sweep shows."""
 
 from __future__ import annotations
 
@@ -29,10 +29,13 @@ def draw_folder(folder: Path, out: Path) -> None:
     import suave_des.report.distributions as distributions
     import suave_des.report.mission_map as mission_map
     import suave_des.report.style as style
+    import suave_des.report.sweep as sweep
 
     with style.publication():
         if (folder / "trajectory.csv").is_file():
             picture = mission_map.draw(folder)
+        elif (folder / "runs.csv").is_file() and (swept := sweep.swept_parameters(folder)):
+            picture = sweep.draw(folder, swept)
         elif (folder / "runs.csv").is_file():
             picture = distributions.draw(folder / "runs.csv")
         else:

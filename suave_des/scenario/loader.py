@@ -113,7 +113,7 @@ def load_scenario(
     else:
         modes_path = find(modes_file, "scenarios")
     modes = modes_of(files.yaml(modes_path))
-    _check_modes(layer, scenario, modes)
+    check_modes(layer, scenario, modes)
     _check_managers(layer, scenario)
 
     ontology_paths = tuple(find(each, "ontology") for each in ontologies) or tuple(
@@ -183,7 +183,7 @@ def _named(layer: Layer, path: Path, key_path: KeyPath, name: str, kind: str, re
     return find(name, kind, beside=path.parent)
 
 
-def _check_modes(layer: Layer, scenario: Scenario, modes: ModeTable) -> None:
+def check_modes(layer: Layer, scenario: Scenario, modes: ModeTable) -> None:
     """See that the modes file has what the mission and the scenario's default modes ask for."""
     for function in MISSION_FUNCTIONS:
         if function not in modes.functions:

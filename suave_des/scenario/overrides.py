@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from suave_des.errors import InputError
 from suave_des.scenario.layers import Layer, Place
-from suave_des.scenario.loader import LoadedScenario
+from suave_des.scenario.loader import LoadedScenario, check_modes
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.problems import input_error
 
@@ -26,16 +26,26 @@ def with_values(loaded: LoadedScenario, values: Mapping[str, Any]) -> LoadedScen
             one, and a whole distribution (a mapping) may stand for a number.
 
     Raises:
-        InputError: a path leads nowhere, or a value is not allowed there.
+        InputError: a path leads nowhere, or a value is not allowed there or names another file.
     """
     data = loaded.scenario.model_dump(mode="json")
     for path, value in values.items():
         _set(data, path, value)
+    layer = Layer(data, {(): Place(0, 1, loaded.path)})
     try:
         scenario = Scenario.model_validate(data)
     except ValidationError as error:
-        raise input_error(error, Layer(data, {(): Place(0, 1, loaded.path)}), Scenario) from None
+        raise input_error(error, layer, Scenario) from None
+    if _named_files(scenario) != _named_files(loaded.scenario):
+        remedy = "write a scenario for each, with `base` and the files that differ"
+        raise InputError("files were read with the scenario and stay as they are", remedy=remedy)
+    check_modes(layer, scenario, loaded.modes)
     return replace(loaded, scenario=scenario)
+
+
+def _named_files(scenario: Scenario) -> tuple[object, ...]:
+    tables = tuple((name, getattr(signal, "file", None)) for name, signal in sorted(scenario.signals.items()))
+    return scenario.knowledge.ontologies, scenario.knowledge.rules, scenario.modes_file, tables
 
 
 def value_at(loaded: LoadedScenario, path: str) -> Any:

@@ -45,7 +45,7 @@ class ManagerHost:
         except RAISED as error:
             raise self.mission_error(error) from error
         if kind.diagnostic is not ManagingSubsystem.diagnostic:
-            bus.subscribe(lambda diagnostic: self._guarded(self.manager.diagnostic, diagnostic))
+            bus.subscribe(lambda diagnostic: self._guarded(self.manager.diagnostic, diagnostic), kind.hears)
         period_s = self.manager.period_s
         if period_s is not None:
             if not period_s > 0.0:

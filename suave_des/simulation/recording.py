@@ -10,7 +10,7 @@ import simpy
 
 from suave_des.managed.coordinator import MAINTAIN_MOTION
 from suave_des.monitor.diagnostics import Diagnostic, Kind
-from suave_des.monitor.monitors import Measurements
+from suave_des.monitor.measurements import Measurements
 from suave_des.scenario.modes import Mode
 from suave_des.simulation.result import Event, KnowledgeRecord, TrajectoryPoint
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
@@ -50,8 +50,6 @@ class Recorder:
 
         def take(diagnostic: Diagnostic) -> None:
             nonlocal band
-            if not self._enabled:
-                return
             if diagnostic.kind == Kind.COMPONENT_STATUS:
                 self.log("thruster_monitor", "component_status", f"{diagnostic.key} {diagnostic.value}")
             elif diagnostic.key == "water_visibility":

@@ -21,10 +21,6 @@ def build_signal(name: str, description: Signal, tables: Mapping[str, Table], dr
         tables: contents of the CSV files of table signals, by signal name.
         draw: draws what the entry gives as a distribution, under its key path.
     """
-    return signals.in_time_steps(_continuous(name, description, tables, draw), description.time_step_s)
-
-
-def _continuous(name: str, description: Signal, tables: Mapping[str, Table], draw: Draw) -> signals.Signal:
     match description:
         case SinusoidSignal():
             shift_s = draw(f"signals.{name}.shift_s", description.shift_s)

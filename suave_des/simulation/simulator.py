@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -21,15 +22,9 @@ from suave_des.managed.reactions import ReactionMeter
 from suave_des.managed.recharge import RECHARGE, GenerateRechargePath
 from suave_des.managed.search import GenerateSearchPath
 from suave_des.managing.base import ManagedSystem
-from suave_des.monitor.diagnostics import DiagnosticsBus
-from suave_des.monitor.monitors import (
-    Measurements,
-    ThrusterFault,
-    battery_monitor,
-    measure,
-    signal_monitor,
-    thruster_monitor,
-)
+from suave_des.monitor.diagnostics import DiagnosticsBus, Kind
+from suave_des.monitor.measurements import BatteryLevel, Measurements, measure
+from suave_des.monitor.monitors import ThrusterFault, battery_monitor, signal_monitor, thruster_monitor
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import Battery
 from suave_des.simulation.chance import Chance
@@ -49,12 +44,15 @@ class Simulator:
 
     Args:
         loaded: the scenario with its files.
+        runs_per_draw: how many runs in a row share the value drawn for a key path; one, if the path is not in it.
     """
 
-    def __init__(self, loaded: LoadedScenario) -> None:
+    def __init__(self, loaded: LoadedScenario, runs_per_draw: Mapping[str, int] = MappingProxyType({})) -> None:
         self.loaded = loaded
+        self.runs_per_draw = dict(runs_per_draw)
         pipeline = loaded.scenario.pipeline
         self.points = sample_points(pipeline.vertices_m, pipeline.points_per_piece)
+        self.way_m: list[list[float]] = self.points[:, :2].tolist()
         height = loaded.scenario.revision.monitors.detected_point_height_m
         self.detection_points = self.points + np.array([0.0, 0.0, height])
 
@@ -101,13 +99,15 @@ class _Mission:
         self.scenario = simulator.loaded.scenario
         self.revision = self.scenario.revision
         self.manager_name, self.run, self.seed = manager, run, seed
-        self.chance = Chance(seed, run)
+        self.chance = Chance(seed, run, simulator.runs_per_draw)
         self.env = simpy.Environment()
         self.recorder = Recorder(self.env, enabled=record)
         self.bus = DiagnosticsBus()
         self.duration_s = self.scenario.mission.time_limit_s + self.revision.coordinator.limit_check_period_s
         self.vehicle = self._make_vehicle()
-        self.visibility = self._start_monitors()
+        self.signals = {name: self._measure(name) for name in sorted(self.scenario.signals)}
+        self.visibility = self.signals["water_visibility"]
+        self.battery = None if self.scenario.battery is None else self._make_battery(self.scenario.battery)
         self.detector = PipelineDetector(
             self.env,
             self.vehicle,
@@ -122,13 +122,15 @@ class _Mission:
             self.chance.sampler("latencies.mode_change_s", self.scenario.latencies.mode_change_s),
             self.recorder.log,
         )
-        self.reactions = ReactionMeter(self.env, self.scenario.reaction_metric, self.visibility)
-        self.bus.subscribe(self.reactions.diagnostic)
-        self.bus.subscribe(self.recorder.diagnostic_of(self.scenario.reaction_metric.visibility_thresholds_m))
+        self.reactions = ReactionMeter(self.env, self.scenario.reaction_metric, self.visibility, self.battery)
+        self.bus.subscribe(self.reactions.diagnostic, (Kind.COMPONENT_STATUS,))
+        if record:
+            self.bus.subscribe(self.recorder.diagnostic_of(self.scenario.reaction_metric.visibility_thresholds_m))
         self.modes.on_effect(self.reactions.mode_effect)
         self.modes.on_effect(self.recorder.mode_effect)
         self.coordinator = self._make_coordinator()
         self.host = self._make_host()
+        self._start_monitors()
 
     def result(self) -> MissionResult:
         """Run to the end and read the metrics."""
@@ -151,7 +153,7 @@ class _Mission:
             pipeline_found=found,
             search_time_s=self.coordinator.search_time_or_limit_s(),
             distance_inspected_m=self.coordinator.distance_inspected_m,
-            mean_reaction_time_s=self.reactions.mean_s,
+            mean_reaction_time_s=self.reactions.mean_s(),
             adaptations=self.modes.adaptations,
             detection_time_s=self.detector.detected_s if found else None,
             detection_x_m=float(self.simulator.points[point, 0]) if found and point is not None else None,
@@ -199,10 +201,12 @@ class _Mission:
 
     # The monitors.
 
-    def _start_monitors(self) -> Measurements:
-        measured = {name: self._measure(name) for name in sorted(self.scenario.signals)}
-        for measurements in measured.values():
-            self.env.process(signal_monitor(self.env, self.bus, measurements))
+    def _start_monitors(self) -> None:
+        if self.bus.has_listeners(Kind.QA_STATUS):
+            for measurements in self.signals.values():
+                self.env.process(signal_monitor(self.env, self.bus, measurements))
+            if self.battery is not None:
+                self.env.process(battery_monitor(self.env, self.bus, self.battery))
         faults = [
             ThrusterFault(
                 event.thruster,
@@ -221,9 +225,6 @@ class _Mission:
                 after_previous=self.revision.monitors.thruster_event_times == "after_previous",
             )
         )
-        if self.scenario.battery is not None:
-            self.env.process(self._battery(self.scenario.battery))
-        return measured["water_visibility"]
 
     def _measure(self, name: str) -> Measurements:
         signal = self.scenario.signals[name]
@@ -239,15 +240,13 @@ class _Mission:
             noise=self.chance.sampler(f"signals.{name}.noise", signal.noise) if noisy else None,
         )
 
-    def _battery(self, battery: Battery) -> Process:
-        def is_at_station() -> bool:
-            x, y, _ = self.vehicle.position(self.env.now)
+    def _make_battery(self, battery: Battery) -> BatteryLevel:
+        def is_at_station(t_s: float) -> bool:
+            x, y, _ = self.vehicle.position(t_s)
             radius = battery.station_radius_m
             return abs(x - battery.station_x_m) <= radius and abs(y - battery.station_y_m) <= radius
 
-        return battery_monitor(
-            self.env,
-            self.bus,
+        return BatteryLevel(
             is_at_station,
             discharge_time_s=battery.discharge_time_s,
             period_s=battery.publishing_period_s,
@@ -263,7 +262,7 @@ class _Mission:
             self.chance.draw(f"revision.set_points.node_frame_offset_y_m/{node}", set_points.node_frame_offset_y_m),
             self.chance.draw(f"revision.set_points.node_frame_offset_z_m/{node}", set_points.node_frame_offset_z_m),
         )
-        stream = self.chance.stream(f"set_points/{node}")
+        stream = self.chance.stream(f"set_points/{node}") if self.loss_probability else None
         return SetPointSender(self.env, self.vehicle, frame, self.loss_probability, stream)
 
     def _make_functions(self) -> tuple[FollowPipeline, dict[str, FunctionNode]]:
@@ -296,7 +295,7 @@ class _Mission:
 
     def _path(self) -> list[tuple[float, float]] | None:
         first = self.detector.first_point
-        return None if first is None else path_to_inspect(self.simulator.points.tolist(), first)
+        return None if first is None else path_to_inspect(self.simulator.way_m, first)
 
     def _make_coordinator(self) -> MissionCoordinator:
         settings = self.revision.coordinator
@@ -329,5 +328,6 @@ class _Mission:
             log=lambda event, detail: self.recorder.log(name, event, detail),
             knowledge=lambda: self.simulator.knowledge,
             reasoned=self.recorder.reasoned,
+            measurements=self.signals if self.battery is None else {**self.signals, self.battery.key: self.battery},
         )
         return ManagerHost(name, self.run, system, self.bus)

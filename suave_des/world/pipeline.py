@@ -36,7 +36,7 @@ def sample_points(
 
 def path_to_inspect(points: Sequence[Sequence[float]], first: int) -> list[tuple[float, float]]:
     """The way to follow from point `first` (0-based): on to the far end, then back along all points, as (x, y) in m."""
-    there = [(float(point[0]), float(point[1])) for point in points]
+    there = [(point[0], point[1]) for point in points]
     return there[first:] + there[::-1]
 
 

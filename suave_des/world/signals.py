@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 Signal = Callable[[float], float]
-"""Value at a mission time in s."""
+"""Value at a mission time in s. Equal descriptions give the same function, so that its values can be remembered."""
 
 
+@lru_cache(maxsize=64)
 def sinusoid(period_s: float, minimum: float, maximum: float, shift_s: float = 0.0) -> Signal:
     """a cos(2 pi (t + shift) / period) + a + minimum with a = (maximum - minimum) / 2, the exemplar's water
     visibility.
@@ -18,11 +20,13 @@ def sinusoid(period_s: float, minimum: float, maximum: float, shift_s: float = 0
     return lambda t_s: amplitude * math.cos(2.0 * math.pi * (t_s + shift_s) / period_s) + amplitude + minimum
 
 
+@lru_cache(maxsize=64)
 def constant(value: float) -> Signal:
     """The same value all the time."""
     return lambda t_s: value
 
 
+@lru_cache(maxsize=64)
 def step(time_s: float, before: float, after: float) -> Signal:
     """`before` until time_s, `after` from then on."""
     return lambda t_s: after if t_s >= time_s else before
@@ -42,11 +46,3 @@ def table(times_s: Sequence[float], values: Sequence[float], *, linear: bool = F
         return values[after - 1] + share * (values[after] - values[after - 1])
 
     return value
-
-
-def in_time_steps(signal: Signal, time_step_s: float) -> Signal:
-    """The signal at mission time cut to multiples of time_step_s (the exemplar's monitor counts whole seconds)."""
-    if time_step_s == 0.0:
-        return signal
-    # A time within a millionth of a step below a multiple counts as the multiple: timers add up rounding errors.
-    return lambda t_s: signal(math.floor(t_s / time_step_s + 1e-6) * time_step_s)

@@ -50,28 +50,35 @@ def workers_of(process: subprocess.Popen[str]) -> list[int]:
         return []
 
 
-def survive_forked(kills: int, chance: random.Random, run: Callable[[bool], object], out: Path) -> list[int]:
+def survive_forked(
+    kills: int, chance: random.Random, run: Callable[[bool, Callable[[object], None]], object], out: Path
+) -> list[int]:
     """The same for a campaign that runs without workers, in forks of this process: quick, as nothing is imported.
 
     Args:
-        kills: how many.
+        kills: how many; most of them when missions are being run, however long it takes to get there.
         chance: decides the moments.
-        run: runs or resumes the campaign.
+        run: runs the campaign, or resumes it if the first argument is true; the second is to be told of progress.
         out: its folder.
     """
     done: list[int] = []
     while len(done) < kills:
         resumes = (out / STORE_FILE).exists()
+        here, there = os.pipe()
         child = os.fork()
         if child == 0:
             try:
-                run(resumes)
+                run(resumes, lambda progress: os.write(there, b"."))  # noqa: B023
                 os._exit(0)
             except BaseException:
                 traceback.print_exc()
                 os._exit(1)
+        os.close(there)
+        if chance.random() < 0.8:
+            os.read(here, 1)  # or the end of file, if there is nothing left to do
         time.sleep(chance.uniform(0.0, 0.3))
         os.kill(child, signal.SIGKILL)
+        os.close(here)
         _, status = os.waitpid(child, 0)
         assert status in (0, signal.SIGKILL)
         done.append(_done(out))

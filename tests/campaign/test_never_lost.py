@@ -10,6 +10,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import chaos
@@ -82,11 +83,11 @@ def test_killed_at_random_moments_the_bytes_are_the_same(scenario: Path, tmp_pat
     runs, out = 1500, tmp_path / "out"
     whole = undisturbed(scenario, runs, tmp_path / "whole")
 
-    def run(resumes: bool) -> None:
+    def run(resumes: bool, told: Callable[[object], None]) -> None:
         if resumes:
-            resume_campaign(out)
+            resume_campaign(out, on_progress=told)
         else:
-            run_campaign(scenario, MANAGERS, runs, 1, out=out)
+            run_campaign(scenario, MANAGERS, runs, 1, out=out, on_progress=told)
 
     done = chaos.survive_forked(25, random.Random(7), run, out)
     assert done == sorted(done)

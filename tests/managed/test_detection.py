@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.managed.detection import PipelineDetector, measured_at_rows
-from suave_des.monitor.monitors import Measurements
+from suave_des.monitor.measurements import Measurements
 from suave_des.scenario.models import Pipeline
 from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.vehicle import STEP_S, Autopilot, Pose, Vehicle, row_at

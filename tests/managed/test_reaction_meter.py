@@ -3,67 +3,79 @@
 Visibility messages come at 0.2, 1.2, 2.2, ... s; the altitude parameter is 2 m before any mode is set.
 """
 
+from collections.abc import Callable
+
 import pytest
 import simpy
 from stand_ins import ACTIVE, INACTIVE, spiral_at
 
 from suave_des.managed.reactions import ReactionMeter
 from suave_des.monitor.diagnostics import Diagnostic, Kind
-from suave_des.monitor.monitors import Measurements
+from suave_des.monitor.measurements import Measurements
 from suave_des.scenario.models import ReactionMetric
 
 SEARCH, MOTION, RECHARGE = "f_generate_search_path", "f_maintain_motion", "generate_recharge_path"
 
 
 class Timeline:
-    """Entries in order of time, each a diagnostic or the effect of a mode."""
+    """Entries in order of time, each something measured or reported, or the effect of a mode."""
 
     def __init__(self) -> None:
-        self.env = simpy.Environment()
-        visibility = Measurements("water_visibility", (0.2,), (3.0,), 0.2, 1.0)
-        self.meter = ReactionMeter(self.env, ReactionMetric(), visibility)
-
-    def _to(self, t_s: float) -> None:
-        if t_s > self.env.now:
-            self.env.run(until=t_s)
+        self._env = simpy.Environment()
+        self._visibility: list[tuple[float, float]] = []
+        self._battery: list[tuple[float, float]] = []
+        self._noted: list[tuple[float, Callable[[ReactionMeter], None]]] = []
 
     def visibility(self, t_s: float, value: float) -> "Timeline":
-        self._to(t_s)
-        self.meter.diagnostic(Diagnostic(t_s, Kind.QA_STATUS, "water_visibility", value))
+        self._visibility.append((t_s, value))
         return self
 
     def battery(self, t_s: float, level: float) -> "Timeline":
-        self._to(t_s)
-        self.meter.diagnostic(Diagnostic(t_s, Kind.QA_STATUS, "battery_level", level))
+        self._battery.append((t_s, level))
         return self
 
     def thruster(self, t_s: float, status: str, number: int = 1) -> "Timeline":
-        self._to(t_s)
-        self.meter.diagnostic(Diagnostic(t_s, Kind.COMPONENT_STATUS, f"c_thruster_{number}", status))
+        report = Diagnostic(t_s, Kind.COMPONENT_STATUS, f"c_thruster_{number}", status)
+        self._noted.append((t_s, lambda meter: meter.diagnostic(report)))
         return self
 
     def altitude(self, t_s: float, altitude_m: float) -> "Timeline":
-        self._to(t_s)
-        self.meter.mode_effect(SEARCH, spiral_at(altitude_m))
+        self._noted.append((t_s, lambda meter: meter.mode_effect(SEARCH, spiral_at(altitude_m))))
         return self
 
     def mode(self, t_s: float, function: str, *, active: bool = True) -> "Timeline":
-        self._to(t_s)
-        self.meter.mode_effect(function, ACTIVE if active else INACTIVE)
+        self._noted.append((t_s, lambda meter: meter.mode_effect(function, ACTIVE if active else INACTIVE)))
         return self
 
     @property
+    def meter(self) -> ReactionMeter:
+        """The meter after all entries."""
+        visibility = Measurements("water_visibility", *_columns(self._visibility), 0.2, 1.0)
+        battery = Measurements("battery_level", *_columns(self._battery), 0.5, 1.0) if self._battery else None
+        meter = ReactionMeter(self._env, ReactionMetric(), visibility, battery)
+        for t_s, note in self._noted:
+            if t_s > self._env.now:
+                self._env.run(until=t_s)
+            note(meter)
+        self._env.run(until=1000.0)
+        return meter
+
+    @property
     def reactions(self) -> list[float]:
-        return [pytest.approx(reaction, abs=1e-9) for reaction in self.meter.reactions_s]
+        return [pytest.approx(reaction, abs=1e-9) for reaction in self.meter.reactions_s()]
+
+
+def _columns(rows: list[tuple[float, float]]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    return tuple(t_s for t_s, _ in rows), tuple(value for _, value in rows)
 
 
 def test_without_reactions_there_is_no_mean() -> None:
-    assert Timeline().meter.mean_s is None
+    assert Timeline().meter.mean_s() is None
 
 
 def test_mean_is_over_all_kinds_of_reaction() -> None:
     timeline = Timeline().visibility(0.2, 3.75).altitude(1.2, 3.0).thruster(35.0, "FALSE").mode(38.0, MOTION)
-    assert timeline.meter.mean_s == pytest.approx((1.0 + 3.0) / 2)
+    assert timeline.meter.mean_s() == pytest.approx((1.0 + 3.0) / 2)
 
 
 # Thrusters

@@ -6,16 +6,11 @@ import pytest
 import simpy
 
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
-from suave_des.monitor.monitors import (
-    ThrusterFault,
-    battery_monitor,
-    measure,
-    signal_monitor,
-    thruster_monitor,
-)
-from suave_des.world.signals import constant, in_time_steps, sinusoid, step
+from suave_des.monitor.measurements import BatteryLevel, measure
+from suave_des.monitor.monitors import ThrusterFault, battery_monitor, signal_monitor, thruster_monitor
+from suave_des.world.signals import constant, sinusoid, step
 
-VISIBILITY = in_time_steps(sinusoid(80.0, 1.25, 3.75), 1.0)
+VISIBILITY = sinusoid(80.0, 1.25, 3.75)
 
 
 class Listener:
@@ -40,7 +35,7 @@ def listener() -> Listener:
 
 
 def test_messages_lie_on_the_monitors_grid() -> None:
-    measured = measure("v", in_time_steps(lambda t: t, 0.0), 3.0, period_s=0.8, phase_s=0.3)
+    measured = measure("v", lambda t: t, 3.0, period_s=0.8, phase_s=0.3)
     assert measured.times_s == pytest.approx((0.3, 1.1, 1.9, 2.7))
 
 
@@ -52,6 +47,12 @@ def test_only_changed_values_are_published() -> None:
 def test_a_message_has_the_value_of_its_whole_second() -> None:
     measured = measure("v", VISIBILITY, 30.0, period_s=1.0, phase_s=0.7, time_step_s=1.0)
     assert measured.values == tuple(sinusoid(80.0, 1.25, 3.75)(float(t)) for t in range(30))
+
+
+def test_rounding_errors_of_a_timer_do_not_shift_a_step() -> None:
+    assert 0.1 + 3 * 0.3 < 1.0  # by a rounding error
+    measured = measure("v", lambda t_s: t_s, 1.9, period_s=0.3, phase_s=0.1, time_step_s=1.0)
+    assert (measured.times_s, measured.values) == ((0.1, pytest.approx(1.0)), (0.0, 1.0))
 
 
 def test_a_constant_is_published_once() -> None:
@@ -178,17 +179,12 @@ def test_a_negative_time_after_another_event_fires_at_the_next_look(listener: Li
 # Battery
 
 
+def battery(docked: set[float]) -> BatteryLevel:
+    return BatteryLevel(lambda t_s: t_s in docked, discharge_time_s=200.0, period_s=1.0, phase_s=0.5)
+
+
 def battery_levels(listener: Listener, until_s: float, docked: set[float]) -> list[tuple[float, float]]:
-    listener.env.process(
-        battery_monitor(
-            listener.env,
-            listener.bus,
-            lambda: listener.env.now in docked,
-            discharge_time_s=200.0,
-            period_s=1.0,
-            phase_s=0.5,
-        )
-    )
+    listener.env.process(battery_monitor(listener.env, listener.bus, battery(docked)))
     listener.env.run(until=until_s)
     return [(each.time_s, each.value) for each in listener.heard]
 
@@ -207,7 +203,25 @@ def test_battery_is_full_at_once_at_the_station(listener: Listener) -> None:
     assert (levels[159.5], levels[160.5], levels[161.5]) == pytest.approx((0.2025, 1.0, 0.995))
 
 
+def test_a_level_looked_up_is_the_one_published_last(listener: Listener) -> None:
+    heard = battery_levels(listener, 200.0, docked={160.5})
+    level = battery({160.5})
+    assert level.published(0.4) == 0
+    assert level.published(160.7) == 161 and level.values[160] == 1.0
+    assert level.published(199.9) == len(heard) and list(zip(level.times_s, level.values, strict=True)) == heard
+    assert level.published(30.5) == 31  # of those known by now
+
+
 # The bus
+
+
+def test_subscribers_hear_the_kinds_that_they_want(listener: Listener) -> None:
+    statuses: list[Diagnostic] = []
+    assert not DiagnosticsBus().has_listeners(Kind.COMPONENT_STATUS)
+    listener.bus.subscribe(statuses.append, (Kind.COMPONENT_STATUS,))
+    listener.bus.publish(Diagnostic(0.0, Kind.QA_STATUS, "v", 1.0))
+    listener.bus.publish(Diagnostic(0.0, Kind.COMPONENT_STATUS, "c_thruster_1", "FALSE"))
+    assert [each.key for each in statuses] == ["c_thruster_1"] and len(listener.heard) == 2
 
 
 def test_every_subscriber_hears_everything_in_order_of_subscription(listener: Listener) -> None:

@@ -10,7 +10,7 @@ import pytest
 from suave_des.campaign.campaign import run_campaign
 from suave_des.campaign.single import run_mission
 from suave_des.errors import InputError
-from suave_des.report import distributions, mission_map
+from suave_des.report import distributions, mission_map, sweep
 from suave_des.report.figures import draw_folder
 
 
@@ -79,3 +79,27 @@ def test_a_campaign_without_missions_is_told(campaign: Path, tmp_path: Path) -> 
     (tmp_path / "runs.csv").write_text(header + "\n")
     with pytest.raises(InputError, match=r"runs\.csv: has no missions"):
         draw_folder(tmp_path, tmp_path / "runs.png")
+
+
+def test_a_sweep_is_drawn_with_a_mean_for_each_manager_at_each_value(tmp_path: Path) -> None:
+    values = {"visibility.period_s": [40.0, 80.0], "default_modes.f_generate_search_path": ["fd_spiral_low"]}
+    result = run_campaign("seams2023", ["none", "random"], 3, 1, out=tmp_path / "out", sweep=values)
+    assert sweep.swept_parameters(tmp_path / "out") == list(values)
+    figure = sweep.draw(tmp_path / "out", list(values))
+    frame = result.frame()
+    panel = figure.axes[0]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["none", "random"]
+    for manager, container in zip(("none", "random"), panel.containers, strict=True):
+        own = frame[frame["manager"] == manager].groupby("visibility.period_s")["search_time_s"].mean()
+        assert list(container[0].get_ydata()) == pytest.approx(list(own))
+    assert [tick.get_text() for tick in figure.axes[3].get_xticklabels()] == ["fd_spiral_low"]
+    draw_folder(tmp_path / "out", tmp_path / "sweep.svg")
+    assert b"visibility.period_s" in (tmp_path / "sweep.svg").read_bytes()
+
+
+def test_many_values_are_drawn_in_bins_of_equally_many_missions(tmp_path: Path) -> None:
+    values = {"start.x_m": [-18.0 + 0.1 * step for step in range(24)]}
+    run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out", sweep=values)
+    figure = sweep.draw(tmp_path / "out", ["start.x_m"])
+    xs = list(figure.axes[0].containers[0][0].get_xdata())
+    assert xs == pytest.approx([-17.9 + 0.3 * number for number in range(8)])

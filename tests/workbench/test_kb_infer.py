@@ -153,3 +153,34 @@ class TestTimeLimit:
         assert limit.run(lambda: 3, "counting") == 3
         with pytest.raises(ZeroDivisionError):
             limit.run(lambda: 1 // 0, "dividing")
+
+    @pytest.mark.parametrize("given_up_on", [False, True])
+    def test_a_program_ends_with_its_own_status_whatever_java_does(self, given_up_on):
+        program = f"""
+import sys
+from suave_des.errors import KnowledgeError
+from suave_des.workbench import KnowledgeBase
+from suave_des.workbench.limit import TimeLimit
+bench = KnowledgeBase.load(reasoner="pellet")  # Java starts in another thread than this one
+state = bench.state(groundings={HIGH["groundings"]!r}, measurements={HIGH["measurements"]!r})
+assert bench.infer(state).plan.decisions
+def for_ever():
+    while True:
+        bench.explain(state)
+try:
+    {given_up_on} and TimeLimit(0.5).run(for_ever, "explaining")
+except KnowledgeError:
+    pass
+sys.exit(5)
+"""
+        path = str(Path(suave_des.__file__).parents[1])
+        environment = {**os.environ, "PYTHONPATH": path}
+        done = subprocess.run(
+            [sys.executable, "-c", program],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+        assert (done.returncode, done.stderr) == (5, "")

@@ -1,12 +1,8 @@
 """Signals: what they are at a mission time."""
 
-import math
-
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from suave_des.world.signals import constant, in_time_steps, sinusoid, step, table
+from suave_des.world.signals import constant, sinusoid, step, table
 
 PAPER = sinusoid(80.0, 1.25, 3.75)
 
@@ -44,18 +40,3 @@ def test_table_keeps_the_value_before(t_s: float, value: float) -> None:
 )
 def test_linear_table_draws_straight_lines(t_s: float, value: float) -> None:
     assert table(TIMES, VALUES, linear=True)(t_s) == pytest.approx(value)
-
-
-@given(st.floats(0.0, 1000.0))
-def test_time_is_cut_to_whole_seconds(t_s: float) -> None:
-    whole_s = math.floor(t_s + 1e-6)
-    assert in_time_steps(lambda t: t, 1.0)(t_s) == whole_s
-
-
-def test_rounding_errors_of_a_timer_do_not_shift_a_step() -> None:
-    one_tenth_added_up = sum([0.1] * 10)  # 0.9999999999999999
-    assert in_time_steps(lambda t: t, 1.0)(one_tenth_added_up) == 1.0
-
-
-def test_without_a_time_step_time_is_not_cut() -> None:
-    assert in_time_steps(lambda t: t, 0.0)(12.34) == 12.34

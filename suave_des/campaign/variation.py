@@ -1,0 +1,246 @@
+"""What differs between the missions of a campaign besides manager and run: a sweep, and what each run draws."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import islice
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from suave_des.campaign.sweep import METHODS, SOBOL_DIMENSIONS, Sample, Sweep
+from suave_des.errors import InputError
+from suave_des.scenario.distributions import Distribution, stated
+from suave_des.scenario.loader import LoadedScenario
+from suave_des.scenario.models import Mission
+from suave_des.scenario.overrides import value_at, with_values
+from suave_des.scenario.wording import did_you_mean, shown
+from suave_des.simulation.simulator import Simulator
+
+_FORMS = ("grid", "zip", "sample")
+_CHECKED_POINTS = 300
+"""Of sweeps with more points, so many are checked before anything runs."""
+_DISTRIBUTION: TypeAdapter[Any] = TypeAdapter(Distribution)
+
+
+@dataclass(frozen=True)
+class Variation:
+    """What differs between a campaign's missions.
+
+    Attributes:
+        sweep: what differs between points.
+        drawn: names of what each run draws, by the key path in the scenario.
+        paths: key path in the scenario of each parameter that is swept, by its name as given.
+        runs_per_draw: how many runs in a row share what is drawn.
+    """
+
+    sweep: Sweep = field(default_factory=Sweep)
+    drawn: Mapping[str, str] = field(default_factory=dict)
+    paths: Mapping[str, str] = field(default_factory=dict)
+    runs_per_draw: int = 1
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of all that varies, as given: further columns of runs.csv."""
+        return (*self.sweep.parameters, *self.drawn.values())
+
+    def simulator(self, loaded: LoadedScenario, point: int) -> Simulator:
+        """The simulator of a point's missions.
+
+        Raises:
+            InputError: the scenario does not allow the point's values together.
+        """
+        if self.paths:
+            values = self.sweep.values(point)
+            try:
+                loaded = with_values(loaded, {self.paths[name]: value for name, value in values.items()})
+            except InputError as error:
+                at = ", ".join(f"{name}={shown(value)}" for name, value in values.items())
+                raise InputError(f"at {at}: {error.problem}", file=error.file, remedy=error.remedy) from None
+        return Simulator(loaded, dict.fromkeys(self.drawn, self.runs_per_draw))
+
+
+def vary(
+    loaded: LoadedScenario,
+    sweep: Mapping[str, Any],
+    perturbations: Mapping[str, Any],
+    runs_per_draw: int,
+    seed: int,
+) -> tuple[LoadedScenario, Variation]:
+    """The scenario with distributions for what is perturbed, and what varies in it.
+
+    Args:
+        loaded: the scenario.
+        sweep: values by key path; or a mapping with grid, zip and sample.
+        perturbations: distribution by key path.
+        runs_per_draw: how many runs in a row share what is drawn.
+        seed: the campaign's.
+
+    Raises:
+        InputError: a key path leads nowhere, a value is not allowed there, or the sweep has no points; its place is
+            the key path within what was given.
+    """
+    if runs_per_draw < 1:
+        raise _wrong("runs_per_draw", f"{runs_per_draw} is out of range", "1, or how many runs share one draw")
+    perturbed = {name: _full_path(loaded, f"perturbations.{name}", name) for name in perturbations}
+    for name, path in perturbed.items():
+        loaded = _perturbed(loaded, f"perturbations.{name}", path, perturbations[name])
+    found = _sweep(sweep, seed)
+    paths = {name: _full_path(loaded, _place_of(name, found, sweep), name) for name in found.parameters}
+    _check_each_once(perturbed, {_place_of(name, found, sweep): path for name, path in paths.items()})
+    variation = Variation(found, {path: name for name, path in perturbed.items()}, paths, runs_per_draw)
+    _check_drawn(loaded, perturbed)
+    _check_points(loaded, variation, sweep)
+    return loaded, variation
+
+
+def _wrong(place: str, problem: str, remedy: str | None) -> InputError:
+    return InputError(problem, place=place, remedy=remedy)
+
+
+def _full_path(loaded: LoadedScenario, place: str, name: str) -> str:
+    """The key path that a name stands for: a signal needs no `signals.`, and visibility is water_visibility."""
+    first, *rest = name.split(".")
+    if first not in type(loaded.scenario).model_fields:
+        signal = "water_visibility" if first == "visibility" else first
+        if signal in loaded.scenario.signals:
+            name = ".".join(("signals", signal, *rest))
+    try:
+        value_at(loaded, name)
+    except InputError as error:
+        raise _wrong(place, error.problem, error.remedy) from None
+    return name
+
+
+def _perturbed(loaded: LoadedScenario, place: str, path: str, distribution: Any) -> LoadedScenario:
+    try:
+        stated_values = stated(_DISTRIBUTION.validate_python(distribution))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        inside = ".".join(str(part) for part in first["loc"][1:])
+        remedy = "such as {distribution: uniform, minimum: 1, maximum: 2}"
+        raise _wrong(place, f"{inside}: {first['msg']}".lstrip(": "), remedy) from None
+    if not isinstance(distribution, Mapping):
+        raise _wrong(
+            place, f"{shown(distribution)} is no distribution", "such as {distribution: normal, mean: 1, std: 2}"
+        )
+    try:
+        for value in stated_values:
+            with_values(loaded, {path: value})
+        return with_values(loaded, {path: dict(distribution)})
+    except InputError as error:
+        raise _wrong(place, f"{path} takes no such distribution: {error.problem}", error.remedy) from None
+
+
+def _sweep(given: Mapping[str, Any], seed: int) -> Sweep:
+    forms = [form for form in _FORMS if form in given]
+    if not forms:
+        return Sweep(grid=_columns("sweep", given), seed=seed)
+    if others := [name for name in given if name not in _FORMS]:
+        raise _wrong(f"sweep.{others[0]}", f"stands beside {forms[0]}", "put it under grid, zip or sample")
+    zipped = _columns("sweep.zip", given.get("zip", {}))
+    lengths = {name: len(values) for name, values in zipped.items()}
+    if len(set(lengths.values())) > 1:
+        told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        raise _wrong("sweep.zip", f"the lists differ in length: {told}", "give equally many values, or use grid")
+    sample = _sample(given["sample"]) if "sample" in given else None
+    return Sweep(_columns("sweep.grid", given.get("grid", {})), zipped, sample, seed)
+
+
+def _columns(place: str, given: Any) -> dict[str, list[Any]]:
+    if not isinstance(given, Mapping):
+        raise _wrong(place, f"{shown(given)} is no mapping", "write `key path: [value, value]` lines under it")
+    for name, values in given.items():
+        if not isinstance(values, list | tuple):
+            raise _wrong(f"{place}.{name}", f"{shown(values)} is no list", f"write it in brackets: [{values}]")
+        if not values:
+            raise _wrong(f"{place}.{name}", "is empty", "give at least one value, or leave it out")
+        if place != "sweep.zip" and (repeated := _repeated(values)) is not None:
+            raise _wrong(f"{place}.{name}", f"{shown(repeated)} is given twice", "name each value once")
+    return {name: list(values) for name, values in given.items()}
+
+
+def _repeated(values: Sequence[Any]) -> Any:
+    """The first value that stands there twice; none if none does."""
+    seen = set()
+    for value in values:
+        if (text := json.dumps(value)) in seen:
+            return value
+        seen.add(text)
+    return None
+
+
+def _sample(given: Any) -> Sample:
+    place = "sweep.sample"
+    keys = ("method", "points", "ranges")
+    if not isinstance(given, Mapping):
+        raise _wrong(place, f"{shown(given)} is no mapping", f"give {', '.join(keys)}")
+    for key in given:
+        if key not in keys:
+            raise _wrong(f"{place}.{key}", "unknown key", did_you_mean(key, keys))
+    for key in keys:
+        if key not in given:
+            raise _wrong(place, f"has no {key}", "add it")
+    method, points, ranges = given["method"], given["points"], given["ranges"]
+    if method not in METHODS:
+        raise _wrong(f"{place}.method", f"{shown(method)} is not known", did_you_mean(method, METHODS))
+    if not isinstance(points, int) or isinstance(points, bool) or not 1 <= points <= 2**24:
+        raise _wrong(f"{place}.points", f"{shown(points)} is out of range", "a whole number from 1 to 16777216")
+    if method == "sobol" and points & (points - 1):
+        lower = 1 << points.bit_length() - 1
+        raise _wrong(f"{place}.points", f"{points} is no power of 2, as sobol needs", f"give {lower} or {2 * lower}")
+    bounds = _columns(f"{place}.ranges", ranges)
+    if not bounds or len(bounds) > SOBOL_DIMENSIONS:
+        raise _wrong(f"{place}.ranges", f"has {len(bounds)} parameters", f"1 to {SOBOL_DIMENSIONS}")
+    for name, pair in bounds.items():
+        numbers = [each for each in pair if isinstance(each, int | float) and not isinstance(each, bool)]
+        if len(pair) != 2 or len(numbers) != 2 or not numbers[0] < numbers[1]:
+            raise _wrong(f"{place}.ranges.{name}", f"{shown(pair)} is no range", "give [smallest, greatest]")
+    return Sample(method, points, {name: (float(low), float(high)) for name, (low, high) in bounds.items()})
+
+
+def _place_of(name: str, sweep: Sweep, given: Mapping[str, Any]) -> str:
+    """Where a swept parameter stands in what was given."""
+    if not any(form in given for form in _FORMS):
+        return f"sweep.{name}"
+    if name in sweep.grid:
+        return f"sweep.grid.{name}"
+    return f"sweep.zip.{name}" if name in sweep.zipped else f"sweep.sample.ranges.{name}"
+
+
+def _check_each_once(perturbed: Mapping[str, str], swept: Mapping[str, str]) -> None:
+    seen: dict[str, str] = {}
+    for place, path in [*((f"perturbations.{name}", path) for name, path in perturbed.items()), *swept.items()]:
+        if path in seen:
+            raise _wrong(place, f"varies {path}, as {seen[path]} does", "vary each key once")
+        seen[path] = place
+
+
+def _check_drawn(loaded: LoadedScenario, perturbed: Mapping[str, str]) -> None:
+    """See that a run draws one value for each: of latencies and noise, each use draws its own."""
+    if not perturbed:
+        return
+    short = loaded.scenario.model_copy(update={"mission": Mission(time_limit_s=1.0)})
+    drawn = Simulator(replace(loaded, scenario=short)).run("none", 1, 0).drawn
+    for name, path in perturbed.items():
+        if path not in drawn:
+            raise _wrong(
+                f"perturbations.{name}",
+                "is not drawn once in a run, but at each use",
+                "put the distribution into the scenario itself, or sweep its parameters",
+            )
+
+
+def _check_points(loaded: LoadedScenario, variation: Variation, given: Mapping[str, Any]) -> None:
+    """See that the scenario allows the points: all, or of very many each value at least once."""
+    sweep = variation.sweep
+    points = set(range(0, sweep.points, max(1, sweep.points // _CHECKED_POINTS)))
+    points.update(islice(sweep.each_value(), _CHECKED_POINTS))
+    for point in sorted(points):
+        try:
+            variation.simulator(loaded, point)
+        except InputError as error:
+            place = _place_of(sweep.parameters[0], sweep, given) if len(sweep.parameters) == 1 else "sweep"
+            raise _wrong(place, error.problem, error.remedy) from None

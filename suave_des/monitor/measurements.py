@@ -1,0 +1,145 @@
+"""What monitors measure, as tables: it can be looked up without anybody waiting for its publication."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from suave_des.clock import tick_at_or_after
+from suave_des.world.signals import Signal
+
+
+class Measured(Protocol):
+    """What a monitor measures of a quality attribute."""
+
+    @property
+    def key(self) -> str:
+        """Name of the quality attribute."""
+
+    @property
+    def times_s(self) -> Sequence[float]:
+        """Times of the published values that are known by now."""
+
+    @property
+    def values(self) -> Sequence[float]:
+        """The published values that are known by now."""
+
+    def published(self, t_s: float) -> int:
+        """How many values are published until mission time t, which must not lie in the future."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measurements:
+    """What a signal's monitor measures in a run: the times at which the published value changes, and the values.
+
+    A monitor that repeats an unchanged value tells nobody anything new, so only values that differ from the one before
+    are kept; they keep the times that the monitor's period gives them.
+    """
+
+    key: str
+    times_s: tuple[float, ...]
+    values: tuple[float, ...]
+    phase_s: float
+    period_s: float
+
+    def published(self, t_s: float) -> int:
+        """How many values are published until mission time t."""
+        return bisect_right(self.times_s, t_s)
+
+    def next_message_s(self, t_s: float) -> float:
+        """Time of the first message, changed or not, at or after t."""
+        return tick_at_or_after(t_s, self.phase_s, self.period_s)
+
+
+def measure(
+    key: str,
+    signal: Signal,
+    duration_s: float,
+    *,
+    period_s: float,
+    phase_s: float,
+    time_step_s: float = 0.0,
+    noise: Callable[[], float] | None = None,
+) -> Measurements:
+    """Measure a signal over a mission.
+
+    Args:
+        key: the quality attribute.
+        signal: the signal.
+        duration_s: how long to measure.
+        period_s: publishing period.
+        phase_s: time of the first message.
+        time_step_s: the signal is looked at at mission time cut to multiples of this; 0: at mission time.
+        noise: draws the error of one measurement; none if measurements are exact.
+    """
+    times = phase_s + np.arange(max(0, math.floor((duration_s - phase_s) / period_s)) + 1) * period_s
+    looks = times
+    if time_step_s:
+        # A time within a millionth of a step below a multiple counts as the multiple: timers add up rounding errors.
+        looks = np.floor(times / time_step_s + 1e-6) * time_step_s
+    first = _changes(looks)
+    values = _looked_up(signal, looks[first].tobytes())
+    if noise is None:
+        times = times[first]
+    else:
+        values = np.repeat(values, np.diff(first, append=len(times)))
+        values = values + np.array([noise() for _ in range(len(times))])
+    changed = _changes(values)
+    return Measurements(key, tuple(times[changed].tolist()), tuple(values[changed].tolist()), phase_s, period_s)
+
+
+@lru_cache(maxsize=64)
+def _looked_up(signal: Signal, times_s: bytes) -> NDArray[np.float64]:
+    """Values of a signal at times (float64): if time is cut and the signal is not drawn, the same in most runs."""
+    values = np.array([signal(t_s) for t_s in np.frombuffer(times_s).tolist()])
+    values.flags.writeable = False
+    return values
+
+
+def _changes(values: NDArray[np.floating[Any]]) -> NDArray[np.int64]:
+    """Places of the values that differ from the one before; the first one does."""
+    return np.flatnonzero(np.concatenate(([True], values[1:] != values[:-1])))
+
+
+class BatteryLevel:
+    """The battery's level, which falls linearly from 1 and is back at 1 at once at the recharge station.
+
+    It is worked out when somebody wants to know it, from where the vehicle was at each message.
+
+    Args:
+        is_at_station: whether the vehicle is at the station at a mission time.
+        discharge_time_s: time from full to empty.
+        period_s: publishing period.
+        phase_s: time of the first message.
+    """
+
+    key = "battery_level"
+
+    def __init__(
+        self, is_at_station: Callable[[float], bool], *, discharge_time_s: float, period_s: float, phase_s: float
+    ) -> None:
+        self._is_at_station = is_at_station
+        self._discharge_time_s = discharge_time_s
+        self.phase_s = phase_s
+        self.period_s = period_s
+        self._next_s = phase_s
+        self._full_at_s = 0.0
+        self.times_s: list[float] = []
+        self.values: list[float] = []
+
+    def published(self, t_s: float) -> int:
+        """How many values are published until mission time t, which must not lie in the future."""
+        while self._next_s <= t_s:
+            if self._is_at_station(self._next_s):
+                self._full_at_s = self._next_s
+            self.times_s.append(self._next_s)
+            self.values.append(max(0.0, 1.0 - (self._next_s - self._full_at_s) / self._discharge_time_s))
+            self._next_s += self.period_s
+        return bisect_right(self.times_s, t_s)

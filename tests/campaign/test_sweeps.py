@@ -1,0 +1,208 @@
+"""Campaign files: sweeps, perturbations, and what is refused."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from suave_des.campaign.campaign import resume_campaign, run_campaign
+from suave_des.campaign.sweep import Sample, Sweep
+from suave_des.errors import InputError
+from suave_des.scenario.loader import load_scenario
+from suave_des.scenario.overrides import with_values
+from suave_des.simulation.simulator import Simulator
+
+HEAD = "campaign: 1\nscenario: seams2023\nmanagers: [none, random]\nruns: 4\nseed: 7\n"
+UNIFORM = "{distribution: uniform, minimum: %s, maximum: %s}"
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "campaign.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def rows_of(folder: Path) -> list[dict[str, str]]:
+    with (folder / "runs.csv").open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_campaign_file_says_what_is_run_and_options_go_before_it(tmp_path: Path) -> None:
+    path = write(tmp_path, HEAD)
+    result = run_campaign(path)
+    assert (result.managers, result.runs, result.seed) == (("none", "random"), 4, 7)
+    assert result.rows == run_campaign("seams2023", ["none", "random"], 4, 7).rows
+    other = run_campaign(path, ["none"], 2, 8)
+    assert (other.managers, other.runs, other.seed) == (("none",), 2, 8)
+
+
+def test_each_value_of_a_sweep_gives_the_missions_of_a_scenario_that_has_it(tmp_path: Path) -> None:
+    path = write(tmp_path, HEAD + "sweep:\n  visibility.period_s: [40, 120]\n")
+    run_campaign(path, out=tmp_path / "out")
+    rows = rows_of(tmp_path / "out")
+    assert [row["visibility.period_s"] for row in rows] == ["40"] * 8 + ["120"] * 8
+    loaded = with_values(load_scenario("seams2023"), {"signals.water_visibility.period_s": 120.0})
+    metrics = Simulator(loaded).run("random", 3, 7).metrics
+    assert float(rows[14]["search_time_s"]) == metrics.search_time_s
+    assert float(rows[14]["distance_inspected_m"]) == pytest.approx(metrics.distance_inspected_m, abs=1e-6)
+
+
+def test_a_grid_combines_each_with_each_and_the_last_named_changes_fastest() -> None:
+    sweep = Sweep(grid={"a": [1, 2], "b": [3, 4, 5]}, zipped={"c": [6, 7], "d": [8, 9]})
+    points = [tuple(sweep.values(point).values()) for point in range(sweep.points)]
+    assert points == [(a, b, *cd) for a, b, cd in itertools.product([1, 2], [3, 4, 5], [(6, 8), (7, 9)])]
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.integers(1, 4), min_size=0, max_size=4))
+def test_points_with_each_value_have_each_value(sizes: list[int]) -> None:
+    sweep = Sweep(grid={f"p{place}": list(range(size)) for place, size in enumerate(sizes)})
+    met = [sweep.values(point) for point in sweep.each_value()]
+    for path, values in sweep.grid.items():
+        assert {point[path] for point in met} == set(values)
+
+
+@pytest.mark.parametrize("method", ["latin_hypercube", "sobol"])
+def test_a_sampled_design_fills_each_range_evenly_and_repeats(method: str) -> None:
+    ranges = {"start.x_m": (-18.0, -16.0), "visibility.period_s": (40.0, 120.0)}
+    sweep = Sweep(sample=Sample(method, 16, ranges), seed=3)
+    points = [sweep.values(point) for point in range(16)]
+    for path, (low, high) in ranges.items():
+        strata = [int((point[path] - low) / (high - low) * 16) for point in points]
+        assert sorted(strata) == list(range(16))
+    assert points == [Sweep(sample=Sample(method, 16, ranges), seed=3).values(point) for point in range(16)]
+    assert points != [Sweep(sample=Sample(method, 16, ranges), seed=4).values(point) for point in range(16)]
+
+
+def test_perturbations_are_the_same_for_all_managers_and_points_and_within_their_bounds(tmp_path: Path) -> None:
+    perturbations = f"perturbations:\n  start.x_m: {UNIFORM % (-18, -16)}\n  visibility.shift_s: {UNIFORM % (-9, 9)}\n"
+    path = write(tmp_path, HEAD + perturbations + "sweep:\n  visibility.period_s: [40, 120]\n")
+    run_campaign(path, out=tmp_path / "out")
+    rows = rows_of(tmp_path / "out")
+    by_run: dict[str, set[tuple[str, str]]] = {}
+    for row in rows:
+        by_run.setdefault(row["run"], set()).add((row["start.x_m"], row["visibility.shift_s"]))
+        assert round(float(row["start.x_m"]), 6) == float(row["initial_x_m"])
+        assert -18 <= float(row["start.x_m"]) <= -16
+        assert -9 <= float(row["visibility.shift_s"]) <= 9
+    assert all(len(drawn) == 1 for drawn in by_run.values())
+    assert len({next(iter(drawn)) for drawn in by_run.values()}) == 4
+
+
+def test_runs_in_a_row_may_share_what_is_drawn_and_nothing_else(tmp_path: Path) -> None:
+    text = HEAD + f"perturbations:\n  start.x_m: {UNIFORM % (-18, -16)}\n"
+    shared = run_campaign(write(tmp_path, text + "runs_per_draw: 3\n"), ["none"], 7).frame()
+    single = run_campaign(write(tmp_path, text), ["none"], 7).frame()
+    firsts = [1, 1, 1, 4, 4, 4, 7]
+    assert list(shared["start.x_m"]) == [single["start.x_m"][first - 1] for first in firsts]
+    assert list(shared["initial_y_m"]) == list(single["initial_y_m"])  # drawn by the scenario, each run its own
+
+
+def test_what_is_drawn_can_be_given_again_exactly(tmp_path: Path) -> None:
+    path = write(tmp_path, HEAD + f"perturbations:\n  start.x_m: {UNIFORM % (-18, -16)}\n")
+    run_campaign(path, ["none"], 2, out=tmp_path / "out")
+    row = rows_of(tmp_path / "out")[1]
+    again = with_values(load_scenario("seams2023"), {"start.x_m": float(row["start.x_m"])})
+    metrics = Simulator(again).run("none", 2, 7).metrics
+    assert repr(round(metrics.distance_inspected_m, 6)) == row["distance_inspected_m"]
+
+
+@settings(max_examples=5, deadline=None)
+@given(st.integers(0, 2**31), st.lists(st.sampled_from([40.0, 60.0, 100.0]), min_size=1, max_size=3, unique=True))
+def test_more_points_managers_or_noise_change_no_other_row(seed: int, periods: list[float]) -> None:
+    def rows(managers: list[str], runs: int, periods: list[float], **more: Any) -> set[tuple[object, ...]]:
+        sweep = {"visibility.period_s": periods}
+        return set(run_campaign("seams2023", managers, runs, seed, sweep=sweep, **more).rows)
+
+    few = rows(["none"], 1, periods)
+    assert few <= rows(["random", "none"], 2, [*periods, 77.0])
+    drawn = {"thruster_events.0.time_s": {"distribution": "uniform", "minimum": 30, "maximum": 40}}
+    alone = {row[:-1] for row in rows(["none"], 1, periods, perturbations=drawn)}
+    noisier = {**drawn, "current.z_m_per_s": {"distribution": "uniform", "minimum": 0, "maximum": 0}}
+    assert alone == {row[:-2] for row in rows(["none"], 1, periods, perturbations=noisier)}
+
+
+def test_a_sweep_gives_the_same_bytes_on_any_number_of_workers_and_when_resumed(tmp_path: Path) -> None:
+    text = HEAD + f"perturbations:\n  start.x_m: {UNIFORM % (-18, -16)}\n"
+    path = write(
+        tmp_path, text + "sweep:\n  sample: {method: sobol, points: 4, ranges: {visibility.period_s: [40, 90]}}\n"
+    )
+    run_campaign(path, workers=1, out=tmp_path / "one")
+    run_campaign(path, workers=2, out=tmp_path / "two")
+    run_campaign(path, runs=2, out=tmp_path / "resumed")
+    resume_campaign(tmp_path / "resumed", runs=4)
+    whole = (tmp_path / "one" / "runs.csv").read_bytes()
+    assert whole == (tmp_path / "two" / "runs.csv").read_bytes() == (tmp_path / "resumed" / "runs.csv").read_bytes()
+    summaries = [(tmp_path / name / "summary.csv").read_bytes() for name in ("one", "two", "resumed")]
+    assert len(set(summaries)) == 1 and summaries[0].count(b"\n") == 1 + 4 * 2
+
+
+def test_a_changed_sweep_cannot_be_resumed(tmp_path: Path) -> None:
+    path = write(tmp_path, HEAD + "sweep:\n  visibility.period_s: [40, 120]\n")
+    run_campaign(path, ["none"], 1, out=tmp_path / "out")
+    path.write_text(path.read_text(encoding="utf-8").replace("120", "160"), encoding="utf-8")
+    with pytest.raises(InputError, match=r"sweep.visibility.period_s.*120.*160"):
+        resume_campaign(tmp_path / "out")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("campaign: 2\nscenario: seams2023\n", "line 1, campaign: a campaign file of version 2"),
+        ("campaign: 1\n", "scenario: is missing"),
+        ("campaign: 1\nscenario: nowhere.yaml\n", "line 2, scenario: no such file"),
+        (HEAD + "sweeps: {}\n", "line 6, sweeps: unknown key 'sweeps' (did you mean 'sweep'?"),
+        (HEAD + "sweep: [1]\n", "line 6, sweep: [1] is not a mapping"),
+        (HEAD + "sweep:\n  visibility.perod_s: [40]\n", "line 7, sweep.visibility.perod_s: "),
+        (HEAD + "sweep:\n  visibility.period_s: []\n", "line 7, sweep.visibility.period_s: is empty"),
+        (HEAD + "sweep:\n  visibility.period_s: 40\n", "is no list (write it in brackets: [40])"),
+        (HEAD + "sweep:\n  visibility.period_s: [40, 40]\n", "40 is given twice"),
+        (
+            HEAD + "sweep:\n  visibility.period_s: [40, -3]\n",
+            "line 7, sweep.visibility.period_s: at visibility.period_s=-3",
+        ),
+        (HEAD + "sweep:\n  modes_file: [a.yaml]\n", "files were read with the scenario"),
+        (HEAD + "sweep:\n  default_modes.f_generate_search_path: [fd_low]\n", "has no mode 'fd_low'"),
+        (HEAD + "sweep:\n  grid: {}\n  start.x_m: [1]\n", "line 8, sweep.start.x_m: stands beside grid"),
+        (HEAD + "sweep:\n  zip: {start.x_m: [1], start.y_m: [1, 2]}\n", "start.x_m has 1, start.y_m has 2"),
+        (HEAD + "sweep:\n  sample: {method: sobol, points: 6, ranges: {start.x_m: [1, 2]}}\n", "give 4 or 8"),
+        (HEAD + "sweep:\n  sample: {method: sobol, points: 8}\n", "sweep.sample: has no ranges"),
+        (HEAD + "sweep:\n  sample: {method: sobol, points: 8, ranges: {start.x_m: [2, 1]}}\n", "[2, 1] is no range"),
+        (HEAD + "runs_per_draw: 0\n", "line 6, runs_per_draw: 0 is out of range"),
+        (HEAD + "perturbations:\n  start.x_m: 3\n", "line 7, perturbations.start.x_m: 3 is no distribution"),
+        (HEAD + f"perturbations:\n  start.q_m: {UNIFORM % (1, 2)}\n", "did you mean z_m?"),
+        (HEAD + f"perturbations:\n  latencies.mode_change_s: {UNIFORM % (1, 2)}\n", "is not drawn once in a run"),
+        (HEAD + f"perturbations:\n  mission.time_limit_s: {UNIFORM % (1, 2)}\n", "takes no such distribution"),
+        (
+            HEAD + f"perturbations:\n  start.x_m: {UNIFORM % (1, 2)}\nsweep:\n  start.x_m: [1]\n",
+            "line 9, sweep.start.x_m: varies start.x_m, as perturbations.start.x_m does",
+        ),
+    ],
+)
+def test_bad_campaign_files(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(InputError) as raised:
+        run_campaign(write(tmp_path, text), out=tmp_path / "out")
+    assert said in str(raised.value)
+    assert str(raised.value).startswith(str(tmp_path))
+    assert not (tmp_path / "out").exists()
+
+
+def test_more_than_a_million_missions_have_to_be_confirmed(tmp_path: Path) -> None:
+    values = ", ".join(str(40 + step) for step in range(1000))
+    path = write(tmp_path, HEAD.replace("4", "1000000") + f"sweep:\n  visibility.period_s: [{values}]\n")
+    with pytest.raises(InputError, match=r"2,000,000,000 missions take about .*--yes"):
+        run_campaign(path, out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_failure_in_a_sweep_names_its_point(tmp_path: Path) -> None:
+    sweep = {"visibility.period_s": [40.0, 80.0]}
+    result = run_campaign("seams2023", ["awkward_managers:RaisesAlways"], 1, 1, sweep=sweep, out=tmp_path / "out")
+    assert [failure.point for failure in result.failures] == [0, 1]
+    assert '"visibility.period_s": 80.0' in (tmp_path / "out" / "manifest.json").read_text(encoding="utf-8")

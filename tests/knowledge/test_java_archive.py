@@ -1,0 +1,91 @@
+"""The archive with which Java starts sooner: it is used, it is never trusted, and nothing depends on it."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from suave_des.knowledge import java_archive
+
+_FIRST = """
+from suave_des.knowledge import jvm
+from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.pellet import InProcessPellet
+assert InProcessPellet(KnowledgeBase.load()).infer(())
+print(jvm.java_class("java.lang.System").getProperty("java.vm.info"))
+"""
+
+
+def _python(*arguments: str, cache: Path, switch: str = "on") -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "SUAVE_DES_CACHE_DIR": str(cache), "SUAVE_DES_JAVA_ARCHIVE": switch}
+    return subprocess.run([sys.executable, *arguments], env=environment, capture_output=True, text=True, timeout=120)
+
+
+def test_an_archive_is_used_and_a_damaged_one_is_removed_without_a_word(tmp_path: Path) -> None:
+    made = _python("-m", "suave_des.knowledge.java_archive", cache=tmp_path)
+    archive = Path(made.stdout.strip())
+    assert made.returncode == 0 and archive.is_file() and archive.is_relative_to(tmp_path), made.stderr
+
+    used = _python("-c", _FIRST, cache=tmp_path)
+    assert (used.returncode, used.stderr) == (0, "")
+    assert "sharing" in used.stdout
+
+    content = bytearray(archive.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    archive.write_bytes(content)
+    archive.with_suffix(".tried").touch()  # or another process would make the next one during this test
+    damaged = _python("-c", _FIRST, cache=tmp_path)
+    assert (damaged.returncode, damaged.stderr) == (0, "")
+    assert "sharing" not in damaged.stdout
+    assert not archive.exists()
+
+
+def test_of_several_processes_one_makes_the_archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[object] = []
+    monkeypatch.setattr(subprocess, "Popen", lambda *command, **_: started.append(command) or _Started())
+    archive = tmp_path / "java" / "1.jsa"
+    for _ in range(3):
+        java_archive.make_later(archive)
+    assert len(started) == 1
+    day_ago_s = time.time() - java_archive.AGAIN_AFTER_S - 1.0
+    os.utime(archive.with_suffix(".tried"), (day_ago_s, day_ago_s))
+    java_archive.make_later(archive)
+    assert len(started) == 2, "what failed is tried again a day later"
+    archive.touch()
+    os.utime(archive.with_suffix(".tried"), (day_ago_s, day_ago_s))
+    java_archive.make_later(archive)
+    assert len(started) == 2, "it is there"
+
+
+class _Started:
+    returncode: int | None = None
+
+
+def test_a_folder_that_cannot_be_written_to_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: pytest.fail("a process was started"))
+    (tmp_path / "file").touch()
+    java_archive.make_later(tmp_path / "file" / "java" / "1.jsa")
+
+
+def test_it_can_be_switched_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SUAVE_DES_JAVA_ARCHIVE", "off")
+    assert java_archive.archive_path((), ()) is None
+    assert java_archive.use_options(None) == ()
+    java_archive.make_later(None)
+    made = _python("-m", "suave_des.knowledge.java_archive", cache=tmp_path, switch="off")
+    assert made.returncode == 0 and "switched off" in made.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_other_libraries_or_options_mean_another_archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("SUAVE_DES_JAVA_ARCHIVE")
+    jar = tmp_path / "a.jar"
+    jar.write_bytes(b"1")
+    paths = {java_archive.archive_path([str(jar)], ["-Xrs"]), java_archive.archive_path([str(jar)], ["-Xmx1g"])}
+    jar.write_bytes(b"12")
+    paths.add(java_archive.archive_path([str(jar)], ["-Xrs"]))
+    assert len(paths) == 3 and None not in paths
+    assert java_archive.archive_path([str(tmp_path / "none.jar")], ["-Xrs"]) is None
