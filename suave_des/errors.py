@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+_NAME_LIMIT = 200
+
 
 class SuaveDesError(Exception):
     """Base of every error that the command line prints as one line, without a traceback."""
@@ -31,13 +33,18 @@ class InputError(SuaveDesError):
         self.file = None if file is None else str(file)
         self.place = place
         self.remedy = remedy
-        where = ": ".join(part for part in (self.file, place) if part)
+        where = ": ".join(part for part in (_short(self.file), place) if part)
         message = f"{where}: {problem}" if where else problem
         super().__init__(f"{message} ({remedy})" if remedy else message)
 
     def __reduce__(self) -> tuple[object, ...]:
         """Survive the trip from a worker process to its parent with all parts."""
         return (_rebuild, (type(self), self.problem, self.file, self.place, self.remedy))
+
+
+def _short(name: str | None) -> str | None:
+    """A file name as it is shown: no name that can exist is cut but those that hide the rest of the message."""
+    return name if name is None or len(name) <= _NAME_LIMIT else f"{name[:_NAME_LIMIT]}..."
 
 
 def _rebuild(

@@ -176,7 +176,7 @@ def fit(
     import cma
 
     start = [parameter.start_unit for parameter in problem.parameters]
-    settings = {"seed": seed, "verbose": -9, "maxfevals": evaluations, "tolfun": 1e-9}
+    settings = {"seed": seed % 2**32 or 2**32 - 1, "verbose": -9, "maxfevals": evaluations, "tolfun": 1e-9}
     search = cma.CMAEvolutionStrategy(start, FIRST_STEP, settings)
     tried: list[Evaluation] = []
     with evaluator(problem, workers) as evaluate_all:

@@ -11,7 +11,7 @@ from suave_des.campaign.early_stop import RUNS_LIMIT_DEFAULT, parse_until_ci
 from suave_des.campaign.executors import check_place
 from suave_des.campaign.lock import LOCK_FILE, locked
 from suave_des.campaign.output import check_output_folder
-from suave_des.campaign.plan import check_plan
+from suave_des.campaign.plan import check_plan, check_seed
 from suave_des.campaign.progress import OnProgress, Progress
 from suave_des.campaign.request import Request, check_time_out
 from suave_des.campaign.results import (
@@ -147,6 +147,7 @@ def run_campaign(
     request = _with_until_ci(request, sheet)
     check_plan(request.managers, request.runs, workers)
     check_place(workers, scheduler)
+    check_seed(request.seed)
     check_time_out(request.time_out_s)
     campaign = Campaign(request, *_read(request, sheet), folder)
     if suave_format and campaign.variation.sweep.points > 1:

@@ -9,8 +9,11 @@ from typing import NamedTuple
 
 from suave_des.errors import InputError
 from suave_des.managing.registry import manager_class
+from suave_des.scenario.wording import shown
 
 RUNS_LIMIT = 1_000_000
+SEED_LIMIT = 2**63 - 1
+"""What tools that read the result files can hold."""
 _WORKERS_PER_CORE = 4
 
 
@@ -65,6 +68,25 @@ def chunked(missions: Iterable[MissionKey], size: int) -> Iterator[Chunk]:
         yield chunk
 
 
+def check_range(what: str, number: int, least: int, greatest: int) -> None:
+    """See that a number lies between two others.
+
+    Raises:
+        InputError: it does not.
+    """
+    if not least <= number <= greatest:
+        raise InputError(f"{what}: {shown(number)} is out of range", remedy=f"give {least} to {greatest}")
+
+
+def check_seed(seed: int) -> None:
+    """See that a seed fits into result files.
+
+    Raises:
+        InputError: it does not.
+    """
+    check_range("seed", seed, 0, SEED_LIMIT)
+
+
 def check_plan(managers: Sequence[str], runs: int, workers: int) -> None:
     """See that a campaign can be run.
 
@@ -77,8 +99,16 @@ def check_plan(managers: Sequence[str], runs: int, workers: int) -> None:
         manager_class(manager)
         if manager in managers[:place]:
             raise InputError(f"manager {manager!r} is given twice", remedy="name each manager once")
-    if not 1 <= runs <= RUNS_LIMIT:
-        raise InputError(f"runs: {runs} is out of range", remedy=f"give 1 to {RUNS_LIMIT}")
+    check_range("runs", runs, 1, RUNS_LIMIT)
+    check_workers(workers)
+
+
+def check_workers(workers: int) -> None:
+    """See that so many processes make sense on this machine.
+
+    Raises:
+        InputError: they do not.
+    """
     cores = os.cpu_count() or 1
     limit = _WORKERS_PER_CORE * cores
     if not 1 <= workers <= limit:

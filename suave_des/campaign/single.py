@@ -16,8 +16,8 @@ from suave_des.campaign.output import (
     make_output_folder,
     write_files,
 )
+from suave_des.campaign.plan import RUNS_LIMIT, check_range, check_seed
 from suave_des.campaign.provenance import provenance
-from suave_des.errors import InputError
 from suave_des.scenario.loader import LoadedScenario, load_scenario
 from suave_des.simulation.result import Event, MissionResult, TrajectoryPoint
 from suave_des.simulation.simulator import Simulator
@@ -71,8 +71,8 @@ def run_mission(
     folder = None if out is None else Path(out)
     if folder is not None:
         check_output_folder(folder, "mission", overwrite=overwrite)
-    if run < 1:
-        raise InputError(f"run: {run} is out of range", remedy="runs count from 1")
+    check_range("run", run, 1, RUNS_LIMIT)
+    check_seed(seed)
     loaded = load_scenario(
         scenario,
         ontologies=ontologies,

@@ -93,7 +93,7 @@ def read_rules_file(path: Path) -> str:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content[: error.start].count(b"\n") + 1
-        raise InputError("is not text in UTF-8", file=path, place=f"line {line}") from error
+        raise InputError("is not UTF-8 text", file=path, place=f"line {line}", remedy="save it as UTF-8") from error
     if text.lstrip().startswith("<?xml"):
         raise InputError("this is XML, not rules as text", file=path, remedy="give it with --ontology")
     return text.replace("\r\n", "\n").replace("\r", "\n")

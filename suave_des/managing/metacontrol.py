@@ -158,6 +158,7 @@ class Metacontrol(ManagingSubsystem):
     def _changes_nothing(self, conclusion: Conclusion) -> bool:
         return (
             conclusion.statuses == self._told
+            and not self._without_design
             and RECOVERED not in self._components.values()
             and all(self._is_carried_out(decision) for decision in conclusion.plan.decisions)
         )
@@ -235,8 +236,7 @@ class Metacontrol(ManagingSubsystem):
         for decision in conclusion.plan.decisions:
             if decision.function in self._objectives and decision.function not in self._cancelled:
                 self._carry_out(decision)
-        decisions = conclusion.plan.decisions
-        self._without_design = frozenset(each.function for each in decisions if each.design is None)
+        self._without_design = frozenset(each.function for each in conclusion.plan.decisions if each.design is None)
         # A recovery is news once: it has been reasoned about, and from now on the component is as if it had never
         # failed. Kept, it would make every objective updatable for ever, and in the exemplar's oldest files, where the
         # status says so, contradict the UNGROUNDED of each objective to come.

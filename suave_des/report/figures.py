@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 
 from suave_des.errors import InputError
@@ -43,7 +44,7 @@ def draw_folder(folder: Path, out: Path) -> None:
                 file=folder,
                 remedy="give the --out folder of suave-des run, campaign or reproduce",
             )
-        temporary = out.with_name(f".{out.stem}.{os.getpid()}{out.suffix}")
+        temporary = out.with_name(f".{os.getpid()}{out.suffix}")
         try:
             picture.savefig(temporary)
             temporary.replace(out)
@@ -52,4 +53,5 @@ def draw_folder(folder: Path, out: Path) -> None:
                 f"cannot be written: {error.strerror}", file=out, remedy="give a path in a folder that is yours"
             ) from None
         finally:
-            temporary.unlink(missing_ok=True)
+            with suppress(OSError):  # there may not even be a folder
+                temporary.unlink()

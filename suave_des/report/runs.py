@@ -36,7 +36,14 @@ def read_runs(path: Path, *, needed: tuple[str, ...] = tuple(COLUMNS)) -> pandas
     missing = [name for name in needed if name not in frame.columns]
     if missing:
         raise InputError(f"has no column {missing[0]}", file=path, remedy=f"a runs.csv has {', '.join(needed)}")
+    if frame["manager"].isna().any():
+        raise InputError("has a mission without manager", file=path, remedy="give a runs.csv")
+    for name, kind in COLUMNS.items():
+        words = set(frame[name].astype("str")) if kind == "bool" and name in frame.columns else set()
+        if not words <= {"True", "False"}:
+            problem = f"{name} {min(words - {'True', 'False'})!r} is neither True nor False"
+            raise InputError(problem, file=path, remedy="give a runs.csv")
     try:
         return frame.astype({name: kind for name, kind in COLUMNS.items() if name in frame.columns})
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, OverflowError) as error:
         raise InputError(f"holds a value of the wrong kind: {error}", file=path, remedy="give a runs.csv") from None

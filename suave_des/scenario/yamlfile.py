@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+import stat
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -67,6 +68,8 @@ def read_bytes(path: Path, limit: int = SIZE_LIMIT_BYTES) -> bytes:
         InputError: missing, a folder, unreadable, or longer than `limit` bytes.
     """
     try:
+        if not stat.S_ISREG(path.stat().st_mode) and not path.is_dir():  # a pipe would be waited for without end
+            raise InputError("is no ordinary file", file=path, remedy="name a file on disk")
         with path.open("rb") as stream:
             content = stream.read(limit + 1)
     except IsADirectoryError:
