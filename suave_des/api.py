@@ -36,6 +36,7 @@ class CampaignOptions(TypedDict, total=False):
     rules: Sequence[str | Path]
     disabled_rules: Sequence[str]
     suave_format: bool
+    record_knowledge: bool
     confirmed: bool
     overwrite: bool
 
@@ -76,8 +77,8 @@ def run_campaign(
             manager needs no more runs. time_out_s: that a mission may take, in s of the clock on the wall. scheduler:
             address of a Dask scheduler whose workers run the missions, instead of processes here. ontologies,
             modes_file, reasoner: in place of the scenario's; rules, disabled_rules: besides them. suave_format: also
-            write the exemplar's results file. confirmed: more than a million missions are meant. overwrite: results in
-            the folder may be replaced.
+            write the exemplar's results file. record_knowledge: keep what managers reasoned about, for `kb try`.
+            confirmed: more than a million missions are meant. overwrite: results in the folder may be replaced.
 
     Raises:
         InputError: something given cannot be used; nothing is written then.

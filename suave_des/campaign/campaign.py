@@ -65,6 +65,7 @@ def run_campaign(
     rules: Sequence[str | Path] = (),
     disabled_rules: Sequence[str] = (),
     suave_format: bool = False,
+    record_knowledge: bool = False,
     time_out_s: float | None = None,
     until_ci: str | None = None,
     confirmed: bool = False,
@@ -100,6 +101,7 @@ def run_campaign(
         rules: files of rules as text, besides the scenario's.
         disabled_rules: names of rules to switch off, besides the scenario's.
         suave_format: whether to write the exemplar's own results file besides.
+        record_knowledge: whether to keep what managers reasoned about, in knowledge_states.jsonl, for `kb try`.
         time_out_s: time that one mission may take, in s of the clock on the wall.
         until_ci: METRIC:HALF_WIDTH; a manager is stopped after the first run, of at least 20, with which half the 95%
             interval of that metric's mean is less; at each point of its own.
@@ -138,6 +140,7 @@ def run_campaign(
         rules=tuple(map(str, rules)),
         disabled_rules=tuple(disabled_rules),
         suave_format=suave_format,
+        record_knowledge=record_knowledge,
         folder=str(Path.cwd()),
         command=tuple(command),
     )

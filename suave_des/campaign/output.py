@@ -24,7 +24,15 @@ DERIVED = (
 """Files that reproduce and validate make of a campaign's, beside them."""
 FAMILIES: Mapping[str, tuple[str, ...]] = {
     "mission": ("mission.json", "events.csv", "trajectory.csv", "knowledge.jsonl"),
-    "campaign": ("campaign.sqlite", "runs.csv", "summary.csv", "manifest.json", "suave_results.csv", *DERIVED),
+    "campaign": (
+        "campaign.sqlite",
+        "runs.csv",
+        "summary.csv",
+        "manifest.json",
+        "suave_results.csv",
+        *DERIVED,
+        "knowledge_states.jsonl",
+    ),
     "fit": ("fitted.yaml", "parameters.csv", "calibration.json", "profiles.png"),
 }
 """Names of result files by what they tell of; a folder has those of one family, so that nothing in it is misread."""

@@ -36,6 +36,7 @@ class Request:
         rules: files of rules as text, besides the scenario's.
         disabled_rules: names of rules to switch off, besides the scenario's.
         suave_format: whether the exemplar's results file is written too.
+        record_knowledge: whether each mission's knowledge states are kept.
         time_out_s: time that a mission may take.
         until_ci: METRIC:HALF_WIDTH, when a manager is stopped before it had all runs; none: never.
         sweep: values by key path; see variation.vary.
@@ -56,6 +57,7 @@ class Request:
     rules: tuple[str, ...] = ()
     disabled_rules: tuple[str, ...] = ()
     suave_format: bool = False
+    record_knowledge: bool = False
     time_out_s: float = 120.0
     until_ci: str | None = None
     sweep: Mapping[str, Any] = field(default_factory=dict)
@@ -105,6 +107,7 @@ def deciding(request: Request, loaded: LoadedScenario, inputs: Mapping[str, str]
         "manager_code_sha256": {name: manager_code(name) for name in request.managers},
         "runs": request.runs,
         "time_out_s": request.time_out_s,
+        "record_knowledge": request.record_knowledge,
         "until_ci": None if request.until_ci is None else asdict(parse_until_ci(request.until_ci)),
         "sweep": request.sweep,
         "perturbations": request.perturbations,

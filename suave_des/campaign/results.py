@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from suave_des.campaign.early_stop import FEWEST_RUNS, Stop, parse_until_ci
 from suave_des.campaign.frames import pieces, typed_frame
+from suave_des.campaign.knowledge_lines import CAMPAIGN_KNOWLEDGE_FILE, scenario_line
 from suave_des.campaign.outcomes import COLUMNS, Failure, Finished, Row
 from suave_des.campaign.output import csv_pieces, csv_text, json_text, rounded, write_files
 from suave_des.campaign.plan import Group
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     import pandas
 
 RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE = "runs.csv", "summary.csv", "manifest.json"
-FILES = (RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE, SUAVE_FILE)
+FILES = (RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE, SUAVE_FILE, CAMPAIGN_KNOWLEDGE_FILE)
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,15 @@ class CampaignResult:
 
     def stream(self) -> Iterator[Row]:
         """Rows of runs.csv one by one, in its order and with its columns, read as they are asked for."""
-        return (outcome for _, outcome in self.outcomes() if not isinstance(outcome, Failure))
+        width = len(self.columns)
+        return (outcome[:width] for _, outcome in self.outcomes() if not isinstance(outcome, Failure))
+
+    def knowledge_lines(self) -> Iterator[str]:
+        """The lines of the knowledge file of a campaign that kept knowledge states; none of managers without any."""
+        yield scenario_line(self.loaded.scenario)
+        for _, outcome in self.outcomes():
+            if not isinstance(outcome, Failure) and (line := outcome[len(self.columns)]):
+                yield str(line)
 
     @property
     def rows(self) -> tuple[Row, ...]:
@@ -180,6 +189,8 @@ def write_results(result: CampaignResult, request: Request, inputs: Mapping[str,
     if request.suave_format:
         scenario = result.loaded.scenario
         files[SUAVE_FILE] = suave_pieces(scenario.revision.name, _numbered(result), scenario.mission.time_limit_s)
+    if request.record_knowledge:
+        files[CAMPAIGN_KNOWLEDGE_FILE] = result.knowledge_lines()
     write_files(result.folder, files, stale=FILES)
 
 

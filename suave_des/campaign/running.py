@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
-from dataclasses import replace
 from pathlib import Path
 
 from suave_des.campaign.early_stop import parse_until_ci
@@ -28,7 +27,6 @@ from suave_des.campaign.store import (
 from suave_des.campaign.variation import Variation
 from suave_des.errors import InputError, SuaveDesError
 from suave_des.scenario.loader import LoadedScenario
-from suave_des.scenario.models import Mission
 
 LARGE = 1_000_000
 """Missions from which a campaign wants to be confirmed."""
@@ -59,7 +57,7 @@ class Campaign:
         folder: Path | None,
     ) -> None:
         self.request, self.loaded, self.variation, self.inputs, self.folder = request, loaded, variation, inputs, folder
-        self.job = Job(loaded, variation, request.managers, request.seed, request.time_out_s)
+        self.job = Job(loaded, variation, request.managers, request.seed, request.time_out_s, request.record_knowledge)
         self.until = None if request.until_ci is None else parse_until_ci(request.until_ci)
         self.watch = self._new_watch()
 
@@ -94,7 +92,7 @@ class Campaign:
         with ExitStack() as stack:
             place = stack.enter_context(executor(workers, scheduler))
             if workers > 1:
-                _compile(self.job)
+                MissionRunner(self.job)  # so that inner loops are compiled and stored before workers would each do it
             if self.folder is not None:
                 if not self.folder.exists():
                     stack.callback(_remove_empty, self.folder)  # unless something is in it then
@@ -229,10 +227,3 @@ def _duration_text(seconds: float) -> str:
 def _remove_empty(folder: Path) -> None:
     with suppress(OSError):
         folder.rmdir()
-
-
-def _compile(job: Job) -> None:
-    """Have inner loops compiled and stored once, before workers would each compile them: a mission of a second does."""
-    loaded = job.loaded
-    short = loaded.scenario.model_copy(update={"mission": Mission(time_limit_s=1.0)})
-    MissionRunner(replace(job, loaded=replace(loaded, scenario=short), managers=("none",))).run((MissionKey(0, 0, 1),))

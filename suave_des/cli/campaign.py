@@ -99,6 +99,10 @@ def campaign(
     also: Annotated[
         Format | None, typer.Option("--format", help="Write the exemplar's own suave_results.csv besides.")
     ] = None,
+    record_knowledge: Annotated[
+        bool,
+        typer.Option("--record-knowledge", help="Keep what managers reasoned about, in knowledge_states.jsonl."),
+    ] = False,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
     yes: Annotated[bool, typer.Option("--yes", help="More than a million missions are meant.")] = False,
@@ -128,6 +132,7 @@ def campaign(
             "--seed": seed,
             "--time-out": time_out,
             "--format": also,
+            "--record-knowledge": record_knowledge,
             "--overwrite": overwrite,
             "--yes": yes,
             "--ontology": ontology,
@@ -165,6 +170,7 @@ def campaign(
                 rules=rules or (),
                 disabled_rules=disable_rule or (),
                 suave_format=also is Format.SUAVE,
+                record_knowledge=record_knowledge,
                 time_out_s=time_out,
                 until_ci=until_ci,
                 confirmed=yes,

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.campaign.campaign import resume_campaign, run_campaign
+from suave_des.campaign.knowledge_lines import CAMPAIGN_KNOWLEDGE_FILE, read_missions
 from suave_des.campaign.sweep import Sample, Sweep
 from suave_des.errors import InputError
 from suave_des.scenario.loader import load_scenario
@@ -206,3 +207,28 @@ def test_a_failure_in_a_sweep_names_its_point(tmp_path: Path) -> None:
     result = run_campaign("seams2023", ["awkward_managers:RaisesAlways"], 1, 1, sweep=sweep, out=tmp_path / "out")
     assert [failure.point for failure in result.failures] == [0, 1]
     assert '"visibility.period_s": 80.0' in (tmp_path / "out" / "manifest.json").read_text(encoding="utf-8")
+
+
+def test_knowledge_states_are_kept_as_run_keeps_them_and_resumed_to_the_same_bytes(tmp_path: Path) -> None:
+    sweep = {"visibility.period_s": [40.0, 80.0]}
+    managers = ["none", "metacontrol"]
+
+    def run(runs: int, workers: int, out: Path) -> bytes:
+        run_campaign("seams2023", managers, runs, 3, workers, out, sweep=sweep, record_knowledge=True)
+        return (out / CAMPAIGN_KNOWLEDGE_FILE).read_bytes()
+
+    whole = run(3, 1, tmp_path / "whole")
+    assert run(3, 2, tmp_path / "two") == whole
+    run(1, 1, tmp_path / "resumed")
+    resume_campaign(tmp_path / "resumed", runs=3)
+    assert (tmp_path / "resumed" / CAMPAIGN_KNOWLEDGE_FILE).read_bytes() == whole
+
+    missions = list(read_missions(tmp_path / "whole" / CAMPAIGN_KNOWLEDGE_FILE))
+    assert [(each.manager, each.point, each.run) for each in missions] == [
+        ("metacontrol", point, run) for point in (0, 1) for run in (1, 2, 3)
+    ]
+    loaded = with_values(load_scenario("seams2023"), {"signals.water_visibility.period_s": 80.0})
+    alone = Simulator(loaded).run("metacontrol", 2, 3, record=True).knowledge
+    assert [each.state for each in missions[4].records] == [each.state for each in alone]
+    plain = run_campaign("seams2023", managers, 3, 3, sweep=sweep)
+    assert run_campaign("seams2023", managers, 3, 3, sweep=sweep, record_knowledge=True).rows == plain.rows
