@@ -15,5 +15,7 @@ settings.load_profile("repeatable")
 os.environ["SUAVE_DES_CACHE_DIR"] = tempfile.mkdtemp(prefix="suave-des-tests-")
 os.environ["SUAVE_DES_JAVA_ARCHIVE"] = "off"  # or processes that outlive the tests would make one in that folder
 
+os.environ.pop("COLUMNS", None)  # which several test processes at once are given, as if there were a terminal
+
 # A shell that runs tests in the background has them ignore Ctrl-C: those that press it, and their children, need it.
 signal.signal(signal.SIGINT, signal.default_int_handler)

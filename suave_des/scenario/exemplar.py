@@ -140,7 +140,7 @@ def _settings(configuration: Configuration, revision: str, notes: list[str]) -> 
 
 def _add(settings: dict[KeyPath, Found], path: KeyPath, found: Found) -> None:
     other = settings.setdefault(path, found)
-    if _normal(path, other.value) != _normal(path, found.value):
+    if other is not found and _normal(path, other.value) != _normal(path, found.value):
         raise found.error(f"contradicts {other.place}", "make them alike, or leave one of them out")
 
 

@@ -350,15 +350,17 @@ class TestCampaign:
 
     def test_interrupted_it_ends_with_status_130_and_says_what_is_kept(self, tmp_path: Path) -> None:
         manager = (
-            "import os, signal\n"
+            "import contextlib, os, signal\n"
             "from suave_des.managing.simple import NoManager\n"
             "class CtrlC(NoManager):\n"
             "    def task_requested(self, task):\n"
-            "        if self.system.stream('stop').random() < 0.2:\n"
+            "        with contextlib.suppress(FileNotFoundError):\n"
+            "            os.unlink('once')\n"
             "            os.kill(os.getppid(), signal.SIGINT)\n"
             "        super().task_requested(task)\n"
         )
         (tmp_path / "impatient.py").write_text(manager)
+        (tmp_path / "once").touch()
         arguments = ("--managers", "none,impatient:CtrlC", "--runs", "100", "--quiet", *OUT)
         ended = suave_des_command("campaign", "seams2023", *arguments, cwd=tmp_path)
         assert ended.returncode == 130

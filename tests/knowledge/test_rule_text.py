@@ -169,7 +169,7 @@ def test_rules_are_switched_off_by_name(kb: KnowledgeBase, tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"\xff\xfe\x00", "is not text in UTF-8"),
+        (b"\xff\xfe\x00", "is not UTF-8 text"),
         (b"<?xml version='1.0'?><x/>", "this is XML, not rules as text"),
         (b"A: B(", "line 1, column 6"),
     ],

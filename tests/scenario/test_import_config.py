@@ -345,7 +345,7 @@ class TestBadInput:
             ("mission_node: {ros__parameters: {time_limit: '300'}}\n", "line 1, mission_node.time_limit", "'300'"),
             ("mission_node: {ros__parameters: {time_limit: true}}\n", "line 1, mission_node.time_limit", "true"),
             ("mission_node: {ros__parameters: {time_limit: 0}}\n", "line 1, mission_node.time_limit", "out of range"),
-            ("mission_node: {ros__parameters: {time_limit: .nan}}\n", "line 1, mission_node.time_limit", "no number"),
+            ("mission_node: {ros__parameters: {time_limit: .nan}}\n", "line 1, mission_node.time_limit", "not finite"),
             (
                 MISSION_2023.replace("(3, recovery, 50.0)", "(9, recovery, 50.0)"),
                 "line 16, thruster_monitor.thruster_events[1].thruster",
