@@ -6,6 +6,7 @@ import sys
 import time
 from pathlib import Path
 
+import pytest
 from doc_blocks import ROOT, blocks_of
 
 import suave_des
@@ -14,6 +15,7 @@ SBATCH = "#!/bin/sh\nbash $1 > job.log 2>&1 &\necho $! >> jobs\necho Submitted b
 SCANCEL = "#!/bin/sh\nkill $@\n"
 
 
+@pytest.mark.slow  # seconds by itself, but beside other work it once waited for its worker for more than two minutes
 def test_the_slurm_script_runs(tmp_path):
     (script,) = [block.text for block in blocks_of(ROOT / "docs" / "guides" / "cluster.md") if "title" in block.marks]
     for shown, short in (("cores=32", "cores=1"), ("jobs=4", "jobs=1"), ("runs=100_000", "runs=2")):
