@@ -9,7 +9,7 @@ from pathlib import Path
 
 from suave_des.campaign.early_stop import parse_until_ci
 from suave_des.campaign.executors import Executor, WorkerError, executor
-from suave_des.campaign.lock import locked
+from suave_des.campaign.lock import FolderLock
 from suave_des.campaign.outcomes import Finished, Job, MissionRunner
 from suave_des.campaign.output import make_output_folder, remove_derived, remove_parts
 from suave_des.campaign.plan import MissionKey, plan
@@ -97,7 +97,9 @@ class Campaign:
                 if not self.folder.exists():
                     stack.callback(_remove_empty, self.folder)  # unless something is in it then
                 make_output_folder(self.folder)
-                stack.enter_context(locked(self.folder))
+                lock = FolderLock(self.folder)
+                stack.callback(lock.release)  # before it is taken, as that may be interrupted anywhere
+                lock.take()
                 remove_parts(self.folder, FILES)
             if not resumed:
                 stack.callback(self._remove_if_empty)

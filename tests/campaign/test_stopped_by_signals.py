@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import fcntl
+import os
 import signal
 import time
 from pathlib import Path
@@ -11,6 +13,7 @@ import chaos
 import pytest
 
 from suave_des.campaign.campaign import resume_campaign, run_campaign
+from suave_des.campaign.lock import LOCK_FILE
 from suave_des.campaign.store import NEW_STORE_FILE, STORE_FILE
 
 STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
@@ -50,7 +53,6 @@ def test_what_is_done_is_kept(number: signal.Signals, workers: int, scenario: Pa
     assert not any(Path(f"/proc/{child}").exists() for child in children)
 
 
-@pytest.mark.slow  # beside other work it failed once, with kill at the moment of the lock
 @pytest.mark.parametrize("number", STATUS)
 @pytest.mark.parametrize("moment", ["lock", "store", "later"])
 def test_no_empty_folder_is_left(number: signal.Signals, moment: str, scenario: Path, tmp_path: Path) -> None:
@@ -76,7 +78,7 @@ class TestInterruptedAtAnAwkwardMoment:
     @pytest.mark.parametrize(
         "moment",
         [
-            "suave_des.campaign.running.locked",
+            "suave_des.campaign.running.FolderLock.take",
             "suave_des.campaign.running.make_store",
             "suave_des.campaign.store.remove_store",
             "suave_des.campaign.running.Store.__init__",
@@ -87,6 +89,25 @@ class TestInterruptedAtAnAwkwardMoment:
         self, moment: str, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(moment, ctrl_c)
+        with pytest.raises(KeyboardInterrupt):
+            run_campaign(scenario, ["none"], 2, 1, out=tmp_path / "out")
+        assert not (tmp_path / "out").exists()
+
+    @pytest.mark.parametrize("call", ["os.open", "fcntl.flock", "os.fstat", "os.pwrite"])
+    def test_while_the_folder_is_locked_nothing_is_left(
+        self, call: str, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        module, name = (os, call[3:]) if call.startswith("os.") else (fcntl, call[6:])
+        real = getattr(module, name)
+
+        def done_and_interrupted(*arguments: object) -> object:
+            result = real(*arguments)
+            if (tmp_path / "out" / LOCK_FILE).exists():
+                monkeypatch.setattr(module, name, real)
+                raise KeyboardInterrupt
+            return result
+
+        monkeypatch.setattr(module, name, done_and_interrupted)
         with pytest.raises(KeyboardInterrupt):
             run_campaign(scenario, ["none"], 2, 1, out=tmp_path / "out")
         assert not (tmp_path / "out").exists()
