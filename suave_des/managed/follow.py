@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable, Generator, Sequence
 
 import numpy as np
@@ -12,6 +13,7 @@ from suave_des.clock import Process
 from suave_des.managed.node import SetPointSender
 from suave_des.managed.travel import TravellingNode
 from suave_des.scenario.revision import FollowRevision
+from suave_des.vehicle.model import Array
 from suave_des.vehicle.vehicle import Vehicle, Watch
 from suave_des.world.pipeline import SEA_BED_Z_M
 
@@ -28,7 +30,6 @@ class FollowPipeline(TravellingNode):
     """The follow function.
 
     Attributes:
-        distance_m: distance inspected, as it was published last.
         finished: the event that the last point of the path is reached.
 
     Args:
@@ -50,13 +51,21 @@ class FollowPipeline(TravellingNode):
         super().__init__(env, vehicle, sender)
         self._revision = revision
         self._path = path
+        self._way: Path = ()
         self._watch: Watch | None = None
-        self._poll = self._sent_at = 0
+        self._reached_at: list[int] = []
+        self._poll = self._wake = self._sent_at = 0
         self._next = 0
         self._last_point: tuple[float, float] | None = None
         self._travelled_m = 0.0
-        self.distance_m = 0.0
+        self._published_m = 0.0
         self.finished = env.event()
+
+    @property
+    def distance_m(self) -> float:
+        """Distance inspected, as it was published last."""
+        self._catch_up()
+        return self._published_m
 
     def activated(self) -> None:
         """Set off; the distance counts from zero again, though the published value stays until there is a new one."""
@@ -72,59 +81,69 @@ class FollowPipeline(TravellingNode):
         """Stop; revision 2023 adds the way from the last point to here, if it was on its way from one."""
         if self._process is None or not self._process.is_alive:
             return
+        self._catch_up()
         self._stop(self._watch, self._poll)
+        self._watch = None
         if self._revision.adds_remaining_way and self._last_point is not None:
             x, y, _ = self._vehicle.position(self.env.now)
             self._travelled_m += math.dist(self._last_point, (x, y))
-            self.distance_m = self._travelled_m
+            self._published_m = self._travelled_m
 
     def _follow(self, path: Path) -> Process:
+        """Go from point to point.
+
+        Polls lie on a grid that began with the activation. Instead of stopping at each, or at each point, the points'
+        set-points are sent ahead, and the node wakes when there is one to send: the next one, or again one that ten
+        polls did not see.
+        """
         rules = self._revision
+        self._way = path
         self._watch = watch = Watch(
             self.env.now, rules.poll_period_s, rules.acceptance_m, math.inf, 0, POLLS_BEFORE_RESENDING
         )
-        self._poll = self._sent_at = 0
+        self._poll = self._wake = self._sent_at = 0
+        places = np.empty((len(path), 3))
+        places[:, :2], places[:, 2] = path, Z_M
         try:
             while self._next < len(path):
                 self._sender.send(*path[self._next], Z_M)
                 self._sent_at = first = self._poll
-                while not (yield from self._go_on(path, watch, first)):
+                while not (yield from self._go_on(places, watch, first)):
                     first = max(first, self._poll + 1, watch.first_tick_from(self.env.now))
         except simpy.Interrupt:
             return
+        self._watch = None
         self.finished.succeed()
 
-    def _go_on(self, path: Path, watch: Watch, first: int) -> Generator[simpy.Event, None, bool]:
-        """Go on from point to point, until there is one to send: the next one, or again one that ten polls did not see.
-
-        Polls lie on a grid that began with the activation. Instead of stopping at each, the points' set-points are sent
-        ahead, and the node wakes when one is reached.
-
-        Args:
-            path: the points.
-            watch: the polls.
-            first: first poll to look at.
-
-        Returns:
-            False if the vehicle's control changes before that.
-        """
-        places = np.array([(x_m, y_m, Z_M) for x_m, y_m in path[self._next : self._next + POINTS_AHEAD]])
-        reached_at, act_at = self._sender.send_ahead(
-            places, Z_M, watch, first=first, last=self._sent_at + POLLS_BEFORE_RESENDING
+    def _go_on(self, places: Array, watch: Watch, first: int) -> Generator[simpy.Event, None, bool]:
+        """Go on from the first poll to look at until there is a point to send; False if control changes before that."""
+        self._reached_at, self._wake = self._sender.send_ahead(
+            places[self._next : self._next + POINTS_AHEAD],
+            Z_M,
+            watch,
+            first=first,
+            last=self._sent_at + POLLS_BEFORE_RESENDING,
         )
-        for poll in reached_at:
-            if poll > self._poll and not (yield from self._sleep(watch, poll)):
-                return False
-            self._poll = self._sent_at = poll
-            self._arrive(path[self._next])
-        if act_at > self._poll and not (yield from self._sleep(watch, act_at)):
-            return False
-        self._poll = act_at
-        return True
+        is_time = self._wake <= self._poll or (yield from self._sleep(watch, self._wake))
+        self._catch_up()
+        if is_time:
+            self._poll = self._wake
+        return is_time
+
+    def _catch_up(self) -> None:
+        """Take in the points that polls until now have found reached."""
+        if self._reached_at and self._watch is not None:
+            poll = min(self._watch.last_tick_until(self.env.now), self._wake)
+            reached = bisect_right(self._reached_at, poll)
+            for point in self._way[self._next : self._next + reached]:
+                self._arrive(point)
+            if reached:
+                self._poll = self._sent_at = self._reached_at[reached - 1]
+                self._reached_at = self._reached_at[reached:]
 
     def _arrive(self, point: tuple[float, float]) -> None:
         self._next += 1
         if self._last_point is not None:
             self._travelled_m += math.dist(self._last_point, point)
-            self.distance_m = self._travelled_m
+            self._published_m = self._travelled_m
         self._last_point = point
