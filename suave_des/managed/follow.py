@@ -20,7 +20,7 @@ from suave_des.world.pipeline import SEA_BED_Z_M
 ALTITUDE_M = 1.25
 Z_M = SEA_BED_Z_M + ALTITUDE_M
 POLLS_BEFORE_RESENDING = 10
-POINTS_AHEAD = 8
+POINTS_AHEAD = 16
 """Points whose set-points are sent at a time: enough to pay, few enough that little is lost when control changes."""
 
 Path = Sequence[tuple[float, float]]
@@ -106,23 +106,34 @@ class FollowPipeline(TravellingNode):
         places[:, :2], places[:, 2] = path, Z_M
         try:
             while self._next < len(path):
-                self._sender.send(*path[self._next], Z_M)
                 self._sent_at = first = self._poll
-                while not (yield from self._go_on(places, watch, first)):
+                begin = True
+                while not (yield from self._go_on(places, watch, first, begin=begin)):
                     first = max(first, self._poll + 1, watch.first_tick_from(self.env.now))
+                    begin = False
         except simpy.Interrupt:
             return
         self._watch = None
         self.finished.succeed()
 
-    def _go_on(self, places: Array, watch: Watch, first: int) -> Generator[simpy.Event, None, bool]:
-        """Go on from the first poll to look at until there is a point to send; False if control changes before that."""
+    def _go_on(
+        self, places: Array, watch: Watch, first: int, *, begin: bool
+    ) -> Generator[simpy.Event, None, bool]:
+        """Go on until there is a point to send; False if control changes before that.
+
+        Args:
+            places: where the points' set-points are, shape (points, 3).
+            watch: the polls.
+            first: first poll to look at.
+            begin: whether the next point is to be sent now.
+        """
         self._reached_at, self._wake = self._sender.send_ahead(
             places[self._next : self._next + POINTS_AHEAD],
             Z_M,
             watch,
             first=first,
             last=self._sent_at + POLLS_BEFORE_RESENDING,
+            begin=begin,
         )
         is_time = self._wake <= self._poll or (yield from self._sleep(watch, self._wake))
         self._catch_up()

@@ -52,14 +52,16 @@ class SetPointSender:
 
     def send(self, x_m: float, y_m: float, z_m: float) -> None:
         """Send a set-point, world frame; whether it arrived nobody is told."""
-        if self._stream is not None and self._stream.random() < self._loss_probability:
+        if self._is_lost():
             return
         self._vehicle.command(self._env.now, x_m + self._frame.x_m, y_m + self._frame.y_m, z_m + self._frame.z_m)
 
-    def send_ahead(self, places_m: Array, z_m: float, watch: Watch, *, first: int, last: int) -> tuple[list[int], int]:
+    def send_ahead(
+        self, places_m: Array, z_m: float, watch: Watch, *, first: int, last: int, begin: bool
+    ) -> tuple[list[int], int]:
         """Send set-points of which each follows the one before when that is found reached; see `Vehicle.give_ahead`.
 
-        The first one was sent already; where messages can be lost, nothing is sent before its time.
+        Where messages can be lost, nothing is sent before its time.
 
         Args:
             places_m: the places, world frame: x, y, z in the first three columns, shape (n, at least 3).
@@ -67,14 +69,21 @@ class SetPointSender:
             watch: the node's ticks, and when a place is reached.
             first: first tick to look at.
             last: last tick to look at for the first place.
+            begin: whether to send the first one now; else it was sent already.
 
         Returns:
             The ticks at which places are reached, and the tick at which the node has to act again.
         """
         if self._stream is not None and self._loss_probability > 0.0:
             places_m = places_m[:1]
-        sent_as_m = (self._frame.x_m, self._frame.y_m, z_m + self._frame.z_m)
-        return self._vehicle.give_ahead(self._env.now, places_m, sent_as_m, watch, first=first, last=last)
+            begin = begin and not self._is_lost()
+        frame = self._frame
+        return self._vehicle.give_ahead(
+            self._env.now, places_m, (frame.x_m, frame.y_m, z_m + frame.z_m), watch, first=first, last=last, begin=begin
+        )
+
+    def _is_lost(self) -> bool:
+        return self._stream is not None and self._stream.random() < self._loss_probability
 
 
 class FunctionNode:

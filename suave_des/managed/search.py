@@ -127,8 +127,7 @@ class GenerateSearchPath(TravellingNode):
                 self.env.now, TICK_PERIOD_S, REACHED_BOX_M, REACHED_BOX_M, 1, TICKS_BEFORE_RESENDING + 1
             )
             while True:
-                self._tick()
-                self._foresee(watch)
+                self._foresee(watch, begin=self._tick())
                 while not (yield from self._sleep(watch, self._wake)) or self._all_reached():
                     self._catch_up()
                     self._foresee(watch)
@@ -137,8 +136,13 @@ class GenerateSearchPath(TravellingNode):
         except simpy.Interrupt:
             return
 
-    def _foresee(self, watch: Watch) -> None:
-        """Send the set-points of coming ticks ahead, as far as the tick at which there is more to do."""
+    def _foresee(self, watch: Watch, *, begin: bool = False) -> None:
+        """Send the set-points of coming ticks ahead, as far as the tick at which there is more to do.
+
+        Args:
+            watch: the ticks.
+            begin: whether to send the present one, too.
+        """
         first = self._ticked + 1
         if self._places is None or self.altitude_m != self._last_altitude_m:
             self._wake = first
@@ -149,7 +153,7 @@ class GenerateSearchPath(TravellingNode):
         spiral(self._count, self._radius_m, self.altitude_m, self._centre_m, self._places[1:])
         last = self._ticked + TICKS_BEFORE_RESENDING + 1 - self._waited_ticks
         self._reached_at, self._wake = self._sender.send_ahead(
-            self._places, self._commanded_z_m(), watch, first=first, last=last
+            self._places, self._commanded_z_m(), watch, first=first, last=last, begin=begin
         )
 
     def _all_reached(self) -> bool:
@@ -171,21 +175,23 @@ class GenerateSearchPath(TravellingNode):
         self._waited_ticks += tick - self._ticked
         self._ticked = tick
 
-    def _tick(self) -> None:
+    def _tick(self) -> bool:
+        """Work out the present set-point; whether it is to be sent."""
         if self.altitude_m != self._last_altitude_m:
             self._count += 1
             self._last_altitude_m = self.altitude_m
         near_xy, near_z = self._near_set_point()
         if near_xy and near_z:
-            self._issue_next()
-            return
+            self._make_next()
+            return True
         self._waited_ticks += 1
-        if self._waited_ticks > TICKS_BEFORE_RESENDING:
-            self._waited_ticks = 0
-            if near_xy:
-                # The autopilot stops short in z: ask for less altitude than is wanted.
-                self._lowered_m += self._revision.workaround_step_m
-            self._send()
+        if self._waited_ticks <= TICKS_BEFORE_RESENDING:
+            return False
+        self._waited_ticks = 0
+        if near_xy:
+            # The autopilot stops short in z: ask for less altitude than is wanted.
+            self._lowered_m += self._revision.workaround_step_m
+        return True
 
     def _near_set_point(self) -> tuple[bool, bool]:
         if self._places is None:
@@ -195,18 +201,12 @@ class GenerateSearchPath(TravellingNode):
         near_xy = abs(x - x_set) <= REACHED_BOX_M and abs(y - y_set) <= REACHED_BOX_M
         return near_xy, abs(z - z_set) <= REACHED_BOX_M
 
-    def _issue_next(self) -> None:
+    def _make_next(self) -> None:
         self._places = np.empty((1, 4))
         spiral(self._count, self._radius_m, self.altitude_m, self._centre_m, self._places)
         self._radius_m = self._places.item(0, 3)
         self._count += 1
         self._waited_ticks = 0
-        self._send()
-
-    def _send(self) -> None:
-        if self._places is not None:
-            x, y, _, _ = self._places[0].tolist()
-            self._sender.send(x, y, self._commanded_z_m())
 
     def _commanded_z_m(self) -> float:
         # A set-point sent again has the present altitude, though "reached" is judged against the one it was made with.

@@ -33,7 +33,8 @@ from suave_des.simulation.recording import Recorder
 from suave_des.simulation.result import MissionMetrics, MissionResult
 from suave_des.simulation.signals import build_signal
 from suave_des.vehicle.bluerov2 import BLUEROV2
-from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle
+from suave_des.vehicle.kernel import ROW
+from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle, track_rows
 from suave_des.world.pipeline import SEA_BED_Z_M, SURFACE_Z_M, path_to_inspect, sample_points
 
 OnTime = Callable[[float, float], None]
@@ -55,6 +56,8 @@ class Simulator:
         self.way_m: list[list[float]] = self.points[:, :2].tolist()
         height = loaded.scenario.revision.monitors.detected_point_height_m
         self.detection_points = self.points + np.array([0.0, 0.0, height])
+        # Kept from mission to mission: allocated for each, it leaves the process's memory in pieces, which then grows.
+        self.track_memory = np.empty((track_rows(_duration_s(loaded)), ROW))
 
     @cached_property
     def knowledge(self) -> Any:
@@ -85,6 +88,10 @@ class Simulator:
         return mission.result()
 
 
+def _duration_s(loaded: LoadedScenario) -> float:
+    return loaded.scenario.mission.time_limit_s + loaded.scenario.revision.coordinator.limit_check_period_s
+
+
 def _tell_time(env: simpy.Environment, on_time: OnTime, limit_s: float) -> Process:
     while env.now <= limit_s:
         on_time(env.now, limit_s)
@@ -103,7 +110,7 @@ class _Mission:
         self.env = simpy.Environment()
         self.recorder = Recorder(self.env, enabled=record)
         self.bus = DiagnosticsBus()
-        self.duration_s = self.scenario.mission.time_limit_s + self.revision.coordinator.limit_check_period_s
+        self.duration_s = _duration_s(simulator.loaded)
         self.vehicle = self._make_vehicle()
         self.signals = {name: self._measure(name) for name in sorted(self.scenario.signals)}
         self.visibility = self.signals["water_visibility"]
@@ -197,6 +204,7 @@ class _Mission:
             ),
             time_scale=1.0 / (1.0 + loss),
             z_limits_m=(SEA_BED_Z_M, SURFACE_Z_M),
+            memory=self.simulator.track_memory,
         )
 
     # The monitors.

@@ -215,6 +215,8 @@ class Vehicle:
         """Set what share of its thrust thruster 1 .. n gives: 1 works, 0 is lost. The autopilot does not learn of
         it.
         """
+        if self._health[thruster - 1] == health:
+            return
         row = row_at(t_s)
         self._change_control(row, t_s)
         self._health[thruster - 1] = health
@@ -276,6 +278,7 @@ class Vehicle:
         *,
         first: int,
         last: int,
+        begin: bool = False,
     ) -> tuple[list[int], int]:
         """Give set-points ahead: each place that is found reached at a tick will be followed by the next one.
 
@@ -285,27 +288,31 @@ class Vehicle:
         Args:
             t_s: mission time.
             places_m: where the vehicle is to come, one after the other: x, y, z in the first three columns, shape
-                (n, at least 3). The first one's set-point is commanded already; what comes after the last is for the
-                caller to command.
+                (n, at least 3). What comes after the last is for the caller to command.
             sent_as_m: what is added to a place's x and y in its set-point, and the set-points' z.
             watch: the ticks, and when a place is reached.
             first: first tick to look at.
             last: last tick to look at for the first place; ticks after the mission's end do not count.
+            begin: whether to command the first place's set-point now; else it is commanded already.
 
         Returns:
             The tick at which each place will be found reached, as far as it will if control does not change; and the
             tick at which the caller has to see to it again: the last place is reached then, or one not in time.
         """
-        course = self._course
-        if course is not None:
-            if course.is_under_way(t_s):
+        row = row_at(t_s)
+        x_m, y_m, z_m = sent_as_m
+        sent_as_m = x_m, y_m, z_m = x_m, y_m, z_m + self._altitude_error_m
+        if begin:
+            self._change_control(row, t_s)
+            self._set_point[:3] = places_m.item(0, 0) + x_m, places_m.item(0, 1) + y_m, z_m
+        elif self._course is not None:
+            if self._course.is_under_way(t_s):
                 places_m = places_m[:1]
             else:
-                self._course = course = None
-        x_m, y_m, z_m = sent_as_m
-        sent_as_m = (x_m, y_m, z_m + self._altitude_error_m)
+                self._course = None
         before = self._set_point.copy()
-        ticks = np.empty(len(places_m), dtype=np.int64)
+        places = len(places_m)
+        ticks = np.empty(places, dtype=np.int64)
         reached, self.computed_row = kernel.follow_places(
             self.track,
             self.computed_row,
@@ -322,10 +329,12 @@ class Vehicle:
             ticks,
         )
         found: list[int] = ticks[:reached].tolist()
-        if reached and len(places_m) > 1:
-            self._course = _Course(watch, found[: len(places_m) - 1], before, places_m, sent_as_m)
-            self._tell(row_at(t_s))
-        if reached == len(places_m):
+        is_new = reached > 0 and places > 1
+        if is_new:
+            self._course = _Course(watch, found[: places - 1], before, places_m, sent_as_m)
+        if is_new or begin:
+            self._tell(row)
+        if reached == places:
             return found, found[-1]
         return found, found[-1] + watch.most_ticks if found else last
 

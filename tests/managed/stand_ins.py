@@ -53,8 +53,12 @@ class PlacedVehicle:
         *,
         first: int,
         last: int,
+        begin: bool = False,
     ) -> tuple[list[int], int]:
         """Tells of the first place only: it cannot tell where a set-point to come will take it."""
+        if begin:
+            x_m, y_m, z_m = sent_as_m
+            self.command(t_s, places_m.item(0, 0) + x_m, places_m.item(0, 1) + y_m, z_m)
         half_widths_m = (watch.half_width_m, watch.half_width_m, watch.half_height_m)
         for tick in range(first, last + 1):
             errors_m = [abs(a - b) for a, b in zip(self.position(watch.time_s(tick)), places_m[0, :3], strict=True)]
