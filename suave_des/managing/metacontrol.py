@@ -56,7 +56,9 @@ class Metacontrol(ManagingSubsystem):
         self._awaited = self._attributes_to_await()
         self._listens_since_s = 0.0
         self._heard_before: dict[str, float | None] = {}
+        self._values: _Values = ()
         self._known: _Known | None = None
+        self._situations = _memories.setdefault(self._deliberation, {})
         self._on_the_bridge = 0
         self._cancelled: set[str] = set()
         self._told: frozenset[str] = frozenset()
@@ -103,9 +105,9 @@ class Metacontrol(ManagingSubsystem):
 
     def adapt(self) -> AdaptationProcess | None:
         """Analyze and plan on the state as it is now; execute when the reasoner has taken its time."""
+        self._values = values = tuple([self.measured(attribute) for attribute in self._attributes])
         if not self._objectives:
             return None
-        values = tuple([self.measured(attribute) for attribute in self._attributes])
         if any(values[place] is None for place in self._awaited):
             return None
         self._cancelled.clear()
@@ -122,8 +124,8 @@ class Metacontrol(ManagingSubsystem):
         if regions is None or self._on_the_bridge:
             return None
         bounds = {
-            attribute: _NO_VALUE if (value := self.measured(attribute)) is None else regions.around(value)
-            for attribute in self._attributes
+            attribute: _NO_VALUE if value is None else regions.around(value)
+            for attribute, value in zip(self._attributes, self._values, strict=True)
         }
         # Of two values in one gap between thresholds rules can tell which is the greater.
         return bounds if len(set(bounds.values())) == len(bounds) else None
@@ -136,24 +138,22 @@ class Metacontrol(ManagingSubsystem):
             self._known = self._known_in_situation()
         conclusion = self._known.get(values)
         if conclusion is None:
-            if len(self._known) >= REMEMBERED:
-                self._known.clear()
+            if sum(map(len, self._situations.values())) >= REMEMBERED:
+                for known in self._situations.values():
+                    known.clear()
             conclusion = self._known[values] = self._deliberation.conclude(
                 self._state(values), improve_exceeded=self._revision.search_improves_when_exceeded
             )
         return conclusion
 
     def _known_in_situation(self) -> _Known:
-        memory = _memories.setdefault(self._deliberation, {})
-        if sum(map(len, memory.values())) >= REMEMBERED:
-            memory.clear()
         situation = (
             self._revision.search_always_improves,
             self._revision.search_improves_when_exceeded,
             self._attributes,
             *map(tuple, (self._objectives.items(), self._groundings.items(), self._components.items())),
         )
-        return memory.setdefault(situation, {})
+        return self._situations.setdefault(situation, {})
 
     def _changes_nothing(self, conclusion: Conclusion) -> bool:
         return (

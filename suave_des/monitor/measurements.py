@@ -94,23 +94,26 @@ def measure(
     if time_step_s:
         # A time within a millionth of a step below a multiple counts as the multiple: timers add up rounding errors.
         looks = np.floor(times / time_step_s + 1e-6) * time_step_s
-    first = _changes(looks)
-    values = _looked_up(signal, looks[first].tobytes())
-    if noise is None:
-        times = times[first]
-    else:
-        values = np.repeat(values, np.diff(first, append=len(times)))
+    values, changed, changed_to = _looked_up(signal, looks.tobytes())
+    if noise is not None:
         values = values + np.array([noise() for _ in range(len(times))])
-    changed = _changes(values)
-    return Measurements(key, tuple(times[changed].tolist()), tuple(values[changed].tolist()), phase_s, period_s)
+        changed = _changes(values)
+        changed_to = tuple(values[changed].tolist())
+    return Measurements(key, tuple(times[changed].tolist()), changed_to, phase_s, period_s)
 
 
 @lru_cache(maxsize=64)
-def _looked_up(signal: Signal, times_s: bytes) -> NDArray[np.float64]:
-    """Values of a signal at times (float64): if time is cut and the signal is not drawn, the same in most runs."""
-    values = np.array([signal(t_s) for t_s in np.frombuffer(times_s).tolist()])
+def _looked_up(signal: Signal, times_s: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64], tuple[float, ...]]:
+    """Values of a signal at times (float64), the places where they change, and what they change to.
+
+    If time is cut and the signal is not drawn, they are the same in most runs.
+    """
+    times = np.frombuffer(times_s)
+    first = _changes(times)
+    values = np.repeat([signal(t_s) for t_s in times[first].tolist()], np.diff(first, append=len(times)))
     values.flags.writeable = False
-    return values
+    changed = _changes(values)
+    return values, changed, tuple(values[changed].tolist())
 
 
 def _changes(values: NDArray[np.floating[Any]]) -> NDArray[np.int64]:
