@@ -116,9 +116,7 @@ class FollowPipeline(TravellingNode):
         self._watch = None
         self.finished.succeed()
 
-    def _go_on(
-        self, places: Array, watch: Watch, first: int, *, begin: bool
-    ) -> Generator[simpy.Event, None, bool]:
+    def _go_on(self, places: Array, watch: Watch, first: int, *, begin: bool) -> Generator[simpy.Event, None, bool]:
         """Go on until there is a point to send; False if control changes before that.
 
         Args:

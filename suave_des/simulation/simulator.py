@@ -34,6 +34,7 @@ from suave_des.simulation.result import MissionMetrics, MissionResult
 from suave_des.simulation.signals import build_signal
 from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.kernel import ROW
+from suave_des.vehicle.model import Array
 from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle, track_rows
 from suave_des.world.pipeline import SEA_BED_Z_M, SURFACE_Z_M, path_to_inspect, sample_points
 
@@ -56,8 +57,8 @@ class Simulator:
         self.way_m: list[list[float]] = self.points[:, :2].tolist()
         height = loaded.scenario.revision.monitors.detected_point_height_m
         self.detection_points = self.points + np.array([0.0, 0.0, height])
-        # Kept from mission to mission: allocated for each, it leaves the process's memory in pieces, which then grows.
-        self.track_memory = np.empty((track_rows(_duration_s(loaded)), ROW))
+        # Kept from mission to mission: a megabyte allocated for each leaves the process's memory in pieces.
+        self._spare_tracks: list[Array] = []
 
     @cached_property
     def knowledge(self) -> Any:
@@ -82,10 +83,17 @@ class Simulator:
             MissionError: the manager raised; the error names it, the run and the mission time.
             InputError: the manager or the knowledge base cannot be used.
         """
-        mission = _Mission(self, manager, run, seed, record=record)
-        if on_time is not None:
-            mission.env.process(_tell_time(mission.env, on_time, self.loaded.scenario.mission.time_limit_s))
-        return mission.result()
+        track = self._spare_tracks.pop() if self._spare_tracks else self._make_track()
+        try:
+            mission = _Mission(self, manager, run, seed, track, record=record)
+            if on_time is not None:
+                mission.env.process(_tell_time(mission.env, on_time, self.loaded.scenario.mission.time_limit_s))
+            return mission.result()
+        finally:
+            self._spare_tracks.append(track)
+
+    def _make_track(self) -> Array:
+        return np.empty((track_rows(_duration_s(self.loaded)), ROW))
 
 
 def _duration_s(loaded: LoadedScenario) -> float:
@@ -101,8 +109,9 @@ def _tell_time(env: simpy.Environment, on_time: OnTime, limit_s: float) -> Proce
 class _Mission:
     """The wiring of one mission."""
 
-    def __init__(self, simulator: Simulator, manager: str, run: int, seed: int, *, record: bool) -> None:
+    def __init__(self, simulator: Simulator, manager: str, run: int, seed: int, track: Array, *, record: bool) -> None:
         self.simulator = simulator
+        self._track = track
         self.scenario = simulator.loaded.scenario
         self.revision = self.scenario.revision
         self.manager_name, self.run, self.seed = manager, run, seed
@@ -204,7 +213,7 @@ class _Mission:
             ),
             time_scale=1.0 / (1.0 + loss),
             z_limits_m=(SEA_BED_Z_M, SURFACE_Z_M),
-            memory=self.simulator.track_memory,
+            memory=self._track,
         )
 
     # The monitors.

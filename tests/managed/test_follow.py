@@ -301,3 +301,32 @@ def test_foreseeing_polls_is_the_same_as_looking_at_each(name: str, disturbances
     foreseen, distance_m = real_follow(name, disturbances, polling=False)
     polled, way_m = real_follow(name, disturbances, polling=True)
     assert (foreseen, distance_m) == (polled, pytest.approx(way_m))
+
+
+# When several things happen at one time
+
+
+@BOTH
+def test_a_poll_due_when_it_is_switched_off_was_due_before(env: simpy.Environment, name: str) -> None:
+    period_s = revision(name).follow.poll_period_s
+    vehicle = MovingVehicle(lambda t_s: (-1.1 if t_s >= 3 * period_s else 0.0, 0.0, -18.75))
+    follow = follow_of(env, name, vehicle, [(0.0, 0.0), (-1.1, 0.0), (-9.0, 0.0)])
+    switch = env.timeout(3 * period_s)  # scheduled before any poll
+    switch.callbacks.append(lambda _: follow.apply(INACTIVE))
+    follow.apply(ACTIVE)
+    env.run(until=4 * period_s)
+    assert follow.distance_m == pytest.approx(1.1)
+
+
+@BOTH
+def test_the_distance_can_be_asked_for_at_any_time(env: simpy.Environment, name: str) -> None:
+    follow, asked = follow_of(env, name, along_the_line()), follow_of(env, name, along_the_line())
+    follow.apply(ACTIVE)
+    asked.apply(ACTIVE)
+    published_m = []
+    for t_s in range(1, 30):
+        env.run(until=t_s + 0.3)
+        published_m.append(asked.distance_m)
+    assert published_m == sorted(published_m)
+    assert len(set(published_m)) > 10
+    assert follow.distance_m == published_m[-1]

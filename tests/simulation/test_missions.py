@@ -32,6 +32,17 @@ def test_the_same_mission_twice_is_identical(simulator, scenario: str, manager: 
     assert simulator(scenario).run(manager, run, seed, record=True) == first
 
 
+def test_missions_of_one_simulator_do_not_disturb_one_another(simulator) -> None:
+    one, other = simulator(), []
+    alone = [one.run("metacontrol", run, 1, record=True) for run in (1, 2)]
+
+    def meanwhile(t_s: float, _: float) -> None:
+        if t_s == 150.0:
+            other.append(one.run("metacontrol", 2, 1, record=True))
+
+    assert [one.run("metacontrol", 1, 1, record=True, on_time=meanwhile), *other] == alone
+
+
 @settings(max_examples=15)
 @given(scenario_names, manager_names, st.integers(1, 1000))
 def test_recording_does_not_change_the_metrics(simulator, scenario: str, manager: str, run: int) -> None:

@@ -45,6 +45,15 @@ def test_looking_ahead_does_not_bind_the_future(make_vehicle, plan: list, ahead:
     assert np.array_equal(carry_out(make_vehicle(duration_s=DURATION_S), plan, []), carry_out(foresighted, plan, []))
 
 
+def test_a_thruster_that_is_as_it_was_is_no_change_of_control(make_vehicle) -> None:
+    vehicle, told = make_vehicle(), []
+    vehicle.control_listeners.append(told.append)
+    vehicle.set_thruster_health(1.0, 2, 1.0)
+    vehicle.set_thruster_health(2.0, 2, 0.0)
+    vehicle.set_thruster_health(3.0, 2, 0.0)
+    assert told == [row_at(2.0)]
+
+
 def test_change_of_control_is_told_with_the_row_of_its_time(make_vehicle) -> None:
     vehicle, rows = make_vehicle(), []
     vehicle.control_listeners.append(rows.append)
