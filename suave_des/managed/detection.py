@@ -19,9 +19,10 @@ _FARTHEST_LOOK_AHEAD_ROWS = 200
 
 def measured_at_rows(measurements: Measurements, rows: int) -> NDArray[np.float64]:
     """Last measured value at each row of a track, shape (rows,); nan before the first measurement."""
-    changes = np.rint(np.array(measurements.times_s) / STEP_S)  # rounded as Vehicle does
-    ends = np.concatenate(([0], np.minimum(changes, rows), [rows])).astype(np.int64)
-    return np.repeat(np.array([np.nan, *measurements.values]), ends[1:] - ends[:-1])
+    times_s, values = measurements.arrays
+    ends = np.empty(len(times_s) + 2, dtype=np.int64)
+    ends[0], ends[1:-1], ends[-1] = 0, np.minimum(np.rint(times_s / STEP_S), rows), rows  # rounded as Vehicle does
+    return np.repeat(np.concatenate(([np.nan], values)), np.diff(ends))
 
 
 class PipelineDetector:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator
 
 import numpy as np
 import simpy
@@ -23,8 +23,6 @@ POLLS_BEFORE_RESENDING = 10
 POINTS_AHEAD = 16
 """Points whose set-points are sent at a time: enough to pay, few enough that little is lost when control changes."""
 
-Path = Sequence[tuple[float, float]]
-
 
 class FollowPipeline(TravellingNode):
     """The follow function.
@@ -37,7 +35,8 @@ class FollowPipeline(TravellingNode):
         vehicle: whose position is looked at.
         sender: the way to the autopilot.
         revision: how the exemplar's revision behaves.
-        path: gives the path to inspect, none while the pipeline is not detected.
+        path: gives the path to inspect, x and y of its points, shape (points, 2); none while the pipeline is not
+            detected.
     """
 
     def __init__(
@@ -46,17 +45,17 @@ class FollowPipeline(TravellingNode):
         vehicle: Vehicle,
         sender: SetPointSender,
         revision: FollowRevision,
-        path: Callable[[], Path | None],
+        path: Callable[[], Array | None],
     ) -> None:
         super().__init__(env, vehicle, sender)
         self._revision = revision
         self._path = path
-        self._way: Path = ()
+        self._way: Array = np.empty((0, 2))
         self._watch: Watch | None = None
         self._reached_at: list[int] = []
         self._poll = self._wake = self._sent_at = 0
         self._next = 0
-        self._last_point: tuple[float, float] | None = None
+        self._last_point: list[float] | None = None
         self._travelled_m = 0.0
         self._published_m = 0.0
         self.finished = env.event()
@@ -89,7 +88,7 @@ class FollowPipeline(TravellingNode):
             self._travelled_m += math.dist(self._last_point, (x, y))
             self._published_m = self._travelled_m
 
-    def _follow(self, path: Path) -> Process:
+    def _follow(self, path: Array) -> Process:
         """Go from point to point.
 
         Polls lie on a grid that began with the activation. Instead of stopping at each, or at each point, the points'
@@ -144,13 +143,13 @@ class FollowPipeline(TravellingNode):
         if self._reached_at and self._watch is not None:
             poll = min(self._watch.last_tick_until(self.env.now), self._wake)
             reached = bisect_right(self._reached_at, poll)
-            for point in self._way[self._next : self._next + reached]:
+            for point in self._way[self._next : self._next + reached].tolist():
                 self._arrive(point)
             if reached:
                 self._poll = self._sent_at = self._reached_at[reached - 1]
                 self._reached_at = self._reached_at[reached:]
 
-    def _arrive(self, point: tuple[float, float]) -> None:
+    def _arrive(self, point: list[float]) -> None:
         self._next += 1
         if self._last_point is not None:
             self._travelled_m += math.dist(self._last_point, point)

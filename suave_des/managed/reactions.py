@@ -75,7 +75,7 @@ class ReactionMeter:
         rising_m = self._settings.visibility_thresholds_m[::-1]
         altitudes_m = (None, *self._settings.expected_altitudes_m[::-1])
         published = self._visibility.published(self._env.now)
-        bands = np.searchsorted(rising_m, self._visibility.values[:published], side="right")
+        bands = np.searchsorted(rising_m, self._visibility.arrays[1][:published], side="right")
         before = -1
         for message, band in enumerate(bands.tolist()):
             if band != before:

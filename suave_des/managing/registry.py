@@ -8,6 +8,7 @@ from difflib import get_close_matches
 from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
+from types import ModuleType
 
 from suave_des.errors import InputError
 from suave_des.managing.base import ManagingSubsystem
@@ -48,11 +49,8 @@ def _registered() -> dict[str, str]:
 
 def _load(name: str, target: str) -> type[ManagingSubsystem]:
     module_name, _, attribute = target.partition(":")
-    here = str(Path.cwd())
-    if here not in sys.path:  # where `python` would find a module of one's own, but an installed command would not
-        sys.path.append(here)
     try:
-        module = importlib.import_module(module_name)
+        module = sys.modules.get(module_name) or _imported(module_name)
     except (Exception, SystemExit) as error:  # whatever the module's own code raises on import
         raise InputError(
             f"manager {name!r}: {type(error).__name__}: {error}",
@@ -65,3 +63,10 @@ def _load(name: str, target: str) -> type[ManagingSubsystem]:
             remedy="derive your class from suave_des.managing.base.ManagingSubsystem",
         )
     return found
+
+
+def _imported(module_name: str) -> ModuleType:
+    here = str(Path.cwd())
+    if here not in sys.path:  # where `python` would find a module of one's own, but an installed command would not
+        sys.path.append(here)
+    return importlib.import_module(module_name)

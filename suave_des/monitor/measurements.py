@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from suave_des.clock import tick_at_or_after
 from suave_des.world.signals import Signal
@@ -51,6 +51,14 @@ class Measurements:
     values: tuple[float, ...]
     phase_s: float
     period_s: float
+    arrays: tuple[NDArray[np.float64], NDArray[np.float64]] = field(repr=False, compare=False)
+    """Times and values once more, for whoever looks at all of them at once."""
+
+    @classmethod
+    def of(cls, key: str, times_s: ArrayLike, values: ArrayLike, phase_s: float, period_s: float) -> Measurements:
+        """Measurements from sequences of times and values."""
+        times, levels = np.asarray(times_s, dtype=np.float64), np.asarray(values, dtype=np.float64)
+        return cls(key, tuple(times.tolist()), tuple(levels.tolist()), phase_s, period_s, (times, levels))
 
     def published(self, t_s: float) -> int:
         """How many values are published until mission time t."""
@@ -94,17 +102,16 @@ def measure(
     if time_step_s:
         # A time within a millionth of a step below a multiple counts as the multiple: timers add up rounding errors.
         looks = np.floor(times / time_step_s + 1e-6) * time_step_s
-    values, changed, changed_to = _looked_up(signal, looks.tobytes())
+    values, changed = _looked_up(signal, looks.tobytes())
     if noise is not None:
         values = values + np.array([noise() for _ in range(len(times))])
         changed = _changes(values)
-        changed_to = tuple(values[changed].tolist())
-    return Measurements(key, tuple(times[changed].tolist()), changed_to, phase_s, period_s)
+    return Measurements.of(key, times[changed], values[changed], phase_s, period_s)
 
 
 @lru_cache(maxsize=64)
-def _looked_up(signal: Signal, times_s: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64], tuple[float, ...]]:
-    """Values of a signal at times (float64), the places where they change, and what they change to.
+def _looked_up(signal: Signal, times_s: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Values of a signal at times (float64), and the places where they change.
 
     If time is cut and the signal is not drawn, they are the same in most runs.
     """
@@ -112,8 +119,7 @@ def _looked_up(signal: Signal, times_s: bytes) -> tuple[NDArray[np.float64], NDA
     first = _changes(times)
     values = np.repeat([signal(t_s) for t_s in times[first].tolist()], np.diff(first, append=len(times)))
     values.flags.writeable = False
-    changed = _changes(values)
-    return values, changed, tuple(values[changed].tolist())
+    return values, _changes(values)
 
 
 def _changes(values: NDArray[np.floating[Any]]) -> NDArray[np.int64]:

@@ -36,7 +36,7 @@ from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.kernel import ROW
 from suave_des.vehicle.model import Array
 from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle, track_rows
-from suave_des.world.pipeline import SEA_BED_Z_M, SURFACE_Z_M, path_to_inspect, sample_points
+from suave_des.world.pipeline import SEA_BED_Z_M, SURFACE_Z_M, sample_points, there_and_back
 
 OnTime = Callable[[float, float], None]
 
@@ -54,7 +54,7 @@ class Simulator:
         self.runs_per_draw = dict(runs_per_draw)
         pipeline = loaded.scenario.pipeline
         self.points = sample_points(pipeline.vertices_m, pipeline.points_per_piece)
-        self.way_m: list[list[float]] = self.points[:, :2].tolist()
+        self.way_m = there_and_back(self.points)
         height = loaded.scenario.revision.monitors.detected_point_height_m
         self.detection_points = self.points + np.array([0.0, 0.0, height])
         # Kept from mission to mission: a megabyte allocated for each leaves the process's memory in pieces.
@@ -310,9 +310,9 @@ class _Mission:
     def _restore_thruster(self, thruster: int) -> None:
         self.vehicle.set_thruster_health(self.env.now, thruster, 1.0)
 
-    def _path(self) -> list[tuple[float, float]] | None:
+    def _path(self) -> Array | None:
         first = self.detector.first_point
-        return None if first is None else path_to_inspect(self.simulator.way_m, first)
+        return None if first is None else self.simulator.way_m[first:]
 
     def _make_coordinator(self) -> MissionCoordinator:
         settings = self.revision.coordinator

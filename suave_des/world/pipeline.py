@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import cache
 from itertools import pairwise
 
@@ -34,10 +33,16 @@ def sample_points(
     return points
 
 
-def path_to_inspect(points: Sequence[Sequence[float]], first: int) -> list[tuple[float, float]]:
-    """The way to follow from point `first` (0-based): on to the far end, then back along all points, as (x, y) in m."""
-    there = [(point[0], point[1]) for point in points]
-    return there[first:] + there[::-1]
+def there_and_back(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The way along all points and back, shape (2 n, 2): x and y in m.
+
+    From its element `first` on it is the way to follow from the point that is seen first: on to the far end, then back
+    along all points.
+
+    Args:
+        points: x and y in the first two columns, shape (n, at least 2), m.
+    """
+    return np.concatenate((points[:, :2], points[::-1, :2]))
 
 
 @compiled

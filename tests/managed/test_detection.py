@@ -107,17 +107,17 @@ def test_detection_under_many_commands_is_still_the_first_sight(commands: list) 
 
 
 def test_visibility_counts_as_it_was_measured_last() -> None:
-    measured = Measurements("water_visibility", (0.2, 1.2, 2.2), (3.0, 2.0, 1.0), 0.2, 1.0)
+    measured = Measurements.of("water_visibility", (0.2, 1.2, 2.2), (3.0, 2.0, 1.0), 0.2, 1.0)
     rows = measured_at_rows(measured, row_at(3.0))
     picked = [rows[row_at(t_s)] for t_s in (0.2, 1.15, 1.2, 2.9)]
     assert picked == [3.0, 3.0, 2.0, 1.0]
 
 
 def test_before_the_first_measurement_there_is_none() -> None:
-    measured = Measurements("water_visibility", (0.2,), (3.0,), 0.2, 1.0)
+    measured = Measurements.of("water_visibility", (0.2,), (3.0,), 0.2, 1.0)
     assert np.isnan(measured_at_rows(measured, 10)[:4]).all()
 
 
 def test_measurements_after_the_end_are_left_out() -> None:
-    measured = Measurements("water_visibility", (0.0, 1.0, 99.0), (3.0, 2.0, 1.0), 0.0, 1.0)
+    measured = Measurements.of("water_visibility", (0.0, 1.0, 99.0), (3.0, 2.0, 1.0), 0.0, 1.0)
     assert measured_at_rows(measured, 40).tolist() == [3.0] * 20 + [2.0] * 20

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 import simpy
 from hypothesis import given, settings
@@ -18,7 +19,8 @@ SPEED = 0.25
 
 
 def follow_of(env: simpy.Environment, name: str, vehicle: PlacedVehicle, path=LINE) -> FollowPipeline:
-    return FollowPipeline(env, vehicle, sender(env, vehicle), revision(name).follow, lambda: path)
+    way = None if path is None else np.array(path)
+    return FollowPipeline(env, vehicle, sender(env, vehicle), revision(name).follow, lambda: way)
 
 
 def along_the_line() -> MovingVehicle:

@@ -50,8 +50,8 @@ class Timeline:
     @property
     def meter(self) -> ReactionMeter:
         """The meter after all entries."""
-        visibility = Measurements("water_visibility", *_columns(self._visibility), 0.2, 1.0)
-        battery = Measurements("battery_level", *_columns(self._battery), 0.5, 1.0) if self._battery else None
+        visibility = Measurements.of("water_visibility", *_columns(self._visibility), 0.2, 1.0)
+        battery = Measurements.of("battery_level", *_columns(self._battery), 0.5, 1.0) if self._battery else None
         meter = ReactionMeter(self._env, ReactionMetric(), visibility, battery)
         for t_s, note in self._noted:
             if t_s > self._env.now:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.simulation.result import MissionResult
-from suave_des.world.pipeline import path_to_inspect
+from suave_des.world.pipeline import there_and_back
 
 NO_ERRORS = {"calibration": {"altitude_error_m": 0.0, "real_time_factor_loss": 0.0}}
 MANAGERS = ("none", "random", "bt", "bt_extended")
@@ -126,7 +126,7 @@ def test_distance_of_an_undisturbed_inspection_is_the_way_along_some_of_the_path
     metrics = simulator(scenario, **NO_ERRORS).run(manager, 1, 1).metrics
     points = simulator(scenario).points
     first = int(np.argmin(np.abs(points[:, 0] - metrics.detection_x_m)))
-    path = path_to_inspect(points.tolist(), first)
+    path = there_and_back(points)[first:].tolist()
     ways_m = np.cumsum([math.dist(here, there) for here, there in pairwise(path)])
     assert np.min(np.abs(ways_m - metrics.distance_inspected_m)) < 1e-9
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from suave_des.scenario.models import Pipeline
-from suave_des.world.pipeline import first_detection, first_point_in_view, path_to_inspect, sample_points
+from suave_des.world.pipeline import first_detection, first_point_in_view, sample_points, there_and_back
 
 POINTS = sample_points(Pipeline().vertices_m)
 HALF_WIDTH_AT_1_M = math.tan(math.radians(30.0))
@@ -43,9 +43,8 @@ def test_points_cannot_be_changed_by_one_of_their_users() -> None:
 
 
 def test_path_goes_on_from_the_point_seen_and_back_along_all_points() -> None:
-    path = path_to_inspect(POINTS.tolist(), 7)
-    there = [(x, y) for x, y, _ in POINTS.tolist()]
-    assert path == there[7:] + list(reversed(there))
+    there = [[x, y] for x, y, _ in POINTS.tolist()]
+    assert there_and_back(POINTS)[7:].tolist() == there[7:] + there[::-1]
 
 
 @pytest.mark.parametrize(
