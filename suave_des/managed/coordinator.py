@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import simpy
 
@@ -12,19 +11,8 @@ from suave_des.clock import Process, tick_at_or_after, until
 from suave_des.managed.detection import PipelineDetector
 from suave_des.managed.follow import FollowPipeline
 from suave_des.managed.node import Log
+from suave_des.managed.task import FOLLOW, MAINTAIN_MOTION, SEARCH, Task
 from suave_des.scenario.revision import CoordinatorRevision
-
-MAINTAIN_MOTION = "f_maintain_motion"
-SEARCH = "f_generate_search_path"
-FOLLOW = "f_follow_pipeline"
-
-
-@dataclass(frozen=True, slots=True)
-class Task:
-    """A task of the mission, with the functions that it needs."""
-
-    name: str
-    functions: tuple[str, ...]
 
 
 class MissionCoordinator:

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 import simpy
 
-from suave_des.managed.coordinator import MAINTAIN_MOTION
-from suave_des.managed.recharge import RECHARGE
 from suave_des.managed.search import INITIAL_ALTITUDE_M
+from suave_des.managed.task import MAINTAIN_MOTION, RECHARGE
 from suave_des.monitor.diagnostics import FAILED, Diagnostic
 from suave_des.monitor.measurements import Measured, Measurements
 from suave_des.scenario.models import ReactionMetric

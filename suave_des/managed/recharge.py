@@ -8,7 +8,6 @@ from suave_des.clock import Process
 from suave_des.managed.node import FunctionNode, SetPointSender
 from suave_des.world.pipeline import SEA_BED_Z_M
 
-RECHARGE = "generate_recharge_path"
 ALTITUDE_M = 1.25
 RESEND_PERIOD_S = 10.0
 

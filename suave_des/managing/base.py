@@ -9,16 +9,18 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Collection, Generator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import simpy
 
-from suave_des.managed.coordinator import Task
-from suave_des.managed.mode_manager import ModeManager
+from suave_des.managed.task import Task
 from suave_des.monitor.diagnostics import Diagnostic, Kind
 from suave_des.monitor.measurements import Measured
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.modes import UNGROUND_MODE
+
+if TYPE_CHECKING:  # or looking a manager up would load the vehicle and the compiler
+    from suave_des.managed.mode_manager import ModeManager
 
 AdaptationProcess = Generator[simpy.Event, None, None]
 Bounds = Mapping[str, tuple[float, float]]

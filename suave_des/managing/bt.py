@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from math import inf
 
-from suave_des.managed.coordinator import FOLLOW, MAINTAIN_MOTION, SEARCH, Task
-from suave_des.managed.recharge import RECHARGE
+from suave_des.managed.task import FOLLOW, MAINTAIN_MOTION, RECHARGE, SEARCH, Task
 from suave_des.managing.base import Bounds, ManagedSystem, ManagingSubsystem
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
 from suave_des.scenario.modes import UNGROUND_MODE

@@ -15,7 +15,7 @@ from weakref import WeakKeyDictionary
 from suave_des.clock import tick_at_or_after, until
 from suave_des.knowledge.deliberation import REMEMBERED, Conclusion, Deliberation
 from suave_des.knowledge.state import Decision, KnowledgeState, ObjectiveState
-from suave_des.managed.coordinator import SEARCH, Task
+from suave_des.managed.task import SEARCH, Task
 from suave_des.managing.base import AdaptationProcess, Bounds, ManagedSystem, ManagingSubsystem
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, Kind
 from suave_des.scenario.distributions import draw

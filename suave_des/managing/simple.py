@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from suave_des.managed.coordinator import MAINTAIN_MOTION, Task
+from suave_des.managed.task import MAINTAIN_MOTION, Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
 
 

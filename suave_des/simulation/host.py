@@ -9,7 +9,7 @@ import simpy
 
 from suave_des.clock import Process, until
 from suave_des.errors import InputError, MissionError, SuaveDesError
-from suave_des.managed.coordinator import Task
+from suave_des.managed.task import Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
 from suave_des.managing.registry import manager_class
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind

@@ -8,7 +8,7 @@ from typing import Any
 
 import simpy
 
-from suave_des.managed.coordinator import MAINTAIN_MOTION
+from suave_des.managed.task import MAINTAIN_MOTION
 from suave_des.monitor.diagnostics import Diagnostic, Kind
 from suave_des.monitor.measurements import Measurements
 from suave_des.scenario.modes import Mode

@@ -12,15 +12,16 @@ import simpy
 
 from suave_des.clock import Process
 from suave_des.errors import SuaveDesError
-from suave_des.managed.coordinator import FOLLOW, MAINTAIN_MOTION, SEARCH, MissionCoordinator
+from suave_des.managed.coordinator import MissionCoordinator
 from suave_des.managed.detection import PipelineDetector, measured_at_rows
 from suave_des.managed.follow import FollowPipeline
 from suave_des.managed.mode_manager import ModeManager
 from suave_des.managed.motion import MaintainMotion
 from suave_des.managed.node import Frame, FunctionNode, SetPointSender
 from suave_des.managed.reactions import ReactionMeter
-from suave_des.managed.recharge import RECHARGE, GenerateRechargePath
+from suave_des.managed.recharge import GenerateRechargePath
 from suave_des.managed.search import GenerateSearchPath
+from suave_des.managed.task import FOLLOW, MAINTAIN_MOTION, RECHARGE, SEARCH
 from suave_des.managing.base import ManagedSystem
 from suave_des.monitor.diagnostics import DiagnosticsBus, Kind
 from suave_des.monitor.measurements import BatteryLevel, Measurements, measure

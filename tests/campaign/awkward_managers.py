@@ -9,7 +9,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from suave_des.managed.coordinator import Task
+from suave_des.managed.task import Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
 from suave_des.managing.simple import NoManager
 
@@ -52,8 +52,7 @@ class InterruptsOnce(_InRun):
     def adapt(self) -> None:
         with suppress(FileNotFoundError):
             Path(os.environ["AWKWARD_ONCE"]).unlink()
-            own = os.environ.get("AWKWARD_TARGET", "self") == "self"
-            os.kill(os.getpid() if own else os.getppid(), signal.SIGINT)
+            os.kill(int(os.environ["AWKWARD_TARGET"]), signal.SIGINT)
 
 
 class DiesInSome(_InRun):

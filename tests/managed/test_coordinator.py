@@ -7,7 +7,8 @@ import pytest
 import simpy
 from stand_ins import revision
 
-from suave_des.managed.coordinator import MissionCoordinator, Task
+from suave_des.managed.coordinator import MissionCoordinator
+from suave_des.managed.task import Task
 
 BOTH = pytest.mark.parametrize("name", ["2023", "1.5"])
 POLL_PHASE_S, LIMIT_PHASE_S = 0.35, 0.2

@@ -4,7 +4,7 @@ import random
 
 import simpy
 
-from suave_des.managed.coordinator import Task
+from suave_des.managed.task import Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
 from suave_des.managing.registry import manager_class
 from suave_des.monitor.diagnostics import Diagnostic, Kind

@@ -1,6 +1,6 @@
 """Managers as a user would write them, some of them with mistakes."""
 
-from suave_des.managed.coordinator import Task
+from suave_des.managed.task import Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
 from suave_des.monitor.diagnostics import Diagnostic, Kind
 
