@@ -69,8 +69,8 @@ def run_campaign(
             metacontrol.
         runs: missions for each manager, at each point of a sweep: 20.
         seed: of everything that is random: 1.
-        workers: processes; with 1 the missions run in this one. With more, a script must guard itself with
-            `if __name__ == "__main__":`, because worker processes import it; a notebook need not.
+        workers: processes; with 1 the missions run in this one. With more, managers that the calling script defines
+            itself (`__main__:Class`) need `if __name__ == "__main__":` around the call, as workers import the script.
         out: folder for runs.csv, summary.csv and manifest.json, from which the campaign can be resumed. None: no files.
         progress: whether to show how far it is; left out: in a notebook and on a terminal.
         options: sweep, perturbations and runs_per_draw: as in a campaign file. until_ci: "METRIC:HALF_WIDTH", when a

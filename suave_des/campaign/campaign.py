@@ -87,8 +87,8 @@ def run_campaign(
         managers: names, or module:Class.
         runs: missions for each manager, at each point; with `until_ci` at most, and 10,000 if they are left out.
         seed: of everything that is random.
-        workers: processes; with 1 the missions run in this one. With more, a script that calls this must guard itself
-            with `if __name__ == "__main__":`, because worker processes import it.
+        workers: processes; with 1 the missions run in this one. With more, managers that the calling script defines
+            itself (`__main__:Class`) need `if __name__ == "__main__":` around the call, as workers import the script.
         out: folder for runs.csv, summary.csv and manifest.json; it is made if its parent exists. None: no files.
         sweep: lists of values by key path of the scenario, each combined with each; or a mapping with grid, zip and
             sample, as in a campaign file. Each parameter is a column of runs.csv.

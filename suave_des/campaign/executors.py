@@ -6,11 +6,11 @@ travels to it by value.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Protocol
 
-from suave_des.campaign.outcomes import Finished, Job, MissionRunner
+from suave_des.campaign.outcomes import Finished, Job
 from suave_des.campaign.plan import MissionKey
 from suave_des.errors import InputError, SuaveDesError
 
@@ -58,10 +58,11 @@ def check_place(workers: int, scheduler: str | None) -> None:
 
 
 @contextmanager
-def executor(workers: int, scheduler: str | None = None) -> Iterator[Executor]:
+def executor(managers: Sequence[str], workers: int, scheduler: str | None = None) -> Iterator[Executor]:
     """Where a campaign's missions run: in this process, in several, or on the workers of a cluster.
 
     Args:
+        managers: that missions are run of.
         workers: number of processes; with one, missions run in this process.
         scheduler: address of a Dask scheduler, whose workers are used instead.
 
@@ -79,7 +80,7 @@ def executor(workers: int, scheduler: str | None = None) -> Iterator[Executor]:
         return
     from suave_des.campaign.pool import process_pool
 
-    with process_pool(workers) as pool:
+    with process_pool(managers, workers) as pool:
         yield pool
 
 
@@ -88,6 +89,8 @@ class InProcess:
 
     def outcomes(self, job: Job, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
         """Outcomes mission by mission; see Executor."""
+        from suave_des.campaign.missions import MissionRunner  # with it comes the compiler, which takes a while
+
         for finished in MissionRunner(job).each(iter(missions)):
             yield [finished]
 

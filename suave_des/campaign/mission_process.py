@@ -20,7 +20,7 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
-    from suave_des.campaign.outcomes import MissionRunner
+    from suave_des.campaign.missions import MissionRunner
     from suave_des.campaign.parcel import Unpacked
 
 FLUSH_S = 0.2
@@ -110,7 +110,7 @@ def _serve(connection: Connection, requests: SimpleQueue[bytes]) -> None:
 
 def _opened(content: bytes) -> tuple[Unpacked, MissionRunner]:
     from suave_des.campaign.executors import WorkerError
-    from suave_des.campaign.outcomes import MissionRunner
+    from suave_des.campaign.missions import MissionRunner
     from suave_des.campaign.parcel import MODULES_FOLDER, unpack
     from suave_des.campaign.request import manager_code
     from suave_des.errors import InputError

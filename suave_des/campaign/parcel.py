@@ -95,7 +95,7 @@ def _knowledge_bases(job: Job) -> Iterator[LoadedScenario]:
         values = variation.sweep.values(point)
         if (its := [values[name] for name in varied]) not in seen:
             seen.append(its)
-            yield variation.simulator(job.loaded, point).loaded
+            yield variation.scenario(job.loaded, point)
             if len(seen) == _KNOWLEDGE_BASES:
                 return
 

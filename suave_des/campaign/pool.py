@@ -5,17 +5,19 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import sys
 import time
 import traceback
 from collections import deque
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
+from types import ModuleType
 
 from suave_des.campaign.executors import WorkerError, chunk_size
-from suave_des.campaign.outcomes import Finished, Job, MissionRunner, time_out_cause
+from suave_des.campaign.outcomes import Finished, Job, time_out_cause
 from suave_des.campaign.plan import Chunk, MissionKey, chunked
 from suave_des.errors import SuaveDesError
 
@@ -77,8 +79,8 @@ class ProcessPool:
     does not end.
     """
 
-    def __init__(self, workers: list[_Worker]) -> None:
-        self._workers = workers
+    def __init__(self, workers: list[_Worker], start: _Start) -> None:
+        self._workers, self._start = workers, start
         self.is_done = False
 
     def outcomes(self, job: Job, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
@@ -86,24 +88,27 @@ class ProcessPool:
         for worker in self._workers:
             worker.begin(job)
         size = chunk_size(total, len(self._workers))
-        yield from _Crew(self._workers, job, (_Task(chunk) for chunk in chunked(missions, size))).outcomes()
+        tasks = (_Task(chunk) for chunk in chunked(missions, size))
+        yield from _Crew(self._workers, self._start, job, tasks).outcomes()
         self.is_done = True
 
 
 @contextmanager
-def process_pool(workers: int) -> Iterator[ProcessPool]:
+def process_pool(managers: Sequence[str], workers: int) -> Iterator[ProcessPool]:
     """A pool whose workers start now: what they import, they import while this process prepares their work.
 
     They are stopped at the end; at once, if not all outcomes were asked for.
 
     Args:
+        managers: that missions are run of.
         workers: number of processes.
     """
+    start = _Start(needs_script=any(name.startswith("__main__:") for name in managers))
     started: list[_Worker] = []
     try:
         for _ in range(workers):
-            started.append(_started())
-        pool = ProcessPool(started)
+            started.append(start())
+        pool = ProcessPool(started, start)
         yield pool
         if pool.is_done:
             for worker in started:
@@ -120,8 +125,8 @@ def process_pool(workers: int) -> Iterator[ProcessPool]:
 
 
 class _Crew:
-    def __init__(self, workers: list[_Worker], job: Job, tasks: Iterator[_Task]) -> None:
-        self._workers = workers
+    def __init__(self, workers: list[_Worker], start: _Start, job: Job, tasks: Iterator[_Task]) -> None:
+        self._workers, self._start = workers, start
         self._job = job
         self._tasks = tasks
         self._again: deque[_Task] = deque()
@@ -186,12 +191,12 @@ class _Crew:
         if self._in_a_row >= _IN_A_ROW:
             raise WorkerError(
                 f"{_IN_A_ROW} worker processes in a row ended before a mission was done, the last with status {status}"
-                " (killed, or out of memory?)"
+                f" (killed, or out of memory?){self._start.hint()}"
             )
         suspect, *others = worker.tasks
         yield from self._try_again(suspect, status, overdue=worker.overdue)
         self._again.extend(others)
-        self._workers[self._workers.index(worker)] = fresh = _started()
+        self._workers[self._workers.index(worker)] = fresh = self._start()
         fresh.begin(self._job)
         self._hand_out()
 
@@ -208,14 +213,33 @@ class _Crew:
             yield [self._job.failed(task.chunk[0], cause)]
 
 
-def _started() -> _Worker:
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
-    process: BaseProcess = context.Process(target=_work, args=(theirs,), daemon=True)
-    with _interrupts_held():
-        process.start()
-    theirs.close()
-    return _Worker(ours, process)
+@dataclass(frozen=True)
+class _Start:
+    """How workers are started.
+
+    Attributes:
+        needs_script: whether they import the script that asked for them, as a manager is defined in it.
+    """
+
+    needs_script: bool
+
+    def __call__(self) -> _Worker:
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        process: BaseProcess = context.Process(target=_work, args=(theirs,), daemon=True)
+        with _interrupts_held(), nullcontext() if self.needs_script else _script_hidden():
+            process.start()
+        theirs.close()
+        return _Worker(ours, process)
+
+    def hint(self) -> str:
+        """What may be wrong when workers cannot start."""
+        if not self.needs_script:
+            return ""
+        return (
+            "; as a manager is defined in the script itself, each worker runs that too: put the manager into a module"
+            ' of its own, or the campaign under `if __name__ == "__main__":`'
+        )
 
 
 def _end(process: BaseProcess) -> None:
@@ -235,8 +259,21 @@ def _interrupts_held() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+@contextmanager
+def _script_hidden() -> Iterator[None]:
+    """Hide the script that was started from multiprocessing, which would import it, and so run it, in each worker."""
+    script = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = script
+
+
 def _work(connection: Connection) -> None:
     """Life of a worker process: a job and chunks in, outcomes out, until there are no more or the parent is gone."""
+    from suave_des.campaign.missions import MissionRunner  # with it comes the compiler, before the job is there
+
     try:
         job: Job | None = connection.recv()
         if job is None:

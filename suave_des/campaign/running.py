@@ -6,11 +6,13 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from suave_des.campaign import machine_code
 from suave_des.campaign.early_stop import parse_until_ci
 from suave_des.campaign.executors import Executor, WorkerError, executor
 from suave_des.campaign.lock import FolderLock
-from suave_des.campaign.outcomes import Finished, Job, MissionRunner
+from suave_des.campaign.outcomes import Finished, Job
 from suave_des.campaign.output import make_output_folder, remove_derived, remove_parts
 from suave_des.campaign.plan import MissionKey, plan
 from suave_des.campaign.progress import OnProgress, Watch
@@ -27,6 +29,9 @@ from suave_des.campaign.store import (
 from suave_des.campaign.variation import Variation
 from suave_des.errors import InputError, SuaveDesError
 from suave_des.scenario.loader import LoadedScenario
+
+if TYPE_CHECKING:
+    from suave_des.campaign.missions import MissionRunner
 
 LARGE = 1_000_000
 """Missions from which a campaign wants to be confirmed."""
@@ -64,6 +69,11 @@ class Campaign:
     def _new_watch(self) -> Watch:
         return Watch(self.variation.sweep.points, self.request.managers, self.request.runs, self.until)
 
+    def _runner(self) -> MissionRunner:
+        from suave_des.campaign.missions import MissionRunner  # with it comes the compiler, which takes a while
+
+        return MissionRunner(self.job)
+
     def check_size(self, workers: int) -> None:
         """See that a very large campaign is meant.
 
@@ -75,7 +85,7 @@ class Campaign:
             return
         managers = range(len(self.request.managers))
         few = tuple(MissionKey(0, manager, run) for manager in managers for run in range(1, _TIMED_RUNS + 1))
-        runner = MissionRunner(self.job)
+        runner = self._runner()
         runner.run(few[::_TIMED_RUNS])  # compiles, and fills the reasoner's memory
         began_s = time.perf_counter()
         runner.run(few)
@@ -90,9 +100,9 @@ class Campaign:
         """Run what is not done yet, and write the files."""
         workers = min(workers, max(1, self.watch.total))
         with ExitStack() as stack:
-            place = stack.enter_context(executor(workers, scheduler))
-            if workers > 1:
-                MissionRunner(self.job)  # so that inner loops are compiled and stored before workers would each do it
+            place = stack.enter_context(executor(self.request.managers, workers, scheduler))
+            if workers > 1 and not machine_code.is_stored():
+                self._runner()  # which compiles: else each worker would do it
             if self.folder is not None:
                 if not self.folder.exists():
                     stack.callback(_remove_empty, self.folder)  # unless something is in it then

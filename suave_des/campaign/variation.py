@@ -17,7 +17,6 @@ from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import Mission
 from suave_des.scenario.overrides import value_at, with_values
 from suave_des.scenario.wording import did_you_mean, shown
-from suave_des.simulation.simulator import Simulator
 
 _FORMS = ("grid", "zip", "sample")
 _CHECKED_POINTS = 300
@@ -46,8 +45,8 @@ class Variation:
         """Names of all that varies, as given: further columns of runs.csv."""
         return (*self.sweep.parameters, *self.drawn.values())
 
-    def simulator(self, loaded: LoadedScenario, point: int) -> Simulator:
-        """The simulator of a point's missions.
+    def scenario(self, loaded: LoadedScenario, point: int) -> LoadedScenario:
+        """The scenario of a point's missions.
 
         Raises:
             InputError: the scenario does not allow the point's values together.
@@ -59,7 +58,7 @@ class Variation:
             except InputError as error:
                 at = ", ".join(f"{name}={shown(value)}" for name, value in values.items())
                 raise InputError(f"at {at}: {error.problem}", file=error.file, remedy=error.remedy) from None
-        return Simulator(loaded, dict.fromkeys(self.drawn, self.runs_per_draw))
+        return loaded
 
 
 def vary(
@@ -222,6 +221,8 @@ def _check_drawn(loaded: LoadedScenario, perturbed: Mapping[str, str]) -> None:
     """See that a run draws one value for each: of latencies and noise, each use draws its own."""
     if not perturbed:
         return
+    from suave_des.simulation.simulator import Simulator  # with it comes the compiler, which takes a while
+
     short = loaded.scenario.model_copy(update={"mission": Mission(time_limit_s=1.0)})
     drawn = Simulator(replace(loaded, scenario=short)).run("none", 1, 0).drawn
     for name, path in perturbed.items():
@@ -240,7 +241,7 @@ def _check_points(loaded: LoadedScenario, variation: Variation, given: Mapping[s
     points.update(islice(sweep.each_value(), _CHECKED_POINTS))
     for point in sorted(points):
         try:
-            variation.simulator(loaded, point)
+            variation.scenario(loaded, point)
         except InputError as error:
             place = _place_of(sweep.parameters[0], sweep, given) if len(sweep.parameters) == 1 else "sweep"
             raise _wrong(place, error.problem, error.remedy) from None

@@ -12,7 +12,7 @@ import pytest
 
 from suave_des.campaign.campaign import CampaignInterrupted, resume_campaign, run_campaign
 from suave_des.campaign.executors import WorkerError
-from suave_des.campaign.outcomes import MissionRunner
+from suave_des.campaign.missions import MissionRunner
 from suave_des.errors import InputError
 
 RUNS = 12
@@ -58,7 +58,7 @@ def test_when_all_missions_fail_there_are_no_rows(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_interrupted_finished_missions_are_kept(workers: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("AWKWARD_TARGET", "self" if workers == 1 else "parent")
+    monkeypatch.setenv("AWKWARD_TARGET", str(os.getpid()))
     monkeypatch.setenv("AWKWARD_ONCE", str(tmp_path / "once"))
     (tmp_path / "once").touch()
     managers = ["none", "awkward_managers:InterruptsOnce"]

@@ -11,7 +11,8 @@ import pytest
 from suave_des.campaign import dask_worker
 from suave_des.campaign.dask_worker import Order, Report
 from suave_des.campaign.mission_process import Trouble
-from suave_des.campaign.outcomes import Failure, Finished, Job, MissionRunner
+from suave_des.campaign.missions import MissionRunner
+from suave_des.campaign.outcomes import Failure, Finished, Job
 from suave_des.campaign.own_modules import own_modules
 from suave_des.campaign.parcel import Parcel, pack, unpack
 from suave_des.campaign.plan import MissionKey
