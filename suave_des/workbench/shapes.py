@@ -67,7 +67,9 @@ def _finding(report: Graph, result: Node, sources: Sequence[OntologyFile]) -> Fi
     name = local_name(value("focusNode"))
     path = local_name(value("resultPath")) if value("resultPath") else ""
     found = [(source, source.line_of(name)) for source in sources]
-    source, line = next(((one, place) for one, place in found if place), (None, None))
+    focus = report.value(result, URIRef(_SH + "focusNode"))
+    mentions = next((source for source in sources if focus in source.graph.all_nodes()), None)
+    source, line = next(((one, place) for one, place in found if place), (mentions, None))
     said = value("resultMessage")
     return Finding(
         _LEVELS.get(URIRef(str(severity)), Level.ERROR),
