@@ -79,12 +79,12 @@ class KnowledgeBase:
 
     def state(
         self,
-        file: Path | None = None,
+        file: str | Path | None = None,
         *,
         measurements: Mapping[str, Number] | None = None,
         components: Mapping[str, str] | None = None,
         groundings: Mapping[str, str] | None = None,
-        objectives: Iterable[str] = (),
+        objectives: Iterable[str] | Mapping[str, str] = (),
     ) -> KnowledgeState:
         """A state with names checked; without objectives, those of the groundings, else those of the search task.
 
@@ -93,7 +93,7 @@ class KnowledgeBase:
             measurements: measured value by quality attribute type.
             components: c_status by component.
             groundings: function design by function.
-            objectives: functions, or function=status.
+            objectives: functions, or o_status by function.
 
         Raises:
             InputError: a name is unknown, or a value cannot be meant.
@@ -105,11 +105,11 @@ class KnowledgeBase:
         return state_from(
             self.base,
             self.loop,
-            file,
+            None if file is None else Path(file),
             measured=words(measurements),
             components=words(components),
             groundings=words(groundings),
-            objectives=objectives,
+            objectives=words(objectives) if isinstance(objectives, Mapping) else objectives,
         )
 
     def infer(self, state: KnowledgeState) -> Conclusion:

@@ -167,6 +167,15 @@ class TestPolicy:
 
 
 class TestFiles:
+    @pytest.mark.parametrize(
+        ("words", "said"),
+        [(("--csv", "."), ".: is a folder (name a file"), (("--max-failed", "-1"), "--max-failed")],
+    )
+    def test_what_cannot_be_meant_ends_in_one_line(self, command, words, said):
+        status, text, error = command("policy", *words)
+        assert (status, text) == (2, "")
+        assert said in error
+
     def test_the_csv_file_has_every_cell(self, command, tmp_path, policy):
         file, picture = tmp_path / "policy.csv", tmp_path / "policy.png"
         status, text, _ = command("policy", "--max-failed", "1", "--csv", file, "--png", picture)
