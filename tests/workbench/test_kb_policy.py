@@ -240,6 +240,13 @@ class TestDiff:
         _, printed, _ = command("diff", empty, file, "--max-failed", "0", "--format", "json")
         assert json.loads(printed)["states"] == 6
 
+    def test_an_outcome_is_told_once(self, command, tmp_path):
+        empty = rules_file(tmp_path, "# nothing\n", "empty.swrl")
+        file = rules_file(tmp_path, "low: FunctionDesign(?d) -> fd_realisability(fd_spiral_low, false)\n")
+        _, text, _ = command("diff", empty, file, "--max-failed", "0")
+        assert f"{SEARCH}, now ungrounded: A fd_spiral_low, B none left\n  1.25 <= . < 2.25: 6 states\n" in text
+        assert "none left, none left" not in text
+
     def test_components_that_only_one_side_has_are_still_alike(self, bench):
         mine = Space.of(bench.base, bench.loop)
         none = replace(mine, alike=())
