@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from suave_des.errors import InputError
+from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.planning import calls
 from suave_des.knowledge.situation import Lit
@@ -120,7 +120,17 @@ class StateParts:
             )
 
     def state(self, loop: Loop) -> KnowledgeState:
-        """The state. Where no objectives are given, they are those of the groundings, else those of the search task."""
+        """The state. Where no objectives are given, they are those of the groundings, else those of the search task.
+
+        Raises:
+            KnowledgeError: the ontologies have no function that an objective could ask for.
+        """
+        if not self.base.functions:
+            raise KnowledgeError(
+                "there is no function, so there is nothing to decide",
+                file=", ".join(map(str, self.base.files)),
+                remedy="give an ontology that uses TOMASys as suave.owl does",
+            )
         asked = dict(self.objectives)
         if not asked:
             default = self.groundings or [name for name in (*LASTING, SEARCH) if name in self.base.functions]
