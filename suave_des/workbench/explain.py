@@ -63,6 +63,17 @@ class DecisionExplanation:
     because: tuple[Derivation, ...] = ()
     candidates: tuple[Candidate, ...] = ()
 
+    def lines(self) -> Iterator[str]:
+        """The answer, and below it what it rests on and what is said of each design."""
+        yield f"{self.function}: {self.answer}"
+        for derivation in self.because:
+            yield "  adapted because"
+            yield from derivation.lines("    ")
+        for candidate in self.candidates:
+            yield f"  {candidate.design}: {candidate.verdict}: {candidate.reason}"
+            for derivation in candidate.because:
+                yield from derivation.lines("    ")
+
 
 @dataclass(frozen=True)
 class Explanation:
@@ -83,6 +94,27 @@ class Explanation:
     problem: str | None = None
     clashes: tuple[Clash, ...] = ()
     rules: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """As `kb explain` prints it."""
+        return "\n".join(self.lines())
+
+    def lines(self) -> Iterator[str]:
+        """All of it, a fact or a decision after the other."""
+        if self.problem is not None:
+            yield f"contradiction: {self.problem}"
+            yield f"rules in it: {', '.join(self.rules) or 'none'}"
+            for clash in self.clashes:
+                yield f"{clash.property} of {clash.subject} would have {len(clash.sides)} values:"
+                for side in clash.sides:
+                    yield from side.lines("  ")
+            return
+        for derivation in self.facts:
+            yield from derivation.lines()
+        for decision in self.decisions:
+            yield from decision.lines()
+        if not self.facts and not self.decisions:
+            yield "nothing is inferred, and nothing decided"
 
 
 def explain(base: KnowledgeBase, state: KnowledgeState, question: str, improves_exceeded: bool) -> Explanation:

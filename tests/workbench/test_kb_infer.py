@@ -130,6 +130,16 @@ def test_statuses_of_ones_own_are_taken(bench):
     assert [each.status for each in state.objectives] == ["DONE", "UPDATABLE"]
 
 
+def test_one_file_or_name_may_stand_alone(bench, tmp_path):
+    (tmp_path / "mine.swrl").write_text("mine: Objective(?o) -> o_updatable(?o, true)\n")
+    alone = KnowledgeBase.load("suave.owl", rules=tmp_path / "mine.swrl", disabled_rules="compError")
+    assert {rule.name: rule.enabled for rule in alone.base.rules if rule.name in ("mine", "compError")} == {
+        "mine": True,
+        "compError": False,
+    }
+    assert [each.function for each in bench.state(objectives="f_maintain_motion").objectives] == ["f_maintain_motion"]
+
+
 class TestTimeLimit:
     def test_names_the_state_that_takes_too_long_and_refuses_more(self, bench, monkeypatch):
         monkeypatch.setattr("suave_des.knowledge.limit._abandoned", [])
