@@ -168,11 +168,13 @@ class _Teller:
         if subject not in known:
             raise InputError(f"there is nothing named {shown(subject)} in this state", remedy=_near(subject, known))
         there = sorted(_text(fact) for fact in self.triples if (fact.property, fact.subject) == (name, subject))
-        properties = sorted({fact.property for fact in self.triples})
+        kinds = self.base.vocabulary.kinds.items()
+        declared = {self.base.names.short(iri) for iri, kind in kinds if kind & {"object property", "data property"}}
+        properties = sorted(declared | {fact.property for fact in self.triples})
         iri = next(triple[0] for fact, triple in self.triples.items() if fact.subject == subject)
         near = near_rules(self.base, name, iri, wanted, self.tracer.known)
         if not near and not there and value is not None and name not in properties:
-            raise InputError(f"nothing has a {shown(name)} in this state", remedy=_near(name, properties))
+            raise InputError(f"there is no property {shown(name)}", remedy=_near(name, properties))
         raise InputError(
             f"{property_name}({subject}{', ' + wanted if value is not None else ''}) does not follow in this state",
             remedy="; ".join([f"{name} of {subject}: {', '.join(there) or 'none'}", *map(str, near[:NEAREST])]),

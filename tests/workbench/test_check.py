@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from suave_des.cli.main import main
-from suave_des.errors import KnowledgeError
+from suave_des.errors import InputError, KnowledgeError
 from suave_des.resources import shipped_folder
 from suave_des.workbench.check import Subject, check
 from suave_des.workbench.findings import Finding, Level, fails
@@ -232,6 +232,26 @@ def test_shapes_of_ones_own(tmp_path: Path) -> None:
     assert len([one for one in findings if one.message == "c_thruster_1: typeC: no class"]) == 1
     assert fails(findings, Level.WARN)
     assert not fails(findings, Level.ERROR)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"@prefix x: <urn:x> .\nfoo\n", "line 2: is no Turtle: expected directive or statement"),
+        (b"<?xml version='1.0'?><rdf:RDF/>", "this is XML, not Turtle"),
+        (b"<urn:a> <urn:b> \xff", "is not UTF-8 text"),
+        (b"@prefix", "is no Turtle"),
+    ],
+)
+def test_shapes_that_cannot_be_read(
+    content: bytes, said: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "bad.ttl").write_bytes(content)
+    with pytest.raises(InputError) as caught:
+        check(Subject(shapes=[tmp_path / "bad.ttl"]))
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert not caplog.records
 
 
 def command(*arguments: str) -> int:
