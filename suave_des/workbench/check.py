@@ -23,7 +23,7 @@ from suave_des.knowledge.regions import regions_of
 from suave_des.knowledge.rule_checks import check_rule
 from suave_des.knowledge.rule_files import RulesFile, with_rules
 from suave_des.knowledge.rule_names import Vocabulary, rule_from_text
-from suave_des.knowledge.rule_syntax import Named
+from suave_des.knowledge.rule_syntax import Atom, Named
 from suave_des.knowledge.rules import Rule
 from suave_des.knowledge.situation import Model, Triple
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
@@ -31,7 +31,7 @@ from suave_des.knowledge.triples import Content, merge
 from suave_des.knowledge.vocabulary import LANGUAGE_NAMESPACES, PERFORMANCE, RDF_TYPE, TOMASYS, local_name, nearest
 from suave_des.resources import shipped_folder
 from suave_des.workbench.findings import Finding, Level, fails, finding_of, in_order, shown_path
-from suave_des.workbench.reachable import atom_text, dead_rules
+from suave_des.workbench.reachable import atom_text, dead_rules, unmeasured
 from suave_des.workbench.regions import matters, numbers_in, regions_between
 from suave_des.workbench.shapes import check_shapes
 from suave_des.workbench.undefined import undefined_names
@@ -153,9 +153,18 @@ def _dead(
     content: Content, model: Model, given: Collection[Path], sources: Mapping[Path, OntologyFile]
 ) -> Iterator[Finding]:
     """Rules that cannot fire; of imported ontologies, which have rules for many models, that is no surprise."""
-    for rule, atom in dead_rules(content.triples, content, model):
+    dead: list[tuple[Rule, Atom, str, str | None]] = [
+        (rule, atom, f"{atom_text(atom)} holds in no state", None)
+        for rule, atom in dead_rules(content.triples, content, model)
+    ]
+    known = {id(rule) for rule, *_ in dead}
+    for rule, atom, attribute in unmeasured(content.triples, content, model):
+        if id(rule) not in known:
+            message = f"no function design has an estimate of {attribute}, so no grounding has a value of it"
+            dead.append((rule, atom, message, f"add a hasQAestimation of type {attribute} to a design"))
+    for rule, atom, message, remedy in dead:
         level = Level.WARN if rule.file.resolve() in given else Level.INFO
-        found = _at(rule, sources, level, f"can never fire: {atom_text(atom)} holds in no state")
+        found = _at(rule, sources, level, f"can never fire: {message}", remedy)
         place = atom.place()
         if place is not None:
             found = replace(found, column=place.column, line=place.line if rule.place else found.line)

@@ -123,6 +123,15 @@ def test_a_rule_that_never_fires(tmp_path: Path) -> None:
     assert [(one.level, one.rule, one.column) for one in findings] == [(Level.WARN, "A", 4), (Level.WARN, "B", 4)]
 
 
+def test_a_rule_on_an_attribute_that_no_grounding_has_a_value_of(tmp_path: Path) -> None:
+    rule = "A: hasQAvalue(?g, ?q) ^ isQAtype(?q, {}) ^ hasValue(?q, ?v) ^ lessThan(?v, 0.3) -> Role(?g)"
+    finding = only(found(tmp_path, rule.format("battery_level")), "no function design has an estimate of battery_level")
+    assert (finding.level, finding.rule, finding.column) == (Level.WARN, "A", 25)
+    assert not fails(found(tmp_path, rule.format("water_visibility")), Level.WARN)
+    given = "\nB: FunctionGrounding(?g) ^ isQAtype(?q, battery_level) -> hasQAvalue(?g, ?q)"
+    assert not fails(found(tmp_path, rule.format("battery_level") + given), Level.WARN)
+
+
 def test_contradictions_come_from_pellet(tmp_path: Path) -> None:
     rules = 'A: Component(?c) -> c_status(?c, "x") ^ c_status(?c, "y")'
     (error,) = errors(found(tmp_path, rules))
