@@ -78,11 +78,13 @@ def _lines(difference: PolicyDifference) -> Iterator[str]:
 
 def _grouped(difference: PolicyDifference) -> dict[tuple[str, str, str, str], list[CellPair]]:
     """Pairs by what differs, in the order of the policy."""
+    from suave_des.workbench.policy_table import outcome_in_words
+
     found: dict[tuple[str, str, str, str], list[CellPair]] = {}
     for pair in difference.differing:
         for function in pair.functions or pair.one.asked:
             now = pair.one.state.grounded(function) or "ungrounded"
-            outcomes = [", ".join((cell.outcome(function), *cell.marks)) for cell in (pair.one, pair.other)]
+            outcomes = [outcome_in_words(cell, function) for cell in (pair.one, pair.other)]
             found.setdefault((function, now, outcomes[0], outcomes[1]), []).append(pair)
     return found
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -23,7 +22,7 @@ from suave_des.cli.options import DisabledRules, Ontologies, Reasoner, RuleFiles
 
 if TYPE_CHECKING:
     from suave_des.workbench.derivation import Derivation
-    from suave_des.workbench.explain import DecisionExplanation, Explanation
+    from suave_des.workbench.explain import Explanation
 
 
 def explain(
@@ -72,49 +71,7 @@ def explain(
     if form is Format.JSON:
         print_json(_as_json(explanation))
         return
-    for line in _lines(explanation):
-        print(line)
-
-
-def _lines(explanation: Explanation) -> Iterator[str]:
-    if explanation.problem is not None:
-        yield f"contradiction: {explanation.problem}"
-        yield f"rules in it: {', '.join(explanation.rules) or 'none'}"
-        for clash in explanation.clashes:
-            yield f"{clash.property} of {clash.subject} would have {len(clash.sides)} values:"
-            for side in clash.sides:
-                yield from _tree(side, "  ")
-        return
-    for derivation in explanation.facts:
-        yield from _tree(derivation, "")
-    for decision in explanation.decisions:
-        yield from _decision(decision)
-    if not explanation.facts and not explanation.decisions:
-        yield "nothing is inferred, and nothing decided"
-
-
-def _decision(decision: DecisionExplanation) -> Iterator[str]:
-    yield f"{decision.function}: {decision.answer}"
-    for derivation in decision.because:
-        yield "  adapted because"
-        yield from _tree(derivation, "    ")
-    for candidate in decision.candidates:
-        yield f"  {candidate.design}: {candidate.verdict}: {candidate.reason}"
-        for derivation in candidate.because:
-            yield from _tree(derivation, "    ")
-
-
-def _tree(derivation: Derivation, indent: str) -> Iterator[str]:
-    bindings = ", ".join(f"?{name} = {value}" for name, value in derivation.bindings)
-    how = {
-        "rule": f"by rule {derivation.rule}" + (f" with {bindings}" if bindings else ""),
-        "axioms": f"by the schema: {'; '.join(derivation.axioms)}" if derivation.axioms else "by the schema",
-        "state": "given in the state",
-        "ontology": "asserted in the ontology",
-    }[derivation.source]
-    yield f"{indent}{derivation.fact}  [{how}]"
-    for premise in derivation.premises:
-        yield from _tree(premise, indent + "  ")
+    print(explanation)
 
 
 def _as_json(explanation: Explanation) -> dict[str, Any]:

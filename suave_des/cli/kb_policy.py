@@ -11,13 +11,14 @@ import typer
 
 from suave_des.cli.kb_options import Format, Formats, ScenarioOption, TimeLimitS, print_json
 from suave_des.cli.options import DisabledRules, Ontologies, Reasoner, RuleFiles
+from suave_des.errors import InputError
 
 if TYPE_CHECKING:
     from suave_des.workbench.policy import Policy
     from suave_des.workbench.policy_table import FunctionTable
 
 MaxFailed = Annotated[
-    int, typer.Option("--max-failed", metavar="N", help="At most so many components have failed or recovered.")
+    int, typer.Option("--max-failed", min=0, metavar="N", help="At most so many components have failed or recovered.")
 ]
 _TOLD = 5
 _WIDE = 300
@@ -45,6 +46,8 @@ def policy(
     from suave_des.workbench import KnowledgeBase
     from suave_des.workbench.policy_table import columns_of, function_table, rows_of
 
+    if csv is not None and csv.is_dir():
+        raise InputError("is a folder", file=csv, remedy="name a file, such as policy.csv")
     bench = KnowledgeBase.load(
         ontology or (),
         scenario=scenario,

@@ -87,3 +87,5 @@ def query(
         for row in found.rows:
             table.add_row(*(cell or "" for cell in row))
         print_trimmed(output(), table)
+        if not found.rows:
+            print("no rows")

@@ -57,7 +57,7 @@ def rules_text(base: KnowledgeBase) -> str:
                     said = "# This rule has an atom without a name, which rules as text cannot have:\n"
                     text = said + "".join(f"# {line}\n" for line in text.splitlines())
                 blocks.append(text)
-    return "\n".join(blocks)
+    return "\n".join(blocks) or "# no rules\n"
 
 
 def add_rule(

@@ -85,7 +85,7 @@ def _lines(mission: MissionTrial) -> Iterator[str]:
         yield f"    {_times(moments)}: {key}"
     problems = [moment for moment in mission.moments if moment.problem]
     if problems:
-        yield f"  states that would contradict themselves: {len(problems)}, {_times(problems)}"
+        yield f"  states that would contradict themselves: {len(problems)} ({_times(problems)})"
         yield f"    {problems[0].problem}"
 
 

@@ -200,20 +200,30 @@ def _read_bytes(path: Path) -> bytes:
 
 
 @contextmanager
-def _literally() -> Iterator[None]:
-    """Let rdflib take literals as they are written, and keep its log lines on odd ones off the terminal.
-
-    It would otherwise write the ill-formed decimal 1e3 as 1000. What it logs is checked after parsing.
-    """
+def without_log() -> Iterator[None]:
+    """Keep what rdflib logs of odd terms off the terminal."""
     logger = logging.getLogger("rdflib.term")
-    before = logger.level, rdflib.NORMALIZE_LITERALS
+    before = logger.level
     logger.setLevel(logging.CRITICAL)
-    rdflib.NORMALIZE_LITERALS = False
     try:
         yield
     finally:
-        logger.setLevel(before[0])
-        rdflib.NORMALIZE_LITERALS = before[1]
+        logger.setLevel(before)
+
+
+@contextmanager
+def _literally() -> Iterator[None]:
+    """Let rdflib take literals as they are written: it would otherwise write the ill-formed decimal 1e3 as 1000.
+
+    What it logs is checked after parsing.
+    """
+    before = rdflib.NORMALIZE_LITERALS
+    rdflib.NORMALIZE_LITERALS = False
+    try:
+        with without_log():
+            yield
+    finally:
+        rdflib.NORMALIZE_LITERALS = before
 
 
 def _parse_rdf(path: Path, content: bytes) -> Graph:

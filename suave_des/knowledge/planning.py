@@ -49,11 +49,16 @@ def plan(
     return Plan(tuple(decisions))
 
 
+def calls(status: str) -> bool:
+    """Whether an objective of a status (o_status) is adapted."""
+    return status in _CALLING or status.startswith("IN_ERROR_")
+
+
 def _call(objective: ObjectiveState, inference: Inference) -> str | None:
     """Why an objective is adapted; None when it need not be."""
     name = objective_name(objective.function)
     for status in map(str, inference.values(name, "o_status")):
-        if status in _CALLING or status.startswith("IN_ERROR_"):
+        if calls(status):
             return f"o_status {status}"
     if True in inference.values(name, "o_updatable"):
         return "updatable"

@@ -22,6 +22,10 @@ from suave_des.workbench.states import Loop, state_from
 DEFAULT_SCENARIO = "seams2023"
 
 
+def _several(files: str | Path | Sequence[str | Path]) -> Sequence[str | Path]:
+    return [files] if isinstance(files, str | Path) else files
+
+
 @dataclass(frozen=True, eq=False)
 class KnowledgeBase:
     """Ontologies with a reasoner, and the loop that they are used in.
@@ -42,18 +46,18 @@ class KnowledgeBase:
     @classmethod
     def load(
         cls,
-        ontologies: Sequence[str | Path] = (),
+        ontologies: str | Path | Sequence[str | Path] = (),
         *,
         scenario: str | Path = DEFAULT_SCENARIO,
         reasoner: str | None = None,
-        rules: Sequence[str | Path] = (),
-        disabled_rules: Sequence[str] = (),
+        rules: str | Path | Sequence[str | Path] = (),
+        disabled_rules: str | Sequence[str] = (),
         time_limit_s: float = TIME_LIMIT_S,
     ) -> KnowledgeBase:
         """Read ontologies and start a reasoner on them.
 
         Args:
-            ontologies: files; without any, those of the scenario.
+            ontologies: files, or one; without any, those of the scenario.
             scenario: a scenario file, or the name of a shipped one: its ontologies, overridden values, measured
                 attributes, and what its revision does in code.
             reasoner: in place of the scenario's.
@@ -66,7 +70,11 @@ class KnowledgeBase:
             KnowledgeError: the ontologies cannot be reasoned with.
         """
         loaded = load_scenario(
-            scenario, ontologies=ontologies, reasoner=reasoner, rules=rules, disabled_rules=disabled_rules
+            scenario,
+            ontologies=_several(ontologies),
+            reasoner=reasoner,
+            rules=_several(rules),
+            disabled_rules=[disabled_rules] if isinstance(disabled_rules, str) else disabled_rules,
         )
         reasoner = loaded.scenario.knowledge.reasoner
         limit = TimeLimit(time_limit_s, "--time-limit")
@@ -79,12 +87,12 @@ class KnowledgeBase:
 
     def state(
         self,
-        file: Path | None = None,
+        file: str | Path | None = None,
         *,
         measurements: Mapping[str, Number] | None = None,
         components: Mapping[str, str] | None = None,
         groundings: Mapping[str, str] | None = None,
-        objectives: Iterable[str] = (),
+        objectives: str | Iterable[str] | Mapping[str, str] = (),
     ) -> KnowledgeState:
         """A state with names checked; without objectives, those of the groundings, else those of the search task.
 
@@ -93,7 +101,7 @@ class KnowledgeBase:
             measurements: measured value by quality attribute type.
             components: c_status by component.
             groundings: function design by function.
-            objectives: functions, or function=status.
+            objectives: functions, or o_status by function.
 
         Raises:
             InputError: a name is unknown, or a value cannot be meant.
@@ -102,14 +110,15 @@ class KnowledgeBase:
         def words(parts: Mapping[str, object] | None) -> list[str]:
             return [f"{name}={value}" for name, value in (parts or {}).items()]
 
+        asked = [objectives] if isinstance(objectives, str) else objectives
         return state_from(
             self.base,
             self.loop,
-            file,
+            None if file is None else Path(file),
             measured=words(measurements),
             components=words(components),
             groundings=words(groundings),
-            objectives=objectives,
+            objectives=words(objectives) if isinstance(objectives, Mapping) else asked,
         )
 
     def infer(self, state: KnowledgeState) -> Conclusion:

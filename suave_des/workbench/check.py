@@ -23,23 +23,24 @@ from suave_des.knowledge.regions import regions_of
 from suave_des.knowledge.rule_checks import check_rule
 from suave_des.knowledge.rule_files import RulesFile, with_rules
 from suave_des.knowledge.rule_names import Vocabulary, rule_from_text
-from suave_des.knowledge.rule_syntax import Named
+from suave_des.knowledge.rule_syntax import Atom, Named
 from suave_des.knowledge.rules import Rule
 from suave_des.knowledge.situation import Model, Triple
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.knowledge.triples import Content, merge
-from suave_des.knowledge.vocabulary import LANGUAGE_NAMESPACES, PERFORMANCE, RDF_TYPE, TOMASYS, local_name
+from suave_des.knowledge.vocabulary import LANGUAGE_NAMESPACES, PERFORMANCE, RDF_TYPE, TOMASYS, local_name, nearest
 from suave_des.resources import shipped_folder
 from suave_des.workbench.findings import Finding, Level, fails, finding_of, in_order, shown_path
-from suave_des.workbench.reachable import atom_text, dead_rules
+from suave_des.workbench.reachable import atom_text, dead_rules, unmeasured
 from suave_des.workbench.regions import matters, numbers_in, regions_between
 from suave_des.workbench.shapes import check_shapes
+from suave_des.workbench.undefined import undefined_names
 
 #: Modes that are no function design: the one that a cancelled task sets, and the one that a file starts with.
 _NO_DESIGNS: Final = {"fd_unground", "__DEFAULT__"}
 #: States that Pellet is asked about; `kb policy` goes through all.
 MAX_STATES: Final = 300
-_ADD_MODE: Final = "add the mode, or remove the design"
+_ADD_MODE: Final = "add a mode of this name to the System Modes file, or remove the design"
 
 
 @dataclass(frozen=True)
@@ -88,10 +89,12 @@ def check(subject: Subject) -> tuple[Finding, ...]:
 
     content = merge(sources, subject.values)
     attempt(lambda: check_values(content, sources))
+    values_are_right = not findings
     built: list[tuple[Model, Content]] = []
     attempt(lambda: built.append(build_model(content, Names(content), sources)))
     model = built[0][0] if built else None
     vocabulary = Vocabulary.of(content.triples, model)
+    findings += _undefined(content, model, vocabulary, sources)
     groups = []
     for file in files:
         findings += [finding_of(error) for error in file.parsed.errors]
@@ -104,10 +107,13 @@ def check(subject: Subject) -> tuple[Finding, ...]:
         groups.append(rules)
     whole = with_rules(content, groups, subject.disabled_rules)
     lines = {source.path: source for source in sources}
+    findings += _replaced(content.rules, groups)
     findings += _of_rules(whole, vocabulary, lines)
     if model is not None:
         findings += _dead(whole, model, {path.resolve() for path in (*given, *subject.rules)}, lines)
         findings += _of_model(whole, model, sources, subject)
+        if values_are_right:
+            findings += _without_performance(whole, model, sources)
     findings += check_shapes(sources, subject.shapes)
     if not fails(findings, Level.ERROR):
         attempt(lambda: findings.extend(_of_reasoner(subject)))
@@ -131,13 +137,34 @@ def _of_rules(content: Content, vocabulary: Vocabulary, sources: Mapping[Path, O
             yield found
 
 
+def _replaced(rules: Sequence[Rule], groups: Sequence[Sequence[Rule]]) -> Iterator[Finding]:
+    """Rules as text that take the place of others of their name, and say something else."""
+    before = {rule.name: rule for rule in rules}
+    for group in groups:
+        for rule in group:
+            old = before.get(rule.name)
+            if old is not None and (old.text, old.enabled) != (rule.text, rule.enabled):
+                message = f"takes the place of the rule of this name in {shown_path(old.file)}"
+                yield _at(rule, {}, Level.INFO, message)
+        before |= {rule.name: rule for rule in group}
+
+
 def _dead(
     content: Content, model: Model, given: Collection[Path], sources: Mapping[Path, OntologyFile]
 ) -> Iterator[Finding]:
     """Rules that cannot fire; of imported ontologies, which have rules for many models, that is no surprise."""
-    for rule, atom in dead_rules(content.triples, content, model):
+    dead: list[tuple[Rule, Atom, str, str | None]] = [
+        (rule, atom, f"{atom_text(atom)} holds in no state", None)
+        for rule, atom in dead_rules(content.triples, content, model)
+    ]
+    known = {id(rule) for rule, *_ in dead}
+    for rule, atom, attribute in unmeasured(content.triples, content, model):
+        if id(rule) not in known:
+            message = f"no function design has an estimate of {attribute}, so no grounding has a value of it"
+            dead.append((rule, atom, message, f"add a hasQAestimation of type {attribute} to a design"))
+    for rule, atom, message, remedy in dead:
         level = Level.WARN if rule.file.resolve() in given else Level.INFO
-        found = _at(rule, sources, level, f"can never fire: {atom_text(atom)} holds in no state")
+        found = _at(rule, sources, level, f"can never fire: {message}", remedy)
         place = atom.place()
         if place is not None:
             found = replace(found, column=place.column, line=place.line if rule.place else found.line)
@@ -165,13 +192,38 @@ def _line_of_rule(name: str, source: OntologyFile | None) -> int | None:
     return int(place.removeprefix("line ")) if place else None
 
 
+def _about(
+    sources: Sequence[OntologyFile], level: Level, name: str, message: str, remedy: str | None = None
+) -> Finding:
+    """A finding on an individual, with the file and line where it is described."""
+    for source in sources:
+        place = source.line_of(name)
+        if place is not None:
+            return Finding(level, message, str(source.path), int(place.removeprefix("line ")), remedy=remedy)
+    return Finding(level, message, str(sources[0].path), remedy=remedy)
+
+
+def _undefined(
+    content: Content, model: Model | None, vocabulary: Vocabulary, sources: Sequence[OntologyFile]
+) -> Iterator[Finding]:
+    """Names that are not defined; those of others' vocabularies may be defined elsewhere."""
+    for found in undefined_names(content, model, vocabulary):
+        level = Level.ERROR if found.is_ours else Level.WARN
+        yield _about(sources, level, local_name(found.subject), found.message, found.remedy)
+
+
+def _without_performance(content: Content, model: Model, sources: Sequence[OntologyFile]) -> Iterator[Finding]:
+    expected = expectations(content, model)
+    for name in sorted(model.designs):
+        if local_name(PERFORMANCE) not in expected.get(name, {}):
+            remedy = "add a hasQAestimation of type performance"
+            message = f"function design {name} has no performance, and counts 0.001"
+            yield _about(sources, Level.WARN, name, message, remedy)
+
+
 def _of_model(content: Content, model: Model, sources: Sequence[OntologyFile], subject: Subject) -> Iterator[Finding]:
     def about(level: Level, name: str, message: str, remedy: str | None = None) -> Finding:
-        for source in sources:
-            place = source.line_of(name)
-            if place is not None:
-                return Finding(level, message, str(source.path), int(place.removeprefix("line ")), remedy=remedy)
-        return Finding(level, message, str(sources[0].path), remedy=remedy)
+        return _about(sources, level, name, message, remedy)
 
     designs: dict[str, list[str]] = {name: [] for name in model.functions}
     functions = {iri: name for name, iri in model.functions.items()}
@@ -190,17 +242,12 @@ def _of_model(content: Content, model: Model, sources: Sequence[OntologyFile], s
         if subject.modes is not None:
             modes = subject.modes.get(name, ())
             level = Level.ERROR if needed else Level.WARN
+            spare = set(modes) - set(designs.get(name, ())) - _NO_DESIGNS
             for design in sorted(set(designs.get(name, ())) - set(modes)):
-                yield about(
-                    level, design, f"function design {design} has no mode of its name for {name}", "add the mode"
-                )
-            for mode in sorted(set(modes) - set(designs.get(name, ())) - _NO_DESIGNS):
+                remedy = nearest(design, spare) or _ADD_MODE
+                yield about(level, design, f"function design {design} has no mode of its name for {name}", remedy)
+            for mode in sorted(spare):
                 yield about(Level.WARN, name, f"mode {mode} of {name} has no function design, so it is never chosen")
-    expected = expectations(content, model)
-    for name in sorted(model.designs):
-        if local_name(PERFORMANCE) not in expected.get(name, {}):
-            remedy = "add a hasQAestimation of type performance"
-            yield about(Level.WARN, name, f"function design {name} has no performance, and counts 0.001", remedy)
     for name in _unused(content, model):
         yield about(Level.INFO, name, f"nothing refers to {name}")
 

@@ -28,6 +28,23 @@ class Derivation:
     premises: tuple[Derivation, ...] = ()
     axioms: tuple[str, ...] = ()
 
+    def __str__(self) -> str:
+        """As a tree of lines."""
+        return "\n".join(self.lines())
+
+    def lines(self, indent: str = "") -> Iterator[str]:
+        """The fact and how it follows, and below it, indented, all that it rests on."""
+        bindings = ", ".join(f"?{name} = {value}" for name, value in self.bindings)
+        how = {
+            "rule": f"by rule {self.rule}" + (f" with {bindings}" if bindings else ""),
+            "axioms": f"by the schema: {'; '.join(self.axioms)}" if self.axioms else "by the schema",
+            "state": "given in the state",
+            "ontology": "asserted in the ontology",
+        }[self.source]
+        yield f"{indent}{self.fact}  [{how}]"
+        for premise in self.premises:
+            yield from premise.lines(indent + "  ")
+
     def leaves(self) -> Iterator[Derivation]:
         """The asserted facts that it rests on."""
         if not self.premises:

@@ -63,6 +63,17 @@ class DecisionExplanation:
     because: tuple[Derivation, ...] = ()
     candidates: tuple[Candidate, ...] = ()
 
+    def lines(self) -> Iterator[str]:
+        """The answer, and below it what it rests on and what is said of each design."""
+        yield f"{self.function}: {self.answer}"
+        for derivation in self.because:
+            yield "  adapted because"
+            yield from derivation.lines("    ")
+        for candidate in self.candidates:
+            yield f"  {candidate.design}: {candidate.verdict}: {candidate.reason}"
+            for derivation in candidate.because:
+                yield from derivation.lines("    ")
+
 
 @dataclass(frozen=True)
 class Explanation:
@@ -83,6 +94,27 @@ class Explanation:
     problem: str | None = None
     clashes: tuple[Clash, ...] = ()
     rules: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """As `kb explain` prints it."""
+        return "\n".join(self.lines())
+
+    def lines(self) -> Iterator[str]:
+        """All of it, a fact or a decision after the other."""
+        if self.problem is not None:
+            yield f"contradiction: {self.problem}"
+            yield f"rules in it: {', '.join(self.rules) or 'none'}"
+            for clash in self.clashes:
+                yield f"{clash.property} of {clash.subject} would have {len(clash.sides)} values:"
+                for side in clash.sides:
+                    yield from side.lines("  ")
+            return
+        for derivation in self.facts:
+            yield from derivation.lines()
+        for decision in self.decisions:
+            yield from decision.lines()
+        if not self.facts and not self.decisions:
+            yield "nothing is inferred, and nothing decided"
 
 
 def explain(base: KnowledgeBase, state: KnowledgeState, question: str, improves_exceeded: bool) -> Explanation:
@@ -136,11 +168,13 @@ class _Teller:
         if subject not in known:
             raise InputError(f"there is nothing named {shown(subject)} in this state", remedy=_near(subject, known))
         there = sorted(_text(fact) for fact in self.triples if (fact.property, fact.subject) == (name, subject))
-        properties = sorted({fact.property for fact in self.triples})
+        kinds = self.base.vocabulary.kinds.items()
+        declared = {self.base.names.short(iri) for iri, kind in kinds if kind & {"object property", "data property"}}
+        properties = sorted(declared | {fact.property for fact in self.triples})
         iri = next(triple[0] for fact, triple in self.triples.items() if fact.subject == subject)
         near = near_rules(self.base, name, iri, wanted, self.tracer.known)
         if not near and not there and value is not None and name not in properties:
-            raise InputError(f"nothing has a {shown(name)} in this state", remedy=_near(name, properties))
+            raise InputError(f"there is no property {shown(name)}", remedy=_near(name, properties))
         raise InputError(
             f"{property_name}({subject}{', ' + wanted if value is not None else ''}) does not follow in this state",
             remedy="; ".join([f"{name} of {subject}: {', '.join(there) or 'none'}", *map(str, near[:NEAREST])]),

@@ -59,6 +59,16 @@ class _Element:
         )
 
     @property
+    def declared_for_rules(self) -> str | None:
+        """The IRI of what this only declares, in the way in which a rule is added; None where it does not."""
+        about = self.attributes.get(f"{RDF_NS} about")
+        kinds = [child.attributes.get(f"{RDF_NS} resource") for child in self.children]
+        if self.name != f"{RDF_NS} Description" or len(self.attributes) != 1 or about is None or len(kinds) != 1:
+            return None
+        declares = self.children[0].name == f"{RDF_NS} type" and _declares_for_rules(about, kinds[0])
+        return about if declares else None
+
+    @property
     def rule_name(self) -> str | None:
         """Its label, or the last part of its IRI; None where it has neither."""
         for child in self.children:
@@ -165,7 +175,7 @@ def add_rule(path: Path, text: str) -> Rule:
 
 
 def remove_rule(path: Path, name: str) -> None:
-    """Remove a rule from an OWL file.
+    """Remove a rule from an OWL file, with the declarations of variables and built-ins that nothing else uses.
 
     Raises:
         InputError: the file cannot be edited.
@@ -173,7 +183,10 @@ def remove_rule(path: Path, name: str) -> None:
     """
     file, document, elements = _found(path, name)
     content = file.content
-    parts = {id(part): part for element in elements for part in document.parts(element)}
+    lone = _used_only_by(file, name)
+    found = [part for element in elements for part in document.parts(element)]
+    found += [element for element in document.elements if element.declared_for_rules in lone]
+    parts = {id(part): part for part in found}
     for part in sorted(parts.values(), key=lambda element: -element.start):
         start = content.rfind(b"\n", 0, part.start) + 1
         start = part.start if content[start : part.start].strip() else start
@@ -248,7 +261,11 @@ def _with(rule: Rule) -> Callable[[list[_Said]], list[_Said]]:
 def _rest(file: OntologyFile, rules: tuple[Rule, ...]) -> tuple[set[Any], Counter[Any]]:
     """What a file says besides its rules: triples, and those with nodes that have no name without these."""
     inside = {triple for rule in rules for triple in rule.triples}
-    triples = [triple for triple in file.graph if triple not in inside and not _declares_for_rules(triple)]
+    triples = [
+        triple
+        for triple in file.graph
+        if triple not in inside and not (triple[1] == RDF.type and _declares_for_rules(str(triple[0]), str(triple[2])))
+    ]
     named = {triple for triple in triples if not any(isinstance(term, BNode) for term in triple)}
     unnamed = Counter(
         tuple(None if isinstance(term, BNode) else term for term in triple) for triple in triples if triple not in named
@@ -256,13 +273,18 @@ def _rest(file: OntologyFile, rules: tuple[Rule, ...]) -> tuple[set[Any], Counte
     return named, unnamed
 
 
-def _declares_for_rules(triple: Any) -> bool:
-    """Whether a triple only declares a variable, a built-in or the mark of switched-off rules."""
-    subject, predicate, value = triple
-    return predicate == RDF.type and (
-        value in (URIRef(SWRL + "Variable"), URIRef(SWRL + "Builtin"))
-        or (value == OWL.AnnotationProperty and str(subject).startswith(SWRLA))
+def _declares_for_rules(iri: str, kind: str | None) -> bool:
+    """Whether a type only declares a variable, a built-in or the mark of switched-off rules."""
+    return kind in (SWRL + "Variable", SWRL + "Builtin") or (
+        kind == str(OWL.AnnotationProperty) and iri.startswith(SWRLA)
     )
+
+
+def _used_only_by(file: OntologyFile, name: str) -> set[str]:
+    """IRIs that stand in rules of a name, and of which the rest of a file says one thing at most: what they are."""
+    inside = {triple for rule in rules_of(file) if rule.name == name for triple in rule.triples}
+    elsewhere = Counter(term for triple in file.graph if triple not in inside for term in triple)
+    return {str(term) for triple in inside for term in triple if isinstance(term, URIRef) and elsewhere[term] <= 1}
 
 
 def _finish(file: OntologyFile, content: bytes, change: Callable[[list[_Said]], list[_Said]]) -> None:

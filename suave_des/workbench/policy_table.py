@@ -49,7 +49,7 @@ def function_table(policy: Policy, function: str) -> FunctionTable:
     """The table of one function, without the coordinates on which it does not depend."""
     cells = [cell for cell in policy.cells if function in cell.asked]
     coordinates = _coordinates(policy)
-    outcome = [_outcome(cell, function) for cell in cells]
+    outcome = [outcome_in_words(cell, function) for cell in cells]
     kept = list(coordinates)
     for name in [*coordinates]:
         if name == f"grounding {function}":
@@ -94,7 +94,8 @@ def present(cell: Cell, function: str) -> str:
     return cell.state.grounded(function) or UNGROUNDED
 
 
-def _outcome(cell: Cell, function: str) -> str:
+def outcome_in_words(cell: Cell, function: str) -> str:
+    """What happens to a function's grounding, and whether the choice flips back and forth."""
     flips = f" ({FLIP_FLOP})" if FLIP_FLOP in cell.marks else ""
     return cell.outcome(function) + flips
 

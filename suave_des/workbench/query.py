@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 import rdflib
+from rdflib.compare import to_canonical_graph
 from rdflib.namespace import RDFS
 
 from suave_des.errors import InputError
@@ -17,6 +19,7 @@ from suave_des.knowledge.state import KnowledgeState
 from suave_des.knowledge.triples import n_triple
 from suave_des.knowledge.vocabulary import MROS, OWL, RDF, SUAVE, SWRL, TOMASYS, XSD
 
+_UNNAMED: Final = re.compile(r"(?<![^\s])_:([A-Za-z0-9]+)(?=\s)")
 _PREFIXES: Final = {
     "suave": SUAVE,
     "tomasys": TOMASYS,
@@ -58,17 +61,28 @@ def run_query(base: KnowledgeBase, text: str, state: KnowledgeState | None, *, i
     """
     situation = () if state is None else base.situation(state)
     more: Iterable[Triple] = InProcessPellet(base).infer(situation) if inferred else ()
-    graph = rdflib.Graph()
-    lines = base.content.n_triples(base.content.rules) + "".join(map(n_triple, (*situation, *more)))
-    graph.parse(data=lines, format="nt")
+    content = replace(base.content, structure=_with_fixed_names(base.content.structure))
+    graph = rdflib.Graph("SimpleMemory")  # goes through triples in the order in which they came
+    lines = content.n_triples(content.rules) + "".join(map(n_triple, (*situation, *more)))
+    names = {name: rdflib.BNode(name) for name in _UNNAMED.findall(lines)}
+    graph.parse(data=lines, format="nt", bnode_context=names)
     for source in base._sources:
         for predicate in (RDFS.label, RDFS.comment):
-            for subject, value in source.graph.subject_objects(predicate):
+            for subject, value in sorted(source.graph.subject_objects(predicate)):
                 if isinstance(subject, rdflib.URIRef):
                     graph.add((subject, predicate, value))
     for prefix, namespace in _PREFIXES.items():
         graph.bind(prefix, namespace, override=True, replace=True)
     return _asked(graph, text)
+
+
+def _with_fixed_names(structure: Sequence[str]) -> tuple[str, ...]:
+    """Class expressions with names for their parts that are the same each time: the parser's are drawn at random.
+
+    A query with LIMIT and without ORDER BY is then answered alike, too.
+    """
+    graph = to_canonical_graph(rdflib.Graph().parse(data="".join(structure), format="nt"))
+    return tuple(sorted(f"{' '.join(term.n3() for term in triple)} .\n" for triple in graph))
 
 
 def _asked(graph: rdflib.Graph, text: str) -> QueryResult:

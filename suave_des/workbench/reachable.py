@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from suave_des.knowledge.rule_syntax import EXPRESSION, Atom
+from suave_des.knowledge.rule_syntax import EXPRESSION, Atom, Named
 from suave_des.knowledge.rule_writer import write_atom
 from suave_des.knowledge.rules import Rule
 from suave_des.knowledge.situation import Lit, Model, Triple
@@ -115,6 +115,34 @@ def dead_rules(triples: Iterable[Triple], content: Content, model: Model) -> lis
         possible.spread()
         waiting = [rule for rule in waiting if rule not in firing]
     return [(rule, next(atom for atom in rule.body if not possible.allows(atom))) for rule in waiting]
+
+
+def unmeasured(triples: Iterable[Triple], content: Content, model: Model) -> list[tuple[Rule, Atom, str]]:
+    """Enabled rules that want a grounding's value (hasQAvalue) of an attribute that no grounding gets a value of.
+
+    A grounding gets the measured values of those attributes that its function design has an estimate of.
+
+    Returns:
+        each with the atom that names the attribute, and the attribute's name.
+    """
+    has_value, is_type = TOMASYS + "hasQAvalue", TOMASYS + "isQAtype"
+    estimated = frozenset().union(*model.estimated.values())
+    never = {iri: name for name, iri in model.attributes.items() if name not in estimated}
+    if content.head_properties() & {has_value, is_type} or any(triple[1] == has_value for triple in triples):
+        return []  # values come from elsewhere, too
+    found = []
+    for rule in content.enabled_rules:
+        held = {atom.arguments[-1] for atom in rule.body if atom.predicate == has_value}
+        for atom in rule.body:
+            term = atom.arguments[-1] if atom.arguments else None
+            if (
+                atom.predicate == is_type
+                and atom.arguments[0] in held
+                and isinstance(term, Named)
+                and term.iri in never
+            ):
+                found.append((rule, atom, never[term.iri]))
+    return found
 
 
 def atom_text(atom: Atom) -> str:

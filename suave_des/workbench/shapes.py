@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
 from rdflib import Graph, Namespace, URIRef
+from rdflib.plugins.parsers.notation3 import BadSyntax
 from rdflib.term import Node
 
 from suave_des.errors import InputError
-from suave_des.knowledge.ontology_file import OntologyFile
+from suave_des.knowledge.ontology_file import OntologyFile, without_log
 from suave_des.knowledge.vocabulary import local_name
 from suave_des.resources import shipped_folder
 from suave_des.workbench.findings import Finding, Level, shown_path
 
 _SH: Final = Namespace("http://www.w3.org/ns/shacl#")
+_REASON: Final = re.compile(r"Bad syntax \((.*?)\) at \^ in:", re.DOTALL)
 _LEVELS: Final = {_SH.Violation: Level.ERROR, _SH.Warning: Level.WARN, _SH.Info: Level.INFO}
 
 
@@ -52,10 +55,25 @@ def _read(path: Path) -> Graph:
             f"cannot be read: {error.strerror}", file=path, remedy="give SHACL shapes in Turtle"
         ) from error
     try:
-        graph.parse(data=content, format="turtle")
-    except Exception as error:  # rdflib raises many kinds; each means that this is no Turtle
-        first = " ".join(str(error).split())[:200]
-        raise InputError(f"is no Turtle: {first}", file=path, remedy="give SHACL shapes in Turtle") from error
+        if content.lstrip().startswith((b"<?xml", b"<rdf:RDF")):
+            raise InputError("this is XML, not Turtle", file=path, remedy="give SHACL shapes in Turtle")
+        with without_log():
+            graph.parse(data=content, format="turtle")
+    except InputError:
+        raise
+    except BadSyntax as error:
+        reason = _REASON.search(str(error))
+        raise InputError(
+            f"is no Turtle: {reason.group(1) if reason else 'bad syntax'}",
+            file=path,
+            place=f"line {error.lines + 1}",
+            remedy="give SHACL shapes in Turtle",
+        ) from error
+    except UnicodeDecodeError as error:
+        raise InputError("is not UTF-8 text", file=path, remedy="save it as UTF-8") from error
+    except Exception as error:  # of what is cut off, the parser says so in many ways
+        said = "it ends too early" if isinstance(error, IndexError) else " ".join(str(error).split())[:200]
+        raise InputError(f"is no Turtle: {said}", file=path, remedy="give SHACL shapes in Turtle") from error
     return graph
 
 
@@ -67,7 +85,9 @@ def _finding(report: Graph, result: Node, sources: Sequence[OntologyFile]) -> Fi
     name = local_name(value("focusNode"))
     path = local_name(value("resultPath")) if value("resultPath") else ""
     found = [(source, source.line_of(name)) for source in sources]
-    source, line = next(((one, place) for one, place in found if place), (None, None))
+    focus = report.value(result, URIRef(_SH + "focusNode"))
+    mentions = next((source for source in sources if focus in source.graph.all_nodes()), None)
+    source, line = next(((one, place) for one, place in found if place), (mentions, None))
     said = value("resultMessage")
     return Finding(
         _LEVELS.get(URIRef(str(severity)), Level.ERROR),

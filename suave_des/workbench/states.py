@@ -7,9 +7,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from suave_des.errors import InputError
+from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.planning import calls
+from suave_des.knowledge.situation import Lit
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
+from suave_des.knowledge.vocabulary import TOMASYS, XSD, nearest
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.wording import KeyPath, did_you_mean, shown
 from suave_des.scenario.yamlfile import YamlDocument, read_yaml
@@ -17,6 +20,7 @@ from suave_des.scenario.yamlfile import YamlDocument, read_yaml
 UNGROUNDED: Final = "UNGROUNDED"
 SEARCH: Final = "f_generate_search_path"
 LASTING: Final = ("f_maintain_motion",)
+_STATUSES: Final = {"components": "c_status", "objectives": "o_status"}
 _KEYS: Final = ("objectives", "groundings", "components", "measurements")
 
 
@@ -86,14 +90,47 @@ class StateParts:
                 value = str(value).upper()
             if not isinstance(value, str) and not (kind == "objectives" and value is None):
                 raise InputError(f"{name}: {shown(value)} is not a word", remedy="put it in quotes")
+        if isinstance(value, str) and kind in _STATUSES:
+            self._see_status(_STATUSES[kind], value)
         if kind == "groundings" and value not in self.base.designs(name):
             raise InputError(
                 f"{name} has no function design {shown(value)}", remedy=did_you_mean(value, self.base.designs(name))
             )
         getattr(self, kind)[name] = value
 
+    def _see_status(self, prop: str, value: str) -> None:
+        """Refuse a status that is nearly one of the rules': nothing would follow from it.
+
+        Raises:
+            InputError: with the statuses that are known.
+        """
+        words = {
+            term.text
+            for rule in self.base.rules
+            for atom in rule.atoms
+            if atom.predicate == TOMASYS + prop
+            for term in atom.arguments
+            if isinstance(term, Lit) and term.datatype == XSD + "string"
+        }
+        if prop == "o_status":
+            words.add(UNGROUNDED)
+        if value not in words and not calls(value) and nearest(value.upper(), words) is not None:
+            raise InputError(
+                f"{shown(value)} is no {prop} that a rule speaks of", remedy=did_you_mean(value.upper(), sorted(words))
+            )
+
     def state(self, loop: Loop) -> KnowledgeState:
-        """The state. Where no objectives are given, they are those of the groundings, else those of the search task."""
+        """The state. Where no objectives are given, they are those of the groundings, else those of the search task.
+
+        Raises:
+            KnowledgeError: the ontologies have no function that an objective could ask for.
+        """
+        if not self.base.functions:
+            raise KnowledgeError(
+                "there is no function, so there is nothing to decide",
+                file=", ".join(map(str, self.base.files)),
+                remedy="give an ontology that uses TOMASys as suave.owl does",
+            )
         asked = dict(self.objectives)
         if not asked:
             default = self.groundings or [name for name in (*LASTING, SEARCH) if name in self.base.functions]

@@ -171,7 +171,7 @@ def _recorded(folder: Path) -> Iterator[_Recorded]:
         raise InputError(
             f"has no {KNOWLEDGE_FILE} or {CAMPAIGN_KNOWLEDGE_FILE}, nor has a folder in it",
             file=folder,
-            remedy="suave-des run --manager metacontrol --out records what is reasoned about",
+            remedy="run --manager metacontrol --out records what is reasoned about, campaign with --record-knowledge",
         )
 
 
@@ -193,7 +193,10 @@ def _with(base: Ontologies, text: str) -> Ontologies:
 
 
 def _without(base: Ontologies, name: str) -> Ontologies:
-    content = with_rules(base.content, [], [name])
+    try:
+        content = with_rules(base.content, [], [name])
+    except KnowledgeError as error:
+        raise KnowledgeError(error.problem, place="--disable", remedy=error.remedy) from None
     return replace(
         base, content=content, rules=content.rules, content_hash=hash_with_rules(base.content_hash, [], [name])
     )

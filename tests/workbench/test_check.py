@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from suave_des.cli.main import main
-from suave_des.errors import KnowledgeError
+from suave_des.errors import InputError, KnowledgeError
 from suave_des.resources import shipped_folder
 from suave_des.workbench.check import Subject, check
 from suave_des.workbench.findings import Finding, Level, fails
@@ -123,6 +123,15 @@ def test_a_rule_that_never_fires(tmp_path: Path) -> None:
     assert [(one.level, one.rule, one.column) for one in findings] == [(Level.WARN, "A", 4), (Level.WARN, "B", 4)]
 
 
+def test_a_rule_on_an_attribute_that_no_grounding_has_a_value_of(tmp_path: Path) -> None:
+    rule = "A: hasQAvalue(?g, ?q) ^ isQAtype(?q, {}) ^ hasValue(?q, ?v) ^ lessThan(?v, 0.3) -> Role(?g)"
+    finding = only(found(tmp_path, rule.format("battery_level")), "no function design has an estimate of battery_level")
+    assert (finding.level, finding.rule, finding.column) == (Level.WARN, "A", 25)
+    assert not fails(found(tmp_path, rule.format("water_visibility")), Level.WARN)
+    given = "\nB: FunctionGrounding(?g) ^ isQAtype(?q, battery_level) -> hasQAvalue(?g, ?q)"
+    assert not fails(found(tmp_path, rule.format("battery_level") + given), Level.WARN)
+
+
 def test_contradictions_come_from_pellet(tmp_path: Path) -> None:
     rules = 'A: Component(?c) -> c_status(?c, "x") ^ c_status(?c, "y")'
     (error,) = errors(found(tmp_path, rules))
@@ -164,6 +173,63 @@ def test_the_model(tmp_path: Path) -> None:
     assert only(findings, "qa_empty: isQAtype: a QAvalue must be of exactly one").line is not None
 
 
+UNDEFINED = {
+    "class": (
+        "tomasys#FunctionDesign",
+        "tomasys#FunctionDesgn",
+        "fd_all_thrusters: class FunctionDesgn",
+        "FunctionDesign",
+    ),
+    "property": ("tomasys:solvesF ", "tomasys:solvsF ", "fd_all_thrusters: property solvsF", "solvesF"),
+    "individual": (
+        'solvesF rdf:resource="http://www.metacontrol.org/suave#f_follow_pipeline',
+        'solvesF rdf:resource="http://www.metacontrol.org/suave#f_folow_pipeline',
+        "fd_follow_pipeline: solvesF f_folow_pipeline",
+        "f_follow_pipeline",
+    ),
+    "namespace": ("tomasys:isQAtype ", "mros:isQAtype ", "property isQAtype", f"{TOMASYS}isQAtype"),
+}
+
+
+@pytest.mark.parametrize("case", UNDEFINED)
+def test_names_that_individuals_misspell_are_errors(case: str, tmp_path: Path) -> None:
+    right, wrong, message, meant = UNDEFINED[case]
+    path = tmp_path / "edited.owl"
+    text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
+    path.write_text(text.replace(right, wrong, 1), encoding="utf-8")
+    error = only(check(Subject([path])), f"{message} is not defined")
+    assert (error.level, error.file, error.remedy) == (Level.ERROR, str(path), f"did you mean {meant}?")
+    name = error.message.partition(":")[0]
+    assert f"#{name}" in text.splitlines()[(error.line or 0) - 1]
+
+
+def test_names_of_other_vocabularies_may_be_defined_elsewhere(tmp_path: Path) -> None:
+    note = '<dc:creator xmlns:dc="http://purl.org/dc/elements/1.1/">me</dc:creator>'
+    finding = only(found(tmp_path, extra=individual("f_new", "Function", note)), "property creator is not defined")
+    assert finding.level is Level.WARN
+
+
+def test_a_number_with_a_comma(tmp_path: Path) -> None:
+    path = tmp_path / "edited.owl"
+    text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
+    path.write_text(text.replace(">3.25<", ">3,25<"), encoding="utf-8")
+    assert only(check(Subject([path])), "hasValue '3,25' is not an xsd:decimal").remedy == "a number such as 2.25"
+
+
+def test_a_rule_as_text_that_takes_the_place_of_another_is_told(tmp_path: Path) -> None:
+    finding = only(found(tmp_path, "S1a: Role(?q) -> Role(?q)"), "takes the place of the rule of this name in")
+    assert (finding.level, finding.rule, finding.line) == (Level.INFO, "S1a", 1)
+    assert finding.message.endswith("tomasys.owl")
+    same = 'S1a: FunctionGrounding(?fg) ^ fg_status(?fg, "IN_ERROR_COMPONENT") ^ solvesO(?fg, ?o)'
+    findings = found(tmp_path, f'{same} -> o_status(?o, "IN_ERROR_COMPONENT")')
+    assert not [one for one in findings if "takes the place" in one.message]
+
+
+def test_a_design_whose_name_is_nearly_that_of_a_mode(tmp_path: Path) -> None:
+    findings = found(tmp_path, modes={"f_follow_pipeline": ["fd_folow_pipeline"]})
+    assert only(findings, "fd_follow_pipeline has no mode").remedy == "did you mean fd_folow_pipeline?"
+
+
 def test_shapes_of_ones_own(tmp_path: Path) -> None:
     shapes = tmp_path / "mine.ttl"
     shapes.write_text(
@@ -175,6 +241,26 @@ def test_shapes_of_ones_own(tmp_path: Path) -> None:
     assert len([one for one in findings if one.message == "c_thruster_1: typeC: no class"]) == 1
     assert fails(findings, Level.WARN)
     assert not fails(findings, Level.ERROR)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"@prefix x: <urn:x> .\nfoo\n", "line 2: is no Turtle: expected directive or statement"),
+        (b"<?xml version='1.0'?><rdf:RDF/>", "this is XML, not Turtle"),
+        (b"<urn:a> <urn:b> \xff", "is not UTF-8 text"),
+        (b"@prefix", "is no Turtle"),
+    ],
+)
+def test_shapes_that_cannot_be_read(
+    content: bytes, said: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "bad.ttl").write_bytes(content)
+    with pytest.raises(InputError) as caught:
+        check(Subject(shapes=[tmp_path / "bad.ttl"]))
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert not caplog.records
 
 
 def command(*arguments: str) -> int:

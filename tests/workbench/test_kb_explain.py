@@ -159,6 +159,7 @@ class TestDecisions:
         ("fg_status(fg_spiral_high, IN_ERROR_FR)", "does not follow in this state (fg_status of fg_spiral_high: IN_E"),
         ("fg_status(fg_spiral_hi, IN_ERROR_FR)", "there is nothing named 'fg_spiral_hi' in this state (did you mean"),
         ("why fd_spiral_lo?", "there is no function design 'fd_spiral_lo' (did you mean 'fd_spiral_low'"),
+        ("fg_statu(fg_spiral_high, IN_ERROR_FR)", "there is no property 'fg_statu' (did you mean 'fg_status'"),
         ("because", "'because' is no question about a state"),
         ("fg_status(", "is no question about a state"),
     ],

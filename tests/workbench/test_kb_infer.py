@@ -69,6 +69,10 @@ def test_a_file_and_words_make_one_state_and_words_win(bench, tmp_path):
         ("measurements: {water_visibilty: 1}\n", "line 1, measurements.water_visibilty: there is no quality attribute"),
         ("measurements:\n  water_visibility: deep\n", "line 2, measurements.water_visibility: 'deep' is not a number"),
         ("groundings: {f_maintain_motion: fd_spiral_low}\n", "f_maintain_motion has no function design"),
+        (
+            "components: {c_thruster_1: recoverd}\n",
+            "'recoverd' is no c_status that a rule speaks of (did you mean 'REC",
+        ),
         ("component: {}\n", "did you mean 'components'"),
         ("components: 3\n", "is not a mapping"),
         ("", "is empty"),
@@ -104,6 +108,8 @@ def test_a_rule_switched_off_infers_nothing(command):
     [
         (("--set", "water_visibility"), "--set: 'water_visibility' has no value"),
         (("--component", "c_thruster_7=FALSE"), "--component: there is no component 'c_thruster_7' (did you mean"),
+        (("--component", "c_thruster_1=false"), "'false' is no c_status that a rule speaks of (did you mean 'FALSE'?"),
+        (("--objective", "f_maintain_motion=ungrounded"), "--objective: 'ungrounded' is no o_status that a rule"),
         (("--disable-rule", "QAWaterVisibilty"), "did you mean QAWaterVisibility?"),
         (("--reasoner", "hermit"), "there is no reasoner 'hermit'"),
         (("--state", "nowhere.yaml"), "nowhere.yaml: no such file"),
@@ -114,6 +120,24 @@ def test_what_cannot_be_used_ends_in_one_line(command, words, said):
     assert (status, text) == (2, "")
     assert said in error
     assert error.count("\n") == 1
+
+
+def test_statuses_of_ones_own_are_taken(bench):
+    state = bench.state(
+        components={"c_thruster_1": "HOT"}, objectives={"f_maintain_motion": "UPDATABLE", "f_follow_pipeline": "DONE"}
+    )
+    assert state.components == (("c_thruster_1", "HOT"),)
+    assert [each.status for each in state.objectives] == ["DONE", "UPDATABLE"]
+
+
+def test_one_file_or_name_may_stand_alone(bench, tmp_path):
+    (tmp_path / "mine.swrl").write_text("mine: Objective(?o) -> o_updatable(?o, true)\n")
+    alone = KnowledgeBase.load("suave.owl", rules=tmp_path / "mine.swrl", disabled_rules="compError")
+    assert {rule.name: rule.enabled for rule in alone.base.rules if rule.name in ("mine", "compError")} == {
+        "mine": True,
+        "compError": False,
+    }
+    assert [each.function for each in bench.state(objectives="f_maintain_motion").objectives] == ["f_maintain_motion"]
 
 
 class TestTimeLimit:

@@ -167,6 +167,15 @@ class TestPolicy:
 
 
 class TestFiles:
+    @pytest.mark.parametrize(
+        ("words", "said"),
+        [(("--csv", "."), ".: is a folder (name a file"), (("--max-failed", "-1"), "--max-failed")],
+    )
+    def test_what_cannot_be_meant_ends_in_one_line(self, command, words, said):
+        status, text, error = command("policy", *words)
+        assert (status, text) == (2, "")
+        assert said in error
+
     def test_the_csv_file_has_every_cell(self, command, tmp_path, policy):
         file, picture = tmp_path / "policy.csv", tmp_path / "policy.png"
         status, text, _ = command("policy", "--max-failed", "1", "--csv", file, "--png", picture)
@@ -230,6 +239,13 @@ class TestDiff:
         assert f"{SEARCH}, now fd_spiral_high: A fd_spiral_medium, B stays\n  3 <= . < 3.25: 6 states\n" in text
         _, printed, _ = command("diff", empty, file, "--max-failed", "0", "--format", "json")
         assert json.loads(printed)["states"] == 6
+
+    def test_an_outcome_is_told_once(self, command, tmp_path):
+        empty = rules_file(tmp_path, "# nothing\n", "empty.swrl")
+        file = rules_file(tmp_path, "low: FunctionDesign(?d) -> fd_realisability(fd_spiral_low, false)\n")
+        _, text, _ = command("diff", empty, file, "--max-failed", "0")
+        assert f"{SEARCH}, now ungrounded: A fd_spiral_low, B none left\n  1.25 <= . < 2.25: 6 states\n" in text
+        assert "none left, none left" not in text
 
     def test_components_that_only_one_side_has_are_still_alike(self, bench):
         mine = Space.of(bench.base, bench.loop)

@@ -7,6 +7,7 @@ import json
 import pytest
 
 from suave_des.errors import InputError
+from suave_des.workbench import KnowledgeBase
 
 SEARCH = "f_generate_search_path"
 
@@ -24,6 +25,17 @@ def test_inferred_facts_are_there_when_asked_for(bench):
     assert bench.query(query, state, inferred=True).rows == (("suave:fg_spiral_high", "IN_ERROR_NFR"),)
     assert bench.query("ASK { suave:fg_spiral_high a tomasys:FunctionGrounding }", state).rows == (("true",),)
     assert bench.query("ASK { suave:fg_spiral_high a tomasys:FunctionGrounding }").rows == (("false",),)
+
+
+def test_answers_are_the_same_each_time():
+    queries = ("SELECT ?s ?o WHERE { ?s ?p ?o } LIMIT 9", "SELECT ?s ?o WHERE { ?s owl:unionOf ?o }")
+    first, second = ([KnowledgeBase.load().query(query).rows for query in queries] for _ in range(2))
+    assert first == second
+    assert all(first)
+
+
+def test_no_answer_is_told(command):
+    assert command("query", "SELECT ?d WHERE { ?d tomasys:solvsF ?f }")[:2] == (0, "d\nno rows\n")
 
 
 def test_an_order_that_the_query_wants_is_kept(bench):
