@@ -2,32 +2,20 @@
 
 from __future__ import annotations
 
-import importlib
-import sys
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 import numba
 
+from suave_des.imports import hidden
+
+# What numba would load on the first call. To see that there is a BLAS, it imports scipy.linalg, which takes 0.2 s and
+# is used by no inner loop. There is one, as scipy is installed; what uses it imports it then.
+with hidden("scipy.linalg"):
+    from numba.np import arraymath
+arraymath._HAVE_BLAS = True
+
 _F = TypeVar("_F", bound=Callable[..., Any])
-_LINEAR_ALGEBRA = "scipy.linalg"
-
-
-def _load_numba() -> None:
-    """Load what numba needs for arrays, without the linear algebra that it would look for in SciPy.
-
-    No loop here multiplies matrices, and looking for it takes each process as long as fifty missions.
-    """
-    if _LINEAR_ALGEBRA in sys.modules:
-        return
-    sys.modules[_LINEAR_ALGEBRA] = cast(Any, None)  # Python's way to say that there is no such module
-    try:
-        importlib.import_module("numba.np.arraymath")
-    finally:
-        del sys.modules[_LINEAR_ALGEBRA]
-
-
-_load_numba()
 
 
 def compiled(function: _F) -> _F:

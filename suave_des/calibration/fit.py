@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from suave_des.calibration.distance import SCALES, Array, energy_distance, missions_as_vectors
+from suave_des.imports import main_hidden
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.overrides import with_values
 from suave_des.simulation.simulator import Simulator
@@ -149,7 +150,9 @@ def evaluator(problem: Problem, workers: int) -> Iterator[Callable[[Sequence[Seq
         yield lambda many: [evaluate(problem, values) for values in many]
         return
     context = multiprocessing.get_context("spawn")
-    with context.Pool(workers, initializer=_set_problem, initargs=(problem,)) as pool:
+    with main_hidden():
+        pool = context.Pool(workers, initializer=_set_problem, initargs=(problem,))
+    with pool:
         yield lambda many: pool.map(_evaluate_here, many, chunksize=1)
 
 

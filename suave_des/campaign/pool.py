@@ -5,7 +5,6 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-import sys
 import time
 import traceback
 from collections import deque
@@ -14,12 +13,12 @@ from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
-from types import ModuleType
 
 from suave_des.campaign.executors import WorkerError, chunk_size
 from suave_des.campaign.outcomes import Finished, Job, time_out_cause
 from suave_des.campaign.plan import Chunk, MissionKey, chunked
 from suave_des.errors import SuaveDesError
+from suave_des.imports import main_hidden
 
 _AHEAD = 2
 """Chunks at a worker at any time: one under way, one waiting, so that it is never idle."""
@@ -227,7 +226,7 @@ class _Start:
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         process: BaseProcess = context.Process(target=_work, args=(theirs,), daemon=True)
-        with _interrupts_held(), nullcontext() if self.needs_script else _script_hidden():
+        with _interrupts_held(), nullcontext() if self.needs_script else main_hidden():
             process.start()
         theirs.close()
         return _Worker(ours, process)
@@ -257,17 +256,6 @@ def _interrupts_held() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-@contextmanager
-def _script_hidden() -> Iterator[None]:
-    """Hide the script that was started from multiprocessing, which would import it, and so run it, in each worker."""
-    script = sys.modules["__main__"]
-    sys.modules["__main__"] = ModuleType("__main__")
-    try:
-        yield
-    finally:
-        sys.modules["__main__"] = script
 
 
 def _work(connection: Connection) -> None:

@@ -12,12 +12,14 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
-import jpype
-import jpype.config
-
 from suave_des.errors import InputError
+from suave_des.imports import hidden
 from suave_des.knowledge import java_archive
 from suave_des.knowledge.java import java_library
+
+with hidden("numpy"):  # which takes 0.1 s, and JPype needs only to tell its truth values from others
+    import jpype
+    import jpype.config
 
 #: What Java is started with, whatever the machine.
 OPTIONS: Final = (
@@ -29,6 +31,8 @@ OPTIONS: Final = (
     "-Xlog:disable",  # of Java itself; an archive that it cannot use would be reported on the terminal
     "--enable-native-access=ALL-UNNAMED",  # else JPype's loading of its library is reported on the terminal
 )
+#: What Java throws, in Python.
+JavaError: Final = jpype.JException
 _lock: Final = threading.RLock()
 _warnings: Final[list[str]] = []
 _started_in: list[int] = []

@@ -12,8 +12,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Final
 
-import jpype
-
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge import jvm
 from suave_des.knowledge.base import KnowledgeBase
@@ -47,7 +45,7 @@ def _java_errors(kb: KnowledgeBase) -> Iterator[None]:
     """What Java throws, as an error for the user: Pellet meets something that it cannot use at all."""
     try:
         yield
-    except jpype.JException as error:
+    except jvm.JavaError as error:
         said = " ".join(str(error).split()).rpartition("Exception: ")[2]
         raise KnowledgeError(
             f"Pellet cannot use the ontologies: {said}", file=_files(kb), remedy="suave-des kb check may say where"

@@ -1,0 +1,35 @@
+"""Importing a library, or starting a process, without what it would take along that is not used here."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import ModuleType
+
+
+@contextmanager
+def hidden(module: str) -> Iterator[None]:
+    """Hide a module from what is imported meanwhile, as if it were not installed; not if it is loaded already.
+
+    Afterwards it can be imported as ever.
+    """
+    if module in sys.modules:
+        yield
+        return
+    sys.modules[module] = None  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        del sys.modules[module]
+
+
+@contextmanager
+def main_hidden() -> Iterator[None]:
+    """Hide the script that was started from multiprocessing, which would import it, and so run it, in a new process."""
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main

@@ -1,0 +1,79 @@
+"""Libraries are loaded without what is not used of them, which still works for whoever wants it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import suave_des
+from suave_des.imports import hidden
+
+COMPILING = """
+import sys
+import numba
+import numpy
+from suave_des.compiling import compiled
+
+@compiled
+def total(values):
+    return values.sum()
+
+print(total(numpy.ones(3)), "scipy.linalg" in sys.modules)
+
+@numba.njit
+def algebra(values):
+    return numpy.cov(values)[0, 1], numpy.dot(values, values)[0, 0], numpy.linalg.inv(values)[0, 0]
+
+print(*algebra(numpy.array([[1.0, 2.0], [3.0, 5.0]])), "scipy.linalg" in sys.modules)
+
+import scipy.linalg
+print(scipy.linalg.det(numpy.eye(2)))
+"""
+
+
+REASONING = """
+import sys
+from suave_des.knowledge import jvm
+jvm.start()
+print("numpy" in sys.modules)
+
+import jpype, numpy
+print(numpy.asarray(jpype.JArray(jpype.JDouble)(numpy.arange(3.0))))
+"""
+
+
+def run(program: str, folder: Path) -> list[str]:
+    (folder / "program.py").write_text(program)
+    environment = {**os.environ, "PYTHONPATH": str(Path(suave_des.__file__).parents[1])}
+    command = [sys.executable, "program.py"]
+    ended = subprocess.run(command, capture_output=True, text=True, cwd=folder, env=environment, check=True)
+    return ended.stdout.splitlines()
+
+
+def test_linear_algebra_is_loaded_by_what_uses_it_only(tmp_path: Path) -> None:
+    first, second, third = run(COMPILING, tmp_path)
+    assert first == "3.0 False"
+    assert [round(float(number), 9) for number in second.split()[:3]] == [1.0, 7.0, -5.0]
+    assert second.endswith("True")
+    assert third == "1.0"
+
+
+def test_java_starts_without_numpy_which_can_be_used_with_it(tmp_path: Path) -> None:
+    assert run(REASONING, tmp_path) == ["False", "[0. 1. 2.]"]
+
+
+def test_what_is_hidden_cannot_be_imported_meanwhile_and_can_afterwards() -> None:
+    sys.modules.pop("this", None)
+    with pytest.raises(ImportError), hidden("this"):
+        __import__("this")
+    assert "this" not in sys.modules
+
+
+def test_what_is_loaded_is_not_hidden() -> None:
+    with hidden("os"):
+        assert __import__("os") is os
+    assert sys.modules["os"] is os
