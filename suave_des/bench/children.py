@@ -19,6 +19,7 @@ from suave_des.errors import SuaveDesError
 _PROC = Path("/proc")
 _SAMPLE_S = 0.1
 _END_S = 10.0
+_INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
 _WORKER = b"spawn_main"
 """Stands on the command line of Python's worker processes."""
 
@@ -63,19 +64,25 @@ def run(arguments: Sequence[str], folder: Path, environment: Mapping[str, str]) 
     log = folder / "stderr.txt"
     with log.open("w") as errors:
         begun, cpu_before_s = time.perf_counter(), _cpu_s()
-        process = subprocess.Popen(
-            [sys.executable, "-m", *arguments],
-            cwd=folder,
-            env={**os.environ, "PYTHONPATH": path, "TMPDIR": str(folder), **environment},
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=errors,
-            text=True,
-            process_group=0,  # Ctrl-C reaches this process alone, which passes it on once
-        )
-        with _ended_at_last(process), _memory(process.pid) as memory:
-            out, _ = process.communicate()
-            wall_s = time.perf_counter() - begun
+        process: subprocess.Popen[str] | None = None
+        try:
+            with _interrupts_later():
+                process = subprocess.Popen(
+                    [sys.executable, "-m", *arguments],
+                    cwd=folder,
+                    env={**os.environ, "PYTHONPATH": path, "TMPDIR": str(folder), **environment},
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.PIPE,
+                    stderr=errors,
+                    text=True,
+                    process_group=0,  # Ctrl-C reaches this process alone, which passes it on once
+                )
+            with _memory(process.pid) as memory:
+                out, _ = process.communicate()
+                wall_s = time.perf_counter() - begun
+        finally:
+            if process is not None:
+                _end(process)
     if process.returncode:
         said = " ".join(log.read_text(errors="replace").split())[-400:]
         raise MeasurementError(f"{' '.join(arguments)} ended with status {process.returncode}: {said}")
@@ -89,25 +96,44 @@ def _cpu_s() -> float:
 
 
 @contextmanager
-def _ended_at_last(process: subprocess.Popen[str]) -> Iterator[None]:
-    """Ends a process in which nobody is interested any more: as Ctrl-C does, so that it ends its workers."""
+def _interrupts_later() -> Iterator[None]:
+    """Ctrl-C and kill are heard at the end: in the middle of its start, a process would be left to itself.
+
+    They are not blocked, as the process that is started would inherit that.
+    """
+    if threading.current_thread() is not threading.main_thread():  # others are not interrupted
+        yield
+        return
+    came: list[int] = []
+    before = {number: signal.getsignal(number) for number in _INTERRUPTS}
+    heard = {number: handler for number, handler in before.items() if callable(handler)}
+    for number in heard:
+        signal.signal(number, lambda number, frame: came.append(number))
     try:
         yield
     finally:
+        for number, handler in heard.items():
+            signal.signal(number, handler)
+        if came:
+            signal.raise_signal(came[0])
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """End a process in which nobody is interested any more: as Ctrl-C does, so that it ends its workers."""
+    with _interrupts_held():
         if process.poll() is None:
-            with _interrupts_held():
-                process.send_signal(signal.SIGINT)
-                try:
-                    process.communicate(timeout=_END_S)
-                except subprocess.TimeoutExpired:
-                    process.kill()
-                    process.communicate()
+            process.send_signal(signal.SIGINT)
+            try:
+                process.communicate(timeout=_END_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.communicate()
 
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Hold a second Ctrl-C back until all is tidied up."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    """Hold another Ctrl-C or kill back until all is tidied up."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _INTERRUPTS)
     try:
         yield
     finally:

@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 
@@ -102,7 +103,8 @@ def process_pool(workers: int) -> Iterator[ProcessPool]:
     started: list[_Worker] = []
     try:
         for _ in range(workers):
-            started.append(_started())
+            with _interrupts_held():
+                started.append(_started())
         pool = ProcessPool(started)
         yield pool
         if pool.is_done:
@@ -191,7 +193,8 @@ class _Crew:
         suspect, *others = worker.tasks
         yield from self._try_again(suspect, status, overdue=worker.overdue)
         self._again.extend(others)
-        self._workers[self._workers.index(worker)] = fresh = _started()
+        with _interrupts_held():
+            self._workers[self._workers.index(worker)] = fresh = _started()
         fresh.begin(self._job)
         self._hand_out()
 
@@ -209,11 +212,11 @@ class _Crew:
 
 
 def _started() -> _Worker:
+    """A new worker; to be called with interrupts held, and kept before they are let through, for it to be ended."""
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     process: BaseProcess = context.Process(target=_work, args=(theirs,), daemon=True)
-    with _interrupts_held():
-        process.start()
+    process.start()
     theirs.close()
     return _Worker(ours, process)
 
@@ -228,6 +231,7 @@ def _end(process: BaseProcess) -> None:
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
     """Hold Ctrl-C and kill back while a worker starts: it inherits that, so that they reach this process alone."""
+    resource_tracker.ensure_running()  # or the first worker's start starts it, which lets them through again
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:
         yield

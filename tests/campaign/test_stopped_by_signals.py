@@ -7,6 +7,8 @@ import fcntl
 import os
 import signal
 import time
+from multiprocessing.context import SpawnProcess
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import chaos
@@ -14,6 +16,7 @@ import pytest
 
 from suave_des.campaign.campaign import resume_campaign, run_campaign
 from suave_des.campaign.lock import LOCK_FILE
+from suave_des.campaign.pool import process_pool
 from suave_des.campaign.store import NEW_STORE_FILE, STORE_FILE
 
 STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
@@ -68,6 +71,33 @@ def test_no_empty_folder_is_left(number: signal.Signals, moment: str, scenario: 
         assert sorted(path.name for path in (tmp_path / "out").iterdir()) == FILES
     else:
         assert err == "suave-des: interrupted\n"
+
+
+def test_workers_leave_ctrl_c_to_the_campaign(scenario: Path, tmp_path: Path) -> None:
+    """A terminal sends it to all processes of a command; each would say so in many lines."""
+    process = chaos.start(
+        [str(scenario), "--managers", "none", "--runs", "2000", "--workers", "2", "--out", "out"], tmp_path
+    )
+    wait_for(tmp_path / "out" / f"{STORE_FILE}-wal", 50_000)
+    for child in chaos.workers_of(process):
+        os.kill(child, signal.SIGINT)
+    assert chaos.ended(process) == (0, "")
+
+
+def test_workers_that_are_interrupted_while_they_start_end_with_the_pool(monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[BaseProcess] = []
+    real = SpawnProcess.start
+
+    def start(process: SpawnProcess) -> None:
+        started.append(process)
+        real(process)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(SpawnProcess, "start", start)
+    with pytest.raises(KeyboardInterrupt), process_pool(2):
+        pass
+    assert started
+    assert [process.exitcode for process in started] == [-signal.SIGKILL] * len(started)
 
 
 def ctrl_c(*_: object) -> None:
