@@ -15,11 +15,11 @@ from pathlib import Path
 
 import suave_des
 from suave_des.errors import SuaveDesError
+from suave_des.interrupts import interrupts_later
 
 _PROC = Path("/proc")
 _SAMPLE_S = 0.1
 _END_S = 10.0
-_INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
 _WORKER = b"spawn_main"
 """Stands on the command line of Python's worker processes."""
 
@@ -66,7 +66,7 @@ def run(arguments: Sequence[str], folder: Path, environment: Mapping[str, str]) 
         begun, cpu_before_s = time.perf_counter(), _cpu_s()
         process: subprocess.Popen[str] | None = None
         try:
-            with _interrupts_later():
+            with interrupts_later():  # or it would be left to itself in the middle of its start
                 process = subprocess.Popen(
                     [sys.executable, "-m", *arguments],
                     cwd=folder,
@@ -95,32 +95,9 @@ def _cpu_s() -> float:
     return times.children_user + times.children_system
 
 
-@contextmanager
-def _interrupts_later() -> Iterator[None]:
-    """Ctrl-C and kill are heard at the end: in the middle of its start, a process would be left to itself.
-
-    They are not blocked, as the process that is started would inherit that.
-    """
-    if threading.current_thread() is not threading.main_thread():  # others are not interrupted
-        yield
-        return
-    came: list[int] = []
-    before = {number: signal.getsignal(number) for number in _INTERRUPTS}
-    heard = {number: handler for number, handler in before.items() if callable(handler)}
-    for number in heard:
-        signal.signal(number, lambda number, frame: came.append(number))
-    try:
-        yield
-    finally:
-        for number, handler in heard.items():
-            signal.signal(number, handler)
-        if came:
-            signal.raise_signal(came[0])
-
-
 def _end(process: subprocess.Popen[str]) -> None:
     """End a process in which nobody is interested any more: as Ctrl-C does, so that it ends its workers."""
-    with _interrupts_held():
+    with interrupts_later():
         if process.poll() is None:
             process.send_signal(signal.SIGINT)
             try:
@@ -128,16 +105,6 @@ def _end(process: subprocess.Popen[str]) -> None:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.communicate()
-
-
-@contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Hold another Ctrl-C or kill back until all is tidied up."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _INTERRUPTS)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager

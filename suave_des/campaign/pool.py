@@ -19,6 +19,7 @@ from suave_des.campaign.executors import WorkerError, chunk_size
 from suave_des.campaign.outcomes import Finished, Job, MissionRunner, time_out_cause
 from suave_des.campaign.plan import Chunk, MissionKey, chunked
 from suave_des.errors import SuaveDesError
+from suave_des.interrupts import INTERRUPTS, interrupts_later
 
 _AHEAD = 2
 """Chunks at a worker at any time: one under way, one waiting, so that it is never idle."""
@@ -232,11 +233,12 @@ def _end(process: BaseProcess) -> None:
 def _interrupts_held() -> Iterator[None]:
     """Hold Ctrl-C and kill back while a worker starts: it inherits that, so that they reach this process alone."""
     resource_tracker.ensure_running()  # or the first worker's start starts it, which lets them through again
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    with interrupts_later():
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _work(connection: Connection) -> None:

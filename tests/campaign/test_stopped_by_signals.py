@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import csv
 import fcntl
 import os
@@ -95,7 +96,9 @@ def test_workers_that_are_interrupted_while_they_start_end_with_the_pool(monkeyp
     def start(process: SpawnProcess) -> None:
         started.append(process)
         real(process)
-        signal.raise_signal(signal.SIGINT)
+        # As one that the system gives to another thread: it does not matter what this one blocks.
+        _thread.interrupt_main()
+        time.sleep(0.0)
 
     monkeypatch.setattr(SpawnProcess, "start", start)
     with pytest.raises(KeyboardInterrupt), process_pool(2):
