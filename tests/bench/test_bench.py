@@ -90,7 +90,7 @@ def quick(tmp_path_factory):
     """A quick run: what it printed, what it said, its JSON file, and the folder for temporary files."""
     folder, temporary = tmp_path_factory.mktemp("bench"), tmp_path_factory.mktemp("temporary")
     process = started("--missions", "20", "--json", "figures.json", cwd=folder, temporary=temporary)
-    out, err = process.communicate(timeout=300)
+    out, err = process.communicate(timeout=600)
     assert process.returncode == 0, err
     return out, err, json.loads((folder / "figures.json").read_text()), temporary
 
