@@ -25,6 +25,7 @@ import shutil
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -111,6 +112,7 @@ def run_page(page: Path, folder: Path, *, quick: bool) -> Iterator[tuple[Block, 
             elif "background" in block.marks:
                 for command in _commands(block, port):
                     background.enter_context(_going_on(command))
+                _wait_for(port)
             elif block.language == "console" and "setup" not in block.marks:
                 shown = _run_console(block, port, quick=quick)
             elif block.language == "python":
@@ -192,6 +194,19 @@ def _free_port() -> str:
         return str(found.getsockname()[1])
 
 
+def _wait_for(port: str) -> None:
+    """Wait until somebody answers at a port, as who has typed the commands would."""
+    end_s = time.monotonic() + 60.0
+    while True:
+        try:
+            socket.create_connection(("127.0.0.1", int(port)), timeout=10.0).close()
+            return
+        except OSError:
+            if time.monotonic() > end_s:
+                raise
+        time.sleep(0.1)
+
+
 def _commands(block: Block, port: str) -> list[str]:
     lines = [line.removeprefix("$ ") for line in block.text.splitlines() if line.startswith("$ ")]
     return [line.replace(_PORT, port) for line in lines]
@@ -212,7 +227,7 @@ def _going_on(command: str) -> Iterator[None]:
     finally:
         process.terminate()
         try:
-            process.wait(20.0)
+            process.wait(60.0)
         finally:
             process.kill()
 

@@ -1,4 +1,4 @@
-"""Settings of all tests: property tests draw the same examples on every machine, and are not timed.
+"""Settings of all tests: property tests draw the same examples on every machine, and are not timed in any way.
 
 What reasoners remember is kept in a folder of the test run, away from the user's.
 """
@@ -7,9 +7,9 @@ import os
 import signal
 import tempfile
 
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
-settings.register_profile("repeatable", derandomize=True, deadline=None)
+settings.register_profile("repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("repeatable")
 
 os.environ["SUAVE_DES_CACHE_DIR"] = tempfile.mkdtemp(prefix="suave-des-tests-")

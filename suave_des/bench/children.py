@@ -15,6 +15,7 @@ from pathlib import Path
 
 import suave_des
 from suave_des.errors import SuaveDesError
+from suave_des.interrupts import interrupts_later
 
 _PROC = Path("/proc")
 _SAMPLE_S = 0.1
@@ -63,19 +64,25 @@ def run(arguments: Sequence[str], folder: Path, environment: Mapping[str, str]) 
     log = folder / "stderr.txt"
     with log.open("w") as errors:
         begun, cpu_before_s = time.perf_counter(), _cpu_s()
-        process = subprocess.Popen(
-            [sys.executable, "-m", *arguments],
-            cwd=folder,
-            env={**os.environ, "PYTHONPATH": path, "TMPDIR": str(folder), **environment},
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=errors,
-            text=True,
-            process_group=0,  # Ctrl-C reaches this process alone, which passes it on once
-        )
-        with _ended_at_last(process), _memory(process.pid) as memory:
-            out, _ = process.communicate()
-            wall_s = time.perf_counter() - begun
+        process: subprocess.Popen[str] | None = None
+        try:
+            with interrupts_later():  # or it would be left to itself in the middle of its start
+                process = subprocess.Popen(
+                    [sys.executable, "-m", *arguments],
+                    cwd=folder,
+                    env={**os.environ, "PYTHONPATH": path, "TMPDIR": str(folder), **environment},
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.PIPE,
+                    stderr=errors,
+                    text=True,
+                    process_group=0,  # Ctrl-C reaches this process alone, which passes it on once
+                )
+            with _memory(process.pid) as memory:
+                out, _ = process.communicate()
+                wall_s = time.perf_counter() - begun
+        finally:
+            if process is not None:
+                _end(process)
     if process.returncode:
         said = " ".join(log.read_text(errors="replace").split())[-400:]
         raise MeasurementError(f"{' '.join(arguments)} ended with status {process.returncode}: {said}")
@@ -88,30 +95,16 @@ def _cpu_s() -> float:
     return times.children_user + times.children_system
 
 
-@contextmanager
-def _ended_at_last(process: subprocess.Popen[str]) -> Iterator[None]:
-    """Ends a process in which nobody is interested any more: as Ctrl-C does, so that it ends its workers."""
-    try:
-        yield
-    finally:
+def _end(process: subprocess.Popen[str]) -> None:
+    """End a process in which nobody is interested any more: as Ctrl-C does, so that it ends its workers."""
+    with interrupts_later():
         if process.poll() is None:
-            with _interrupts_held():
-                process.send_signal(signal.SIGINT)
-                try:
-                    process.communicate(timeout=_END_S)
-                except subprocess.TimeoutExpired:
-                    process.kill()
-                    process.communicate()
-
-
-@contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Hold a second Ctrl-C back until all is tidied up."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            process.send_signal(signal.SIGINT)
+            try:
+                process.communicate(timeout=_END_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.communicate()
 
 
 @contextmanager

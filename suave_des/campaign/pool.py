@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 
@@ -19,6 +20,7 @@ from suave_des.campaign.outcomes import Finished, Job, time_out_cause
 from suave_des.campaign.plan import Chunk, MissionKey, chunked
 from suave_des.errors import SuaveDesError
 from suave_des.imports import main_hidden
+from suave_des.interrupts import INTERRUPTS, interrupts_later
 
 _AHEAD = 2
 """Chunks at a worker at any time: one under way, one waiting, so that it is never idle."""
@@ -106,7 +108,8 @@ def process_pool(managers: Sequence[str], workers: int) -> Iterator[ProcessPool]
     started: list[_Worker] = []
     try:
         for _ in range(workers):
-            started.append(start())
+            with _interrupts_held():
+                started.append(start())
         pool = ProcessPool(started, start)
         yield pool
         if pool.is_done:
@@ -195,7 +198,8 @@ class _Crew:
         suspect, *others = worker.tasks
         yield from self._try_again(suspect, status, overdue=worker.overdue)
         self._again.extend(others)
-        self._workers[self._workers.index(worker)] = fresh = self._start()
+        with _interrupts_held():
+            self._workers[self._workers.index(worker)] = fresh = self._start()
         fresh.begin(self._job)
         self._hand_out()
 
@@ -223,10 +227,11 @@ class _Start:
     needs_script: bool
 
     def __call__(self) -> _Worker:
+        """A new worker; to be called with interrupts held, and kept before they are let through, for it to be ended."""
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         process: BaseProcess = context.Process(target=_work, args=(theirs,), daemon=True)
-        with _interrupts_held(), nullcontext() if self.needs_script else main_hidden():
+        with nullcontext() if self.needs_script else main_hidden():
             process.start()
         theirs.close()
         return _Worker(ours, process)
@@ -251,11 +256,13 @@ def _end(process: BaseProcess) -> None:
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
     """Hold Ctrl-C and kill back while a worker starts: it inherits that, so that they reach this process alone."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    resource_tracker.ensure_running()  # or the first worker's start starts it, which lets them through again
+    with interrupts_later():
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _work(connection: Connection) -> None:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import Any
 
-_NUMBERS = (signal.SIGINT, signal.SIGTERM)
+from suave_des.interrupts import INTERRUPTS
+
+_AGAIN_S = 0.05
 _received: list[int] = []
 
 
@@ -27,13 +32,41 @@ def told_by_exceptions() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    taken = [number for number in _NUMBERS if signal.getsignal(number) is not signal.SIG_IGN]
+    taken = [number for number in INTERRUPTS if signal.getsignal(number) is not signal.SIG_IGN]
     before = [signal.signal(number, _stop) for number in taken]
     try:
-        yield
+        with _lost_ones_again():
+            yield
     finally:
         for number, handler in zip(taken, before, strict=True):
             signal.signal(number, handler)
+
+
+@contextmanager
+def _lost_ones_again() -> Iterator[None]:
+    """Signals come again when what they raised was lost.
+
+    Nobody hears an exception in a __del__, or in Python code that compiled code has called, as numba's does.
+    """
+    timers: list[threading.Timer] = []
+    tell = sys.unraisablehook
+
+    def again(lost: Any) -> None:
+        if not isinstance(lost.exc_value, Stopped):
+            tell(lost)
+            return
+        timers.append(threading.Timer(_AGAIN_S, os.kill, (os.getpid(), _received[0])))
+        timers[-1].daemon = True
+        timers[-1].start()
+
+    sys.unraisablehook = again
+    try:
+        yield
+    finally:
+        sys.unraisablehook = tell
+        for timer in timers:
+            timer.cancel()
+            timer.join()
 
 
 def _stop(number: int, frame: FrameType | None) -> None:

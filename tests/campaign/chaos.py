@@ -36,7 +36,7 @@ def start(arguments: Sequence[str], cwd: Path) -> subprocess.Popen[str]:
 
 def ended(process: subprocess.Popen[str]) -> tuple[int, str]:
     """Wait for it; its exit status and what it said on stderr."""
-    _, err = process.communicate(timeout=120)
+    _, err = process.communicate(timeout=300)
     return process.returncode, err
 
 

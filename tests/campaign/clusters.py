@@ -70,6 +70,10 @@ class Cluster:
         self.workers.append(worker)
         return worker
 
+    def wait_for_workers(self, number: int) -> None:
+        """Wait until so many workers have come to the scheduler."""
+        wait_until(lambda: self.log("dask_scheduler").count("Register worker") >= number)
+
     def opened(self) -> list[str]:
         """Forbidden files that workers opened."""
         return self._opened.read_text().splitlines() if self._opened.exists() else []
@@ -117,7 +121,7 @@ def kill(process: subprocess.Popen[bytes]) -> None:
     process.wait()
 
 
-def wait_until(is_so: Callable[[], bool], longest_s: float = 30.0) -> None:
+def wait_until(is_so: Callable[[], bool], longest_s: float = 120.0) -> None:
     """Wait for something, and fail if it does not come."""
     end_s = time.monotonic() + longest_s
     while not is_so():

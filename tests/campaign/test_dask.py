@@ -68,6 +68,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory, users_folder: Path) -> Ite
     try:
         cluster.add_worker()
         cluster.add_worker(threads=2)
+        cluster.wait_for_workers(2)
         yield cluster
     finally:
         cluster.stop()
@@ -142,7 +143,7 @@ def test_ctrl_c_on_the_command_line(cluster: Cluster, short: Path, tmp_path: Pat
     assert err.startswith("suave-des: interrupted; ")
     assert err.endswith("suave-des campaign --resume out does the rest\n")
     assert err.count("\n") == 1
-    wait_until(lambda: not cluster.mission_processes(), 5.0)
+    wait_until(lambda: not cluster.mission_processes(), 30.0)  # and not only when they have been idle for minutes
 
 
 def test_interrupted_there_and_resumed_here(cluster: Cluster, short: Path, tmp_path: Path) -> None:
@@ -182,10 +183,11 @@ def test_a_scheduler_that_is_lost_in_the_middle(short: Path, tmp_path: Path, cap
 
     try:
         cluster.add_worker()
+        cluster.wait_for_workers(1)
         asked = (short, ["none", "random"], 200, 1)
         with pytest.raises(WorkerError) as lost:
             run_campaign(*asked, out=tmp_path / "out", scheduler=cluster.address, on_progress=kill_scheduler)
-        assert time.monotonic() < stopped_s[0] + 5.0
+        assert time.monotonic() < stopped_s[0] + 20.0  # Dask itself would go on for longer
     finally:
         cluster.stop()
     line = (
@@ -202,6 +204,7 @@ def test_a_mission_with_which_workers_die_has_failed_and_no_other(tmp_path: Path
     cluster = Cluster(tmp_path / "cluster", tmp_path / "nothing", DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="0")
     try:
         cluster.add_worker(replaced=True)
+        cluster.wait_for_workers(1)
         manager = "awkward_managers:KillsClusterWorkerInSome"
         result = run_campaign("seams2023", [manager], 9, 1, scheduler=cluster.address)
     finally:
@@ -248,7 +251,7 @@ class TestBadInput:
                 started_s = time.monotonic()
                 with pytest.raises(InputError, match=rf"{address} does not answer as a Dask scheduler within 1 s"):
                     run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / folder, scheduler=address, overwrite=True)
-                assert time.monotonic() < started_s + 3.0
+                assert time.monotonic() < started_s + 20.0  # Dask itself would go on for longer
         assert not (tmp_path / "out").exists()
         assert (tmp_path / "earlier" / "runs.csv").read_bytes() == before
         assert resume_campaign(tmp_path / "earlier").done == 1

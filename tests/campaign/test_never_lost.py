@@ -109,9 +109,10 @@ def test_killed_with_its_workers_or_without_the_bytes_are_the_same(scenario: Pat
 
 
 def test_ctrl_c_on_the_command_line(scenario: Path, tmp_path: Path) -> None:
-    process = chaos.start([str(scenario), "--managers", "none", "--runs", "20000", "--out", "out"], tmp_path)
+    process = chaos.start([str(scenario), "--managers", "none", "--runs", "100000", "--out", "out"], tmp_path)
     started = time.monotonic()
-    while not (tmp_path / "out" / STORE_FILE).exists() and time.monotonic() < started + 60:
+    while not (tmp_path / "out" / STORE_FILE).exists():
+        assert time.monotonic() < started + 60
         time.sleep(0.05)
     time.sleep(2.0)
     process.send_signal(signal.SIGINT)
@@ -197,10 +198,11 @@ class TestRefusals:
             run_campaign(scenario, MANAGERS, 20, 1, out=tmp_path / "out")
 
     def test_two_campaigns_on_one_folder(self, scenario: Path, tmp_path: Path) -> None:
-        process = chaos.start([str(scenario), "--managers", "none", "--runs", "50000", "--out", "out"], tmp_path)
+        process = chaos.start([str(scenario), "--managers", "none", "--runs", "100000", "--out", "out"], tmp_path)
         try:
             started = time.monotonic()
-            while not (tmp_path / "out" / STORE_FILE).exists() and time.monotonic() < started + 60:
+            while not (tmp_path / "out" / STORE_FILE).exists():
+                assert time.monotonic() < started + 60
                 time.sleep(0.05)
             taken = rf"another campaign is running in the output folder \(process {process.pid}\)"
             with pytest.raises(InputError, match=taken):
@@ -309,6 +311,6 @@ def test_missions_that_took_too_long_are_run_again_when_resumed(
 ) -> None:
     manager = "awkward_managers:HangsOnce"
     monkeypatch.setenv("AWKWARD_MARKS", str(tmp_path))
-    result = run_campaign("seams2023", [manager], 12, 1, out=tmp_path / "out", time_out_s=0.5)
+    result = run_campaign("seams2023", [manager], 12, 1, out=tmp_path / "out", time_out_s=2.0)
     assert 0 < len(result.failures) < 12
     assert resume_campaign(tmp_path / "out").done == 12

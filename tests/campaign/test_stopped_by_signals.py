@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import _thread
 import csv
 import fcntl
 import os
 import signal
 import time
+from multiprocessing.context import SpawnProcess
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 import chaos
@@ -14,9 +17,12 @@ import pytest
 
 from suave_des.campaign.campaign import resume_campaign, run_campaign
 from suave_des.campaign.lock import LOCK_FILE
+from suave_des.campaign.pool import process_pool
 from suave_des.campaign.store import NEW_STORE_FILE, STORE_FILE
 
 STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
+RUNS = 100_000
+"""More than are done before a signal comes, also from a test that a busy machine held up for seconds."""
 FILES = [STORE_FILE, "manifest.json", "runs.csv", "summary.csv"]
 
 
@@ -37,7 +43,7 @@ def wait_for(path: Path, size: int = 0) -> None:
 @pytest.mark.parametrize("number", STATUS)
 @pytest.mark.parametrize("workers", [1, 2])
 def test_what_is_done_is_kept(number: signal.Signals, workers: int, scenario: Path, tmp_path: Path) -> None:
-    asked = [str(scenario), "--managers", "none", "--runs", "5000", "--workers", str(workers), "--out", "out"]
+    asked = [str(scenario), "--managers", "none", "--runs", str(RUNS), "--workers", str(workers), "--out", "out"]
     process = chaos.start(asked, tmp_path)
     wait_for(tmp_path / "out" / f"{STORE_FILE}-wal", 50_000)
     children = chaos.workers_of(process)
@@ -45,10 +51,12 @@ def test_what_is_done_is_kept(number: signal.Signals, workers: int, scenario: Pa
     status, err = chaos.ended(process)
     assert status == STATUS[number]
     assert err.startswith("suave-des: interrupted; ")
-    assert err.endswith(" of 5000 missions are done, and kept in out; suave-des campaign --resume out does the rest\n")
+    assert err.endswith(
+        f" of {RUNS} missions are done, and kept in out; suave-des campaign --resume out does the rest\n"
+    )
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == FILES
     with (tmp_path / "out" / "runs.csv").open(newline="") as file:
-        assert 0 < len(list(csv.DictReader(file))) < 5000
+        assert 0 < len(list(csv.DictReader(file))) < RUNS
     assert len(children) == (0 if workers == 1 else 2)
     assert not any(Path(f"/proc/{child}").exists() for child in children)
 
@@ -56,7 +64,7 @@ def test_what_is_done_is_kept(number: signal.Signals, workers: int, scenario: Pa
 @pytest.mark.parametrize("number", STATUS)
 @pytest.mark.parametrize("moment", ["lock", "store", "later"])
 def test_no_empty_folder_is_left(number: signal.Signals, moment: str, scenario: Path, tmp_path: Path) -> None:
-    process = chaos.start([str(scenario), "--managers", "none", "--runs", "5000", "--out", "out"], tmp_path)
+    process = chaos.start([str(scenario), "--managers", "none", "--runs", str(RUNS), "--out", "out"], tmp_path)
     wait_for(tmp_path / "out" / (".campaign.lock" if moment == "lock" else STORE_FILE))
     if moment == "later":
         time.sleep(0.3)
@@ -68,6 +76,35 @@ def test_no_empty_folder_is_left(number: signal.Signals, moment: str, scenario: 
         assert sorted(path.name for path in (tmp_path / "out").iterdir()) == FILES
     else:
         assert err == "suave-des: interrupted\n"
+
+
+def test_workers_leave_ctrl_c_to_the_campaign(scenario: Path, tmp_path: Path) -> None:
+    """A terminal sends it to all processes of a command; each would say so in many lines."""
+    process = chaos.start(
+        [str(scenario), "--managers", "none", "--runs", "1000", "--workers", "2", "--out", "out"], tmp_path
+    )
+    wait_for(tmp_path / "out" / f"{STORE_FILE}-wal", 50_000)
+    for child in chaos.workers_of(process):
+        os.kill(child, signal.SIGINT)
+    assert chaos.ended(process) == (0, "")
+
+
+def test_workers_that_are_interrupted_while_they_start_end_with_the_pool(monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[BaseProcess] = []
+    real = SpawnProcess.start
+
+    def start(process: SpawnProcess) -> None:
+        started.append(process)
+        real(process)
+        # As one that the system gives to another thread: it does not matter what this one blocks.
+        _thread.interrupt_main()
+        time.sleep(0.0)
+
+    monkeypatch.setattr(SpawnProcess, "start", start)
+    with pytest.raises(KeyboardInterrupt), process_pool(2):
+        pass
+    assert started
+    assert [process.exitcode for process in started] == [-signal.SIGKILL] * len(started)
 
 
 def ctrl_c(*_: object) -> None:

@@ -17,7 +17,7 @@ from suave_des.campaign.single import run_mission
 from suave_des.cli.status import mission_status
 
 SLOW = """
-import time
+import os, time
 from suave_des.managing.simple import NoManager
 
 class Slow(NoManager):
@@ -28,7 +28,7 @@ class Slow(NoManager):
     def think(self):
         for _ in range(3):
             yield self.system.env.timeout(50.0)
-            time.sleep(0.4)
+            time.sleep(float(os.environ["THINKS_S"]))
 """
 
 
@@ -59,13 +59,25 @@ def test_elsewhere_there_is_nothing_to_tell() -> None:
 def test_the_command_tells_it_on_its_error_stream_only_if_that_is_a_terminal(tmp_path: Path) -> None:
     (tmp_path / "slow.py").write_text(SLOW)
     arguments = ("run", "seams2023", "--manager", "slow:Slow")
-    plain = suave_des_command(*arguments, cwd=tmp_path)
+    plain = suave_des_command(*arguments, cwd=tmp_path, THINKS_S="0.4")
     assert (plain.returncode, plain.stderr) == (0, "")
     ours, theirs = pty.openpty()
-    environment = {**os.environ, "PYTHONPATH": str(Path(suave_des.__file__).parents[1]), "TERM": "xterm"}
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(Path(suave_des.__file__).parents[1]),
+        "TERM": "xterm",
+        "THINKS_S": "1.0",
+    }
     command = [sys.executable, "-m", "suave_des", *arguments]
     ended = subprocess.run(
-        command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=theirs, text=True, timeout=60, check=True
+        command,
+        cwd=tmp_path,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=theirs,
+        text=True,
+        timeout=120,
+        check=True,
     )
     os.close(theirs)
     said = b""

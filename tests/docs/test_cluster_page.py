@@ -6,16 +6,15 @@ import sys
 import time
 from pathlib import Path
 
-import pytest
 from doc_blocks import ROOT, blocks_of
 
 import suave_des
 
-SBATCH = "#!/bin/sh\nbash $1 > job.log 2>&1 &\necho $! >> jobs\necho Submitted batch job $!\n"
+# Keeps the script, as Slurm does: dask-jobqueue removes it as soon as it is submitted.
+SBATCH = "#!/bin/sh\ncp $1 job.sh\nbash job.sh > job.log 2>&1 &\necho $! >> jobs\necho Submitted batch job $!\n"
 SCANCEL = "#!/bin/sh\nkill $@\n"
 
 
-@pytest.mark.slow  # seconds by itself, but beside other work it once waited for its worker for more than two minutes
 def test_the_slurm_script_runs(tmp_path):
     (script,) = [block.text for block in blocks_of(ROOT / "docs" / "guides" / "cluster.md") if "title" in block.marks]
     for shown, short in (("cores=32", "cores=1"), ("jobs=4", "jobs=1"), ("runs=100_000", "runs=2")):
@@ -44,7 +43,7 @@ def test_the_slurm_script_runs(tmp_path):
     assert done.stdout == "6 missions are in on_slurm/runs.csv\n", done.stderr
     assert len((tmp_path / "on_slurm" / "runs.csv").read_text().splitlines()) == 1 + 6
     (job,) = (tmp_path / "jobs").read_text().split()
-    end_s = time.monotonic() + 20.0
+    end_s = time.monotonic() + 60.0
     while Path(f"/proc/{job}").exists():  # which closing the cluster has cancelled
         assert time.monotonic() < end_s
         time.sleep(0.1)

@@ -21,7 +21,7 @@ print(jvm.java_class("java.lang.System").getProperty("java.vm.info"))
 
 def _python(*arguments: str, cache: Path, switch: str = "on") -> subprocess.CompletedProcess[str]:
     environment = {**os.environ, "SUAVE_DES_CACHE_DIR": str(cache), "SUAVE_DES_JAVA_ARCHIVE": switch}
-    return subprocess.run([sys.executable, *arguments], env=environment, capture_output=True, text=True, timeout=120)
+    return subprocess.run([sys.executable, *arguments], env=environment, capture_output=True, text=True, timeout=300)
 
 
 def test_an_archive_is_used_and_a_damaged_one_is_removed_without_a_word(tmp_path: Path) -> None:

@@ -1,0 +1,52 @@
+"""A signal that asks to stop is heard, wherever Python is when it comes."""
+
+import signal
+import time
+
+import pytest
+
+from suave_des.cli.signals import Stopped, exit_status, told_by_exceptions
+
+
+class Deaf:
+    """What is raised as it is forgotten, nobody hears; nor in Python code that compiled code calls."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+
+    def __del__(self) -> None:
+        signal.raise_signal(self.number)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_where_an_exception_is_lost_it_is_asked_again(number: int, capsys: pytest.CaptureFixture[str]) -> None:
+    with told_by_exceptions():
+        with pytest.raises(Stopped):
+            Deaf(number)
+            time.sleep(20.0)
+        assert exit_status() == 128 + number
+    assert capsys.readouterr().err == ""
+
+
+def test_what_else_is_lost_is_told_as_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Clumsy:
+        def __del__(self) -> None:
+            raise ValueError
+
+    told = []
+    monkeypatch.setattr("sys.unraisablehook", lambda lost: told.append(lost.exc_type))
+    with told_by_exceptions():
+        Clumsy()
+    assert told == [ValueError]
+
+
+def test_when_the_command_has_ended_nothing_is_asked_any_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    heard = []
+    before = signal.signal(signal.SIGTERM, lambda number, frame: heard.append(number))
+    try:
+        with told_by_exceptions():
+            Deaf(signal.SIGTERM)
+        time.sleep(0.3)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert heard == []
