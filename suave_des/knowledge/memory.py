@@ -16,6 +16,7 @@ import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
 from decimal import Decimal, InvalidOperation
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -154,7 +155,7 @@ class DiskMemory:
             return None
         try:
             key, facts = json.loads(text)
-            return _key_from_json(key), frozenset(map(_fact_from_json, facts))
+            return _key_from_json(key), frozenset([_fact(*fact) for fact in facts])
         except (ValueError, TypeError, InvalidOperation, RecursionError):
             return None
 
@@ -190,11 +191,25 @@ def _key_to_json(key: Key) -> list[Any]:
 def _key_from_json(content: Any) -> Key:
     objectives, groundings, components, where = content
     return (
-        tuple(ObjectiveState(_text(f), None if s is None else _text(s), _truth(a)) for f, s, a in objectives),
-        tuple((_text(function), _text(design)) for function, design in groundings),
-        tuple((_text(component), _text(status)) for component, status in components),
-        tuple((_text(name), _where(place)) for name, place in where),
+        tuple([_objective(*objective) for objective in objectives]),
+        tuple([_texts(*grounding) for grounding in groundings]),
+        tuple([_texts(*component) for component in components]),
+        tuple([(_text(name), _where(place)) for name, place in where]),
     )
+
+
+# A file has thousands of entries made of a few parts, which are made and checked once. Where equal is not the same to
+# JSON, as 1 and true, `typed` tells them apart.
+
+
+@lru_cache(maxsize=4096, typed=True)
+def _objective(function: Any, status: Any, always_improve: Any) -> ObjectiveState:
+    return ObjectiveState(_text(function), None if status is None else _text(status), _truth(always_improve))
+
+
+@lru_cache(maxsize=4096)
+def _texts(name: Any, value: Any) -> tuple[str, str]:
+    return _text(name), _text(value)
 
 
 def _where(place: Any) -> Any:
@@ -215,8 +230,9 @@ def _fact_to_json(fact: Fact) -> list[str]:
     return [fact.subject, fact.property, "text", fact.value]
 
 
-def _fact_from_json(content: Any) -> Fact:
-    subject, name, kind, value = map(_text, content)
+@lru_cache(maxsize=4096)
+def _fact(subject: Any, name: Any, kind: Any, value: Any) -> Fact:
+    subject, name, kind, value = map(_text, (subject, name, kind, value))
     values = {"truth": {"true": True, "false": False}.get, "number": Decimal, "text": str}
     if kind not in values or (kind == "truth" and value not in ("true", "false")):
         raise ValueError(f"a value of kind {kind}")
