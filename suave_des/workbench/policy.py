@@ -37,6 +37,7 @@ class Cell:
         statuses: what is inferred of objectives and groundings, in words, sorted.
         choices: (function, design) decided; None for the design when none is left.
         marks: any of "inconsistent", "none left", "flip-flop".
+        flipping: functions whose grounding flips back and forth.
         problem: what contradicts what, for an inconsistent one.
     """
 
@@ -47,6 +48,7 @@ class Cell:
     statuses: tuple[str, ...] = ()
     choices: tuple[tuple[str, str | None], ...] = ()
     marks: tuple[str, ...] = ()
+    flipping: tuple[str, ...] = ()
     problem: str | None = None
 
     def outcome(self, function: str) -> str:
@@ -238,7 +240,7 @@ def _decided(cell: Cell, infer: Callable[[KnowledgeState], Conclusion]) -> Cell:
 def _with_flip_flops(cells: list[Cell]) -> list[Cell]:
     """Mark cells whose decisions lead back to their own groundings by way of others, while nothing else changes."""
     found = {(cell.asked, cell.state.groundings): cell for cell in cells}
-    flipping = set()
+    flipping: dict[object, tuple[str, ...]] = {}
     for start in found:
         way = [start]
         while len(way) <= len(found):
@@ -248,9 +250,12 @@ def _with_flip_flops(cells: list[Cell]) -> list[Cell]:
                 break
             way.append(following)
             if following == start:
-                flipping.add(start)
+                designs = [dict(groundings) for _, groundings in way]
+                flipping[start] = tuple(name for name in cell.asked if len({each.get(name) for each in designs}) > 1)
                 break
     return [
-        replace(cell, marks=(*cell.marks, FLIP_FLOP)) if (cell.asked, cell.state.groundings) in flipping else cell
+        replace(cell, marks=(*cell.marks, FLIP_FLOP), flipping=functions)
+        if (functions := flipping.get((cell.asked, cell.state.groundings)))
+        else cell
         for cell in cells
     ]

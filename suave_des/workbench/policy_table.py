@@ -96,7 +96,7 @@ def present(cell: Cell, function: str) -> str:
 
 def outcome_in_words(cell: Cell, function: str) -> str:
     """What happens to a function's grounding, and whether the choice flips back and forth."""
-    flips = f" ({FLIP_FLOP})" if FLIP_FLOP in cell.marks else ""
+    flips = f" ({FLIP_FLOP})" if function in cell.flipping else ""
     return cell.outcome(function) + flips
 
 

@@ -145,6 +145,9 @@ class TestPolicy:
         flipping = found.marked("flip-flop")
         assert {cell.state.grounded(MOTION) for cell in flipping} == {"fd_all_thrusters", "fd_recover_thrusters"}
         assert any("(flip-flop)" in outcome for row in function_table(found, MOTION).rows for outcome in row.outcomes)
+        assert {cell.flipping for cell in flipping} == {(MOTION,)}
+        others = [outcome for row in function_table(found, SEARCH).rows for outcome in row.outcomes]
+        assert not any("flip-flop" in outcome for outcome in others)
 
     def test_a_rule_that_computes_takes_the_proof_away(self, tmp_path):
         file = rules_file(tmp_path, f'sum: {VISIBLE} ^ add(?w, ?v, 1) ^ lessThan(?w, 2) -> fg_status(?fg, "X")\n')
