@@ -101,7 +101,7 @@ def test_workers_that_are_interrupted_while_they_start_end_with_the_pool(monkeyp
         time.sleep(0.0)
 
     monkeypatch.setattr(SpawnProcess, "start", start)
-    with pytest.raises(KeyboardInterrupt), process_pool(2):
+    with pytest.raises(KeyboardInterrupt), process_pool(["none"], 2):
         pass
     assert started
     assert [process.exitcode for process in started] == [-signal.SIGKILL] * len(started)
