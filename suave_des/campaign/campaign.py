@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from suave_des.campaign.early_stop import RUNS_LIMIT_DEFAULT, parse_until_ci
-from suave_des.campaign.executors import check_place
+from suave_des.campaign.executors import Place, check_place
 from suave_des.campaign.lock import LOCK_FILE, locked
 from suave_des.campaign.output import check_output_folder
 from suave_des.campaign.plan import check_plan, check_seed
@@ -152,15 +153,16 @@ def run_campaign(
     check_place(workers, scheduler)
     check_seed(request.seed)
     check_time_out(request.time_out_s)
-    campaign = Campaign(request, *_read(request, sheet), folder)
-    if suave_format and campaign.variation.sweep.points > 1:
-        raise InputError(
-            "the exemplar's results file has no place for what a sweep varies",
-            remedy="leave --format suave out, or run a campaign for each point",
-        )
-    if not confirmed:
-        campaign.check_size(workers)
-    return campaign.run(workers, on_progress, scheduler, resumed=False)
+    with _place(request, workers, scheduler) as place:
+        campaign = Campaign(request, *_read(request, sheet), folder)
+        if suave_format and campaign.variation.sweep.points > 1:
+            raise InputError(
+                "the exemplar's results file has no place for what a sweep varies",
+                remedy="leave --format suave out, or run a campaign for each point",
+            )
+        if not confirmed:
+            campaign.check_size(workers)
+        return campaign.run(place.executor(), on_progress, resumed=False)
 
 
 def resume_campaign(
@@ -197,18 +199,26 @@ def resume_campaign(
         request = replace(request, until_ci=until_ci)
     given = {"runs": runs, "until_ci": until_ci}
     request = replace(request, of_file=tuple(name for name in request.of_file if given.get(name) is None))
-    try:
-        sheet = read_sheet(request.scenario)
-        request = replace(request, **said(sheet, request.of_file))
-        check_plan(request.managers, request.runs, workers)
-        check_place(workers, scheduler)
-        campaign = Campaign(request, *_read(request, sheet), folder)
-    except InputError as error:
-        if str(Path.cwd()) == request.folder:
-            raise
-        remedy = f"the campaign was started in {request.folder}: resume it there"
-        raise InputError(error.problem, file=error.file, place=error.place, remedy=remedy) from None
-    return campaign.run(workers, on_progress, scheduler, resumed=True)
+    with ExitStack() as stack:
+        try:
+            sheet = read_sheet(request.scenario)
+            request = replace(request, **said(sheet, request.of_file))
+            check_plan(request.managers, request.runs, workers)
+            check_place(workers, scheduler)
+            place = stack.enter_context(_place(request, workers, scheduler))
+            campaign = Campaign(request, *_read(request, sheet), folder)
+        except InputError as error:
+            if str(Path.cwd()) == request.folder:
+                raise
+            remedy = f"the campaign was started in {request.folder}: resume it there"
+            raise InputError(error.problem, file=error.file, place=error.place, remedy=remedy) from None
+        return campaign.run(place.executor(), on_progress, resumed=True)
+
+
+def _place(request: Request, workers: int, scheduler: str | None) -> Place:
+    """Where a campaign's missions will run, with no more workers than there are missions."""
+    fewest = len(request.managers) * request.runs
+    return Place(request.managers, workers if request.sweep else min(workers, fewest), scheduler)
 
 
 def _with_until_ci(request: Request, sheet: Sheet | None) -> Request:

@@ -7,8 +7,8 @@ travels to it by value.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import Protocol
+from contextlib import ExitStack
+from typing import Protocol, Self
 
 from suave_des.campaign.outcomes import Finished, Job
 from suave_des.campaign.plan import MissionKey
@@ -57,31 +57,42 @@ def check_place(workers: int, scheduler: str | None) -> None:
     check_address(scheduler)
 
 
-@contextmanager
-def executor(managers: Sequence[str], workers: int, scheduler: str | None = None) -> Iterator[Executor]:
-    """Where a campaign's missions run: in this process, in several, or on the workers of a cluster.
+class Place(ExitStack):
+    """Where a campaign's missions will run: in this process, in several, or on the workers of a cluster.
+
+    Worker processes start at once: they import what they need while this process reads and checks. A cluster is asked
+    only when all is checked. At the end, workers are stopped.
 
     Args:
         managers: that missions are run of.
         workers: number of processes; with one, missions run in this process.
         scheduler: address of a Dask scheduler, whose workers are used instead.
-
-    Raises:
-        InputError: the scheduler does not answer, or its workers are not fit for missions.
     """
-    if scheduler is not None:
-        from suave_des.campaign.dask_cluster import connected
 
-        with connected(scheduler) as cluster:
-            yield cluster
-        return
-    if workers == 1:
-        yield InProcess()
-        return
-    from suave_des.campaign.pool import process_pool
+    def __init__(self, managers: Sequence[str], workers: int, scheduler: str | None = None) -> None:
+        super().__init__()
+        self._managers, self._workers, self._scheduler = managers, workers, scheduler
+        self._started: Executor | None = None
 
-    with process_pool(managers, workers) as pool:
-        yield pool
+    def __enter__(self) -> Self:
+        """Start what can start."""
+        if self._scheduler is None and self._workers > 1:
+            from suave_des.campaign.pool import process_pool
+
+            self._started = self.enter_context(process_pool(self._managers, self._workers))
+        return self
+
+    def executor(self) -> Executor:
+        """What runs the missions.
+
+        Raises:
+            InputError: the scheduler does not answer, or its workers are not fit for missions.
+        """
+        if self._scheduler is not None:
+            from suave_des.campaign.dask_cluster import connected
+
+            return self.enter_context(connected(self._scheduler))
+        return self._started or InProcess()
 
 
 class InProcess:

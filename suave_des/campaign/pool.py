@@ -15,6 +15,7 @@ from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 
+from suave_des.campaign import machine_code
 from suave_des.campaign.executors import WorkerError, chunk_size
 from suave_des.campaign.outcomes import Finished, Job, time_out_cause
 from suave_des.campaign.plan import Chunk, MissionKey, chunked
@@ -86,6 +87,10 @@ class ProcessPool:
 
     def outcomes(self, job: Job, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
         """Outcomes chunk by chunk; see Executor."""
+        if not machine_code.is_stored():
+            from suave_des.campaign.missions import MissionRunner
+
+            MissionRunner(job)  # which compiles: else each worker would do it
         for worker in self._workers:
             worker.begin(job)
         size = chunk_size(total, len(self._workers))

@@ -8,9 +8,8 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from suave_des.campaign import machine_code
 from suave_des.campaign.early_stop import parse_until_ci
-from suave_des.campaign.executors import Executor, WorkerError, executor
+from suave_des.campaign.executors import Executor, WorkerError
 from suave_des.campaign.lock import FolderLock
 from suave_des.campaign.outcomes import Finished, Job
 from suave_des.campaign.output import make_output_folder, remove_derived, remove_parts
@@ -94,15 +93,9 @@ class Campaign:
         problem = f"{total:,} missions take about {_duration_text(expected_s)} with {by} on this machine"
         raise InputError(problem, remedy="give --yes if that is meant")
 
-    def run(
-        self, workers: int, on_progress: OnProgress | None, scheduler: str | None, *, resumed: bool
-    ) -> CampaignResult:
+    def run(self, place: Executor, on_progress: OnProgress | None, *, resumed: bool) -> CampaignResult:
         """Run what is not done yet, and write the files."""
-        workers = min(workers, max(1, self.watch.total))
         with ExitStack() as stack:
-            place = stack.enter_context(executor(self.request.managers, workers, scheduler))
-            if workers > 1 and not machine_code.is_stored():
-                self._runner()  # which compiles: else each worker would do it
             if self.folder is not None:
                 if not self.folder.exists():
                     stack.callback(_remove_empty, self.folder)  # unless something is in it then
