@@ -119,7 +119,7 @@ class TestInterruptedAtAnAwkwardMoment:
             "suave_des.campaign.running.make_store",
             "suave_des.campaign.store.remove_store",
             "suave_des.campaign.running.Store.__init__",
-            "suave_des.campaign.running.executor",
+            "suave_des.campaign.executors.Place.executor",
         ],
     )
     def test_before_the_first_mission_nothing_is_left(
