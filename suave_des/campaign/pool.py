@@ -32,6 +32,7 @@ _IN_A_ROW = 8
 _STOP_TIMEOUT_S = 5.0
 _OUT_OF_MEMORY = 12
 """Exit status of a worker that could not get the memory it asked for (the system's number of that error)."""
+_COMPILE_TIMEOUT_S = 300.0
 _START_AND_STOP_S = 60.0
 """Added to the time that a chunk's missions may take: starting Python and Java, and what a worker says by itself."""
 
@@ -71,6 +72,12 @@ class _Worker:
         with suppress(BrokenPipeError, ConnectionResetError):  # it is gone, which receiving from it tells
             self.connection.send(task.chunk)
 
+    def end(self) -> None:
+        """End it at once, if it has not ended by itself."""
+        self.connection.close()
+        self.process.kill()
+        _end(self.process)
+
 
 class ProcessPool:
     """Runs chunks of missions in worker processes.
@@ -88,15 +95,27 @@ class ProcessPool:
     def outcomes(self, job: Job, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
         """Outcomes chunk by chunk; see Executor."""
         if not machine_code.is_stored():
-            from suave_des.campaign.missions import MissionRunner
-
-            MissionRunner(job)  # which compiles: else each worker would do it
+            self._compile(job)
         for worker in self._workers:
             worker.begin(job)
         size = chunk_size(total, len(self._workers))
         tasks = (_Task(chunk) for chunk in chunked(missions, size))
         yield from _Crew(self._workers, self._start, job, tasks).outcomes()
         self.is_done = True
+
+    def _compile(self, job: Job) -> None:
+        """Have a process compile, and end: each worker would do it else, and be larger by what the compiler takes."""
+        compiling: _Worker | None = None
+        try:
+            with _interrupts_held():
+                compiling = self._start()
+            compiling.begin(job)
+            with suppress(BrokenPipeError, ConnectionResetError):  # it is gone: workers will see to it
+                compiling.connection.send(None)
+            compiling.process.join(_COMPILE_TIMEOUT_S)
+        finally:
+            if compiling is not None:
+                compiling.end()
 
 
 @contextmanager
