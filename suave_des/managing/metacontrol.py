@@ -56,7 +56,7 @@ class Metacontrol(ManagingSubsystem):
         self._awaited = self._attributes_to_await()
         self._listens_since_s = 0.0
         self._heard_before: dict[str, float | None] = {}
-        self._values: _Values = ()
+        self._values: _Values = (None,) * len(self._attributes)
         self._known: _Known | None = None
         self._situations = _memories.setdefault(self._deliberation, {})
         self._on_the_bridge = 0
