@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
 
 import suave_des
-from suave_des.imports import hidden
+from suave_des.imports import hidden, main_hidden
 
 COMPILING = """
 import sys
@@ -77,3 +78,21 @@ def test_what_is_loaded_is_not_hidden() -> None:
     with hidden("os"):
         assert __import__("os") is os
     assert sys.modules["os"] is os
+
+
+def test_the_script_is_back_when_two_threads_have_hidden_it() -> None:
+    main, inside, go_on = sys.modules["__main__"], threading.Event(), threading.Event()
+
+    def hide(event: threading.Event) -> None:
+        with main_hidden():
+            event.set()
+            go_on.wait(10.0)
+
+    threads = [threading.Thread(target=hide, args=(inside,)), threading.Thread(target=hide, args=(threading.Event(),))]
+    threads[0].start()
+    assert inside.wait(10.0)
+    threads[1].start()
+    go_on.set()
+    for thread in threads:
+        thread.join()
+    assert sys.modules["__main__"] is main

@@ -25,13 +25,15 @@ _KEPT = 16
 def is_stored() -> bool:
     """Whether the machine code is stored, as far as is known."""
     note = _note()
-    return note is not None and note.exists()
+    with suppress(OSError):  # a folder that may not be entered
+        return note is not None and note.exists()
+    return False
 
 
 def note_stored() -> None:
     """Take note that it is stored now."""
     note = _note()
-    if note is None or note.exists():
+    if note is None or is_stored():
         return
     with suppress(OSError):  # without a note the next campaign loads it once more than it has to
         note.parent.mkdir(mode=0o700, parents=True, exist_ok=True)

@@ -83,7 +83,12 @@ class TimeLimit:
             threading.Thread(target=_do_all, args=(self._jobs,), daemon=True, name="reasoner").start()
         job = _Job(work)
         self._jobs.put(job)  # type: ignore[arg-type]
-        if not job.wait(self.seconds):
+        try:
+            in_time = job.wait(self.seconds)
+        except BaseException:  # Ctrl-C: the thread may be in Java, which crashes if the process ends as usual
+            _abandoned.append(doing)
+            raise
+        if not in_time:
             self._stuck = doing
             _abandoned.append(doing)
             raise self.exceeded(doing)

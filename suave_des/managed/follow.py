@@ -136,7 +136,7 @@ class FollowPipeline(TravellingNode):
         self._catch_up()
         if is_time:
             self._poll = self._wake
-        return is_time
+        return self._poll == self._wake  # also if control changes at the very poll that finds the last point reached
 
     def _catch_up(self) -> None:
         """Take in the points that polls until now have found reached."""

@@ -8,7 +8,6 @@ from difflib import get_close_matches
 from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
-from types import ModuleType
 
 from suave_des.errors import InputError
 from suave_des.managing.base import ManagingSubsystem
@@ -50,7 +49,9 @@ def _registered() -> dict[str, str]:
 def _load(name: str, target: str) -> type[ManagingSubsystem]:
     module_name, _, attribute = target.partition(":")
     try:
-        module = sys.modules.get(module_name) or _imported(module_name)
+        if module_name not in sys.modules:
+            _look_here()
+        module = importlib.import_module(module_name)
     except (Exception, SystemExit) as error:  # whatever the module's own code raises on import
         raise InputError(
             f"manager {name!r}: {type(error).__name__}: {error}",
@@ -65,8 +66,7 @@ def _load(name: str, target: str) -> type[ManagingSubsystem]:
     return found
 
 
-def _imported(module_name: str) -> ModuleType:
+def _look_here() -> None:
     here = str(Path.cwd())
     if here not in sys.path:  # where `python` would find a module of one's own, but an installed command would not
         sys.path.append(here)
-    return importlib.import_module(module_name)

@@ -110,6 +110,9 @@ class KnowledgeBase:
         def words(parts: Mapping[str, object] | None) -> list[str]:
             return [f"{name}={value}" for name, value in (parts or {}).items()]
 
+        def statuses(parts: Mapping[str, object]) -> list[str]:
+            return [name if status is None else f"{name}={status}" for name, status in parts.items()]
+
         asked = [objectives] if isinstance(objectives, str) else objectives
         return state_from(
             self.base,
@@ -118,7 +121,7 @@ class KnowledgeBase:
             measured=words(measurements),
             components=words(components),
             groundings=words(groundings),
-            objectives=words(objectives) if isinstance(objectives, Mapping) else asked,
+            objectives=statuses(objectives) if isinstance(objectives, Mapping) else asked,
         )
 
     def infer(self, state: KnowledgeState) -> Conclusion:

@@ -92,3 +92,14 @@ def test_where_nothing_can_be_kept_missions_run_all_the_same(tmp_path: Path, mon
     monkeypatch.setenv("SUAVE_DES_CACHE_DIR", str(tmp_path / "file"))
     machine_code.note_stored()
     assert not machine_code.is_stored()
+
+
+def test_a_cache_folder_that_may_not_be_entered_is_as_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SUAVE_DES_CACHE_DIR", str(tmp_path))
+
+    def refused(path: Path) -> bool:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "exists", refused)
+    machine_code.note_stored()
+    assert not machine_code.is_stored()

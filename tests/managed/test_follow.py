@@ -332,3 +332,34 @@ def test_the_distance_can_be_asked_for_at_any_time(env: simpy.Environment, name:
     assert published_m == sorted(published_m)
     assert len(set(published_m)) > 10
     assert follow.distance_m == published_m[-1]
+
+
+def real_end(name: str, changed_s: float | None) -> tuple[float, float, list[float]]:
+    """When a real vehicle has followed the line, the distance, and the times at which the node means to act.
+
+    A thruster gets hardly any weaker at one time: scheduled before any poll, too little to reach a point at another.
+    """
+    env = simpy.Environment()
+    vehicle = Vehicle(BLUEROV2, Autopilot(0.48, 0.34, 0.36, 0.5), Pose(1.0, 0.3, -18.75, 0.0, 0.0, 0.0), 120.0)
+    follow = follow_of(env, name, vehicle)
+    give_ahead, acting_s = vehicle.give_ahead, []
+
+    def give(t_s, places_m, sent_as_m, watch, **others):
+        reached, act_at = give_ahead(t_s, places_m, sent_as_m, watch, **others)
+        acting_s.append(watch.time_s(act_at))
+        return reached, act_at
+
+    vehicle.give_ahead = give
+    if changed_s is not None:
+        env.timeout(changed_s).callbacks.append(lambda _: vehicle.set_thruster_health(env.now, 1, 0.999999))
+    follow.apply(ACTIVE)
+    env.run(until=follow.finished)
+    return env.now, follow.distance_m, acting_s
+
+
+@BOTH
+def test_control_that_changes_at_the_poll_that_ends_what_was_sent_ahead_changes_nothing_else(name: str) -> None:
+    end_s, distance_m, acting_s = real_end(name, None)
+    assert len(acting_s) > 1
+    for at_s in acting_s:
+        assert real_end(name, at_s)[:2] == (end_s, distance_m)

@@ -1,5 +1,8 @@
 """Managers by name."""
 
+import sys
+import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -64,3 +67,19 @@ def test_a_module_that_fails_on_import_is_bad_input(tmp_path: Path, monkeypatch:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError, match="SyntaxError"):
         manager_class("broken_manager_module:Mine")
+
+
+def test_a_module_that_another_thread_still_imports_is_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mine = "from suave_des.managing.simple import NoManager\nclass Slow(NoManager):\n    pass\n"
+    source = f"import time\ntime.sleep(0.5)\n{mine}"
+    (tmp_path / "slow_to_import.py").write_text(source)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path)])
+    first = threading.Thread(target=manager_class, args=("slow_to_import:Slow",))
+    first.start()
+    while "slow_to_import" not in sys.modules:
+        time.sleep(0.01)
+    assert manager_class("slow_to_import:Slow").__name__ == "Slow"
+    first.join()

@@ -11,7 +11,7 @@ import pytest
 
 import suave_des
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.knowledge.limit import TimeLimit
+from suave_des.knowledge.limit import TimeLimit, times_abandoned
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import ObjectiveState
 from suave_des.workbench import KnowledgeBase
@@ -190,6 +190,17 @@ main(["run", "seams2023", "--reasoner", {reasoner!r}, "--rules", {str(rules)!r}]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
         assert (done.returncode, done.stderr) == (0, "")
 
+    def test_who_is_interrupted_while_it_lasts_has_given_it_up(self, monkeypatch):
+        # Java may still run then, and crashes in a process that ends as usual.
+        def interrupted(*_):
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr("suave_des.knowledge.limit._abandoned", [])
+        monkeypatch.setattr("suave_des.knowledge.limit._Job.wait", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            TimeLimit().run(lambda: None, "reasoning")
+        assert times_abandoned() == 1
+
     def test_passes_on_results_and_errors(self):
         limit = TimeLimit(60.0)
         assert limit.run(lambda: 3, "counting") == 3
@@ -202,7 +213,7 @@ main(["run", "seams2023", "--reasoner", {reasoner!r}, "--rules", {str(rules)!r}]
 import sys
 from suave_des.errors import KnowledgeError
 from suave_des.workbench import KnowledgeBase
-from suave_des.knowledge.limit import TimeLimit
+from suave_des.knowledge.limit import TimeLimit, times_abandoned
 bench = KnowledgeBase.load(reasoner="pellet")  # Java starts in another thread than this one
 state = bench.state(groundings={HIGH["groundings"]!r}, measurements={HIGH["measurements"]!r})
 assert bench.infer(state).plan.decisions
