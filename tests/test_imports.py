@@ -81,18 +81,20 @@ def test_what_is_loaded_is_not_hidden() -> None:
 
 
 def test_the_script_is_back_when_two_threads_have_hidden_it() -> None:
-    main, inside, go_on = sys.modules["__main__"], threading.Event(), threading.Event()
+    main = sys.modules["__main__"]
+    inside, leave = [threading.Event(), threading.Event()], [threading.Event(), threading.Event()]
 
-    def hide(event: threading.Event) -> None:
+    def hide(number: int) -> None:
         with main_hidden():
-            event.set()
-            go_on.wait(10.0)
+            inside[number].set()
+            leave[number].wait(10.0)
 
-    threads = [threading.Thread(target=hide, args=(inside,)), threading.Thread(target=hide, args=(threading.Event(),))]
+    threads = [threading.Thread(target=hide, args=(number,)) for number in (0, 1)]
     threads[0].start()
-    assert inside.wait(10.0)
+    assert inside[0].wait(10.0)
     threads[1].start()
-    go_on.set()
-    for thread in threads:
-        thread.join()
+    inside[1].wait(0.5)  # it has to wait for the first one
+    for number in (0, 1):
+        leave[number].set()
+        threads[number].join()
     assert sys.modules["__main__"] is main

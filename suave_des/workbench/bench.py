@@ -92,7 +92,7 @@ class KnowledgeBase:
         measurements: Mapping[str, Number] | None = None,
         components: Mapping[str, str] | None = None,
         groundings: Mapping[str, str] | None = None,
-        objectives: str | Iterable[str] | Mapping[str, str] = (),
+        objectives: str | Iterable[str] | Mapping[str, str | None] = (),
     ) -> KnowledgeState:
         """A state with names checked; without objectives, those of the groundings, else those of the search task.
 
@@ -101,7 +101,7 @@ class KnowledgeBase:
             measurements: measured value by quality attribute type.
             components: c_status by component.
             groundings: function design by function.
-            objectives: functions, or o_status by function.
+            objectives: functions, or o_status by function; none: UNGROUNDED without a grounding, else nothing.
 
         Raises:
             InputError: a name is unknown, or a value cannot be meant.

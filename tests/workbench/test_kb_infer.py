@@ -130,6 +130,12 @@ def test_statuses_of_ones_own_are_taken(bench):
     assert [each.status for each in state.objectives] == ["DONE", "UPDATABLE"]
 
 
+def test_an_objective_without_a_status_of_ones_own_has_the_one_that_follows(bench):
+    for groundings in ({}, {"f_maintain_motion": "fd_all_thrusters"}):
+        named = bench.state(objectives=["f_maintain_motion"], groundings=groundings)
+        assert bench.state(objectives={"f_maintain_motion": None}, groundings=groundings) == named
+
+
 def test_one_file_or_name_may_stand_alone(bench, tmp_path):
     (tmp_path / "mine.swrl").write_text("mine: Objective(?o) -> o_updatable(?o, true)\n")
     alone = KnowledgeBase.load("suave.owl", rules=tmp_path / "mine.swrl", disabled_rules="compError")
