@@ -1,7 +1,9 @@
-"""Where the shipped ontologies, scenarios and modes files are, in a checkout and in an installed copy."""
+"""Where the shipped ontologies, scenarios and modes files are, in a checkout and installed; and the cache folder."""
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -21,6 +23,20 @@ def shipped_folder(kind: str) -> Path:
     """Folder of shipped files of one kind: "ontology", "scenarios", "scenarios/revisions" or "scenarios/published"."""
     installed = _PACKAGE / "shipped" / kind
     return installed if installed.is_dir() else _PACKAGE.parent / kind
+
+
+def cache_folder() -> Path:
+    """The user's folder for what can be made again: SUAVE_DES_CACHE_DIR, or where the system keeps such things."""
+    chosen = os.environ.get("SUAVE_DES_CACHE_DIR")
+    if chosen:
+        return Path(chosen)
+    if sys.platform == "win32":
+        start = os.environ.get("LOCALAPPDATA")
+        return (Path(start) if start else Path.home() / "AppData" / "Local") / "suave-des" / "Cache"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "suave-des"
+    start = os.environ.get("XDG_CACHE_HOME")  # to be ignored unless absolute, says the XDG specification
+    return (Path(start) if start and Path(start).is_absolute() else Path.home() / ".cache") / "suave-des"
 
 
 def _is_a(kind: Callable[[Path], bool], path: Path) -> bool:

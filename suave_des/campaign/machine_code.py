@@ -15,7 +15,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import suave_des
-from suave_des.knowledge.memory import cache_folder
+from suave_des.resources import cache_folder
 
 COMPILED_MODULES = ("managed/search.py", "vehicle/kernel.py", "world/pipeline.py")
 _KEPT = 16

@@ -25,7 +25,7 @@ from typing import Final
 
 from suave_des.errors import InputError
 from suave_des.knowledge.java import java_executable, java_library
-from suave_des.knowledge.memory import cache_folder
+from suave_des.resources import cache_folder
 
 #: Raised when archives are made in another way.
 _FORMAT: Final = 1

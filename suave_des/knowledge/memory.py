@@ -11,7 +11,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import sys
 import tempfile
 from collections.abc import Mapping
 from contextlib import suppress
@@ -22,6 +21,7 @@ from typing import Any, Final
 
 from suave_des.knowledge.regions import Key
 from suave_des.knowledge.state import Fact, ObjectiveState
+from suave_des.resources import cache_folder
 
 #: Raised when entries are written in another way.
 _FORMAT: Final = 1
@@ -30,20 +30,6 @@ _SUFFIX: Final = ".memory"
 MAX_BYTES: Final = 16 * 2**20
 #: Files that are kept; those used longest ago are removed.
 MAX_FILES: Final = 64
-
-
-def cache_folder() -> Path:
-    """The user's folder for what can be made again: SUAVE_DES_CACHE_DIR, or where the system keeps such things."""
-    chosen = os.environ.get("SUAVE_DES_CACHE_DIR")
-    if chosen:
-        return Path(chosen)
-    if sys.platform == "win32":
-        start = os.environ.get("LOCALAPPDATA")
-        return (Path(start) if start else Path.home() / "AppData" / "Local") / "suave-des" / "Cache"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "suave-des"
-    start = os.environ.get("XDG_CACHE_HOME")  # to be ignored unless absolute, says the XDG specification
-    return (Path(start) if start and Path(start).is_absolute() else Path.home() / ".cache") / "suave-des"
 
 
 def grown(sizes: dict[str, int]) -> dict[str, bytes]:
