@@ -22,7 +22,18 @@ def until(env: simpy.Environment, t_s: float) -> simpy.Timeout:
     return simpy.Timeout(env, delay_s if delay_s > 0.0 else 0.0)
 
 
-def call_at(env: simpy.Environment, t_s: float, callback: Callable[[Any], None], value: Any) -> None:
-    """Have `callback` called with `value` at mission time t, or as the next thing now if t has passed."""
-    callbacks: Any = until(env, t_s).callbacks  # a list, until the event is processed
-    callbacks.append(lambda _: callback(value))
+def call_at(env: simpy.Environment, t_s: float, callback: Callable[[simpy.Event], None]) -> simpy.Event:
+    """Have `callback` called with the returned event at mission time t, or as the next thing now if t has passed."""
+    event = until(env, t_s)
+    callbacks: Any = event.callbacks  # a list, until the event is processed
+    callbacks.append(callback)
+    return event
+
+
+def call_next(env: simpy.Environment, callback: Callable[[simpy.Event], None]) -> simpy.Event:
+    """Have `callback` called with the returned event now, before any other event, as SimPy does with interrupts."""
+    event = simpy.Event(env)
+    event.callbacks = [callback]
+    event._ok, event._value = True, None
+    env.schedule(event, simpy.events.URGENT)
+    return event

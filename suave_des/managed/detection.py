@@ -55,7 +55,10 @@ class PipelineDetector:
         self._vehicle = vehicle
         self._visibility_m = visibility_m
         self._points = points
-        self._version = 0
+        self._looked = self._rows = 0
+        self._seen: int | None = None
+        self._alarm: simpy.Event | None = None
+        self._alarm_row = 0
         self.detected = env.event()
         self.first_point: int | None = None
         self.detected_s: float | None = None
@@ -66,23 +69,29 @@ class PipelineDetector:
         self._look_ahead(row, max(_LOOK_AHEAD_ROWS, self._vehicle.computed_row + _MARGIN_ROWS - row))
 
     def _look_ahead(self, row: int, rows: int) -> None:
-        self._version += 1
-        last = min(row + rows, self._vehicle.last_row)
-        if row >= last:
+        """Look along the way from a row on; be there at the first sight, or else not after what was looked at ends."""
+        self._looked, self._rows, self._seen = min(row + rows, self._vehicle.last_row), rows, None
+        if row >= self._looked:
             return
-        self._vehicle.look_ahead(last)
-        seen_row, point = first_detection(self._vehicle.track, row, last, self._visibility_m, self._points)
-        wake_s = (seen_row if point >= 0 else last) * STEP_S
-        call_at(self._env, wake_s, self._arrive, (self._version, point, last, rows))
+        self._vehicle.look_ahead(self._looked)
+        seen_row, point = first_detection(self._vehicle.track, row, self._looked, self._visibility_m, self._points)
+        if point >= 0:
+            self._looked, self._seen = seen_row, point
+        elif self._alarm is not None and self._alarm_row <= self._looked:
+            return  # soon enough
+        self._alarm, self._alarm_row = call_at(self._env, self._looked * STEP_S, self._arrive), self._looked
 
-    def _arrive(self, foreseen: tuple[int, int, int, int]) -> None:
-        version, point, last, rows = foreseen
-        if version != self._version:
+    def _arrive(self, event: simpy.Event) -> None:
+        if event is not self._alarm:
             return
-        if point < 0:
-            self._look_ahead(last, min(2 * rows, _FARTHEST_LOOK_AHEAD_ROWS))
+        self._alarm = None
+        if self._alarm_row < self._looked:
+            self._alarm, self._alarm_row = call_at(self._env, self._looked * STEP_S, self._arrive), self._looked
+            return
+        if self._seen is None:
+            self._look_ahead(self._looked, min(2 * self._rows, _FARTHEST_LOOK_AHEAD_ROWS))
             return
         self._vehicle.control_listeners.remove(self._look_anew)
-        self.first_point = point
+        self.first_point = self._seen
         self.detected_s = float(self._env.now)
         self.detected.succeed()

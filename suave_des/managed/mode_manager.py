@@ -81,11 +81,10 @@ class ModeManager:
         self._log("mode_manager", "mode_requested", f"{function} -> {mode}")
         due_s = max(self._env.now + self._latency_s(), self._effect_due_s.get(function, 0.0))
         self._effect_due_s[function] = due_s
-        call_at(self._env, due_s, self._take_effect, (function, mode))
+        call_at(self._env, due_s, lambda _: self._take_effect(function, mode))
         return True
 
-    def _take_effect(self, effect: tuple[str, str]) -> None:
-        function, name = effect
+    def _take_effect(self, function: str, name: str) -> None:
         mode = self._table.mode(function, name)
         self._nodes[function].apply(mode)
         self._log("mode_manager", "mode_set", f"{function} = {name}")

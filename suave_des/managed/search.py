@@ -8,7 +8,7 @@ from bisect import bisect_right
 import numpy as np
 import simpy
 
-from suave_des.clock import Process, tick_at_or_after, until
+from suave_des.clock import tick_at_or_after
 from suave_des.compiling import compiled
 from suave_des.managed.node import SetPointSender
 from suave_des.managed.travel import TravellingNode
@@ -81,7 +81,6 @@ class GenerateSearchPath(TravellingNode):
         self._centre_m = origin_m
         self.altitude_m = INITIAL_ALTITUDE_M
         self._lowered_m = 0.0
-        self._watch: Watch | None = None
         self._ticked = self._wake = 0
         self._restart()
 
@@ -103,13 +102,13 @@ class GenerateSearchPath(TravellingNode):
             self._lowered_m = 0.0
         if self._revision.centre == "activation":
             self._centre_m = self._vehicle.position(self.env.now)[:2]
-        self._process = self.env.process(self._tick_while_active())
+        first_s = tick_at_or_after(max(self.env.now, self._ready_s), self._phase_s, TICK_PERIOD_S)
+        self._rest_until(first_s)
 
     def deactivated(self) -> None:
         """Stop ticking."""
         self._catch_up()
-        self._stop(self._watch, self._ticked)
-        self._watch = None
+        self._stop(self._ticked)
 
     def _restart(self) -> None:
         self._count = 0
@@ -119,25 +118,29 @@ class GenerateSearchPath(TravellingNode):
         self._reached_at: list[int] = []
         self._waited_ticks = 0
 
-    def _tick_while_active(self) -> Process:
-        try:
-            yield until(self.env, tick_at_or_after(max(self.env.now, self._ready_s), self._phase_s, TICK_PERIOD_S))
+    def wake(self) -> None:
+        """Do what there is to do at this tick, and foresee those that follow."""
+        if self._watch is None:
             self._ticked = self._wake = 0
-            self._watch = watch = Watch(
+            self._watch = Watch(
                 self.env.now, TICK_PERIOD_S, REACHED_BOX_M, REACHED_BOX_M, 1, TICKS_BEFORE_RESENDING + 1
             )
-            while True:
-                self._foresee(watch, begin=self._tick())
-                while not (yield from self._sleep(watch, self._wake)) or self._all_reached():
-                    self._catch_up()
-                    self._foresee(watch)
-                self._catch_up()
-                self._ticked = self._wake
-        except simpy.Interrupt:
+        elif self._all_reached():
+            self.foresee_anew()
             return
+        else:
+            self._catch_up()
+            self._ticked = self._wake
+        self._foresee(self._watch, begin=self._tick())
+
+    def foresee_anew(self) -> None:
+        """Take in the ticks until now, and foresee those that follow."""
+        if self._watch is not None:
+            self._catch_up()
+            self._foresee(self._watch)
 
     def _foresee(self, watch: Watch, *, begin: bool = False) -> None:
-        """Send the set-points of coming ticks ahead, as far as the tick at which there is more to do.
+        """Send the set-points of coming ticks ahead, as far as the tick at which there is more to do; rest until then.
 
         Args:
             watch: the ticks.
@@ -146,15 +149,16 @@ class GenerateSearchPath(TravellingNode):
         first = self._ticked + 1
         if self._places is None or self.altitude_m != self._last_altitude_m:
             self._wake = first
-            return
-        present = self._places[0]
-        self._places = np.empty((1 + SET_POINTS_AHEAD, 4))
-        self._places[0] = present
-        spiral(self._count, self._radius_m, self.altitude_m, self._centre_m, self._places[1:])
-        last = self._ticked + TICKS_BEFORE_RESENDING + 1 - self._waited_ticks
-        self._reached_at, self._wake = self._sender.send_ahead(
-            self._places, self._commanded_z_m(), watch, first=first, last=last, begin=begin
-        )
+        else:
+            present = self._places[0]
+            self._places = np.empty((1 + SET_POINTS_AHEAD, 4))
+            self._places[0] = present
+            spiral(self._count, self._radius_m, self.altitude_m, self._centre_m, self._places[1:])
+            last = self._ticked + TICKS_BEFORE_RESENDING + 1 - self._waited_ticks
+            self._reached_at, self._wake = self._sender.send_ahead(
+                self._places, self._commanded_z_m(), watch, first=first, last=last, begin=begin
+            )
+        self._rest_until(watch.time_s(self._wake))
 
     def _all_reached(self) -> bool:
         """Whether set-points were sent ahead and all reached: then those after them are sent at the same tick."""

@@ -1,22 +1,19 @@
-"""What the functions that move the vehicle share: they foresee their ticks, and sleep until one that matters."""
+"""What the functions that move the vehicle share: they foresee their ticks, and rest until one that matters."""
 
 from __future__ import annotations
 
-from collections.abc import Generator
-
 import simpy
 
+from suave_des.clock import call_at, call_next
 from suave_des.managed.node import FunctionNode, SetPointSender
 from suave_des.vehicle.vehicle import Vehicle, Watch
-
-_CONTROL_CHANGE = "control change"
 
 
 class TravellingNode(FunctionNode):
     """A node that looks at each tick of its timer whether a place is reached, and then sends the next one.
 
-    Instead of stopping at each tick, it gives set-points ahead; should the vehicle's control change meanwhile, it
-    catches up with what has happened until then and foresees the rest anew.
+    Instead of stopping at each tick, it gives set-points ahead and rests; should the vehicle's control change
+    meanwhile, it catches up with what has happened until then and foresees the rest anew.
 
     Args:
         env: the mission's clock.
@@ -28,34 +25,40 @@ class TravellingNode(FunctionNode):
         super().__init__(env)
         self._vehicle = vehicle
         self._sender = sender
-        self._process: simpy.Process | None = None
-        self._asleep = False
+        self._watch: Watch | None = None
+        self._alarm: simpy.Event | None = None
+        """The event that the node waits for; one that is not this any more comes too late."""
+        self._rests = False
         vehicle.control_listeners.append(self._control_changed)
 
-    def _sleep(self, watch: Watch, tick: int) -> Generator[simpy.Event, None, bool]:
-        """Sleep until a tick; False if a change of the vehicle's control has come first."""
-        delay_s = watch.time_s(tick) - self.env.now
-        self._asleep = True
-        try:
-            yield simpy.Timeout(self.env, delay_s if delay_s > 0.0 else 0.0)
-        except simpy.Interrupt as interrupt:
-            if interrupt.cause is not _CONTROL_CHANGE or self.env.active_process is not self._process:
-                raise
-            return False
-        finally:
-            self._asleep = False
-        return True
+    def wake(self) -> None:
+        """The tick has come until which the node was to rest."""
+
+    def foresee_anew(self) -> None:
+        """The vehicle's control has changed before that tick."""
+
+    def _rest_until(self, t_s: float) -> None:
+        self._alarm = call_at(self.env, t_s, self._end_rest)
+        self._rests = True
+
+    def _end_rest(self, event: simpy.Event) -> None:
+        if event is self._alarm:
+            self._rests = False
+            self.wake()
 
     def _control_changed(self, row: int) -> None:
-        if self._asleep and self._process is not None:
-            self._asleep = False  # one waking is enough
-            self._process.interrupt(_CONTROL_CHANGE)
+        if self._rests and self._watch is not None:
+            self._rests = False
+            # Whatever else changes control in this event is to have done so when the rest is foreseen anew.
+            self._alarm = call_next(self.env, self._after_change)
 
-    def _stop(self, watch: Watch | None, tick: int) -> None:
-        """End the process, and what it has given ahead for ticks after the given one."""
-        process, self._process = self._process, None
-        self._asleep = False
-        if process is not None and process.is_alive:
-            process.interrupt()
-            if watch is not None:
-                self._vehicle.drop_ahead(self.env.now, watch, tick)
+    def _after_change(self, event: simpy.Event) -> None:
+        if event is self._alarm:
+            self.foresee_anew()
+
+    def _stop(self, tick: int) -> None:
+        """Rest for good, and drop what was given ahead for ticks after the given one."""
+        watch, self._watch = self._watch, None
+        self._alarm, self._rests = None, False
+        if watch is not None:
+            self._vehicle.drop_ahead(self.env.now, watch, tick)

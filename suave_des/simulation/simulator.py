@@ -14,7 +14,7 @@ from suave_des.clock import Process
 from suave_des.errors import SuaveDesError
 from suave_des.managed.coordinator import MissionCoordinator
 from suave_des.managed.detection import PipelineDetector, measured_at_rows
-from suave_des.managed.follow import FollowPipeline
+from suave_des.managed.follow import FollowPipeline, Way
 from suave_des.managed.mode_manager import ModeManager
 from suave_des.managed.motion import MaintainMotion
 from suave_des.managed.node import Frame, FunctionNode, SetPointSender
@@ -55,7 +55,7 @@ class Simulator:
         self.runs_per_draw = dict(runs_per_draw)
         pipeline = loaded.scenario.pipeline
         self.points = sample_points(pipeline.vertices_m, pipeline.points_per_piece)
-        self.way_m = there_and_back(self.points)
+        self.way = Way.along(there_and_back(self.points))
         height = loaded.scenario.revision.monitors.detected_point_height_m
         self.detection_points = self.points + np.array([0.0, 0.0, height])
         # Kept from mission to mission: a megabyte allocated for each leaves the process's memory in pieces.
@@ -311,9 +311,9 @@ class _Mission:
     def _restore_thruster(self, thruster: int) -> None:
         self.vehicle.set_thruster_health(self.env.now, thruster, 1.0)
 
-    def _path(self) -> Array | None:
+    def _path(self) -> Way | None:
         first = self.detector.first_point
-        return None if first is None else self.simulator.way_m[first:]
+        return None if first is None else self.simulator.way.from_point(first)
 
     def _make_coordinator(self) -> MissionCoordinator:
         settings = self.revision.coordinator

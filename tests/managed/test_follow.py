@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from stand_ins import ACTIVE, INACTIVE, MovingVehicle, PlacedVehicle, revision, sender
 
-from suave_des.managed.follow import FollowPipeline
+from suave_des.managed.follow import FollowPipeline, Way
 from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle, row_at
 
@@ -19,7 +19,7 @@ SPEED = 0.25
 
 
 def follow_of(env: simpy.Environment, name: str, vehicle: PlacedVehicle, path=LINE) -> FollowPipeline:
-    way = None if path is None else np.array(path)
+    way = None if path is None else Way.along(np.array(path))
     return FollowPipeline(env, vehicle, sender(env, vehicle), revision(name).follow, lambda: way)
 
 

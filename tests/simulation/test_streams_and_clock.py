@@ -5,7 +5,7 @@ import simpy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from suave_des.clock import call_at, tick_at_or_after, until
+from suave_des.clock import call_at, call_next, tick_at_or_after, until
 from suave_des.streams import Streams
 
 names = st.text(min_size=1, max_size=20)
@@ -57,8 +57,21 @@ def test_waiting_for_a_time_that_has_passed_takes_no_time() -> None:
     assert env.now == 5.0
 
 
-def test_callback_comes_at_its_time_with_its_value() -> None:
+def test_callback_comes_at_its_time_with_its_event() -> None:
     env, called = simpy.Environment(), []
-    call_at(env, 4.0, lambda value: called.append((env.now, value)), "value")
+    event = call_at(env, 4.0, lambda happened: called.append((env.now, happened)))
     env.run()
-    assert called == [(4.0, "value")]
+    assert called == [(4.0, event)]
+
+
+def test_what_is_called_next_comes_before_all_else_of_its_time_but_not_at_once() -> None:
+    env, called = simpy.Environment(), []
+
+    def first(_: simpy.Event) -> None:
+        call_next(env, lambda _: called.append((env.now, "next")))
+        called.append((env.now, "first"))
+
+    call_at(env, 4.0, first)
+    call_at(env, 4.0, lambda _: called.append((env.now, "second")))
+    env.run()
+    assert called == [(4.0, "first"), (4.0, "next"), (4.0, "second")]
