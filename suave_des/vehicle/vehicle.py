@@ -85,11 +85,15 @@ def _parameters(
     vector[kernel.HEADING_INTEGRAL_GAIN] = omega**3 / 8.0
     vector[kernel.HEADING_INTEGRAL_LIMIT] = 4.0 * omega * omega
     vector[kernel.CURRENT : kernel.CURRENT + 3] = current_m_per_s
+    inertia = np.array([model.mass_kg] * 3 + [*model.inertia_kg_m2])
+    vector[kernel.INVERSE_MASS : kernel.INVERSE_MASS + 4] = 1.0 / inertia[2:]
+    vector[kernel.DRAG_RATE : kernel.DRAG_RATE + 6] = np.array(model.quadratic_drag) / inertia
     vector[[kernel.FLOOR, kernel.CEILING]] = z_limits_m
     return vector
 
 
-class Watch(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Watch:
     """When it is looked whether the vehicle has reached a place, and what counts as reached.
 
     Attributes:
@@ -148,7 +152,7 @@ class _Course(NamedTuple):
         place = bisect_right(self.given_at, tick)
         if place > 0:
             x_m, y_m, z_m = self.sent_as_m
-            self.before[:3] = self.places_m[place, 0] + x_m, self.places_m[place, 1] + y_m, z_m
+            self.before[:3] = self.places_m.item(place, 0) + x_m, self.places_m.item(place, 1) + y_m, z_m
         return self.before
 
 
@@ -206,9 +210,7 @@ class Vehicle:
         """Give the autopilot a new position set-point; it replaces the one before."""
         row = row_at(t_s)
         self._change_control(row, t_s)
-        self._set_point[0] = x_m
-        self._set_point[1] = y_m
-        self._set_point[2] = z_m + self._altitude_error_m
+        self._set_point[:3] = x_m, y_m, z_m + self._altitude_error_m
         self._tell(row)
 
     def set_thruster_health(self, t_s: float, thruster: int, health: float) -> None:
