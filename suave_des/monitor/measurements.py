@@ -7,7 +7,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -102,16 +102,31 @@ def measure(
     if time_step_s:
         # A time within a millionth of a step below a multiple counts as the multiple: timers add up rounding errors.
         looks = np.floor(times / time_step_s + 1e-6) * time_step_s
-    values, changed = _looked_up(signal, looks.tobytes())
+    values, news = _looked_up(signal, looks.tobytes())
     if noise is not None:
-        values = values + np.array([noise() for _ in range(len(times))])
-        changed = _changes(values)
-    return Measurements.of(key, times[changed], values[changed], phase_s, period_s)
+        news = _news(values + np.array([noise() for _ in range(len(times))]))
+    times = times[news.places]
+    return Measurements(key, tuple(times.tolist()), news.values, phase_s, period_s, (times, news.array))
+
+
+class _News(NamedTuple):
+    """Those of a sequence of values that differ from the one before, and their places in it; the first one does."""
+
+    places: NDArray[np.int64]
+    values: tuple[float, ...]
+    array: NDArray[np.float64]
+
+
+def _news(values: NDArray[np.float64]) -> _News:
+    places = _changes(values)
+    array = values[places]
+    array.flags.writeable = False
+    return _News(places, tuple(array.tolist()), array)
 
 
 @lru_cache(maxsize=64)
-def _looked_up(signal: Signal, times_s: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Values of a signal at times (float64), and the places where they change.
+def _looked_up(signal: Signal, times_s: bytes) -> tuple[NDArray[np.float64], _News]:
+    """Values of a signal at times (float64), and what is new among them.
 
     If time is cut and the signal is not drawn, they are the same in most runs.
     """
@@ -119,10 +134,10 @@ def _looked_up(signal: Signal, times_s: bytes) -> tuple[NDArray[np.float64], NDA
     first = _changes(times)
     values = np.repeat([signal(t_s) for t_s in times[first].tolist()], np.diff(first, append=len(times)))
     values.flags.writeable = False
-    return values, _changes(values)
+    return values, _news(values)
 
 
-def _changes(values: NDArray[np.floating[Any]]) -> NDArray[np.int64]:
+def _changes(values: NDArray[np.float64]) -> NDArray[np.int64]:
     """Places of the values that differ from the one before; the first one does."""
     return np.flatnonzero(np.concatenate(([True], values[1:] != values[:-1])))
 

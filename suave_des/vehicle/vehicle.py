@@ -63,30 +63,30 @@ def _parameters(
     current_m_per_s: tuple[float, float, float],
     z_limits_m: tuple[float, float],
 ) -> Array:
-    vector = np.zeros(kernel.PARAMETERS)
-    vector[kernel.MASS] = model.mass_kg
-    vector[[kernel.IXX, kernel.IYY, kernel.IZZ]] = model.inertia_kg_m2
-    vector[kernel.NET_BUOYANCY] = model.buoyancy_n - model.weight_n
-    vector[kernel.RIGHTING] = model.buoyancy_n * model.centre_of_buoyancy_m
-    vector[kernel.DRAG : kernel.DRAG + 6] = model.quadratic_drag
-    vector[kernel.THRUST_LIMIT] = model.thrust_limit_n
-    vector[kernel.POSITION_GAIN] = autopilot.position_gain_per_s
-    vector[kernel.SPEED_LIMIT_XY] = autopilot.horizontal_speed_limit_m_per_s
-    vector[kernel.SPEED_LIMIT_Z] = autopilot.vertical_speed_limit_m_per_s
-    vector[kernel.ALTITUDE_DEADBAND] = autopilot.altitude_deadband_m
+    values = [0.0] * kernel.PARAMETERS
+    values[kernel.MASS] = model.mass_kg
+    values[kernel.IXX], values[kernel.IYY], values[kernel.IZZ] = model.inertia_kg_m2
+    values[kernel.NET_BUOYANCY] = model.buoyancy_n - model.weight_n
+    values[kernel.RIGHTING] = model.buoyancy_n * model.centre_of_buoyancy_m
+    values[kernel.DRAG : kernel.DRAG + 6] = model.quadratic_drag
+    values[kernel.THRUST_LIMIT] = model.thrust_limit_n
+    values[kernel.POSITION_GAIN] = autopilot.position_gain_per_s
+    values[kernel.SPEED_LIMIT_XY] = autopilot.horizontal_speed_limit_m_per_s
+    values[kernel.SPEED_LIMIT_Z] = autopilot.vertical_speed_limit_m_per_s
+    values[kernel.ALTITUDE_DEADBAND] = autopilot.altitude_deadband_m
     rate = 1.0 / autopilot.velocity_time_constant_s
-    vector[kernel.VELOCITY_GAIN] = rate
-    vector[kernel.VELOCITY_INTEGRAL_GAIN] = rate * rate / 4.0
+    values[kernel.VELOCITY_GAIN] = rate
+    values[kernel.VELOCITY_INTEGRAL_GAIN] = rate * rate / 4.0
     # An integral may ask for as much as the four horizontal thrusters together give along one axis, and no more.
-    vector[kernel.INTEGRAL_LIMIT] = 4.0 * model.thrust_limit_n * math.sqrt(0.5) / model.mass_kg
+    values[kernel.INTEGRAL_LIMIT] = 4.0 * model.thrust_limit_n * math.sqrt(0.5) / model.mass_kg
     omega = autopilot.attitude_frequency_rad_per_s
-    vector[kernel.ATTITUDE_GAIN] = omega * omega
-    vector[kernel.RATE_GAIN] = 2.0 * omega
-    vector[kernel.HEADING_INTEGRAL_GAIN] = omega**3 / 8.0
-    vector[kernel.HEADING_INTEGRAL_LIMIT] = 4.0 * omega * omega
-    vector[kernel.CURRENT : kernel.CURRENT + 3] = current_m_per_s
-    vector[[kernel.FLOOR, kernel.CEILING]] = z_limits_m
-    return vector
+    values[kernel.ATTITUDE_GAIN] = omega * omega
+    values[kernel.RATE_GAIN] = 2.0 * omega
+    values[kernel.HEADING_INTEGRAL_GAIN] = omega**3 / 8.0
+    values[kernel.HEADING_INTEGRAL_LIMIT] = 4.0 * omega * omega
+    values[kernel.CURRENT : kernel.CURRENT + 3] = current_m_per_s
+    values[kernel.FLOOR], values[kernel.CEILING] = z_limits_m
+    return np.array(values)
 
 
 class Watch(NamedTuple):
