@@ -185,7 +185,7 @@ class Vehicle:
     ) -> None:
         self._B = allocation_matrix(model)
         self._allocation = autopilot_allocation(model)
-        self._health = np.ones(len(model.thrusters))
+        self._health = np.array([1.0] * len(model.thrusters))
         self._effectiveness = self._B.copy()
         self._parameters = _parameters(model, autopilot, current_m_per_s, z_limits_m)
         self._altitude_error_m = autopilot.altitude_error_m
@@ -193,9 +193,10 @@ class Vehicle:
         rows = track_rows(duration_s)
         self.last_row = rows - 1
         self.track: Array = np.empty((rows, kernel.ROW)) if memory is None else memory
-        self.track[0] = 0.0
-        self.track[0, kernel.POSITION] = (start.x_m, start.y_m, start.z_m)
-        self.track[0, kernel.ATTITUDE] = quaternion(start.roll_rad, start.pitch_rad, start.yaw_rad)
+        at_rest = [0.0] * kernel.ROW
+        at_rest[kernel.POSITION] = start.x_m, start.y_m, start.z_m
+        at_rest[kernel.ATTITUDE] = quaternion(start.roll_rad, start.pitch_rad, start.yaw_rad)
+        self.track[0] = at_rest
         self.computed_row = 0
         self._set_point = np.array([start.x_m, start.y_m, start.z_m, 1.0, 0.0])  # heading 0, see kernel.advance
         self._course: _Course | None = None
