@@ -24,7 +24,8 @@ from suave_des.managed.search import GenerateSearchPath
 from suave_des.managed.task import FOLLOW, MAINTAIN_MOTION, RECHARGE, SEARCH
 from suave_des.managing.base import ManagedSystem
 from suave_des.monitor.diagnostics import DiagnosticsBus, Kind
-from suave_des.monitor.measurements import BatteryLevel, Measurements, measure
+from suave_des.monitor.measurements import BatteryLevel, Measurements
+from suave_des.monitor.measuring import measure
 from suave_des.monitor.monitors import ThrusterFault, battery_monitor, signal_monitor, thruster_monitor
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import Battery

@@ -7,7 +7,8 @@ import pytest
 import simpy
 
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
-from suave_des.monitor.measurements import BatteryLevel, Measurements, measure
+from suave_des.monitor.measurements import BatteryLevel, Measurements
+from suave_des.monitor.measuring import measure
 from suave_des.monitor.monitors import ThrusterFault, battery_monitor, signal_monitor, thruster_monitor
 from suave_des.world.signals import constant, sinusoid, step
 
