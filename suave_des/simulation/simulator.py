@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from types import MappingProxyType
@@ -85,6 +86,9 @@ class Simulator:
             MissionError: the manager raised; the error names it, the run and the mission time.
             InputError: the manager or the knowledge base cannot be used.
         """
+        # A mission's objects know one another, so its memory would stay in use until some later garbage collection; the
+        # memory of the mission before, freed now, is still in the processor's caches.
+        gc.collect(0)
         track = self._spare_tracks.pop() if self._spare_tracks else self._make_track()
         try:
             mission = _Mission(self, manager, run, seed, track, record=record)
