@@ -55,11 +55,13 @@ class Simulator:
     def __init__(self, loaded: LoadedScenario, runs_per_draw: Mapping[str, int] = MappingProxyType({})) -> None:
         self.loaded = loaded
         self.runs_per_draw = dict(runs_per_draw)
-        pipeline = loaded.scenario.pipeline
+        scenario = loaded.scenario
+        pipeline = scenario.pipeline
         self.points = sample_points(pipeline.vertices_m, pipeline.points_per_piece)
         self.way_m = there_and_back(self.points)
-        height = loaded.scenario.revision.monitors.detected_point_height_m
+        height = scenario.revision.monitors.detected_point_height_m
         self.detection_points = self.points + np.array([0.0, 0.0, height])
+        self.duration_s = scenario.mission.time_limit_s + scenario.revision.coordinator.limit_check_period_s
         # Kept from mission to mission: a megabyte allocated for each leaves the process's memory in pieces.
         self._spare_tracks: list[Array] = []
 
@@ -99,11 +101,7 @@ class Simulator:
             self._spare_tracks.append(track)
 
     def _make_track(self) -> Array:
-        return np.empty((track_rows(_duration_s(self.loaded)), ROW))
-
-
-def _duration_s(loaded: LoadedScenario) -> float:
-    return loaded.scenario.mission.time_limit_s + loaded.scenario.revision.coordinator.limit_check_period_s
+        return np.empty((track_rows(self.duration_s), ROW))
 
 
 def _tell_time(env: simpy.Environment, on_time: OnTime, limit_s: float) -> Process:
@@ -125,7 +123,7 @@ class _Mission:
         self.env = simpy.Environment()
         self.recorder = Recorder(self.env, enabled=record)
         self.bus = DiagnosticsBus()
-        self.duration_s = _duration_s(simulator.loaded)
+        self.duration_s = simulator.duration_s
         self.vehicle = self._make_vehicle()
         self.signals = {name: self._measure(name) for name in sorted(self.scenario.signals)}
         self.visibility = self.signals["water_visibility"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -16,8 +15,7 @@ from suave_des.vehicle.model import Array, VehicleModel, allocation_matrix, auto
 STEP_S = 0.05
 
 
-@dataclass(frozen=True, slots=True)
-class Pose:
+class Pose(NamedTuple):
     """eta in the world frame: position in m, attitude as Euler angles in rad (rotation order z, y, x; Handbook,
     2.2.1).
     """
@@ -30,8 +28,7 @@ class Pose:
     yaw_rad: float
 
 
-@dataclass(frozen=True, slots=True)
-class Autopilot:
+class Autopilot(NamedTuple):
     """The guided controller: ArduSub's cascade of position, velocity and attitude loops, in its simplest form.
 
     The attitude loop's gains are those of a double integrator with the natural frequency of a BlueROV2's angle
