@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from suave_des.clock import call_at
 from suave_des.compiling import compiled
-from suave_des.monitor.measurements import Measurements
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
 from suave_des.world.pipeline import first_detection
 
@@ -18,27 +17,20 @@ _MARGIN_ROWS = 2
 _FARTHEST_LOOK_AHEAD_ROWS = 200
 
 
-def measured_at_rows(measurements: Measurements, rows: int) -> NDArray[np.float64]:
-    """Last measured value at each row of a track, shape (rows,); nan before the first measurement."""
-    at_rows = np.empty(rows)
-    hold_values(*measurements.arrays, at_rows)
-    return at_rows
-
-
 @compiled
-def hold_values(times_s: NDArray[np.float64], values: NDArray[np.float64], at_rows: NDArray[np.float64]) -> None:
-    """Write into each row the value of the last time that is not after it; nan before the first one.
+def measured_at_rows(times_s: NDArray[np.float64], values: NDArray[np.float64], at_rows: NDArray[np.float64]) -> None:
+    """Last measured value at each row of a track; nan before the first measurement.
 
     Args:
-        times_s: increasing, in s.
-        values: one for each time.
-        at_rows: shape (rows,), `STEP_S` apart; written into.
+        times_s: times of the measurements, increasing.
+        values: what was measured.
+        at_rows: shape (rows,); written into.
     """
     row, value = 0, np.nan
-    for place in range(len(times_s)):
-        first = min(int(np.rint(times_s[place] / STEP_S)), len(at_rows))  # rounded as Vehicle does
+    for message in range(len(times_s)):
+        first = min(int(np.rint(times_s[message] / STEP_S)), len(at_rows))  # rounded as Vehicle does
         at_rows[row:first] = value
-        row, value = first, values[place]
+        row, value = first, values[message]
     at_rows[row:] = value
 
 

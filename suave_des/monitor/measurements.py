@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from suave_des.clock import tick_at_or_after
 
@@ -51,12 +51,6 @@ class Measurements:
     period_s: float
     arrays: tuple[NDArray[np.float64], NDArray[np.float64]] = field(repr=False, compare=False)
     """Times and values once more, for whoever looks at all of them at once."""
-
-    @classmethod
-    def of(cls, key: str, times_s: ArrayLike, values: ArrayLike, phase_s: float, period_s: float) -> Measurements:
-        """Measurements from sequences of times and values."""
-        times, levels = np.asarray(times_s, dtype=np.float64), np.asarray(values, dtype=np.float64)
-        return cls(key, tuple(times.tolist()), tuple(levels.tolist()), phase_s, period_s, (times, levels))
 
     def published(self, t_s: float) -> int:
         """How many values are published until mission time t."""
