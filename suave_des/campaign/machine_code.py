@@ -17,7 +17,13 @@ from pathlib import Path
 import suave_des
 from suave_des.resources import cache_folder
 
-COMPILED_MODULES = ("managed/search.py", "vehicle/kernel.py", "world/pipeline.py")
+COMPILED_MODULES = (
+    "managed/detection.py",
+    "managed/search.py",
+    "monitor/measuring.py",
+    "vehicle/kernel.py",
+    "world/pipeline.py",
+)
 _KEPT = 16
 """Notes that are kept; others are of other versions."""
 

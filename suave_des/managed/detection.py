@@ -7,7 +7,7 @@ import simpy
 from numpy.typing import NDArray
 
 from suave_des.clock import call_at
-from suave_des.monitor.measurements import Measurements
+from suave_des.compiling import compiled
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
 from suave_des.world.pipeline import first_detection
 
@@ -17,12 +17,21 @@ _MARGIN_ROWS = 2
 _FARTHEST_LOOK_AHEAD_ROWS = 200
 
 
-def measured_at_rows(measurements: Measurements, rows: int) -> NDArray[np.float64]:
-    """Last measured value at each row of a track, shape (rows,); nan before the first measurement."""
-    times_s, values = measurements.arrays
-    ends = np.empty(len(times_s) + 2, dtype=np.int64)
-    ends[0], ends[1:-1], ends[-1] = 0, np.minimum(np.rint(times_s / STEP_S), rows), rows  # rounded as Vehicle does
-    return np.repeat(np.concatenate(([np.nan], values)), np.diff(ends))
+@compiled
+def measured_at_rows(times_s: NDArray[np.float64], values: NDArray[np.float64], at_rows: NDArray[np.float64]) -> None:
+    """Last measured value at each row of a track; nan before the first measurement.
+
+    Args:
+        times_s: times of the measurements, increasing.
+        values: what was measured.
+        at_rows: shape (rows,); written into.
+    """
+    row, value = 0, np.nan
+    for message in range(len(times_s)):
+        first = min(int(np.rint(times_s[message] / STEP_S)), len(at_rows))  # rounded as Vehicle does
+        at_rows[row:first] = value
+        row, value = first, values[message]
+    at_rows[row:] = value
 
 
 class PipelineDetector:

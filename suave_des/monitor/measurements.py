@@ -6,14 +6,12 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from suave_des.clock import tick_at_or_after
-from suave_des.world.signals import Signal
 
 
 class Measured(Protocol):
@@ -54,12 +52,6 @@ class Measurements:
     arrays: tuple[NDArray[np.float64], NDArray[np.float64]] = field(repr=False, compare=False)
     """Times and values once more, for whoever looks at all of them at once."""
 
-    @classmethod
-    def of(cls, key: str, times_s: ArrayLike, values: ArrayLike, phase_s: float, period_s: float) -> Measurements:
-        """Measurements from sequences of times and values."""
-        times, levels = np.asarray(times_s, dtype=np.float64), np.asarray(values, dtype=np.float64)
-        return cls(key, tuple(times.tolist()), tuple(levels.tolist()), phase_s, period_s, (times, levels))
-
     def published(self, t_s: float) -> int:
         """How many values are published until mission time t."""
         return bisect_right(self.times_s, t_s)
@@ -74,57 +66,6 @@ class Measurements:
     def next_message_s(self, t_s: float) -> float:
         """Time of the first message, changed or not, at or after t."""
         return tick_at_or_after(t_s, self.phase_s, self.period_s)
-
-
-def measure(
-    key: str,
-    signal: Signal,
-    duration_s: float,
-    *,
-    period_s: float,
-    phase_s: float,
-    time_step_s: float = 0.0,
-    noise: Callable[[], float] | None = None,
-) -> Measurements:
-    """Measure a signal over a mission.
-
-    Args:
-        key: the quality attribute.
-        signal: the signal.
-        duration_s: how long to measure.
-        period_s: publishing period.
-        phase_s: time of the first message.
-        time_step_s: the signal is looked at at mission time cut to multiples of this; 0: at mission time.
-        noise: draws the error of one measurement; none if measurements are exact.
-    """
-    times = phase_s + np.arange(max(0, math.floor((duration_s - phase_s) / period_s)) + 1) * period_s
-    looks = times
-    if time_step_s:
-        # A time within a millionth of a step below a multiple counts as the multiple: timers add up rounding errors.
-        looks = np.floor(times / time_step_s + 1e-6) * time_step_s
-    values, changed = _looked_up(signal, looks.tobytes())
-    if noise is not None:
-        values = values + np.array([noise() for _ in range(len(times))])
-        changed = _changes(values)
-    return Measurements.of(key, times[changed], values[changed], phase_s, period_s)
-
-
-@lru_cache(maxsize=64)
-def _looked_up(signal: Signal, times_s: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Values of a signal at times (float64), and the places where they change.
-
-    If time is cut and the signal is not drawn, they are the same in most runs.
-    """
-    times = np.frombuffer(times_s)
-    first = _changes(times)
-    values = np.repeat([signal(t_s) for t_s in times[first].tolist()], np.diff(first, append=len(times)))
-    values.flags.writeable = False
-    return values, _changes(values)
-
-
-def _changes(values: NDArray[np.floating[Any]]) -> NDArray[np.int64]:
-    """Places of the values that differ from the one before; the first one does."""
-    return np.flatnonzero(np.concatenate(([True], values[1:] != values[:-1])))
 
 
 class BatteryLevel:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import simpy
 
@@ -28,8 +28,7 @@ def battery_monitor(env: simpy.Environment, bus: DiagnosticsBus, level: BatteryL
         yield env.timeout(level.period_s)
 
 
-@dataclass(frozen=True, slots=True)
-class ThrusterFault:
+class ThrusterFault(NamedTuple):
     """A thruster that fails or recovers, time in s as the revision counts it."""
 
     thruster: int

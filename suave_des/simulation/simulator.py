@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import simpy
@@ -24,7 +25,8 @@ from suave_des.managed.search import GenerateSearchPath
 from suave_des.managed.task import FOLLOW, MAINTAIN_MOTION, RECHARGE, SEARCH
 from suave_des.managing.base import ManagedSystem
 from suave_des.monitor.diagnostics import DiagnosticsBus, Kind
-from suave_des.monitor.measurements import BatteryLevel, Measurements, measure
+from suave_des.monitor.measurements import BatteryLevel, Measurements
+from suave_des.monitor.measuring import measure
 from suave_des.monitor.monitors import ThrusterFault, battery_monitor, signal_monitor, thruster_monitor
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import Battery
@@ -41,6 +43,20 @@ from suave_des.world.pipeline import SEA_BED_Z_M, SURFACE_Z_M, sample_points, th
 
 OnTime = Callable[[float, float], None]
 
+_MISSIONS_FREED = 100
+"""A mission's objects know one another, so only garbage collection frees them: soon done while they are still in the
+processor's caches. After so many missions the collector's own rules are left to decide: they free what is older, too.
+"""
+
+
+class _Memory(NamedTuple):
+    """What a mission fills row by row, kept from mission to mission: allocated for each, a megabyte leaves the
+    process's memory in pieces.
+    """
+
+    track: Array
+    visibility_m: Array
+
 
 class Simulator:
     """Runs missions of one scenario in this process; what does not change between missions is made once.
@@ -53,13 +69,14 @@ class Simulator:
     def __init__(self, loaded: LoadedScenario, runs_per_draw: Mapping[str, int] = MappingProxyType({})) -> None:
         self.loaded = loaded
         self.runs_per_draw = dict(runs_per_draw)
-        pipeline = loaded.scenario.pipeline
+        scenario = loaded.scenario
+        pipeline = scenario.pipeline
         self.points = sample_points(pipeline.vertices_m, pipeline.points_per_piece)
         self.way = Way.along(there_and_back(self.points))
-        height = loaded.scenario.revision.monitors.detected_point_height_m
+        height = scenario.revision.monitors.detected_point_height_m
         self.detection_points = self.points + np.array([0.0, 0.0, height])
-        # Kept from mission to mission: a megabyte allocated for each leaves the process's memory in pieces.
-        self._spare_tracks: list[Array] = []
+        self.duration_s = scenario.mission.time_limit_s + scenario.revision.coordinator.limit_check_period_s
+        self._spare_memory: list[_Memory] = []
 
     @cached_property
     def knowledge(self) -> Any:
@@ -84,21 +101,20 @@ class Simulator:
             MissionError: the manager raised; the error names it, the run and the mission time.
             InputError: the manager or the knowledge base cannot be used.
         """
-        track = self._spare_tracks.pop() if self._spare_tracks else self._make_track()
+        if gc.get_count()[1] < _MISSIONS_FREED:
+            gc.collect(0)
+        memory = self._spare_memory.pop() if self._spare_memory else self._make_memory()
         try:
-            mission = _Mission(self, manager, run, seed, track, record=record)
+            mission = _Mission(self, manager, run, seed, memory, record=record)
             if on_time is not None:
                 mission.env.process(_tell_time(mission.env, on_time, self.loaded.scenario.mission.time_limit_s))
             return mission.result()
         finally:
-            self._spare_tracks.append(track)
+            self._spare_memory.append(memory)
 
-    def _make_track(self) -> Array:
-        return np.empty((track_rows(_duration_s(self.loaded)), ROW))
-
-
-def _duration_s(loaded: LoadedScenario) -> float:
-    return loaded.scenario.mission.time_limit_s + loaded.scenario.revision.coordinator.limit_check_period_s
+    def _make_memory(self) -> _Memory:
+        rows = track_rows(self.duration_s)
+        return _Memory(np.empty((rows, ROW)), np.empty(rows))
 
 
 def _tell_time(env: simpy.Environment, on_time: OnTime, limit_s: float) -> Process:
@@ -110,9 +126,11 @@ def _tell_time(env: simpy.Environment, on_time: OnTime, limit_s: float) -> Proce
 class _Mission:
     """The wiring of one mission."""
 
-    def __init__(self, simulator: Simulator, manager: str, run: int, seed: int, track: Array, *, record: bool) -> None:
+    def __init__(
+        self, simulator: Simulator, manager: str, run: int, seed: int, memory: _Memory, *, record: bool
+    ) -> None:
         self.simulator = simulator
-        self._track = track
+        self._memory = memory
         self.scenario = simulator.loaded.scenario
         self.revision = self.scenario.revision
         self.manager_name, self.run, self.seed = manager, run, seed
@@ -120,17 +138,13 @@ class _Mission:
         self.env = simpy.Environment()
         self.recorder = Recorder(self.env, enabled=record)
         self.bus = DiagnosticsBus()
-        self.duration_s = _duration_s(simulator.loaded)
+        self.duration_s = simulator.duration_s
         self.vehicle = self._make_vehicle()
         self.signals = {name: self._measure(name) for name in sorted(self.scenario.signals)}
         self.visibility = self.signals["water_visibility"]
         self.battery = None if self.scenario.battery is None else self._make_battery(self.scenario.battery)
-        self.detector = PipelineDetector(
-            self.env,
-            self.vehicle,
-            measured_at_rows(self.visibility, self.vehicle.last_row + 1),
-            simulator.detection_points,
-        )
+        measured_at_rows(*self.visibility.arrays, memory.visibility_m)
+        self.detector = PipelineDetector(self.env, self.vehicle, memory.visibility_m, simulator.detection_points)
         self.follow, nodes = self._make_functions()
         self.modes = ModeManager(
             self.env,
@@ -214,7 +228,7 @@ class _Mission:
             ),
             time_scale=1.0 / (1.0 + loss),
             z_limits_m=(SEA_BED_Z_M, SURFACE_Z_M),
-            memory=self._track,
+            memory=self._memory.track,
         )
 
     # The monitors.

@@ -26,9 +26,9 @@ class Thruster:
     direction: tuple[float, float, float]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class VehicleModel:
-    """A rigid body with thrusters in water.
+    """A rigid body with thrusters in water; equal to itself alone, so that what follows from it is quickly looked up.
 
     Attributes:
         inertia_kg_m2: principal moments (Ixx, Iyy, Izz).

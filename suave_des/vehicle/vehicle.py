@@ -16,8 +16,7 @@ from suave_des.vehicle.model import Array, VehicleModel, allocation_matrix, auto
 STEP_S = 0.05
 
 
-@dataclass(frozen=True, slots=True)
-class Pose:
+class Pose(NamedTuple):
     """eta in the world frame: position in m, attitude as Euler angles in rad (rotation order z, y, x; Handbook,
     2.2.1).
     """
@@ -30,8 +29,7 @@ class Pose:
     yaw_rad: float
 
 
-@dataclass(frozen=True, slots=True)
-class Autopilot:
+class Autopilot(NamedTuple):
     """The guided controller: ArduSub's cascade of position, velocity and attitude loops, in its simplest form.
 
     The attitude loop's gains are those of a double integrator with the natural frequency of a BlueROV2's angle
@@ -63,33 +61,35 @@ def _parameters(
     current_m_per_s: tuple[float, float, float],
     z_limits_m: tuple[float, float],
 ) -> Array:
-    vector = np.zeros(kernel.PARAMETERS)
-    vector[kernel.MASS] = model.mass_kg
-    vector[[kernel.IXX, kernel.IYY, kernel.IZZ]] = model.inertia_kg_m2
-    vector[kernel.NET_BUOYANCY] = model.buoyancy_n - model.weight_n
-    vector[kernel.RIGHTING] = model.buoyancy_n * model.centre_of_buoyancy_m
-    vector[kernel.DRAG : kernel.DRAG + 6] = model.quadratic_drag
-    vector[kernel.THRUST_LIMIT] = model.thrust_limit_n
-    vector[kernel.POSITION_GAIN] = autopilot.position_gain_per_s
-    vector[kernel.SPEED_LIMIT_XY] = autopilot.horizontal_speed_limit_m_per_s
-    vector[kernel.SPEED_LIMIT_Z] = autopilot.vertical_speed_limit_m_per_s
-    vector[kernel.ALTITUDE_DEADBAND] = autopilot.altitude_deadband_m
+    values = [0.0] * kernel.PARAMETERS
+    values[kernel.MASS] = model.mass_kg
+    values[kernel.IXX], values[kernel.IYY], values[kernel.IZZ] = model.inertia_kg_m2
+    values[kernel.NET_BUOYANCY] = model.buoyancy_n - model.weight_n
+    values[kernel.RIGHTING] = model.buoyancy_n * model.centre_of_buoyancy_m
+    values[kernel.DRAG : kernel.DRAG + 6] = model.quadratic_drag
+    values[kernel.THRUST_LIMIT] = model.thrust_limit_n
+    values[kernel.POSITION_GAIN] = autopilot.position_gain_per_s
+    values[kernel.SPEED_LIMIT_XY] = autopilot.horizontal_speed_limit_m_per_s
+    values[kernel.SPEED_LIMIT_Z] = autopilot.vertical_speed_limit_m_per_s
+    values[kernel.ALTITUDE_DEADBAND] = autopilot.altitude_deadband_m
     rate = 1.0 / autopilot.velocity_time_constant_s
-    vector[kernel.VELOCITY_GAIN] = rate
-    vector[kernel.VELOCITY_INTEGRAL_GAIN] = rate * rate / 4.0
+    values[kernel.VELOCITY_GAIN] = rate
+    values[kernel.VELOCITY_INTEGRAL_GAIN] = rate * rate / 4.0
     # An integral may ask for as much as the four horizontal thrusters together give along one axis, and no more.
-    vector[kernel.INTEGRAL_LIMIT] = 4.0 * model.thrust_limit_n * math.sqrt(0.5) / model.mass_kg
+    values[kernel.INTEGRAL_LIMIT] = 4.0 * model.thrust_limit_n * math.sqrt(0.5) / model.mass_kg
     omega = autopilot.attitude_frequency_rad_per_s
-    vector[kernel.ATTITUDE_GAIN] = omega * omega
-    vector[kernel.RATE_GAIN] = 2.0 * omega
-    vector[kernel.HEADING_INTEGRAL_GAIN] = omega**3 / 8.0
-    vector[kernel.HEADING_INTEGRAL_LIMIT] = 4.0 * omega * omega
-    vector[kernel.CURRENT : kernel.CURRENT + 3] = current_m_per_s
-    inertia = np.array([model.mass_kg] * 3 + [*model.inertia_kg_m2])
-    vector[kernel.INVERSE_MASS : kernel.INVERSE_MASS + 4] = 1.0 / inertia[2:]
-    vector[kernel.DRAG_RATE : kernel.DRAG_RATE + 6] = np.array(model.quadratic_drag) / inertia
-    vector[[kernel.FLOOR, kernel.CEILING]] = z_limits_m
-    return vector
+    values[kernel.ATTITUDE_GAIN] = omega * omega
+    values[kernel.RATE_GAIN] = 2.0 * omega
+    values[kernel.HEADING_INTEGRAL_GAIN] = omega**3 / 8.0
+    values[kernel.HEADING_INTEGRAL_LIMIT] = 4.0 * omega * omega
+    values[kernel.CURRENT : kernel.CURRENT + 3] = current_m_per_s
+    inertia = (model.mass_kg, model.mass_kg, model.mass_kg, *model.inertia_kg_m2)
+    values[kernel.INVERSE_MASS : kernel.INVERSE_MASS + 4] = [1.0 / each for each in inertia[2:]]
+    values[kernel.DRAG_RATE : kernel.DRAG_RATE + 6] = [
+        drag / each for drag, each in zip(model.quadratic_drag, inertia, strict=True)
+    ]
+    values[kernel.FLOOR], values[kernel.CEILING] = z_limits_m
+    return np.array(values)
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +189,7 @@ class Vehicle:
     ) -> None:
         self._B = allocation_matrix(model)
         self._allocation = autopilot_allocation(model)
-        self._health = np.ones(len(model.thrusters))
+        self._health = np.array([1.0] * len(model.thrusters))
         self._effectiveness = self._B.copy()
         self._parameters = _parameters(model, autopilot, current_m_per_s, z_limits_m)
         self._altitude_error_m = autopilot.altitude_error_m
@@ -197,9 +197,10 @@ class Vehicle:
         rows = track_rows(duration_s)
         self.last_row = rows - 1
         self.track: Array = np.empty((rows, kernel.ROW)) if memory is None else memory
-        self.track[0] = 0.0
-        self.track[0, kernel.POSITION] = (start.x_m, start.y_m, start.z_m)
-        self.track[0, kernel.ATTITUDE] = quaternion(start.roll_rad, start.pitch_rad, start.yaw_rad)
+        at_rest = [0.0] * kernel.ROW
+        at_rest[kernel.POSITION] = start.x_m, start.y_m, start.z_m
+        at_rest[kernel.ATTITUDE] = quaternion(start.roll_rad, start.pitch_rad, start.yaw_rad)
+        self.track[0] = at_rest
         self.computed_row = 0
         self._set_point = np.array([start.x_m, start.y_m, start.z_m, 1.0, 0.0])  # heading 0, see kernel.advance
         self._course: _Course | None = None

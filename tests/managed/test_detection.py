@@ -5,9 +5,9 @@ import pytest
 import simpy
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from suave_des.managed.detection import PipelineDetector, measured_at_rows
-from suave_des.monitor.measurements import Measurements
 from suave_des.scenario.models import Pipeline
 from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.vehicle import STEP_S, Autopilot, Pose, Vehicle, row_at
@@ -106,18 +106,21 @@ def test_detection_under_many_commands_is_still_the_first_sight(commands: list) 
             first_sight(sight)
 
 
+def at_rows(times_s: tuple[float, ...], values: tuple[float, ...], rows: int) -> NDArray[np.float64]:
+    found = np.zeros(rows)
+    measured_at_rows(np.array(times_s), np.array(values), found)
+    return found
+
+
 def test_visibility_counts_as_it_was_measured_last() -> None:
-    measured = Measurements.of("water_visibility", (0.2, 1.2, 2.2), (3.0, 2.0, 1.0), 0.2, 1.0)
-    rows = measured_at_rows(measured, row_at(3.0))
+    rows = at_rows((0.2, 1.2, 2.2), (3.0, 2.0, 1.0), row_at(3.0))
     picked = [rows[row_at(t_s)] for t_s in (0.2, 1.15, 1.2, 2.9)]
     assert picked == [3.0, 3.0, 2.0, 1.0]
 
 
 def test_before_the_first_measurement_there_is_none() -> None:
-    measured = Measurements.of("water_visibility", (0.2,), (3.0,), 0.2, 1.0)
-    assert np.isnan(measured_at_rows(measured, 10)[:4]).all()
+    assert np.isnan(at_rows((0.2,), (3.0,), 10)[:4]).all()
 
 
 def test_measurements_after_the_end_are_left_out() -> None:
-    measured = Measurements.of("water_visibility", (0.0, 1.0, 99.0), (3.0, 2.0, 1.0), 0.0, 1.0)
-    assert measured_at_rows(measured, 40).tolist() == [3.0] * 20 + [2.0] * 20
+    assert at_rows((0.0, 1.0, 99.0), (3.0, 2.0, 1.0), 40).tolist() == [3.0] * 20 + [2.0] * 20

@@ -5,6 +5,7 @@ Visibility messages come at 0.2, 1.2, 2.2, ... s; the altitude parameter is 2 m 
 
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 import simpy
 from stand_ins import ACTIVE, INACTIVE, spiral_at
@@ -50,8 +51,8 @@ class Timeline:
     @property
     def meter(self) -> ReactionMeter:
         """The meter after all entries."""
-        visibility = Measurements.of("water_visibility", *_columns(self._visibility), 0.2, 1.0)
-        battery = Measurements.of("battery_level", *_columns(self._battery), 0.5, 1.0) if self._battery else None
+        visibility = _measurements("water_visibility", self._visibility, 0.2)
+        battery = _measurements("battery_level", self._battery, 0.5) if self._battery else None
         meter = ReactionMeter(self._env, ReactionMetric(), visibility, battery)
         for t_s, note in self._noted:
             if t_s > self._env.now:
@@ -65,8 +66,9 @@ class Timeline:
         return [pytest.approx(reaction, abs=1e-9) for reaction in self.meter.reactions_s()]
 
 
-def _columns(rows: list[tuple[float, float]]) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    return tuple(t_s for t_s, _ in rows), tuple(value for _, value in rows)
+def _measurements(key: str, rows: list[tuple[float, float]], phase_s: float) -> Measurements:
+    times_s, values = tuple(t_s for t_s, _ in rows), tuple(value for _, value in rows)
+    return Measurements(key, times_s, values, phase_s, 1.0, (np.array(times_s), np.array(values)))
 
 
 def test_without_reactions_there_is_no_mean() -> None:

@@ -3,11 +3,13 @@
 import itertools
 import math
 
+import numpy as np
 import pytest
 import simpy
 
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
-from suave_des.monitor.measurements import BatteryLevel, Measurements, measure
+from suave_des.monitor.measurements import BatteryLevel, Measurements
+from suave_des.monitor.measuring import measure
 from suave_des.monitor.monitors import ThrusterFault, battery_monitor, signal_monitor, thruster_monitor
 from suave_des.world.signals import constant, sinusoid, step
 
@@ -61,7 +63,8 @@ def test_rounding_errors_of_a_timer_do_not_shift_a_step() -> None:
     [(2.5, 3.5, 4.0), (2.0, 3.5, 5.0), (2.5, 4.0, 4.0), (2.5, 3.0, 3.0), (-1.0, 9.0, math.inf)],
 )
 def test_a_value_leaves_its_bounds_when_it_is_on_one_or_beyond(above: float, below: float, leaves_s: float) -> None:
-    measured = Measurements.of("v", (1.0, 2.0, 3.0, 4.0, 5.0), (9.0, 2.7, 3.0, 2.4, 1.0), 1.0, 1.0)
+    times_s, values = (1.0, 2.0, 3.0, 4.0, 5.0), (9.0, 2.7, 3.0, 2.4, 1.0)
+    measured = Measurements("v", times_s, values, 1.0, 1.0, (np.array(times_s), np.array(values)))
     assert measured.leaves_at_s(2.0, above, below) == leaves_s
 
 

@@ -1,5 +1,8 @@
 """Managers as a user would write them, some of them with mistakes."""
 
+from typing import ClassVar
+from weakref import WeakSet
+
 from suave_des.managed.task import Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
 from suave_des.monitor.diagnostics import Diagnostic, Kind
@@ -39,6 +42,26 @@ class Drawing(ManagingSubsystem):
 
     def task_requested(self, task: Task) -> None:
         self.system.log("drew", str(self.system.stream("my/choice").random()))
+
+
+class Counted(ManagingSubsystem):
+    """Tells how many of its kind there still are."""
+
+    existing: ClassVar[WeakSet] = WeakSet()
+
+    def __init__(self, system: ManagedSystem) -> None:
+        super().__init__(system)
+        self.existing.add(self)
+
+
+class Lingering(Counted):
+    """Outlives its mission, until there is another one."""
+
+    latest: ClassVar[Counted | None] = None
+
+    def __init__(self, system: ManagedSystem) -> None:
+        super().__init__(system)
+        Lingering.latest = self
 
 
 class FailsAtLaunch(ManagingSubsystem):
