@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from operator import itemgetter
 from typing import Any
 
 import numpy as np
 import simpy
+from numpy.typing import NDArray
 
 from suave_des.managed.search import INITIAL_ALTITUDE_M
 from suave_des.managed.task import MAINTAIN_MOTION, RECHARGE
@@ -60,7 +62,8 @@ class ReactionMeter:
         """The reactions completed by now, in the order of their completion."""
         reactions = _Open(self._visibility.next_message_s)
         happenings = [*self._fitting_altitudes(), *self._low_battery(), *self._noted]
-        for t_s, what, value in sorted(happenings, key=itemgetter(0)):
+        happenings.sort(key=itemgetter(0))
+        for t_s, what, value in happenings:
             what(reactions, t_s, value)
         return reactions.completed_s
 
@@ -71,10 +74,10 @@ class ReactionMeter:
 
     def _fitting_altitudes(self) -> Iterator[_Happening]:
         """The messages from which on another altitude fits than before."""
-        rising_m = self._settings.visibility_thresholds_m[::-1]
         altitudes_m = (None, *self._settings.expected_altitudes_m[::-1])
         published = self._visibility.published(self._env.now)
-        bands = np.searchsorted(rising_m, self._visibility.arrays[1][:published], side="right")
+        rising_m = _rising(self._settings.visibility_thresholds_m)
+        bands = rising_m.searchsorted(self._visibility.arrays[1][:published], side="right")
         before = -1
         for message, band in enumerate(bands.tolist()):
             if band != before:
@@ -86,6 +89,11 @@ class ReactionMeter:
             for message in range(self._battery.published(self._env.now)):
                 low = self._battery.values[message] < self._settings.battery_limit
                 yield self._battery.times_s[message], _Open.battery, low
+
+
+@lru_cache(maxsize=16)
+def _rising(thresholds: tuple[float, ...]) -> NDArray[np.float64]:
+    return np.array(thresholds[::-1])
 
 
 class _Open:
