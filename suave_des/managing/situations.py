@@ -1,6 +1,7 @@
 """The situations that metacontrol gets into: all that it knows but measured values. Each is worked out once.
 
-Missions of one scenario go through the same few situations, so that what follows is looked up in most of them.
+Missions of one scenario go through the same few situations, so that what follows is looked up in most of them. Those of
+several threads may share them.
 """
 
 from __future__ import annotations
@@ -95,7 +96,7 @@ class Situations:
         self._size += 1
         if self._size > REMEMBERED:
             self._size = 1
-            for situation in self._all.values():
+            for situation in tuple(self._all.values()):
                 situation.forget()
             self._all.clear()
 
@@ -114,18 +115,18 @@ class Situation:
 
     def __init__(self, situations: Situations, known: Known) -> None:
         self._situations = situations
-        self.objectives, self.groundings, self.components = self._known = known
+        self.objectives, self.groundings, self.components = known
         self.recovered = tuple([name for name, status in known.components.items() if status == RECOVERED])
         self._after: dict[object, Situation] = {}
         self._conclusions: dict[Region, Conclusion] = {}
-        self._rests: dict[Region, tuple[tuple[float, ...], ...] | None] = {}
+        self._rests: dict[Region, tuple[tuple[float, ...], ...]] = {}
 
     def after(self, news: News, *what: Any) -> Situation:
         """The situation after news."""
         key = news, what
         found = self._after.get(key)
         if found is None:
-            known = Known(*[part.copy() for part in self._known])  # type: ignore[arg-type]
+            known = Known(self.objectives.copy(), self.groundings.copy(), self.components.copy())
             news(known, *what)
             found = self._after[key] = self._situations.of(known)
         return found
@@ -163,15 +164,18 @@ class Situation:
 
         None if that is not known of a region itself.
         """
-        if region not in self._rests:
-            self._rests[region] = self._bounds(region) if self._is_met_in(region) else None
-        return self._rests[region]
+        if not self._is_met_in(region):
+            return None
+        bounds = self._rests.get(region)
+        if bounds is None:
+            bounds = self._rests[region] = self._bounds(region)
+        return bounds
 
     def _bounds(self, region: Region) -> tuple[tuple[float, ...], ...]:
         # Of several values two could be in one gap in other regions.
         if len(region) != 1 or len(self._conclusions) > JOINED:
             return region
-        return (_joined([only for (only,) in self._conclusions if self._is_met_in((only,))]),)
+        return (_joined([only for (only,) in tuple(self._conclusions) if self._is_met_in((only,))]),)
 
     def _is_met_in(self, region: Region) -> bool:
         conclusion = self._conclusions.get(region)

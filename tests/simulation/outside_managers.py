@@ -2,6 +2,7 @@
 
 from suave_des.managed.task import Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
+from suave_des.managing.metacontrol import Metacontrol
 from suave_des.monitor.diagnostics import Diagnostic, Kind
 
 
@@ -135,6 +136,47 @@ class NeverIdle(Resting):
         super().adapt()
         yield self.system.env.timeout(0.0)
 
+
+class Acting(Resting):
+    """Each adaptation takes half a second, after which it has nothing to do for as long."""
+
+    rests_after = Resting.rests_while
+
+    def adapt(self):
+        super().adapt()
+        yield self.system.env.timeout(0.5)
+
+
+class StillActing(Acting):
+    """Derived from one that rests after it has acted."""
+
+
+class InTwoRanges(Resting):
+    """Has nothing to do either while the visibility is between 2 and 3 m, or between 3 and 4 m."""
+
+    def rests_while(self):
+        return {"water_visibility": (2.0, 3.0, 3.0, 4.0)}
+
+
+class AsksForTheRecord(ManagingSubsystem):
+    def __init__(self, system: ManagedSystem) -> None:
+        super().__init__(system)
+        RECORDED.append(system.recorded)
+
+
+class BlindInTheDark(Metacontrol):
+    """Takes a visibility below 2 m for no number."""
+
+    rests_while = Metacontrol.rests_while
+    rests_after = Metacontrol.rests_after
+
+    def measured(self, attribute):
+        value = super().measured(attribute)
+        return float("nan") if value is not None and value < 2.0 else value
+
+
+RECORDED: list[bool] = []
+"""What managers were told of the record."""
 
 CALLED_S: list[float] = []
 """When the last mission's manager was called."""

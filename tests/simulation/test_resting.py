@@ -2,12 +2,15 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from unittest import mock
 
 import outside_managers
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from suave_des.errors import MissionError
+from suave_des.managed.mode_manager import ModeManager
 from suave_des.managing.metacontrol import Metacontrol
 from suave_des.scenario.loader import LoadedScenario, load_scenario
 from suave_des.scenario.models import ConstantSignal
@@ -32,26 +35,55 @@ def called_s(values: dict, manager: str = "Resting", *, record: bool = False) ->
 EVERY_S = pytest.approx([11.0 + 2.0 * count for count in range(25)], abs=1e-9)
 
 
-@pytest.mark.parametrize(("manager", "record"), [("Resting", True), ("NotResting", False), ("NeverIdle", False)])
+@pytest.mark.parametrize(
+    ("manager", "record"),
+    [
+        ("Resting", True),
+        ("NotResting", False),
+        ("NeverIdle", False),
+        ("Acting", True),
+        ("StillActing", False),
+    ],
+)
 def test_no_call_is_left_out(manager: str, record: bool) -> None:
-    """Of a mission that is recorded, a class that does not say so itself, or an adapt that took time."""
+    """Of a mission that is recorded, or a class that does not say itself that there is nothing to do then."""
     assert called_s(steps(2.5, 2.6, 30.0), manager, record=record) == EVERY_S
 
 
-def test_it_is_called_at_the_first_of_its_times_at_which_a_value_is_out_of_its_bounds() -> None:
-    rested = called_s(steps(2.5, 3.5, 31.5))
-    assert 33.0 in rested and len([t_s for t_s in rested if t_s < 33.0]) <= 2
+RESTING = pytest.mark.parametrize("manager", ["Resting", "Acting"])
 
 
-def test_a_value_on_a_bound_is_out_of_it() -> None:
-    assert 33.0 in called_s(steps(2.5, 3.0, 31.5))
+@RESTING
+def test_it_is_called_at_the_first_of_its_times_at_which_a_value_is_out_of_its_bounds(manager: str) -> None:
+    rested = called_s(steps(2.5, 3.5, 31.5), manager)
+    assert 33.0 in rested and len([t_s for t_s in rested if t_s < 33.0]) <= 1
 
 
-def test_it_is_called_after_a_diagnostic() -> None:
+@RESTING
+def test_a_value_on_a_bound_is_out_of_it(manager: str) -> None:
+    assert 33.0 in called_s(steps(2.5, 3.0, 31.5), manager)
+
+
+@RESTING
+def test_it_is_called_after_a_diagnostic(manager: str) -> None:
     fault = [{"thruster": 1, "event": "failure", "time_s": 40.0}]
-    rested = called_s({**steps(2.5, 2.6, 30.0), "thruster_events": fault})
-    quiet = called_s(steps(2.5, 2.6, 30.0))
+    rested = called_s({**steps(2.5, 2.6, 30.0), "thruster_events": fault}, manager)
+    quiet = called_s(steps(2.5, 2.6, 30.0), manager)
     assert [t_s for t_s in rested if t_s not in quiet] == [41.0]
+
+
+def test_a_value_may_go_from_one_pair_of_bounds_to_another() -> None:
+    assert 33.0 not in called_s(steps(2.5, 3.5, 31.5), "InTwoRanges")
+    for value in (1.5, 2.0, 3.0, 4.0, 4.5):
+        assert 33.0 in called_s(steps(2.5, value, 31.5), "InTwoRanges")
+
+
+def test_a_manager_can_tell_whether_the_record_is_kept() -> None:
+    outside_managers.RECORDED.clear()
+    simulator = Simulator(LOADED["seams2023"])
+    for record in (True, False):
+        simulator.run("outside_managers:AsksForTheRecord", 1, 1, record=record)
+    assert outside_managers.RECORDED == [True, False]
 
 
 def test_the_batterys_level_is_not_foreseen() -> None:
@@ -78,7 +110,20 @@ def test_metacontrol_reasons_when_something_has_changed(calls) -> None:
     simulator.run("metacontrol", 1, 1)
     resting = len(calls)
     simulator.run("metacontrol", 1, 1, record=True)
-    assert len(calls) - resting == 150 and resting < 60
+    assert len(calls) - resting == 150 and resting < 40
+    calls.clear()
+    simulator.run("metacontrol", 1, 1)  # by now it knows which values ask for what
+    assert len(calls) < 15
+
+
+def test_a_measured_value_that_is_no_number_is_an_error_at_once() -> None:
+    simulator = Simulator(with_values(LOADED["seams2023"], {**NO_FAULTS, **steps(3.5, 1.5, 24.5)}))
+    told = []
+    for record in (True, False, False):
+        with pytest.raises(MissionError, match="not a finite number") as raised:
+            simulator.run("outside_managers:BlindInTheDark", 1, 1, record=record)
+        told.append(str(raised.value))
+    assert told[0] == told[1] == told[2]
 
 
 @pytest.mark.parametrize(
@@ -136,7 +181,7 @@ def with_another_signal(name: str) -> LoadedScenario:
     name=st.sampled_from(sorted(LOADED)),
     signal=SIGNALS,
     other=st.none() | SIGNALS,
-    inference_s=st.sampled_from([0.0, 1.0, 2.5]),
+    inference_s=st.sampled_from([0.0, 1.0, 1.4999999999999998, 1.9999999999999998, 2.5]),
     mode_change_s=st.sampled_from([0.0, 0.5, 1.0]),
     fault_s=TIMES_S,
     run=st.integers(1, 1000),
@@ -159,5 +204,20 @@ def test_resting_changes_no_result(
     if other is not None:
         values["signals.performance"] = other
     simulator = Simulator(with_values(LOADED[name] if other is None else with_another_signal(name), values))
-    with_all = simulator.run(manager, run, 1, record=True)
-    assert simulator.run(manager, run, 1).metrics == with_all.metrics
+    with_all = outcome(simulator, manager, run, record=True)
+    for _ in range(2):  # at first metacontrol does not know yet which values ask for what
+        assert outcome(simulator, manager, run, record=False) == with_all
+
+
+def outcome(simulator: Simulator, manager: str, run: int, *, record: bool) -> tuple:
+    """A mission's metrics, and the modes that took effect with their times."""
+    effects = []
+    take_effect = ModeManager._take_effect
+
+    def noted(self: ModeManager, effect: tuple[str, str]) -> None:
+        effects.append((self._env.now, effect))
+        take_effect(self, effect)
+
+    with mock.patch.object(ModeManager, "_take_effect", noted):
+        metrics = simulator.run(manager, run, 1, record=record).metrics
+    return metrics, effects
