@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import simpy
-from numpy.typing import NDArray
 
 from suave_des.managed.search import INITIAL_ALTITUDE_M
 from suave_des.managed.task import MAINTAIN_MOTION, RECHARGE
@@ -75,14 +74,12 @@ class ReactionMeter:
     def _fitting_altitudes(self) -> Iterator[_Happening]:
         """The messages from which on another altitude fits than before."""
         altitudes_m = (None, *self._settings.expected_altitudes_m[::-1])
+        times_s = self._visibility.times_s
         published = self._visibility.published(self._env.now)
-        rising_m = _rising(self._settings.visibility_thresholds_m)
-        bands = rising_m.searchsorted(self._visibility.arrays[1][:published], side="right")
-        before = -1
-        for message, band in enumerate(bands.tolist()):
-            if band != before:
-                before = band
-                yield self._visibility.times_s[message], _Open.expect, altitudes_m[band]
+        for message, band in _bands(self._visibility.arrays[1].tobytes(), self._settings.visibility_thresholds_m):
+            if message >= published:
+                break
+            yield times_s[message], _Open.expect, altitudes_m[band]
 
     def _low_battery(self) -> Iterator[_Happening]:
         if self._battery is not None:
@@ -91,9 +88,14 @@ class ReactionMeter:
                 yield self._battery.times_s[message], _Open.battery, low
 
 
-@lru_cache(maxsize=16)
-def _rising(thresholds: tuple[float, ...]) -> NDArray[np.float64]:
-    return np.array(thresholds[::-1])
+@lru_cache(maxsize=64)
+def _bands(values: bytes, falling: tuple[float, ...]) -> list[tuple[int, int]]:
+    """Places of the values (float64) that lie between other thresholds than the one before, and how many are below.
+
+    Without noise they are the same in most runs.
+    """
+    bands = np.searchsorted(falling[::-1], np.frombuffer(values), side="right").tolist()
+    return [(place, band) for place, band in enumerate(bands) if place == 0 or band != bands[place - 1]]
 
 
 class _Open:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
 from functools import partial
-from math import isfinite
 from typing import ClassVar
 from weakref import WeakKeyDictionary
 
@@ -18,22 +17,10 @@ from suave_des.knowledge.deliberation import Conclusion, Deliberation
 from suave_des.knowledge.state import Decision, KnowledgeState, ObjectiveState
 from suave_des.managed.task import SEARCH, Task
 from suave_des.managing.base import AdaptationProcess, Bounds, ManagedSystem, ManagingSubsystem
-from suave_des.managing.situations import (
-    NO_VALUE,
-    UNGROUNDED,
-    Bound,
-    Region,
-    Situations,
-    cancelled,
-    executed,
-    reported,
-    requested,
-)
+from suave_des.managing.situations import UNGROUNDED, Situations, Values, cancelled, executed, reported, requested
 from suave_des.monitor.diagnostics import Diagnostic, Kind
 from suave_des.scenario.distributions import draw
 from suave_des.scenario.modes import UNGROUND_MODE
-
-_Values = tuple[float | None, ...]
 
 _memories: WeakKeyDictionary[Deliberation, dict[object, Situations]] = WeakKeyDictionary()
 """Situations that were met, by what is the same in a mission."""
@@ -60,15 +47,9 @@ class Metacontrol(ManagingSubsystem):
         self._awaited = self._attributes_to_await()
         self._listens_since_s = 0.0
         self._heard_before: dict[str, float | None] = {}
-        self._values: _Values = (None,) * len(self._attributes)
-        revision = self._revision
-        same = (
-            system.recorded,
-            revision.search_always_improves,
-            revision.search_improves_when_exceeded,
-            self._attributes,
-        )
-        self._situation = _memories.setdefault(self._deliberation, {}).setdefault(same, Situations()).first()
+        self._values: Values = (None,) * len(self._attributes)
+        self._situations = self._situations_of_missions_like_this()
+        self._situation = self._situations.first()
         self._on_the_bridge = 0
         self._cancelled: set[str] = set()
         self._told: frozenset[str] = frozenset()
@@ -82,9 +63,9 @@ class Metacontrol(ManagingSubsystem):
         self.period_s = self._cycle_s = period_s = system.scenario.managers.metacontrol.reasoning_period_s
         self.starts_s = system.stream("metacontrol/phase").uniform(0.0, period_s)
         self._in_time_s = period_s - _ROUNDING_S
-        self._regions = None if system.recorded else self._deliberation.regions
         # A cycle that draws its latency draws each time; one that takes longer than a period leaves the next one out.
-        self._may_rest = self._regions is not None and isinstance(latency, float) and latency < self._in_time_s
+        is_in_time = isinstance(latency, float) and latency < self._in_time_s
+        self._may_rest = is_in_time and self._situations.regions is not None
         if self._revision.task_bridge_period_s > 0.0:
             bridge_period_s = self._revision.task_bridge_period_s
             self._bridge_phase_s = system.stream("metacontrol/bridge").uniform(0.0, bridge_period_s)
@@ -134,36 +115,42 @@ class Metacontrol(ManagingSubsystem):
         """The same, if a cycle would change nothing now."""
         return self._rest(self._measured_now())
 
-    def _measured_now(self) -> _Values:
+    def _situations_of_missions_like_this(self) -> Situations:
+        known = _memories.setdefault(self._deliberation, {})
+        recorded, revision = self.system.recorded, self._revision
+        same = (
+            recorded,
+            revision.search_always_improves,
+            revision.search_improves_when_exceeded,
+            self._attributes,
+        )
+        if same not in known:
+            # The words of a conclusion name the measured values: for the record each has its own.
+            known[same] = Situations(None if recorded else self._deliberation.regions)
+        return known[same]
+
+    def _measured_now(self) -> Values:
         return tuple([self.measured(attribute) for attribute in self._attributes])
 
-    def _waits_for(self, values: _Values) -> bool:
+    def _waits_for(self, values: Values) -> bool:
         """Whether there is nothing to reason about yet."""
-        return not self._situation.objectives or any(values[place] is None for place in self._awaited)
+        if not self._situation.objectives:
+            return True
+        return bool(self._awaited) and any(values[place] is None for place in self._awaited)
 
-    def _rest(self, values: _Values) -> Bounds | None:
+    def _rest(self, values: Values) -> Bounds | None:
         situation = self._situation
-        if not self._may_rest or self._on_the_bridge or not self._is_in_force(situation.groundings.items()):
+        if not self._may_rest or self._on_the_bridge or not self._are_in_force(situation.groundings.items()):
             return None
-        region = self._region(values)
+        region = self._situations.region(values)
         bounds = region if self._waits_for(values) else situation.rest(region)
         return None if bounds is None else dict(zip(self._attributes, bounds, strict=True))
-
-    def _region(self, values: _Values) -> Region:
-        """The region of measured values; for the record, whose words name the values, they alone are one."""
-        regions = self._regions
-        if regions is not None:
-            region = tuple([_bound(value, regions.around) for value in values])
-            # Of two values in one gap between thresholds rules can tell which is the greater.
-            if len(set(region)) == len(region):
-                return region
-        return tuple([_bound(value, _alone) for value in values])
 
     def _listens(self) -> bool:
         return bool(self._situation.objectives) or not self._revision.ignores_diagnostics_without_objective
 
-    def _conclude(self, values: _Values) -> Conclusion:
-        region = self._region(values)
+    def _conclude(self, values: Values) -> Conclusion:
+        region = self._situations.region(values)
         conclusion = self._situation.conclusion(region)
         if conclusion is None:
             conclusion = self._deliberation.conclude(
@@ -178,7 +165,7 @@ class Metacontrol(ManagingSubsystem):
         if (self.system.recorded or self.system.env.now < self._cycle_s) and not self._is_told(conclusion):
             return False
         designs = [(each.function, each.design) for each in conclusion.plan.decisions if each.design is not None]
-        return self._situation.is_met_by(conclusion) and self._is_in_force(designs)
+        return self._situation.is_met_by(conclusion) and self._are_in_force(designs)
 
     def _is_told(self, conclusion: Conclusion) -> bool:
         """Whether the record has it all."""
@@ -188,10 +175,13 @@ class Metacontrol(ManagingSubsystem):
             and all(decision.design is not None for decision in conclusion.plan.decisions)
         )
 
-    def _is_in_force(self, designs: Iterable[tuple[str, str]]) -> bool:
+    def _are_in_force(self, designs: Iterable[tuple[str, str]]) -> bool:
         """Whether function designs are the modes that were requested last."""
         current_mode = self.system.modes.current_mode
-        return all(current_mode(function) == design for function, design in designs)
+        for function, design in designs:
+            if current_mode(function) != design:
+                return False
+        return True
 
     def _over_the_bridge(self, task: Task, *, requested: bool) -> AdaptationProcess:
         period_s = self._revision.task_bridge_period_s
@@ -223,7 +213,7 @@ class Metacontrol(ManagingSubsystem):
         if not self._listens():
             self._heard_before = heard
 
-    def _state(self, values: _Values) -> KnowledgeState:
+    def _state(self, values: Values) -> KnowledgeState:
         known = zip(self._attributes, values, strict=True)
         always = self._revision.search_always_improves
         situation = self._situation
@@ -292,13 +282,3 @@ class Metacontrol(ManagingSubsystem):
         if self.system.recorded:
             left_out = "".join([f"; not {each.design}: {each.reason}" for each in decision.rejected])
             self.system.log(event, f"{what}: {decision.reason}{left_out}")
-
-
-def _bound(value: float | None, around: Callable[[float], Bound]) -> Bound:
-    if value is None:
-        return NO_VALUE
-    return around(value) if isfinite(value) else (value, value)
-
-
-def _alone(value: float) -> Bound:
-    return value, value

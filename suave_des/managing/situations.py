@@ -7,13 +7,18 @@ several threads may share them.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf, nextafter
+from functools import lru_cache, partial
+from math import inf, isfinite, nextafter
 from typing import Any, Final, NamedTuple
 
 from suave_des.knowledge.deliberation import REMEMBERED, Conclusion
+from suave_des.knowledge.regions import Regions
 from suave_des.monitor.diagnostics import RECOVERED
 
 UNGROUNDED = "UNGROUNDED"
+
+Values = tuple[float | None, ...]
+"""Measured values, in the order of their quality attributes' names; none before the first measurement."""
 
 Bound = tuple[float, float]
 Region = tuple[Bound, ...]
@@ -72,9 +77,18 @@ def executed(known: Known, designs: tuple[tuple[str, str], ...], recovered: tupl
 
 
 class Situations:
-    """All situations that belong together: what is concluded in one of them depends on it and measured values alone."""
+    """All situations that belong together: what is concluded in one of them depends on it and measured values alone.
 
-    def __init__(self) -> None:
+    Args:
+        regions: regions of measured values that make no difference; none if each value makes one.
+
+    Attributes:
+        region: the region of measured values.
+    """
+
+    def __init__(self, regions: Regions | None) -> None:
+        self.regions = regions
+        self.region: Callable[[Values], Region] = lru_cache(maxsize=4096)(partial(_region, regions))
         self._all: dict[object, Situation] = {}
         self._size = 0
 
@@ -180,6 +194,25 @@ class Situation:
     def _is_met_in(self, region: Region) -> bool:
         conclusion = self._conclusions.get(region)
         return conclusion is not None and self.is_met_by(conclusion)
+
+
+def _region(regions: Regions | None, values: Values) -> Region:
+    if regions is not None:
+        region = tuple([_bound(value, regions.around) for value in values])
+        # Of two values in one gap between thresholds rules can tell which is the greater.
+        if len(set(region)) == len(region):
+            return region
+    return tuple([_bound(value, _alone) for value in values])
+
+
+def _bound(value: float | None, around: Callable[[float], Bound]) -> Bound:
+    if value is None:
+        return NO_VALUE
+    return around(value) if isfinite(value) else _alone(value)
+
+
+def _alone(value: float) -> Bound:
+    return value, value
 
 
 def _joined(bounds: list[Bound]) -> tuple[float, ...]:

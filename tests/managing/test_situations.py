@@ -23,11 +23,11 @@ def asking(design: str | None = None, *, of: str = "f") -> Conclusion:
 
 
 def grounded(design: str = HIGH) -> Situation:
-    return Situations().first().after(requested, ("f",)).after(executed, (("f", design),), ())
+    return Situations(None).first().after(requested, ("f",)).after(executed, (("f", design),), ())
 
 
 def test_the_same_news_lead_to_the_same_situation() -> None:
-    first = Situations().first()
+    first = Situations(None).first()
     assert first.after(requested, ("f", "g")) is first.after(requested, ("f", "g"))
     assert first.after(requested, ("f",)).after(requested, ("g",)) is first.after(requested, ("g", "f"))
     assert not first.objectives
@@ -122,7 +122,7 @@ def test_values_between_the_bounds_are_those_of_the_regions_in_which_nothing_is_
 
 def test_when_too_much_is_remembered_all_is_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(situations, "REMEMBERED", 4)
-    first = Situations().first()
+    first = Situations(None).first()
     needed = first.after(requested, ("f",))
     needed.remember(((1.0, 2.0),), asking())
     assert needed.conclusion(((1.0, 2.0),)) is not None
