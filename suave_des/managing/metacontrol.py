@@ -48,6 +48,8 @@ class Metacontrol(ManagingSubsystem):
         self._listens_since_s = 0.0
         self._heard_before: dict[str, float | None] = {}
         self._values: Values = (None,) * len(self._attributes)
+        # What changes nothing but the record is left out where nobody keeps it, and `adapt` is known to do nothing else.
+        self._is_complete = system.recorded or "rests_while" not in vars(type(self))
         self._situations = self._situations_of_missions_like_this()
         self._situation = self._situations.first()
         self._on_the_bridge = 0
@@ -60,12 +62,10 @@ class Metacontrol(ManagingSubsystem):
             if isinstance(latency, float)
             else partial(draw, latency, system.stream("metacontrol/inference"))
         )
-        self.period_s = self._cycle_s = period_s = system.scenario.managers.metacontrol.reasoning_period_s
-        self.starts_s = system.stream("metacontrol/phase").uniform(0.0, period_s)
-        self._in_time_s = period_s - _ROUNDING_S
-        # A cycle that draws its latency draws each time; one that takes longer than a period leaves the next one out.
-        is_in_time = isinstance(latency, float) and latency < self._in_time_s
-        self._may_rest = is_in_time and self._situations.regions is not None
+        self._latency_s = latency if isinstance(latency, float) else None
+        self._cycle_s = system.scenario.managers.metacontrol.reasoning_period_s
+        self.period_s = self._cycle_s
+        self.starts_s = system.stream("metacontrol/phase").uniform(0.0, self._cycle_s)
         if self._revision.task_bridge_period_s > 0.0:
             bridge_period_s = self._revision.task_bridge_period_s
             self._bridge_phase_s = system.stream("metacontrol/bridge").uniform(0.0, bridge_period_s)
@@ -103,7 +103,7 @@ class Metacontrol(ManagingSubsystem):
         conclusion = self._conclude(values)
         self.system.reasoned(conclusion.inference.state)
         latency_s = self._inference_time_s()
-        if latency_s < self._in_time_s and self._changes_nothing(conclusion):
+        if latency_s < self._cycle_s and self._changes_nothing(conclusion, latency_s):
             return None  # and it will be over before the next cycle
         return self._execute(conclusion, latency_s)
 
@@ -117,16 +117,16 @@ class Metacontrol(ManagingSubsystem):
 
     def _situations_of_missions_like_this(self) -> Situations:
         known = _memories.setdefault(self._deliberation, {})
-        recorded, revision = self.system.recorded, self._revision
+        revision = self._revision
         same = (
-            recorded,
+            self._is_complete,
             revision.search_always_improves,
             revision.search_improves_when_exceeded,
             self._attributes,
         )
         if same not in known:
             # The words of a conclusion name the measured values: for the record each has its own.
-            known[same] = Situations(None if recorded else self._deliberation.regions)
+            known[same] = Situations(self._attributes, None if self._is_complete else self._deliberation.regions)
         return known[same]
 
     def _measured_now(self) -> Values:
@@ -139,12 +139,17 @@ class Metacontrol(ManagingSubsystem):
         return bool(self._awaited) and any(values[place] is None for place in self._awaited)
 
     def _rest(self, values: Values) -> Bounds | None:
-        situation = self._situation
-        if not self._may_rest or self._on_the_bridge or not self._are_in_force(situation.groundings.items()):
+        situations, situation, latency_s = self._situations, self._situation, self._latency_s
+        if latency_s is None or latency_s >= self._cycle_s or not self._is_over_in_time(latency_s):
+            return None  # a cycle that draws its latency draws each time; one that takes long leaves the next one out
+        if situations.regions is None or self._on_the_bridge or not self._are_in_force(situation.groundings.items()):
             return None
-        region = self._situations.region(values)
-        bounds = region if self._waits_for(values) else situation.rest(region)
-        return None if bounds is None else dict(zip(self._attributes, bounds, strict=True))
+        region = situations.region(values)
+        return situations.bounds(region) if self._waits_for(values) else situation.rest(region)
+
+    def _is_over_in_time(self, latency_s: float) -> bool:
+        """Whether a cycle is over before the next one, with all rounding errors."""
+        return self.period_s is not None and latency_s + _ROUNDING_S < self.period_s
 
     def _listens(self) -> bool:
         return bool(self._situation.objectives) or not self._revision.ignores_diagnostics_without_objective
@@ -159,13 +164,20 @@ class Metacontrol(ManagingSubsystem):
             self._situation.remember(region, conclusion)
         return conclusion
 
-    def _changes_nothing(self, conclusion: Conclusion) -> bool:
-        # What only the record would tell is done for the record only. The first cycle is always carried out, as from it
-        # the clock comes to the second one with a rounding error, and from the end of its execution with another.
-        if (self.system.recorded or self.system.env.now < self._cycle_s) and not self._is_told(conclusion):
+    def _changes_nothing(self, conclusion: Conclusion, latency_s: float) -> bool:
+        if not (self._is_told(conclusion) or self._is_for_the_record(latency_s)):
             return False
         designs = [(each.function, each.design) for each in conclusion.plan.decisions if each.design is not None]
         return self._situation.is_met_by(conclusion) and self._are_in_force(designs)
+
+    def _is_for_the_record(self, latency_s: float) -> bool:
+        """Whether nothing depends on a cycle that only tells something.
+
+        The clock comes to the next cycle from here as from the end of this one: times until twice the present one are
+        not rounded.
+        """
+        in_time = not self._is_complete and self._is_over_in_time(latency_s)
+        return in_time and self.period_s is not None and self.period_s <= self.system.env.now
 
     def _is_told(self, conclusion: Conclusion) -> bool:
         """Whether the record has it all."""

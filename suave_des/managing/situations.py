@@ -6,13 +6,14 @@ several threads may share them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import lru_cache, partial
 from math import inf, isfinite, nextafter
 from typing import Any, Final, NamedTuple
 
 from suave_des.knowledge.deliberation import REMEMBERED, Conclusion
 from suave_des.knowledge.regions import Regions
+from suave_des.managing.base import Bounds
 from suave_des.monitor.diagnostics import RECOVERED
 
 UNGROUNDED = "UNGROUNDED"
@@ -80,13 +81,15 @@ class Situations:
     """All situations that belong together: what is concluded in one of them depends on it and measured values alone.
 
     Args:
+        attributes: quality attributes that are measured, in the order of the values.
         regions: regions of measured values that make no difference; none if each value makes one.
 
     Attributes:
         region: the region of measured values.
     """
 
-    def __init__(self, regions: Regions | None) -> None:
+    def __init__(self, attributes: tuple[str, ...], regions: Regions | None) -> None:
+        self._attributes = attributes
         self.regions = regions
         self.region: Callable[[Values], Region] = lru_cache(maxsize=4096)(partial(_region, regions))
         self._all: dict[object, Situation] = {}
@@ -95,6 +98,10 @@ class Situations:
     def first(self) -> Situation:
         """Nothing is known."""
         return self.of(Known({}, {}, {}))
+
+    def bounds(self, edges: Iterable[tuple[float, ...]]) -> Bounds:
+        """Bounds by quality attribute."""
+        return dict(zip(self._attributes, edges, strict=True))
 
     def of(self, known: Known) -> Situation:
         """The situation in which that is known."""
@@ -133,7 +140,7 @@ class Situation:
         self.recovered = tuple([name for name, status in known.components.items() if status == RECOVERED])
         self._after: dict[object, Situation] = {}
         self._conclusions: dict[Region, Conclusion] = {}
-        self._rests: dict[Region, tuple[tuple[float, ...], ...]] = {}
+        self._rests: dict[Region, Bounds] = {}
 
     def after(self, news: News, *what: Any) -> Situation:
         """The situation after news."""
@@ -173,8 +180,8 @@ class Situation:
                 return False
         return True
 
-    def rest(self, region: Region) -> tuple[tuple[float, ...], ...] | None:
-        """Bounds of each measured value, between which all that would be concluded is known, and is so already.
+    def rest(self, region: Region) -> Bounds | None:
+        """Between which measured values all that would be concluded is known, and is so already.
 
         None if that is not known of a region itself.
         """
@@ -182,14 +189,14 @@ class Situation:
             return None
         bounds = self._rests.get(region)
         if bounds is None:
-            bounds = self._rests[region] = self._bounds(region)
+            bounds = self._rests[region] = self._situations.bounds(self._widened(region))
         return bounds
 
-    def _bounds(self, region: Region) -> tuple[tuple[float, ...], ...]:
+    def _widened(self, region: Region) -> Iterable[tuple[float, ...]]:
         # Of several values two could be in one gap in other regions.
         if len(region) != 1 or len(self._conclusions) > JOINED:
             return region
-        return (_joined([only for (only,) in tuple(self._conclusions) if self._is_met_in((only,))]),)
+        return [_joined([only for (only,) in tuple(self._conclusions) if self._is_met_in((only,))])]
 
     def _is_met_in(self, region: Region) -> bool:
         conclusion = self._conclusions.get(region)

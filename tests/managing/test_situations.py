@@ -22,12 +22,16 @@ def asking(design: str | None = None, *, of: str = "f") -> Conclusion:
     return Conclusion(Inference(KnowledgeState(), frozenset(), frozenset()), Plan(decisions), frozenset())
 
 
-def grounded(design: str = HIGH) -> Situation:
-    return Situations(None).first().after(requested, ("f",)).after(executed, (("f", design),), ())
+def nothing_known(*attributes: str) -> Situation:
+    return Situations(attributes, None).first()
+
+
+def grounded(*attributes: str) -> Situation:
+    return nothing_known(*attributes).after(requested, ("f",)).after(executed, (("f", HIGH),), ())
 
 
 def test_the_same_news_lead_to_the_same_situation() -> None:
-    first = Situations(None).first()
+    first = nothing_known()
     assert first.after(requested, ("f", "g")) is first.after(requested, ("f", "g"))
     assert first.after(requested, ("f",)).after(requested, ("g",)) is first.after(requested, ("g", "f"))
     assert not first.objectives
@@ -63,11 +67,11 @@ def test_where_no_design_is_left_nothing_is_asked_for() -> None:
 
 def rest(*concluded: tuple[tuple[float, float], Conclusion]) -> tuple[float, ...] | None:
     """Bounds of the rest in the first of some regions."""
-    situation = grounded()
+    situation = grounded("v")
     for bound, conclusion in concluded:
         situation.remember((bound,), conclusion)
     found = situation.rest((concluded[0][0],))
-    return None if found is None else found[0]
+    return None if found is None else found["v"]
 
 
 def test_a_rest_goes_on_in_all_regions_in_which_nothing_is_asked_for() -> None:
@@ -80,19 +84,19 @@ def test_a_rest_goes_on_in_all_regions_in_which_nothing_is_asked_for() -> None:
 
 
 def test_what_is_learnt_later_widens_a_rest() -> None:
-    situation = grounded()
+    situation = grounded("v")
     assert situation.rest(((1.0, 2.0),)) is None
     situation.remember(((1.0, 2.0),), asking())
-    assert situation.rest(((1.0, 2.0),)) == ((1.0, 2.0),)
+    assert situation.rest(((1.0, 2.0),)) == {"v": (1.0, 2.0)}
     situation.remember(((2.0, 2.0),), asking())
-    assert situation.rest(((1.0, 2.0),)) == ((1.0, nextafter(2.0, inf)),)
+    assert situation.rest(((1.0, 2.0),)) == {"v": (1.0, nextafter(2.0, inf))}
 
 
 def test_of_several_values_a_rest_has_the_region_alone() -> None:
-    situation = grounded()
+    situation = grounded("v", "w")
     for region in (((1.0, 2.0), (5.0, 6.0)), ((2.0, 3.0), (5.0, 6.0))):
         situation.remember(region, asking())
-    assert situation.rest(((1.0, 2.0), (5.0, 6.0))) == ((1.0, 2.0), (5.0, 6.0))
+    assert situation.rest(((1.0, 2.0), (5.0, 6.0))) == {"v": (1.0, 2.0), "w": (5.0, 6.0)}
 
 
 @given(
@@ -104,7 +108,7 @@ def test_values_between_the_bounds_are_those_of_the_regions_in_which_nothing_is_
     thresholds: list[int], concluded: list[tuple[float, bool]], value: float
 ) -> None:
     regions = Regions(tuple(map(Decimal, sorted(thresholds))), ())
-    situation = grounded()
+    situation = grounded("v")
     met = {}
     for where, is_met in concluded:
         bound = regions.around(where)
@@ -114,7 +118,7 @@ def test_values_between_the_bounds_are_those_of_the_regions_in_which_nothing_is_
     if found is None:
         assert not met[regions.around(concluded[0][0])]
         return
-    (edges,) = found
+    edges = found["v"]
     inside = any(low < value < high for low, high in zip(edges[::2], edges[1::2], strict=True))
     assert inside == met.get(regions.around(value), False)
     assert list(edges) == sorted(edges)
@@ -122,7 +126,7 @@ def test_values_between_the_bounds_are_those_of_the_regions_in_which_nothing_is_
 
 def test_when_too_much_is_remembered_all_is_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(situations, "REMEMBERED", 4)
-    first = Situations(None).first()
+    first = nothing_known()
     needed = first.after(requested, ("f",))
     needed.remember(((1.0, 2.0),), asking())
     assert needed.conclusion(((1.0, 2.0),)) is not None

@@ -175,6 +175,27 @@ class BlindInTheDark(Metacontrol):
         return float("nan") if value is not None and value < 2.0 else value
 
 
+class Hasty(Metacontrol):
+    """Begins a cycle sooner than one is over."""
+
+    rests_while = Metacontrol.rests_while
+    rests_after = Metacontrol.rests_after
+
+    def __init__(self, system: ManagedSystem) -> None:
+        super().__init__(system)
+        self.period_s = 0.4
+
+
+class DoesMore(Metacontrol):
+    """Notes when metacontrol's cycles are over."""
+
+    def adapt(self):
+        execution = super().adapt()
+        if execution is not None:
+            yield from execution
+        CALLED_S.append(self.system.now_s)
+
+
 RECORDED: list[bool] = []
 """What managers were told of the record."""
 

@@ -143,6 +143,18 @@ def test_metacontrol_leaves_no_cycle_out_with(values: dict, calls) -> None:
     assert rested == calls
 
 
+@pytest.mark.parametrize("manager", ["Hasty", "DoesMore"])
+@pytest.mark.parametrize("name", sorted(LOADED))
+def test_metacontrol_in_another_class_is_the_same_with_and_without_a_record(manager: str, name: str) -> None:
+    simulator = Simulator(LOADED[name])
+    found = []
+    for record in (True, False, False):
+        outside_managers.CALLED_S.clear()
+        metrics, effects = outcome(simulator, f"outside_managers:{manager}", 3, record=record)
+        found.append((metrics, effects, outside_managers.CALLED_S.copy()))
+    assert found[0] == found[1] == found[2]
+
+
 VALUES = st.sampled_from([1.0, 1.25, 1.2500000000000002, 2.0, 2.25, 3.0, 3.25, 3.75]) | st.floats(0.5, 4.5)
 TIMES_S = st.floats(5.0, 110.0)
 SIGNALS = st.one_of(
