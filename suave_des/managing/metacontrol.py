@@ -48,7 +48,7 @@ class Metacontrol(ManagingSubsystem):
         self._listens_since_s = 0.0
         self._heard_before: dict[str, float | None] = {}
         self._values: Values = (None,) * len(self._attributes)
-        # What changes nothing but the record is left out where nobody keeps it, and `adapt` is known to do nothing else.
+        # What changes nothing but the record is left out where nobody keeps it, and `adapt` is known to do no more.
         self._is_complete = system.recorded or "rests_while" not in vars(type(self))
         self._situations = self._situations_of_missions_like_this()
         self._situation = self._situations.first()

@@ -147,6 +147,25 @@ class Acting(Resting):
         yield self.system.env.timeout(0.5)
 
 
+class AnyGrid(Acting):
+    """The same with the times that the scenario says."""
+
+    rests_while = Resting.rests_while
+    rests_after = Resting.rests_while
+
+    def __init__(self, system: ManagedSystem) -> None:
+        super().__init__(system)
+        self.period_s, self.starts_s = system.settings["period_s"], system.settings["starts_s"]
+
+    def adapt(self):
+        self.called_s.append(self.system.now_s)
+        takes_s = self.system.settings["takes_s"]
+        return self._act(takes_s) if takes_s else None
+
+    def _act(self, takes_s: float):
+        yield self.system.env.timeout(takes_s)
+
+
 class StillActing(Acting):
     """Derived from one that rests after it has acted."""
 

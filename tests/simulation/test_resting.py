@@ -143,16 +143,54 @@ def test_metacontrol_leaves_no_cycle_out_with(values: dict, calls) -> None:
     assert rested == calls
 
 
-@pytest.mark.parametrize("manager", ["Hasty", "DoesMore"])
+FAULT = {"thruster_events": [{"thruster": 1, "event": "failure", "time_s": 40.0}], "mission.time_limit_s": 60.0}
+
+
+@pytest.mark.parametrize("manager", ["metacontrol", "outside_managers:Hasty", "outside_managers:DoesMore"])
+@pytest.mark.parametrize(
+    "values",
+    [{}, *({**FAULT, **steps(3.5, 1.5, time_s)} for time_s in (38.5, 39.5, 40.5, 41.5, 42.5))],
+    ids=["as shipped", "before a fault", "just before", "with it", "while it is reasoned about", "after it"],
+)
 @pytest.mark.parametrize("name", sorted(LOADED))
-def test_metacontrol_in_another_class_is_the_same_with_and_without_a_record(manager: str, name: str) -> None:
-    simulator = Simulator(LOADED[name])
+def test_metacontrol_does_the_same_with_and_without_a_record(manager: str, values: dict, name: str) -> None:
+    simulator = Simulator(with_values(LOADED[name], values))
+    for run in range(1, 9):
+        found = []
+        for record in (True, False, False):
+            outside_managers.CALLED_S.clear()
+            found.append((outcome(simulator, manager, run, record=record), outside_managers.CALLED_S.copy()))
+        assert found[0] == found[1] == found[2]
+
+
+@given(
+    period_s=st.floats(0.05, 4.0),
+    start=st.floats(0.0, 1.0),
+    takes_s=st.just(0.0) | st.floats(0.0, 1.0),
+    changes_s=st.floats(0.0, 20.0),
+    fault_s=st.floats(0.0, 20.0),
+)
+@settings(max_examples=100, deadline=None)
+def test_calls_that_are_not_left_out_come_at_the_very_same_times(period_s, start, takes_s, changes_s, fault_s) -> None:
+    values = {
+        "mission.time_limit_s": 20.0,
+        "thruster_events": [{"thruster": 1, "event": "failure", "time_s": fault_s}],
+        "managers": {
+            "outside_managers:AnyGrid": {
+                "period_s": period_s,
+                "starts_s": start * period_s,
+                "takes_s": takes_s * period_s,
+            }
+        },
+        **steps(2.5, 3.5, changes_s),
+    }
+    simulator = Simulator(with_values(LOADED["seams2023"], values))
     found = []
-    for record in (True, False, False):
-        outside_managers.CALLED_S.clear()
-        metrics, effects = outcome(simulator, f"outside_managers:{manager}", 3, record=record)
-        found.append((metrics, effects, outside_managers.CALLED_S.copy()))
-    assert found[0] == found[1] == found[2]
+    for record in (True, False):
+        simulator.run("outside_managers:AnyGrid", 1, 1, record=record)
+        found.append(outside_managers.CALLED_S.copy())
+    every, rested = found
+    assert set(rested) <= set(every)
 
 
 VALUES = st.sampled_from([1.0, 1.25, 1.2500000000000002, 2.0, 2.25, 3.0, 3.25, 3.75]) | st.floats(0.5, 4.5)
