@@ -1,20 +1,27 @@
 """Calls of adapt that would do nothing are left out, and the results are those of a mission with all of them."""
 
+import random
 from dataclasses import replace
 from itertools import pairwise
 from unittest import mock
 
 import outside_managers
 import pytest
+import simpy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from suave_des.clock import call_at
 from suave_des.errors import MissionError
 from suave_des.managed.mode_manager import ModeManager
+from suave_des.managing.base import ManagedSystem
 from suave_des.managing.metacontrol import Metacontrol
+from suave_des.monitor.diagnostics import FAILED, Diagnostic, DiagnosticsBus, Kind
+from suave_des.monitor.measurements import Measurements
 from suave_des.scenario.loader import LoadedScenario, load_scenario
 from suave_des.scenario.models import ConstantSignal
 from suave_des.scenario.overrides import with_values
+from suave_des.simulation.host import ManagerHost
 from suave_des.simulation.simulator import Simulator
 
 NO_FAULTS = {"thruster_events": [], "mission.time_limit_s": 60.0}
@@ -166,28 +173,33 @@ def test_metacontrol_does_the_same_with_and_without_a_record(manager: str, value
 @given(
     period_s=st.floats(0.05, 4.0),
     start=st.floats(0.0, 1.0),
-    takes_s=st.just(0.0) | st.floats(0.0, 1.0),
-    changes_s=st.floats(0.0, 20.0),
-    fault_s=st.floats(0.0, 20.0),
+    takes=st.just(0.0) | st.floats(0.0, 1.0),
+    changes=st.lists(st.floats(0.0, 12.0), max_size=4).map(sorted),
+    told=st.lists(st.floats(0.0, 2.0) | st.floats(0.0, 12.0), max_size=3),
 )
-@settings(max_examples=100, deadline=None)
-def test_calls_that_are_not_left_out_come_at_the_very_same_times(period_s, start, takes_s, changes_s, fault_s) -> None:
-    values = {
-        "mission.time_limit_s": 20.0,
-        "thruster_events": [{"thruster": 1, "event": "failure", "time_s": fault_s}],
-        "managers": {
-            "outside_managers:AnyGrid": {
-                "period_s": period_s,
-                "starts_s": start * period_s,
-                "takes_s": takes_s * period_s,
-            }
-        },
-        **steps(2.5, 3.5, changes_s),
-    }
-    simulator = Simulator(with_values(LOADED["seams2023"], values))
+@settings(max_examples=1000, deadline=None)
+def test_calls_that_are_not_left_out_come_at_the_very_same_times(period_s, start, takes, changes, told) -> None:
+    """Times are given in periods; at each change the value leaves the bounds until the next one."""
+    levels = [2.5, *([3.5, 2.5] * 2)[: len(changes)]]
+    measured = Measurements.of("water_visibility", [0.0, *(period_s * time for time in changes)], levels, 0.0, period_s)
     found = []
-    for record in (True, False):
-        simulator.run("outside_managers:AnyGrid", 1, 1, record=record)
+    for may_rest in (False, True):
+        env, bus = simpy.Environment(), DiagnosticsBus()
+        system = ManagedSystem(
+            env,
+            LOADED["seams2023"].scenario,
+            {"period_s": period_s, "starts_s": start * period_s, "takes_s": takes * period_s},
+            modes=None,
+            lasting_functions=(),
+            stream=random.Random,
+            log=lambda event, detail: None,
+            knowledge=lambda: None,
+            measurements={measured.key: measured},
+        )
+        ManagerHost("outside_managers:AnyGrid", 1, system, bus, may_rest=may_rest)
+        for time in told:
+            call_at(env, time * period_s, bus.publish, Diagnostic(0.0, Kind.COMPONENT_STATUS, "c_thruster_1", FAILED))
+        env.run(until=12.0 * period_s)
         found.append(outside_managers.CALLED_S.copy())
     every, rested = found
     assert set(rested) <= set(every)
