@@ -135,5 +135,8 @@ class ManagingSubsystem:
         return None
 
     def rests_after(self) -> Bounds | None:
-        """The same, asked at the end of each `adapt` that took time; and likewise only of a class's own method."""
+        """The same, asked at the end of each `adapt` that took time; and likewise only of a class's own method.
+
+        A call that does nothing may take time, too, but must be over before the next one, or that would be left out.
+        """
         return None
