@@ -190,10 +190,7 @@ class Metacontrol(ManagingSubsystem):
     def _are_in_force(self, designs: Iterable[tuple[str, str]]) -> bool:
         """Whether function designs are the modes that were requested last."""
         current_mode = self.system.modes.current_mode
-        for function, design in designs:
-            if current_mode(function) != design:
-                return False
-        return True
+        return all(current_mode(function) == design for function, design in designs)
 
     def _over_the_bridge(self, task: Task, *, requested: bool) -> AdaptationProcess:
         period_s = self._revision.task_bridge_period_s
