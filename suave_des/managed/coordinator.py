@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import simpy
 
-from suave_des.clock import Process, tick_at_or_after, until
+from suave_des.clock import Process, call_at, tick_at_or_after, until
 from suave_des.managed.detection import PipelineDetector
 from suave_des.managed.follow import FollowPipeline
 from suave_des.managed.node import Log
@@ -73,10 +73,10 @@ class MissionCoordinator:
         self._inspect = Task("inspect_pipeline", (*shared, FOLLOW))
         self.lasting_functions = () if revision.maintain_motion_per_task else (MAINTAIN_MOTION,)
         """Functions that are needed from launch to the end, and belong to no task."""
-        self._limit_s = tick_at_or_after(time_limit_s, limit_phase_s, revision.limit_check_period_s)
+        limit_s = tick_at_or_after(time_limit_s, limit_phase_s, revision.limit_check_period_s)
         detector.detected.callbacks.append(self._note_detection)
         env.process(self._coordinate())
-        env.process(self._watch_limit())
+        call_at(env, limit_s, self._finish, "time limit")
 
     def search_time_or_limit_s(self) -> float:
         """The search time metric; the time limit when the pipeline was not found."""
@@ -100,10 +100,6 @@ class MissionCoordinator:
 
     def _note_detection(self, _: simpy.Event) -> None:
         self._log("detection", "pipeline_detected", f"point {self._detector.first_point}")
-
-    def _watch_limit(self) -> Process:
-        yield until(self._env, self._limit_s)
-        self._finish("time limit")
 
     def _next_poll_s(self) -> float:
         return tick_at_or_after(self._env.now, self._poll_phase_s, self._revision.poll_period_s)

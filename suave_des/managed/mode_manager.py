@@ -52,7 +52,7 @@ class ModeManager:
 
     def available_modes(self, function: str) -> tuple[str, ...]:
         """All modes of a function, in the order of the modes file; none for an unknown function."""
-        return self._table.modes(function) if function in self._table.functions else ()
+        return self._table.modes(function) if function in self._table.table else ()
 
     def current_mode(self, function: str) -> str | None:
         """The mode that was requested last; none before the first request."""
@@ -68,11 +68,11 @@ class ModeManager:
 
     def change_mode(self, function: str, mode: str) -> bool:
         """Request a mode; False for a function or mode that the modes file does not have, or that has no node here."""
+        if self._requested.get(function) == mode:
+            return True
         if function not in self._nodes or mode not in self.available_modes(function):
             self._log("mode_manager", "refused", f"{function}: no mode {mode}")
             return False
-        if self._requested.get(function) == mode:
-            return True
         self._requested[function] = mode
         if function in self._in_use:
             self.adaptations += 1

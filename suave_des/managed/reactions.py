@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from operator import itemgetter
 from typing import Any
 
@@ -60,7 +61,8 @@ class ReactionMeter:
         """The reactions completed by now, in the order of their completion."""
         reactions = _Open(self._visibility.next_message_s)
         happenings = [*self._fitting_altitudes(), *self._low_battery(), *self._noted]
-        for t_s, what, value in sorted(happenings, key=itemgetter(0)):
+        happenings.sort(key=itemgetter(0))
+        for t_s, what, value in happenings:
             what(reactions, t_s, value)
         return reactions.completed_s
 
@@ -71,21 +73,29 @@ class ReactionMeter:
 
     def _fitting_altitudes(self) -> Iterator[_Happening]:
         """The messages from which on another altitude fits than before."""
-        rising_m = self._settings.visibility_thresholds_m[::-1]
         altitudes_m = (None, *self._settings.expected_altitudes_m[::-1])
+        times_s = self._visibility.times_s
         published = self._visibility.published(self._env.now)
-        bands = np.searchsorted(rising_m, self._visibility.arrays[1][:published], side="right")
-        before = -1
-        for message, band in enumerate(bands.tolist()):
-            if band != before:
-                before = band
-                yield self._visibility.times_s[message], _Open.expect, altitudes_m[band]
+        for message, band in _bands(self._visibility.arrays[1].tobytes(), self._settings.visibility_thresholds_m):
+            if message >= published:
+                break
+            yield times_s[message], _Open.expect, altitudes_m[band]
 
     def _low_battery(self) -> Iterator[_Happening]:
         if self._battery is not None:
             for message in range(self._battery.published(self._env.now)):
                 low = self._battery.values[message] < self._settings.battery_limit
                 yield self._battery.times_s[message], _Open.battery, low
+
+
+@lru_cache(maxsize=64)
+def _bands(values: bytes, falling: tuple[float, ...]) -> list[tuple[int, int]]:
+    """Places of the values (float64) that lie between other thresholds than the one before, and how many are below.
+
+    Without noise they are the same in most runs.
+    """
+    bands = np.searchsorted(falling[::-1], np.frombuffer(values), side="right").tolist()
+    return [(place, band) for place, band in enumerate(bands) if place == 0 or band != bands[place - 1]]
 
 
 class _Open:

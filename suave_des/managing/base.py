@@ -23,8 +23,9 @@ if TYPE_CHECKING:  # or looking a manager up would load the vehicle and the comp
     from suave_des.managed.mode_manager import ModeManager
 
 AdaptationProcess = Generator[simpy.Event, None, None]
-Bounds = Mapping[str, tuple[float, float]]
-"""By quality attribute: a value that a measured one must be above, and one that it must be below."""
+Bounds = Mapping[str, tuple[float, ...]]
+"""By quality attribute: a value that a measured one must be above, and one that it must be below; or several such pairs
+in ascending order, of which it must be between any."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,7 @@ class ManagedSystem:
         lasting_functions: functions that are needed all the time and belong to no task.
         stream: makes a named random stream of this run, the same for every manager.
         log: takes an event and its detail for the mission's record.
+        recorded: whether the record is kept; if not, a manager may leave out what it does for the record alone.
         knowledge: gives the knowledge base with its reasoner (a Deliberation), opened on the first call.
         reasoned: takes each KnowledgeState that is reasoned about, for the mission's record.
         measurements: what monitors have measured, by quality attribute; see `measured`.
@@ -54,6 +56,7 @@ class ManagedSystem:
     knowledge: Callable[[], Any]
     reasoned: Callable[[Any], None] = lambda state: None
     measurements: Mapping[str, Measured] = field(default_factory=dict)
+    recorded: bool = True
 
     @property
     def now_s(self) -> float:
@@ -128,5 +131,12 @@ class ManagingSubsystem:
 
         Returns:
             Bounds, or None: `adapt` is to be called after the next period.
+        """
+        return None
+
+    def rests_after(self) -> Bounds | None:
+        """The same, asked at the end of each `adapt` that took time; and likewise only of a class's own method.
+
+        A call that does nothing may take time, too, but must be over before the next one, or that would be left out.
         """
         return None

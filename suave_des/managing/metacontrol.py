@@ -13,25 +13,19 @@ from typing import ClassVar
 from weakref import WeakKeyDictionary
 
 from suave_des.clock import tick_at_or_after, until
-from suave_des.knowledge.deliberation import REMEMBERED, Conclusion, Deliberation
+from suave_des.knowledge.deliberation import Conclusion, Deliberation
 from suave_des.knowledge.state import Decision, KnowledgeState, ObjectiveState
 from suave_des.managed.task import SEARCH, Task
 from suave_des.managing.base import AdaptationProcess, Bounds, ManagedSystem, ManagingSubsystem
-from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, Kind
+from suave_des.managing.situations import UNGROUNDED, Situations, Values, cancelled, executed, reported, requested
+from suave_des.monitor.diagnostics import Diagnostic, Kind
 from suave_des.scenario.distributions import draw
 from suave_des.scenario.modes import UNGROUND_MODE
 
-UNGROUNDED = "UNGROUNDED"
+_memories: WeakKeyDictionary[Deliberation, dict[object, Situations]] = WeakKeyDictionary()
+"""Situations that were met, by what is the same in a mission."""
 
-_NO_VALUE = (0.0, 0.0)
-"""Bounds that no value is between."""
-
-_Values = tuple[float | None, ...]
-_Known = dict[_Values, Conclusion]
-"""Conclusions by measured values, while all else that is known stays the same."""
-
-_memories: WeakKeyDictionary[Deliberation, dict[object, _Known]] = WeakKeyDictionary()
-"""What was concluded, by all else that is known: so that a state is built only for what is new."""
+_ROUNDING_S = 1e-9
 
 
 class Metacontrol(ManagingSubsystem):
@@ -49,28 +43,26 @@ class Metacontrol(ManagingSubsystem):
         super().__init__(system)
         self._revision = system.scenario.revision.metacontrol
         self._deliberation: Deliberation = system.knowledge()
-        self._objectives: dict[str, str | None] = {}
-        self._groundings: dict[str, str] = {}
-        self._components: dict[str, str] = {}
         self._attributes = tuple(sorted(system.measurements))
         self._awaited = self._attributes_to_await()
         self._listens_since_s = 0.0
         self._heard_before: dict[str, float | None] = {}
-        self._values: _Values = (None,) * len(self._attributes)
-        self._known: _Known | None = None
-        self._situations = _memories.setdefault(self._deliberation, {})
+        self._values: Values = (None,) * len(self._attributes)
+        # What changes nothing but the record is left out where nobody keeps it, and `adapt` is known to do no more.
+        self._is_complete = system.recorded or "rests_while" not in vars(type(self))
+        self._situations = self._situations_of_missions_like_this()
+        self._situation = self._situations.first()
         self._on_the_bridge = 0
         self._cancelled: set[str] = set()
         self._told: frozenset[str] = frozenset()
         self._without_design: frozenset[str] = frozenset()
         latency = system.scenario.latencies.inference_s
-        # A cycle that draws its latency draws each time, and may last for more than a period.
-        self._regions = self._deliberation.regions if isinstance(latency, float) else None
         self._inference_time_s: Callable[[], float] = (
             (lambda: latency)
             if isinstance(latency, float)
             else partial(draw, latency, system.stream("metacontrol/inference"))
         )
+        self._latency_s = latency if isinstance(latency, float) else None
         self._cycle_s = system.scenario.managers.metacontrol.reasoning_period_s
         self.period_s = self._cycle_s
         self.starts_s = system.stream("metacontrol/phase").uniform(0.0, self._cycle_s)
@@ -79,7 +71,7 @@ class Metacontrol(ManagingSubsystem):
             self._bridge_phase_s = system.stream("metacontrol/bridge").uniform(0.0, bridge_period_s)
         self._add_objectives(system.lasting_functions)
         if self._revision.objectives_at_launch:
-            self._add_objectives([SEARCH])
+            self._add_objectives((SEARCH,))
 
     def task_requested(self, task: Task) -> None:
         """Add an objective for each function of the task, when the task bridge passes it on."""
@@ -92,8 +84,7 @@ class Metacontrol(ManagingSubsystem):
     def diagnostic(self, diagnostic: Diagnostic) -> None:
         """Monitor: update what is known of components."""
         if self._listens() and diagnostic.kind == Kind.COMPONENT_STATUS:
-            self._components[diagnostic.key] = str(diagnostic.value)
-            self._known = None
+            self._situation = self._situation.after(reported, diagnostic.key, str(diagnostic.value))
 
     def measured(self, attribute: str) -> float | None:
         """Monitor: the value of a quality attribute that is known now, none if there is none."""
@@ -105,71 +96,101 @@ class Metacontrol(ManagingSubsystem):
 
     def adapt(self) -> AdaptationProcess | None:
         """Analyze and plan on the state as it is now; execute when the reasoner has taken its time."""
-        self._values = values = tuple([self.measured(attribute) for attribute in self._attributes])
-        if not self._objectives:
-            return None
-        if any(values[place] is None for place in self._awaited):
+        self._values = values = self._measured_now()
+        if self._waits_for(values):
             return None
         self._cancelled.clear()
         conclusion = self._conclude(values)
         self.system.reasoned(conclusion.inference.state)
         latency_s = self._inference_time_s()
-        if self._changes_nothing(conclusion) and latency_s < self._cycle_s:
+        if latency_s < self._cycle_s and self._changes_nothing(conclusion, latency_s):
             return None  # and it will be over before the next cycle
         return self._execute(conclusion, latency_s)
 
     def rests_while(self) -> Bounds | None:
-        """While measured values stay in their regions a cycle concludes what this one did, and changes nothing."""
-        regions = self._regions
-        if regions is None or self._on_the_bridge:
+        """While measured values stay in regions of which it is known that a cycle changes nothing."""
+        return self._rest(self._values)
+
+    def rests_after(self) -> Bounds | None:
+        """The same, if a cycle would change nothing now."""
+        return self._rest(self._measured_now())
+
+    def _situations_of_missions_like_this(self) -> Situations:
+        known = _memories.setdefault(self._deliberation, {})
+        revision = self._revision
+        same = (
+            self._is_complete,
+            revision.search_always_improves,
+            revision.search_improves_when_exceeded,
+            self._attributes,
+        )
+        if same not in known:
+            # The words of a conclusion name the measured values: for the record each has its own.
+            known[same] = Situations(self._attributes, None if self._is_complete else self._deliberation.regions)
+        return known[same]
+
+    def _measured_now(self) -> Values:
+        return tuple([self.measured(attribute) for attribute in self._attributes])
+
+    def _waits_for(self, values: Values) -> bool:
+        """Whether there is nothing to reason about yet."""
+        if not self._situation.objectives:
+            return True
+        return bool(self._awaited) and any(values[place] is None for place in self._awaited)
+
+    def _rest(self, values: Values) -> Bounds | None:
+        situations, situation, latency_s = self._situations, self._situation, self._latency_s
+        if latency_s is None or latency_s >= self._cycle_s or not self._is_over_in_time(latency_s):
+            return None  # a cycle that draws its latency draws each time; one that takes long leaves the next one out
+        if situations.regions is None or self._on_the_bridge or not self._are_in_force(situation.groundings.items()):
             return None
-        bounds = {
-            attribute: _NO_VALUE if value is None else regions.around(value)
-            for attribute, value in zip(self._attributes, self._values, strict=True)
-        }
-        # Of two values in one gap between thresholds rules can tell which is the greater.
-        return bounds if len(set(bounds.values())) == len(bounds) else None
+        region = situations.region(values)
+        return situations.bounds(region) if self._waits_for(values) else situation.rest(region)
+
+    def _is_over_in_time(self, latency_s: float) -> bool:
+        """Whether a cycle is over before the next one, with all rounding errors."""
+        return self.period_s is not None and latency_s + _ROUNDING_S < self.period_s
 
     def _listens(self) -> bool:
-        return bool(self._objectives) or not self._revision.ignores_diagnostics_without_objective
+        return bool(self._situation.objectives) or not self._revision.ignores_diagnostics_without_objective
 
-    def _conclude(self, values: _Values) -> Conclusion:
-        if self._known is None:
-            self._known = self._known_in_situation()
-        conclusion = self._known.get(values)
+    def _conclude(self, values: Values) -> Conclusion:
+        region = self._situations.region(values)
+        conclusion = self._situation.conclusion(region)
         if conclusion is None:
-            if sum(map(len, self._situations.values())) >= REMEMBERED:
-                for known in self._situations.values():
-                    known.clear()
-            conclusion = self._known[values] = self._deliberation.conclude(
+            conclusion = self._deliberation.conclude(
                 self._state(values), improve_exceeded=self._revision.search_improves_when_exceeded
             )
+            self._situation.remember(region, conclusion)
         return conclusion
 
-    def _known_in_situation(self) -> _Known:
-        situation = (
-            self._revision.search_always_improves,
-            self._revision.search_improves_when_exceeded,
-            self._attributes,
-            *map(tuple, (self._objectives.items(), self._groundings.items(), self._components.items())),
-        )
-        return self._situations.setdefault(situation, {})
+    def _changes_nothing(self, conclusion: Conclusion, latency_s: float) -> bool:
+        if not (self._is_told(conclusion) or self._is_for_the_record(latency_s)):
+            return False
+        designs = [(each.function, each.design) for each in conclusion.plan.decisions if each.design is not None]
+        return self._situation.is_met_by(conclusion) and self._are_in_force(designs)
 
-    def _changes_nothing(self, conclusion: Conclusion) -> bool:
+    def _is_for_the_record(self, latency_s: float) -> bool:
+        """Whether nothing depends on a cycle that only tells something.
+
+        The clock comes to the next cycle from here as from the end of this one: times until twice the present one are
+        not rounded.
+        """
+        in_time = not self._is_complete and self._is_over_in_time(latency_s)
+        return in_time and self.period_s is not None and self.period_s <= self.system.env.now
+
+    def _is_told(self, conclusion: Conclusion) -> bool:
+        """Whether the record has it all."""
         return (
             conclusion.statuses == self._told
             and not self._without_design
-            and RECOVERED not in self._components.values()
-            and all(self._is_carried_out(decision) for decision in conclusion.plan.decisions)
+            and all(decision.design is not None for decision in conclusion.plan.decisions)
         )
 
-    def _is_carried_out(self, decision: Decision) -> bool:
-        function, design = decision.function, decision.design
-        return (
-            design is not None
-            and self._groundings.get(function) == design == self.system.modes.current_mode(function)
-            and self._objectives[function] is None
-        )
+    def _are_in_force(self, designs: Iterable[tuple[str, str]]) -> bool:
+        """Whether function designs are the modes that were requested last."""
+        current_mode = self.system.modes.current_mode
+        return all(current_mode(function) == design for function, design in designs)
 
     def _over_the_bridge(self, task: Task, *, requested: bool) -> AdaptationProcess:
         period_s = self._revision.task_bridge_period_s
@@ -182,36 +203,36 @@ class Metacontrol(ManagingSubsystem):
         else:
             self._remove_objectives(task.functions)
 
-    def _add_objectives(self, functions: Iterable[str]) -> None:
+    def _add_objectives(self, functions: tuple[str, ...]) -> None:
         if not self._listens():
             self._listens_since_s = self.system.now_s
-        self._known = None
-        for function in functions:
-            if function not in self._objectives:
-                self._objectives[function] = UNGROUNDED
-                self.system.log("objective", f"{function} {UNGROUNDED}")
+        before = self._situation.objectives
+        self._situation = self._situation.after(requested, functions)
+        if self.system.recorded:
+            for function in dict.fromkeys(functions):
+                if function not in before:
+                    self.system.log("objective", f"{function} {UNGROUNDED}")
 
-    def _remove_objectives(self, functions: Iterable[str]) -> None:
+    def _remove_objectives(self, functions: tuple[str, ...]) -> None:
         heard = {attribute: self.measured(attribute) for attribute in self._attributes}
+        self._situation = self._situation.after(cancelled, functions)
+        self._cancelled.update(functions)
         for function in functions:
-            self._objectives.pop(function, None)
-            self._groundings.pop(function, None)
-            self._cancelled.add(function)
             self.system.change_mode(function, UNGROUND_MODE)
-        self._known = None
         if not self._listens():
             self._heard_before = heard
 
-    def _state(self, values: _Values) -> KnowledgeState:
+    def _state(self, values: Values) -> KnowledgeState:
         known = zip(self._attributes, values, strict=True)
         always = self._revision.search_always_improves
+        situation = self._situation
         return KnowledgeState.of(
             objectives=[
                 ObjectiveState(function, status, always and function == SEARCH)
-                for function, status in self._objectives.items()
+                for function, status in situation.objectives.items()
             ],
-            groundings=self._groundings,
-            components=self._components,
+            groundings=situation.groundings,
+            components=situation.components,
             measurements={attribute: value for attribute, value in known if value is not None},
         )
 
@@ -230,42 +251,43 @@ class Metacontrol(ManagingSubsystem):
         return [place for place, name in enumerate(self._attributes) if name in expected and name in signals]
 
     def _execute(self, conclusion: Conclusion, latency_s: float) -> AdaptationProcess:
-        recovered = [component for component, status in self._components.items() if status == RECOVERED]
+        recovered = self._situation.recovered
         yield self.system.env.timeout(latency_s)
         self._tell(conclusion.statuses)
-        for decision in conclusion.plan.decisions:
-            if decision.function in self._objectives and decision.function not in self._cancelled:
-                self._carry_out(decision)
-        self._without_design = frozenset(each.function for each in conclusion.plan.decisions if each.design is None)
-        # A recovery is news once: it has been reasoned about, and from now on the component is as if it had never
-        # failed. Kept, it would make every objective updatable for ever, and in the exemplar's oldest files, where the
-        # status says so, contradict the UNGROUNDED of each objective to come.
-        for component in recovered:
-            if self._components.get(component) == RECOVERED:
-                del self._components[component]
-        self._known = None
+        decisions = conclusion.plan.decisions
+        grounded = tuple(
+            [
+                (decision.function, decision.design)
+                for decision in decisions
+                if decision.function in self._situation.objectives
+                and decision.function not in self._cancelled
+                and self._carry_out(decision)
+            ]
+        )
+        self._without_design = frozenset([each.function for each in decisions if each.design is None])
+        self._situation = self._situation.after(executed, grounded, recovered)
 
-    def _carry_out(self, decision: Decision) -> None:
+    def _carry_out(self, decision: Decision) -> bool:
+        """Request a decision's design; false if there is none."""
         function, design = decision.function, decision.design
         if design is None:
-            if function in self._without_design:  # told already: only the measured values in the reasons are others
-                return
-            self.system.log("no_design_left", f"{function}: {decision.reason}{_left_out(decision)}")
-            return
-        if self.system.change_mode(function, design):
-            if self._groundings.get(function) != design:
-                before = self._groundings.get(function, "ungrounded")
-                why = f"{decision.reason}{_left_out(decision)}"
-                self.system.log("adaptation", f"{function}: {before} -> {design}: {why}")
-            self._groundings[function] = design
-            self._objectives[function] = None
+            if function not in self._without_design:  # else only the measured values in the reasons are others
+                self._log("no_design_left", decision, function)
+            return False
+        if not self.system.change_mode(function, design):
+            return False
+        before = self._situation.groundings.get(function, "ungrounded")
+        if before != design:
+            self._log("adaptation", decision, f"{function}: {before} -> {design}")
+        return True
 
     def _tell(self, statuses: frozenset[str]) -> None:
-        for line in sorted(statuses - self._told):
-            self.system.log("inferred", line)
+        if self.system.recorded:
+            for line in sorted(statuses - self._told):
+                self.system.log("inferred", line)
         self._told = statuses
 
-
-def _left_out(decision: Decision) -> str:
-    """The designs that were left out, with the reason of each."""
-    return "".join(f"; not {each.design}: {each.reason}" for each in decision.rejected)
+    def _log(self, event: str, decision: Decision, what: str) -> None:
+        if self.system.recorded:
+            left_out = "".join([f"; not {each.design}: {each.reason}" for each in decision.rejected])
+            self.system.log(event, f"{what}: {decision.reason}{left_out}")

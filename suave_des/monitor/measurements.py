@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -32,8 +32,8 @@ class Measured(Protocol):
     def published(self, t_s: float) -> int:
         """How many values are published until mission time t, which must not lie in the future."""
 
-    def leaves_at_s(self, t_s: float, above: float, below: float) -> float:
-        """Time of the first value after t that is, or may be, not between two bounds; inf: there is none."""
+    def leaves_at_s(self, t_s: float, *bounds: float) -> float:
+        """Time of the first value after t that is, or may be, between no pair of bounds; inf: there is none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,11 +56,21 @@ class Measurements:
         """How many values are published until mission time t."""
         return bisect_right(self.times_s, t_s)
 
-    def leaves_at_s(self, t_s: float, above: float, below: float) -> float:
-        """Time of the first value after mission time t that is not between two bounds; inf: there is none."""
-        for place in range(self.published(t_s), len(self.values)):
-            if not above < self.values[place] < below:
-                return self.times_s[place]
+    def leaves_at_s(self, t_s: float, *bounds: float) -> float:
+        """Time of the first value after mission time t that is between no pair of bounds; inf: there is none.
+
+        Args:
+            t_s: mission time.
+            bounds: pairs in ascending order.
+        """
+        published = self.published(t_s)
+        above = below = math.nan
+        for place, value in enumerate(self.values[published:], published):
+            if not above < value < below:
+                passed = bisect_left(bounds, value)
+                if passed % 2 == 0 or bounds[passed] == value:
+                    return self.times_s[place]
+                above, below = bounds[passed - 1], bounds[passed]
         return math.inf
 
     def next_message_s(self, t_s: float) -> float:
@@ -104,7 +114,7 @@ class BatteryLevel:
             self._next_s += self.period_s
         return bisect_right(self.times_s, t_s)
 
-    def leaves_at_s(self, t_s: float, above: float, below: float) -> float:
+    def leaves_at_s(self, t_s: float, *bounds: float) -> float:
         """Time of the first value after t, which is now: what it will be depends on where the vehicle goes."""
         self.published(t_s)
         return self._next_s

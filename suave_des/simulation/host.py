@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -10,7 +11,7 @@ import simpy
 from suave_des.clock import Process, until
 from suave_des.errors import InputError, MissionError, SuaveDesError
 from suave_des.managed.task import Task
-from suave_des.managing.base import ManagedSystem, ManagingSubsystem
+from suave_des.managing.base import Bounds, ManagedSystem, ManagingSubsystem
 from suave_des.managing.registry import manager_class
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
 
@@ -47,7 +48,9 @@ class ManagerHost:
             raise  # such as an ontology that cannot be used: it concerns every mission
         except RAISED as error:
             raise self.mission_error(error) from error
-        self._may_rest = may_rest and "rests_while" in vars(kind)
+        own = vars(kind) if may_rest else {}
+        self._rests_while = self.manager.rests_while if "rests_while" in own else None
+        self._rests_after = self.manager.rests_after if "rests_after" in own else None
         if kind.diagnostic is not ManagingSubsystem.diagnostic:
             bus.subscribe(self._diagnostic, kind.hears)
         period_s = self.manager.period_s
@@ -84,36 +87,44 @@ class ManagerHost:
         due_s = env.now
         while True:
             adaptation = self._guarded(self.manager.adapt)
+            rests = self._rests_while
             if adaptation is not None:
                 yield from self._guarded_steps(adaptation)
+                rests = self._rests_after
             while due_s <= env.now:
                 due_s += period_s
-            tick_s = self._after_rest_s(due_s, period_s) if adaptation is None and self._may_rest else due_s
+            bounds = None if rests is None else self._guarded(rests)
+            tick_s = due_s if bounds is None else self._after_rest_s(due_s, period_s, bounds)
             self._rests = tick_s > due_s
             try:
                 yield until(env, tick_s)
+                due_s = tick_s
             except simpy.Interrupt:  # told something
-                while due_s < env.now:
-                    due_s += period_s
+                due_s = _step_at_or_after(env.now, due_s, period_s)
                 yield until(env, due_s)
             self._rests = False
 
-    def _after_rest_s(self, due_s: float, period_s: float) -> float:
+    def _after_rest_s(self, due_s: float, period_s: float, bounds: Bounds) -> float:
         """The first time from `due_s` on, in steps of the period, that a measured value is out of its bounds."""
         now_s = self._env.now
-        bounds = self._guarded(self.manager.rests_while)
-        if bounds is None:
+        # The clock comes to a time by a delay, which is rounded where the time is more than twice the present one. Then
+        # a mission that leaves nothing out, which comes to each tick from the one before, could be there earlier.
+        if due_s > 2.0 * now_s:
             return due_s
-        leaves_s = [
-            measured.leaves_at_s(now_s, *bounds[attribute])
-            for attribute, measured in self._measurements.items()
-            if attribute in bounds
-        ]
-        # Not beyond twice the present time: only until there the clock surely comes to this time, and no rounded one.
-        end_s = min([2.0 * now_s - period_s, *leaves_s])
-        while due_s < end_s:
-            due_s += period_s
-        return due_s
+        leaves_s = min(
+            [
+                measured.leaves_at_s(now_s, *bounds[attribute])
+                for attribute, measured in self._measurements.items()
+                if attribute in bounds
+            ],
+            default=math.inf,
+        )
+        if leaves_s == math.inf:
+            return leaves_s
+        tick_s = _step_at_or_after(leaves_s, due_s, period_s)
+        if now_s + (tick_s - now_s) != tick_s:
+            tick_s = _step_at_or_after(2.0 * now_s - period_s, due_s, period_s)
+        return tick_s
 
     def _tell(self, hook: Callable[[Any], None], news: Any) -> None:
         self._guarded(hook, news)
@@ -139,3 +150,10 @@ class ManagerHost:
             return hook(*arguments)
         except RAISED as error:
             raise self.mission_error(error) from error
+
+
+def _step_at_or_after(t_s: float, first_s: float, step_s: float) -> float:
+    """The first time not before t of those that go from one to the next in steps, rounding errors included."""
+    while first_s < t_s:
+        first_s += step_s
+    return first_s

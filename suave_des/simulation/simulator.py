@@ -360,6 +360,7 @@ class _Mission:
             log=lambda event, detail: self.recorder.log(name, event, detail),
             knowledge=lambda: self.simulator.knowledge,
             reasoned=self.recorder.reasoned,
+            recorded=self.recorder.enabled,
             measurements=self.signals if self.battery is None else {**self.signals, self.battery.key: self.battery},
         )
         return ManagerHost(name, self.run, system, self.bus, may_rest=not self.recorder.enabled)

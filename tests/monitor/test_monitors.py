@@ -68,6 +68,22 @@ def test_a_value_leaves_its_bounds_when_it_is_on_one_or_beyond(above: float, bel
     assert measured.leaves_at_s(2.0, above, below) == leaves_s
 
 
+@pytest.mark.parametrize(
+    ("bounds", "leaves_s"),
+    [
+        ((2.5, 2.6, 2.6, 9.0), 4.0),
+        ((2.0, 3.0, 3.0, 4.0), 3.0),
+        ((0.5, 2.0, 2.3, 2.5, 2.9, 4.0), math.inf),
+        ((0.5, 1.0, 2.3, 2.5, 2.9, 4.0), 5.0),
+        ((), 3.0),
+        ((math.inf, -math.inf), 3.0),
+    ],
+)
+def test_a_value_may_be_in_any_of_several_pairs_of_bounds(bounds: tuple[float, ...], leaves_s: float) -> None:
+    measured = Measurements.of("v", (1.0, 2.0, 3.0, 4.0, 5.0), (9.0, 2.7, 3.0, 2.4, 1.0), 1.0, 1.0)
+    assert measured.leaves_at_s(2.0, *bounds) == leaves_s
+
+
 def test_a_constant_is_published_once() -> None:
     measured = measure("v", constant(2.0), 100.0, period_s=0.2, phase_s=0.05)
     assert (measured.times_s, measured.values) == ((0.05,), (2.0,))

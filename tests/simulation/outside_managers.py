@@ -5,6 +5,7 @@ from weakref import WeakSet
 
 from suave_des.managed.task import Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
+from suave_des.managing.metacontrol import Metacontrol
 from suave_des.monitor.diagnostics import Diagnostic, Kind
 
 
@@ -158,6 +159,87 @@ class NeverIdle(Resting):
         super().adapt()
         yield self.system.env.timeout(0.0)
 
+
+class Acting(Resting):
+    """Each adaptation takes half a second, after which it has nothing to do for as long."""
+
+    rests_after = Resting.rests_while
+
+    def adapt(self):
+        super().adapt()
+        yield self.system.env.timeout(0.5)
+
+
+class AnyGrid(Acting):
+    """The same with the times that the scenario says."""
+
+    rests_while = Resting.rests_while
+    rests_after = Resting.rests_while
+
+    def __init__(self, system: ManagedSystem) -> None:
+        super().__init__(system)
+        self.period_s, self.starts_s = system.settings["period_s"], system.settings["starts_s"]
+
+    def adapt(self):
+        self.called_s.append(self.system.now_s)
+        takes_s = self.system.settings["takes_s"]
+        return self._act(takes_s) if takes_s else None
+
+    def _act(self, takes_s: float):
+        yield self.system.env.timeout(takes_s)
+
+
+class StillActing(Acting):
+    """Derived from one that rests after it has acted."""
+
+
+class InTwoRanges(Resting):
+    """Has nothing to do either while the visibility is between 2 and 3 m, or between 3 and 4 m."""
+
+    def rests_while(self):
+        return {"water_visibility": (2.0, 3.0, 3.0, 4.0)}
+
+
+class AsksForTheRecord(ManagingSubsystem):
+    def __init__(self, system: ManagedSystem) -> None:
+        super().__init__(system)
+        RECORDED.append(system.recorded)
+
+
+class BlindInTheDark(Metacontrol):
+    """Takes a visibility below 2 m for no number."""
+
+    rests_while = Metacontrol.rests_while
+    rests_after = Metacontrol.rests_after
+
+    def measured(self, attribute):
+        value = super().measured(attribute)
+        return float("nan") if value is not None and value < 2.0 else value
+
+
+class Hasty(Metacontrol):
+    """Begins a cycle sooner than one is over."""
+
+    rests_while = Metacontrol.rests_while
+    rests_after = Metacontrol.rests_after
+
+    def __init__(self, system: ManagedSystem) -> None:
+        super().__init__(system)
+        self.period_s = 0.4
+
+
+class DoesMore(Metacontrol):
+    """Notes when metacontrol's cycles are over."""
+
+    def adapt(self):
+        execution = super().adapt()
+        if execution is not None:
+            yield from execution
+        CALLED_S.append(self.system.now_s)
+
+
+RECORDED: list[bool] = []
+"""What managers were told of the record."""
 
 CALLED_S: list[float] = []
 """When the last mission's manager was called."""
