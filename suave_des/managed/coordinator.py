@@ -76,7 +76,7 @@ class MissionCoordinator:
         limit_s = tick_at_or_after(time_limit_s, limit_phase_s, revision.limit_check_period_s)
         detector.detected.callbacks.append(self._note_detection)
         env.process(self._coordinate())
-        call_at(env, limit_s, self._finish, "time limit")
+        call_at(env, limit_s, lambda _: self._finish("time limit"))
 
     def search_time_or_limit_s(self) -> float:
         """The search time metric; the time limit when the pipeline was not found."""

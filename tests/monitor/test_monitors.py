@@ -80,7 +80,8 @@ def test_a_value_leaves_its_bounds_when_it_is_on_one_or_beyond(above: float, bel
     ],
 )
 def test_a_value_may_be_in_any_of_several_pairs_of_bounds(bounds: tuple[float, ...], leaves_s: float) -> None:
-    measured = Measurements.of("v", (1.0, 2.0, 3.0, 4.0, 5.0), (9.0, 2.7, 3.0, 2.4, 1.0), 1.0, 1.0)
+    times_s, values = (1.0, 2.0, 3.0, 4.0, 5.0), (9.0, 2.7, 3.0, 2.4, 1.0)
+    measured = Measurements("v", times_s, values, 1.0, 1.0, (np.array(times_s), np.array(values)))
     assert measured.leaves_at_s(2.0, *bounds) == leaves_s
 
 

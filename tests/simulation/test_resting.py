@@ -5,6 +5,7 @@ from dataclasses import replace
 from itertools import pairwise
 from unittest import mock
 
+import numpy as np
 import outside_managers
 import pytest
 import simpy
@@ -181,7 +182,9 @@ def test_metacontrol_does_the_same_with_and_without_a_record(manager: str, value
 def test_calls_that_are_not_left_out_come_at_the_very_same_times(period_s, start, takes, changes, told) -> None:
     """Times are given in periods; at each change the value leaves the bounds until the next one."""
     levels = [2.5, *([3.5, 2.5] * 2)[: len(changes)]]
-    measured = Measurements.of("water_visibility", [0.0, *(period_s * time for time in changes)], levels, 0.0, period_s)
+    times_s = (0.0, *(period_s * time for time in changes))
+    arrays = (np.array(times_s), np.array(levels))
+    measured = Measurements("water_visibility", times_s, tuple(levels), 0.0, period_s, arrays)
     found = []
     for may_rest in (False, True):
         env, bus = simpy.Environment(), DiagnosticsBus()
