@@ -69,7 +69,12 @@ def advance(
     prm = parameters
     mass, ixx, iyy, izz = prm[MASS], prm[IXX], prm[IYY], prm[IZZ]
     heading_w, heading_z = set_point[3], set_point[4]
-    x, y, z, qw, qx, qy, qz, u, v, w, p, q, r, ix, iy, iz, ir = track[first, :ROW]
+    # Number by number: to unpack a slice makes an array of it, which takes as long as a step.
+    x, y, z = track[first, 0], track[first, 1], track[first, 2]
+    qw, qx, qy, qz = track[first, 3], track[first, 4], track[first, 5], track[first, 6]
+    u, v, w = track[first, 7], track[first, 8], track[first, 9]
+    p, q, r = track[first, 10], track[first, 11], track[first, 12]
+    ix, iy, iz, ir = track[first, 13], track[first, 14], track[first, 15], track[first, 16]
     h = step_s
     t0 = t1 = t2 = t3 = t5 = 0.0
     for row in range(first + 1, last + 1):
