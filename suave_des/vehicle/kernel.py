@@ -191,7 +191,10 @@ def advance(
         qx += 0.5 * h * dx
         qy += 0.5 * h * dy
         qz += 0.5 * h * dz
-        scale = 1.0 / math.sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
+        # The norm's inverse: near 1, one step of Newton's method from there is less than 4e-7 off, which the next row
+        # corrects; the square root and the division take an eighth of a step's time.
+        square = qw * qw + qx * qx + qy * qy + qz * qz
+        scale = 1.5 - 0.5 * square if abs(square - 1.0) < 1e-3 else 1.0 / math.sqrt(square)
         qw, qx, qy, qz = qw * scale, qx * scale, qy * scale, qz * scale
 
         track[row, 0], track[row, 1], track[row, 2] = x, y, z
