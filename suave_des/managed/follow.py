@@ -21,8 +21,6 @@ from suave_des.world.pipeline import SEA_BED_Z_M
 ALTITUDE_M = 1.25
 Z_M = SEA_BED_Z_M + ALTITUDE_M
 POLLS_BEFORE_RESENDING = 10
-POINTS_AHEAD = 16
-"""Points whose set-points are sent at a time: enough to pay, few enough that little is lost when control changes."""
 
 
 class Way(NamedTuple):
@@ -160,7 +158,7 @@ class FollowPipeline(TravellingNode):
         if self._watch is None:
             return
         self._reached_at, self._wake = self._sender.send_ahead(
-            self._way.places_m[self._next : self._next + POINTS_AHEAD],
+            self._way.places_m[self._next : self._next + 1 + self._ahead],
             Z_M,
             self._watch,
             first=first,

@@ -24,8 +24,6 @@ REACHED_BOX_M = 0.4
 TICKS_BEFORE_RESENDING = 10
 INITIAL_ALTITUDE_M = 2.0
 """The node's altitude parameter before any mode is set."""
-SET_POINTS_AHEAD = 5
-"""Set-points that are sent ahead: enough to pay, few enough that little is lost when a mode or a sight ends them."""
 
 
 @compiled
@@ -151,7 +149,7 @@ class GenerateSearchPath(TravellingNode):
             self._wake = first
         else:
             present = self._places[0]
-            self._places = np.empty((1 + SET_POINTS_AHEAD, 4))
+            self._places = np.empty((1 + self._ahead, 4))
             self._places[0] = present
             spiral(self._count, self._radius_m, self.altitude_m, self._centre_m, self._places[1:])
             last = self._ticked + TICKS_BEFORE_RESENDING + 1 - self._waited_ticks

@@ -8,6 +8,12 @@ from suave_des.clock import call_at, call_next
 from suave_des.managed.node import FunctionNode, SetPointSender
 from suave_des.vehicle.vehicle import Vehicle, Watch
 
+FEWEST_AHEAD = 6
+MOST_AHEAD = 24
+"""Set-points that are given ahead at a time: few after a change of control, as what was given is lost at the next one;
+twice as many each time that none has come.
+"""
+
 
 class TravellingNode(FunctionNode):
     """A node that looks at each tick of its timer whether a place is reached, and then sends the next one.
@@ -29,6 +35,7 @@ class TravellingNode(FunctionNode):
         self._alarm: simpy.Event | None = None
         """The event that the node waits for; one that is not this any more comes too late."""
         self._rests = False
+        self._ahead = FEWEST_AHEAD
         vehicle.control_listeners.append(self._control_changed)
 
     def wake(self) -> None:
@@ -44,6 +51,7 @@ class TravellingNode(FunctionNode):
     def _end_rest(self, event: simpy.Event) -> None:
         if event is self._alarm:
             self._rests = False
+            self._ahead = min(2 * self._ahead, MOST_AHEAD)
             self.wake()
 
     def _control_changed(self, row: int) -> None:
@@ -54,6 +62,7 @@ class TravellingNode(FunctionNode):
 
     def _after_change(self, event: simpy.Event) -> None:
         if event is self._alarm:
+            self._ahead = FEWEST_AHEAD
             self.foresee_anew()
 
     def _stop(self, tick: int) -> None:
