@@ -88,6 +88,9 @@ class PipelineDetector:
             self._looked, self._seen = seen_row, point
         elif self._alarm is not None and self._alarm_row <= self._looked:
             return  # soon enough
+        self._set_alarm()
+
+    def _set_alarm(self) -> None:
         self._alarm, self._alarm_row = call_at(self._env, self._looked * STEP_S, self._arrive), self._looked
 
     def _arrive(self, event: simpy.Event) -> None:
@@ -95,12 +98,11 @@ class PipelineDetector:
             return
         self._alarm = None
         if self._alarm_row < self._looked:
-            self._alarm, self._alarm_row = call_at(self._env, self._looked * STEP_S, self._arrive), self._looked
-            return
-        if self._seen is None:
+            self._set_alarm()
+        elif self._seen is None:
             self._look_ahead(self._looked, min(2 * self._rows, _FARTHEST_LOOK_AHEAD_ROWS))
-            return
-        self._vehicle.control_listeners.remove(self._look_anew)
-        self.first_point = self._seen
-        self.detected_s = float(self._env.now)
-        self.detected.succeed()
+        else:
+            self._vehicle.control_listeners.remove(self._look_anew)
+            self.first_point = self._seen
+            self.detected_s = float(self._env.now)
+            self.detected.succeed()
