@@ -152,7 +152,8 @@ class _Course(NamedTuple):
         place = bisect_right(self.given_at, tick)
         if place > 0:
             x_m, y_m, z_m = self.sent_as_m
-            self.before[:3] = self.places_m.item(place, 0) + x_m, self.places_m.item(place, 1) + y_m, z_m
+            set_point, at = self.before, self.places_m
+            set_point[0], set_point[1], set_point[2] = at.item(place, 0) + x_m, at.item(place, 1) + y_m, z_m
         return self.before
 
 
@@ -307,7 +308,8 @@ class Vehicle:
         sent_as_m = x_m, y_m, z_m = x_m, y_m, z_m + self._altitude_error_m
         if begin:
             self._change_control(row, t_s)
-            self._set_point[:3] = places_m.item(0, 0) + x_m, places_m.item(0, 1) + y_m, z_m
+            set_point = self._set_point
+            set_point[0], set_point[1], set_point[2] = places_m.item(0, 0) + x_m, places_m.item(0, 1) + y_m, z_m
         elif self._course is not None:
             if self._course.is_under_way(t_s):
                 places_m = places_m[:1]
