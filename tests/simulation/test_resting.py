@@ -200,8 +200,9 @@ def test_calls_that_are_not_left_out_come_at_the_very_same_times(period_s, start
             measurements={measured.key: measured},
         )
         ManagerHost("outside_managers:AnyGrid", 1, system, bus, may_rest=may_rest)
+        fault = Diagnostic(0.0, Kind.COMPONENT_STATUS, "c_thruster_1", FAILED)
         for time in told:
-            call_at(env, time * period_s, bus.publish, Diagnostic(0.0, Kind.COMPONENT_STATUS, "c_thruster_1", FAILED))
+            call_at(env, time * period_s, lambda _, publish=bus.publish: publish(fault))
         env.run(until=12.0 * period_s)
         found.append(outside_managers.CALLED_S.copy())
     every, rested = found
@@ -279,9 +280,9 @@ def outcome(simulator: Simulator, manager: str, run: int, *, record: bool) -> tu
     effects = []
     take_effect = ModeManager._take_effect
 
-    def noted(self: ModeManager, effect: tuple[str, str]) -> None:
-        effects.append((self._env.now, effect))
-        take_effect(self, effect)
+    def noted(self: ModeManager, function: str, name: str) -> None:
+        effects.append((self._env.now, function, name))
+        take_effect(self, function, name)
 
     with mock.patch.object(ModeManager, "_take_effect", noted):
         metrics = simulator.run(manager, run, 1, record=record).metrics
