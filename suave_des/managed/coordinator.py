@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import simpy
 
-from suave_des.clock import Process, call_at, tick_at_or_after, until
+from suave_des.clock import call_at, tick_at_or_after
 from suave_des.managed.detection import PipelineDetector
 from suave_des.managed.follow import FollowPipeline
 from suave_des.managed.node import Log
@@ -61,7 +61,6 @@ class MissionCoordinator:
         self._request = request
         self._cancel = cancel
         self._time_limit_s = time_limit_s
-        self._start_delay_s = start_delay_s
         self._poll_phase_s = poll_phase_s
         self._log = log
         self.ended = env.event()
@@ -75,28 +74,40 @@ class MissionCoordinator:
         """Functions that are needed from launch to the end, and belong to no task."""
         limit_s = tick_at_or_after(time_limit_s, limit_phase_s, revision.limit_check_period_s)
         detector.detected.callbacks.append(self._note_detection)
-        env.process(self._coordinate())
         call_at(env, limit_s, lambda _: self._finish("time limit"))
+        call_at(env, start_delay_s, self._begin_search)
 
     def search_time_or_limit_s(self) -> float:
         """The search time metric; the time limit when the pipeline was not found."""
         return self._time_limit_s if self.search_time_s is None else self.search_time_s
 
-    def _coordinate(self) -> Process:
-        yield self._env.timeout(self._start_delay_s)
+    def _begin_search(self, _: simpy.Event) -> None:
         self._begin(self._search)
-        yield self._detector.detected
-        yield until(self._env, self._next_poll_s())
+        self._at_poll_after(self._detector.detected, self._begin_inspection)
+
+    def _begin_inspection(self, _: simpy.Event) -> None:
         seen_s = float(self._env.now)
         if self._revision.search_time == "detection" and self._detector.detected_s is not None:
             seen_s = self._detector.detected_s
         self.search_time_s = float(math.floor(seen_s + 1e-9))
         self._end("task_done")
         self._begin(self._inspect)
-        yield self._follow.finished
-        yield until(self._env, self._next_poll_s())
+        self._at_poll_after(self._follow.finished, self._end_inspection)
+
+    def _end_inspection(self, _: simpy.Event) -> None:
         self._end("task_done")
         self._finish("the end of the path is reached")
+
+    def _at_poll_after(self, event: simpy.Event, what: Callable[[simpy.Event], None]) -> None:
+        """Go on at the first tick of the coordinator's loop at or after an event, which may have been already."""
+
+        def wait(_: simpy.Event) -> None:
+            call_at(self._env, self._next_poll_s(), what)
+
+        if event.callbacks is None:
+            wait(event)
+        else:
+            event.callbacks.append(wait)
 
     def _note_detection(self, _: simpy.Event) -> None:
         self._log("detection", "pipeline_detected", f"point {self._detector.first_point}")

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import simpy
 
-from suave_des.clock import Process
 from suave_des.managed.node import FunctionNode
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.monitors import thruster_name
@@ -38,25 +37,31 @@ class MaintainMotion(FunctionNode):
         self._bus = bus
         self._revision = revision
         self._restore = restore
-        self._process: simpy.Process | None = None
+        self._recovered = 0
+        self._pause: simpy.Event | None = None  # of the recovery that goes on
 
     def activated(self) -> None:
         """Begin a recovery, unless an earlier one still goes on."""
-        if self._process is None or not self._process.is_alive:
-            self._process = self.env.process(self._recover())
+        if self._pause is None:
+            self._recovered = 0
+            self._wait(RECOVERY_TIME_S)
 
     def deactivated(self) -> None:
         """Back to normal operation; revision 1.5 breaks a recovery off."""
-        if self._process is not None and self._process.is_alive and not self._revision.survives_deactivation:
-            self._process.interrupt()
-            self._process = None
+        if not self._revision.survives_deactivation:
+            self._pause = None
 
-    def _recover(self) -> Process:
-        try:
-            yield self.env.timeout(RECOVERY_TIME_S)
-            for thruster in range(1, THRUSTERS + 1):
-                self._restore(thruster)
-                self._bus.publish(Diagnostic(self.env.now, Kind.COMPONENT_STATUS, thruster_name(thruster), RECOVERED))
-                yield self.env.timeout(THRUSTER_PERIOD_S)
-        except simpy.Interrupt:
+    def _wait(self, time_s: float) -> None:
+        self._pause = pause = simpy.Timeout(self.env, time_s)
+        pause.callbacks.append(self._go_on)
+
+    def _go_on(self, pause: simpy.Event) -> None:
+        if pause is not self._pause:
+            return  # broken off
+        if self._recovered == THRUSTERS:
+            self._pause = None
             return
+        self._recovered = thruster = self._recovered + 1
+        self._restore(thruster)
+        self._bus.publish(Diagnostic(self.env.now, Kind.COMPONENT_STATUS, thruster_name(thruster), RECOVERED))
+        self._wait(THRUSTER_PERIOD_S)

@@ -12,7 +12,9 @@ from functools import partial
 from typing import ClassVar
 from weakref import WeakKeyDictionary
 
-from suave_des.clock import tick_at_or_after, until
+import simpy
+
+from suave_des.clock import call_at, call_next, tick_at_or_after
 from suave_des.knowledge.deliberation import Conclusion, Deliberation
 from suave_des.knowledge.state import Decision, KnowledgeState, ObjectiveState
 from suave_des.managed.task import SEARCH, Task
@@ -75,11 +77,11 @@ class Metacontrol(ManagingSubsystem):
 
     def task_requested(self, task: Task) -> None:
         """Add an objective for each function of the task, when the task bridge passes it on."""
-        self.system.env.process(self._over_the_bridge(task, requested=True))
+        self._over_the_bridge(self._add_objectives, task)
 
     def task_cancelled(self, task: Task) -> None:
         """Remove the task's objectives with their groundings, when the task bridge passes it on."""
-        self.system.env.process(self._over_the_bridge(task, requested=False))
+        self._over_the_bridge(self._remove_objectives, task)
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
         """Monitor: update what is known of components."""
@@ -192,16 +194,17 @@ class Metacontrol(ManagingSubsystem):
         current_mode = self.system.modes.current_mode
         return all(current_mode(function) == design for function, design in designs)
 
-    def _over_the_bridge(self, task: Task, *, requested: bool) -> AdaptationProcess:
-        period_s = self._revision.task_bridge_period_s
-        if period_s > 0.0:
-            self._on_the_bridge += 1
-            yield until(self.system.env, tick_at_or_after(self.system.now_s, self._bridge_phase_s, period_s))
+    def _over_the_bridge(self, change: Callable[[tuple[str, ...]], None], task: Task) -> None:
+        def arrive(_: simpy.Event) -> None:
             self._on_the_bridge -= 1
-        if requested:
-            self._add_objectives(task.functions)
+            change(task.functions)
+
+        self._on_the_bridge += 1
+        env, period_s = self.system.env, self._revision.task_bridge_period_s
+        if period_s > 0.0:
+            call_at(env, tick_at_or_after(env.now, self._bridge_phase_s, period_s), arrive)
         else:
-            self._remove_objectives(task.functions)
+            call_next(env, arrive)
 
     def _add_objectives(self, functions: tuple[str, ...]) -> None:
         if not self._listens():
