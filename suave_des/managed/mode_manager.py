@@ -70,7 +70,8 @@ class ModeManager:
         """Request a mode; False for a function or mode that the modes file does not have, or that has no node here."""
         if self._requested.get(function) == mode:
             return True
-        if function not in self._nodes or mode not in self.available_modes(function):
+        chosen = self._table.table.get(function, {}).get(mode)
+        if chosen is None or function not in self._nodes:
             self._log("mode_manager", "refused", f"{function}: no mode {mode}")
             return False
         self._requested[function] = mode
@@ -81,12 +82,11 @@ class ModeManager:
         self._log("mode_manager", "mode_requested", f"{function} -> {mode}")
         due_s = max(self._env.now + self._latency_s(), self._effect_due_s.get(function, 0.0))
         self._effect_due_s[function] = due_s
-        call_at(self._env, due_s, lambda _: self._take_effect(function, mode))
+        call_at(self._env, due_s, lambda _: self._take_effect(function, chosen))
         return True
 
-    def _take_effect(self, function: str, name: str) -> None:
-        mode = self._table.mode(function, name)
+    def _take_effect(self, function: str, mode: Mode) -> None:
         self._nodes[function].apply(mode)
-        self._log("mode_manager", "mode_set", f"{function} = {name}")
+        self._log("mode_manager", "mode_set", f"{function} = {mode.name}")
         for listener in self._listeners:
             listener(function, mode)

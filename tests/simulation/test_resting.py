@@ -21,6 +21,7 @@ from suave_des.monitor.diagnostics import FAILED, Diagnostic, DiagnosticsBus, Ki
 from suave_des.monitor.measurements import Measurements
 from suave_des.scenario.loader import LoadedScenario, load_scenario
 from suave_des.scenario.models import ConstantSignal
+from suave_des.scenario.modes import Mode
 from suave_des.scenario.overrides import with_values
 from suave_des.simulation.host import ManagerHost
 from suave_des.simulation.simulator import Simulator
@@ -171,6 +172,9 @@ def test_metacontrol_does_the_same_with_and_without_a_record(manager: str, value
         assert found[0] == found[1] == found[2]
 
 
+FAULT = Diagnostic(0.0, Kind.COMPONENT_STATUS, "c_thruster_1", FAILED)
+
+
 @given(
     period_s=st.floats(0.05, 4.0),
     start=st.floats(0.0, 1.0),
@@ -200,9 +204,8 @@ def test_calls_that_are_not_left_out_come_at_the_very_same_times(period_s, start
             measurements={measured.key: measured},
         )
         ManagerHost("outside_managers:AnyGrid", 1, system, bus, may_rest=may_rest)
-        fault = Diagnostic(0.0, Kind.COMPONENT_STATUS, "c_thruster_1", FAILED)
         for time in told:
-            call_at(env, time * period_s, lambda _, publish=bus.publish: publish(fault))
+            call_at(env, time * period_s, lambda _, publish=bus.publish: publish(FAULT))
         env.run(until=12.0 * period_s)
         found.append(outside_managers.CALLED_S.copy())
     every, rested = found
@@ -280,9 +283,9 @@ def outcome(simulator: Simulator, manager: str, run: int, *, record: bool) -> tu
     effects = []
     take_effect = ModeManager._take_effect
 
-    def noted(self: ModeManager, function: str, name: str) -> None:
-        effects.append((self._env.now, function, name))
-        take_effect(self, function, name)
+    def noted(self: ModeManager, function: str, mode: Mode) -> None:
+        effects.append((self._env.now, function, mode))
+        take_effect(self, function, mode)
 
     with mock.patch.object(ModeManager, "_take_effect", noted):
         metrics = simulator.run(manager, run, 1, record=record).metrics
