@@ -118,7 +118,9 @@ class Metacontrol(ManagingSubsystem):
         return self._rest(self._measured_now())
 
     def _situations_of_missions_like_this(self) -> Situations:
-        known = _memories.setdefault(self._deliberation, {})
+        known = _memories.get(self._deliberation)
+        if known is None:
+            known = _memories.setdefault(self._deliberation, {})
         revision = self._revision
         same = (
             self._is_complete,
@@ -167,10 +169,12 @@ class Metacontrol(ManagingSubsystem):
         return conclusion
 
     def _changes_nothing(self, conclusion: Conclusion, latency_s: float) -> bool:
+        if not self._situation.is_met_by(conclusion):
+            return False
         if not (self._is_told(conclusion) or self._is_for_the_record(latency_s)):
             return False
         designs = [(each.function, each.design) for each in conclusion.plan.decisions if each.design is not None]
-        return self._situation.is_met_by(conclusion) and self._are_in_force(designs)
+        return self._are_in_force(designs)
 
     def _is_for_the_record(self, latency_s: float) -> bool:
         """Whether nothing depends on a cycle that only tells something.

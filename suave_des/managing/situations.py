@@ -185,10 +185,8 @@ class Situation:
 
         None if that is not known of a region itself.
         """
-        if not self._is_met_in(region):
-            return None
         bounds = self._rests.get(region)
-        if bounds is None:
+        if bounds is None and self._is_met_in(region):
             bounds = self._rests[region] = self._situations.bounds(self._widened(region))
         return bounds
 

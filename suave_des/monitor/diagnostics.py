@@ -28,6 +28,7 @@ class Diagnostic:
     value: float | str
 
 
+_KINDS = tuple(Kind)
 Subscriber = Callable[[Diagnostic], None]
 
 
@@ -35,9 +36,9 @@ class DiagnosticsBus:
     """Hands each diagnostic at once to those who want its kind, in the order of subscription."""
 
     def __init__(self) -> None:
-        self._subscribers: dict[Kind, list[Subscriber]] = {kind: [] for kind in Kind}
+        self._subscribers: dict[Kind, list[Subscriber]] = {kind: [] for kind in _KINDS}
 
-    def subscribe(self, subscriber: Subscriber, kinds: Collection[Kind] = tuple(Kind)) -> None:
+    def subscribe(self, subscriber: Subscriber, kinds: Collection[Kind] = _KINDS) -> None:
         """Have every later diagnostic of some kinds passed to `subscriber`."""
         for kind in kinds:
             self._subscribers[kind].append(subscriber)

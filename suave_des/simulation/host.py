@@ -96,12 +96,15 @@ class ManagerHost:
             bounds = None if rests is None else self._guarded(rests)
             tick_s = due_s if bounds is None else self._after_rest_s(due_s, period_s, bounds)
             self._rests = tick_s > due_s
+            told = False
             try:
                 yield until(env, tick_s)
-                due_s = tick_s
-            except simpy.Interrupt:  # told something
-                due_s = _step_at_or_after(env.now, due_s, period_s)
-                yield until(env, due_s)
+            except simpy.Interrupt:
+                told = True
+            if told:
+                tick_s = _step_at_or_after(env.now, due_s, period_s)
+                yield until(env, tick_s)
+            due_s = tick_s
             self._rests = False
 
     def _after_rest_s(self, due_s: float, period_s: float, bounds: Bounds) -> float:

@@ -66,7 +66,7 @@ class Recorder:
 
     def mode_effect(self, function: str, mode: Mode) -> None:
         """Keep the mode of the function that moves the vehicle, for the trajectory."""
-        if self.enabled and function != MAINTAIN_MOTION:
+        if function != MAINTAIN_MOTION:
             self._modes.append((float(self._env.now), mode.name))
 
     def trajectory(self, vehicle: Vehicle, visibility: Measurements) -> tuple[TrajectoryPoint, ...]:

@@ -157,8 +157,8 @@ class _Mission:
         self.bus.subscribe(self.reactions.diagnostic, (Kind.COMPONENT_STATUS,))
         if record:
             self.bus.subscribe(self.recorder.diagnostic_of(self.scenario.reaction_metric.visibility_thresholds_m))
+            self.modes.on_effect(self.recorder.mode_effect)
         self.modes.on_effect(self.reactions.mode_effect)
-        self.modes.on_effect(self.recorder.mode_effect)
         self.coordinator = self._make_coordinator()
         self.host = self._make_host()
         self._start_monitors()
