@@ -259,7 +259,7 @@ class Metacontrol(ManagingSubsystem):
 
     def _execute(self, conclusion: Conclusion, latency_s: float) -> AdaptationProcess:
         recovered = self._situation.recovered
-        yield self.system.env.timeout(latency_s)
+        yield simpy.Timeout(self.system.env, latency_s)
         self._tell(conclusion.statuses)
         decisions = conclusion.plan.decisions
         grounded = tuple(

@@ -37,7 +37,7 @@ def measure(
         noise: draws the error of one measurement; none if measurements are exact.
     """
     times = np.empty(max(0, math.floor((duration_s - phase_s) / period_s)) + 1)
-    looks = np.empty_like(times)
+    looks = np.empty(len(times))
     message_times(phase_s, period_s, time_step_s, times, looks)
     values, news = _looked_up(signal, looks.tobytes())
     if noise is not None:

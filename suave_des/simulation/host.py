@@ -114,14 +114,10 @@ class ManagerHost:
         # a mission that leaves nothing out, which comes to each tick from the one before, could be there earlier.
         if due_s > 2.0 * now_s:
             return due_s
-        leaves_s = min(
-            [
-                measured.leaves_at_s(now_s, *bounds[attribute])
-                for attribute, measured in self._measurements.items()
-                if attribute in bounds
-            ],
-            default=math.inf,
-        )
+        leaves_s = math.inf
+        for attribute, measured in self._measurements.items():
+            if attribute in bounds:
+                leaves_s = min(leaves_s, measured.leaves_at_s(now_s, *bounds[attribute]))
         if leaves_s == math.inf:
             return leaves_s
         tick_s = _step_at_or_after(leaves_s, due_s, period_s)
