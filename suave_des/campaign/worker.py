@@ -22,7 +22,7 @@ from multiprocessing.process import BaseProcess
 from typing import TYPE_CHECKING
 
 from suave_des.errors import SuaveDesError
-from suave_des.imports import main_hidden
+from suave_des.imports import collecting_later, main_hidden
 from suave_des.interrupts import INTERRUPTS, interrupts_later
 
 if TYPE_CHECKING:
@@ -154,13 +154,14 @@ def end(workers: Sequence[Worker]) -> None:
 def _work(connection: Connection) -> None:
     """Life of a worker process: a job and chunks in, outcomes out, until there are no more or the parent is gone."""
     atexit.register(_end)  # first of all, so that it is called last
-    from suave_des.campaign.missions import MissionRunner  # with it comes the compiler, before the job is there
-
     try:
-        job: Job | None = connection.recv()
-        if job is None:
-            return
-        runner = MissionRunner(job)
+        with collecting_later():
+            from suave_des.campaign.missions import MissionRunner  # with it comes the compiler, before the job is there
+
+            job: Job | None = connection.recv()
+            if job is None:
+                return
+            runner = MissionRunner(job)
         while (chunk := connection.recv()) is not None:
             connection.send(runner.run(chunk))
     except (EOFError, BrokenPipeError, ConnectionResetError):

@@ -22,6 +22,7 @@ from suave_des.cli.options import (
     command_line,
 )
 from suave_des.errors import InputError
+from suave_des.imports import collecting_later
 
 if TYPE_CHECKING:
     from suave_des.campaign.campaign import CampaignResult
@@ -153,9 +154,10 @@ def campaign(
         raise InputError(f"{missing} is missing", remedy="see suave-des campaign --help")
     useful = workers if names is None or runs is None else min(workers, len(names) * runs)
     with _started_ahead(useful if scheduler is None else 1) as ready:
-        from suave_des.campaign.campaign import resume_campaign, run_campaign
-        from suave_des.cli.console import output, progress
-        from suave_des.cli.tables import print_stops, print_summary
+        with collecting_later():
+            from suave_des.campaign.campaign import resume_campaign, run_campaign
+            from suave_des.cli.console import output, progress
+            from suave_des.cli.tables import print_stops, print_summary
 
         with progress(str(resume or scenario), quiet=quiet) as show:
             if resume is not None:
