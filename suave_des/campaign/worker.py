@@ -6,6 +6,7 @@ Little is imported here: workers start before the process that asks for them has
 from __future__ import annotations
 
 import atexit
+import gc
 import multiprocessing
 import os
 import signal
@@ -162,6 +163,7 @@ def _work(connection: Connection) -> None:
             if job is None:
                 return
             runner = MissionRunner(job)
+        gc.freeze()  # or the first look for garbage afterwards goes through all of that
         while (chunk := connection.recv()) is not None:
             connection.send(runner.run(chunk))
     except (EOFError, BrokenPipeError, ConnectionResetError):
