@@ -41,10 +41,10 @@ class Estimate:
 
         It supposes values that are normally distributed, and is a rough guide where they are not.
         """
-        from scipy.special import chdtri  # scipy.stats would take a second to import
-
         if self.std is None:
             return None
+        from scipy.special import chdtri  # scipy.stats would take a second to import
+
         tail = (1.0 - CONFIDENCE) / 2.0
         freedom = self.n - 1
         low, high = (self.std * math.sqrt(freedom / float(chdtri(freedom, share))) for share in (tail, 1.0 - tail))
