@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from suave_des.campaign.early_stop import RUNS_LIMIT_DEFAULT, parse_until_ci
 from suave_des.campaign.executors import Place, check_place
@@ -31,9 +31,13 @@ from suave_des.campaign.store import (
 )
 from suave_des.campaign.variation import Variation, vary
 from suave_des.errors import InputError
+from suave_des.imports import collecting_later
 from suave_des.managing.registry import manager_class
 from suave_des.scenario.bases import Files
 from suave_des.scenario.loader import LoadedScenario, load_scenario
+
+if TYPE_CHECKING:
+    from suave_des.campaign.worker import Worker
 
 __all__ = [
     "FILES",
@@ -74,6 +78,7 @@ def run_campaign(
     command: Sequence[str] = (),
     on_progress: OnProgress | None = None,
     scheduler: str | None = None,
+    ready: Sequence[Worker] = (),
 ) -> CampaignResult:
     """Run `runs` missions of a scenario under each manager, at each point of the sweep if there is one.
 
@@ -112,6 +117,7 @@ def run_campaign(
         on_progress: called when missions are done.
         scheduler: address of a Dask scheduler, such as tcp://127.0.0.1:8786: missions run on its workers, which get all
             that they need by value, and `workers` must be left at 1.
+        ready: worker processes that have been started already; they count among the `workers`.
 
     Raises:
         InputError: something given cannot be used; nothing is written then.
@@ -153,7 +159,7 @@ def run_campaign(
     check_place(workers, scheduler)
     check_seed(request.seed)
     check_time_out(request.time_out_s)
-    with _place(request, workers, scheduler) as place:
+    with _place(request, workers, scheduler, ready) as place:
         campaign = Campaign(request, *_read(request, sheet), folder)
         if suave_format and campaign.variation.sweep.points > 1:
             raise InputError(
@@ -173,6 +179,7 @@ def resume_campaign(
     until_ci: str | None = None,
     on_progress: OnProgress | None = None,
     scheduler: str | None = None,
+    ready: Sequence[Worker] = (),
 ) -> CampaignResult:
     """Go on with a campaign where it stopped; what it was asked is in its folder.
 
@@ -185,6 +192,7 @@ def resume_campaign(
         until_ci: the metric asked for at first with a smaller half-width; left out: as at first.
         on_progress: called when missions are done.
         scheduler: as of run_campaign; it may be another, or none.
+        ready: as of run_campaign.
 
     Raises:
         InputError: there is no campaign, it is damaged or in use, or something that decides results has changed; the
@@ -205,7 +213,7 @@ def resume_campaign(
             request = replace(request, **said(sheet, request.of_file))
             check_plan(request.managers, request.runs, workers)
             check_place(workers, scheduler)
-            place = stack.enter_context(_place(request, workers, scheduler))
+            place = stack.enter_context(_place(request, workers, scheduler, ready))
             campaign = Campaign(request, *_read(request, sheet), folder)
         except InputError as error:
             if str(Path.cwd()) == request.folder:
@@ -215,10 +223,10 @@ def resume_campaign(
         return campaign.run(place.executor(), on_progress, resumed=True)
 
 
-def _place(request: Request, workers: int, scheduler: str | None) -> Place:
+def _place(request: Request, workers: int, scheduler: str | None, ready: Sequence[Worker]) -> Place:
     """Where a campaign's missions will run, with no more workers than there are missions."""
     fewest = len(request.managers) * request.runs
-    return Place(request.managers, workers if request.sweep else min(workers, fewest), scheduler)
+    return Place(request.managers, workers if request.sweep else min(workers, fewest), scheduler, ready)
 
 
 def _with_until_ci(request: Request, sheet: Sheet | None) -> Request:
@@ -277,7 +285,8 @@ def _read(request: Request, sheet: Sheet | None) -> tuple[LoadedScenario, Variat
         loaded, variation = vary(loaded, request.sweep, request.perturbations, request.runs_per_draw, request.seed)
     except InputError as error:
         raise error if sheet is None else sheet.located(error) from None
-    inputs = check_knowledge(loaded, request.managers, given=given)
+    with collecting_later():
+        inputs = check_knowledge(loaded, request.managers, given=given)
     return loaded, variation, inputs if sheet is None else {**inputs, **sheet.inputs}
 
 

@@ -8,11 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
-from typing import Protocol, Self
+from typing import TYPE_CHECKING, Protocol, Self
 
 from suave_des.campaign.outcomes import Finished, Job
 from suave_des.campaign.plan import MissionKey
 from suave_des.errors import InputError, SuaveDesError
+
+if TYPE_CHECKING:
+    from suave_des.campaign.worker import Worker
 
 _LARGEST_CHUNK = 10
 
@@ -67,11 +70,14 @@ class Place(ExitStack):
         managers: that missions are run of.
         workers: number of processes; with one, missions run in this process.
         scheduler: address of a Dask scheduler, whose workers are used instead.
+        ready: worker processes that have been started already.
     """
 
-    def __init__(self, managers: Sequence[str], workers: int, scheduler: str | None = None) -> None:
+    def __init__(
+        self, managers: Sequence[str], workers: int, scheduler: str | None = None, ready: Sequence[Worker] = ()
+    ) -> None:
         super().__init__()
-        self._managers, self._workers, self._scheduler = managers, workers, scheduler
+        self._managers, self._workers, self._scheduler, self._ready = managers, workers, scheduler, ready
         self._started: Executor | None = None
 
     def __enter__(self) -> Self:
@@ -79,7 +85,7 @@ class Place(ExitStack):
         if self._scheduler is None and self._workers > 1:
             from suave_des.campaign.pool import process_pool
 
-            self._started = self.enter_context(process_pool(self._managers, self._workers))
+            self._started = self.enter_context(process_pool(self._managers, self._workers, self._ready))
         return self
 
     def executor(self) -> Executor:

@@ -8,6 +8,7 @@ from itertools import islice
 from typing import NamedTuple
 
 from suave_des.errors import InputError
+from suave_des.imports import collecting_later
 from suave_des.managing.registry import manager_class
 from suave_des.scenario.wording import shown
 
@@ -96,7 +97,8 @@ def check_plan(managers: Sequence[str], runs: int, workers: int) -> None:
     if not managers:
         raise InputError("no managers are given", remedy="for instance none,random,metacontrol")
     for place, manager in enumerate(managers):
-        manager_class(manager)
+        with collecting_later():  # it is imported
+            manager_class(manager)
         if manager in managers[:place]:
             raise InputError(f"manager {manager!r} is given twice", remedy="name each manager once")
     check_range("runs", runs, 1, RUNS_LIMIT)

@@ -12,7 +12,7 @@ from suave_des.campaign import machine_code
 from suave_des.campaign.executors import WorkerError, chunk_size
 from suave_des.campaign.outcomes import Finished, Job, time_out_cause
 from suave_des.campaign.plan import MissionKey, chunked
-from suave_des.campaign.worker import Crash, StartWorker, Task, Worker, interrupts_held
+from suave_des.campaign.worker import Crash, StartWorker, Task, Worker, end, interrupts_held, workers_started
 
 _AHEAD = 2
 """Chunks at a worker at any time: one under way, one waiting, so that it is never idle."""
@@ -65,7 +65,7 @@ class ProcessPool:
 
 
 @contextmanager
-def process_pool(managers: Sequence[str], workers: int) -> Iterator[ProcessPool]:
+def process_pool(managers: Sequence[str], workers: int, ready: Sequence[Worker] = ()) -> Iterator[ProcessPool]:
     """A pool whose workers start now: what they import, they import while this process prepares their work.
 
     They are stopped at the end; at once, if not all outcomes were asked for.
@@ -73,25 +73,23 @@ def process_pool(managers: Sequence[str], workers: int) -> Iterator[ProcessPool]
     Args:
         managers: that missions are run of.
         workers: number of processes.
+        ready: workers that were started before, without the script; they count among these.
     """
     start = StartWorker(needs_script=any(name.startswith("__main__:") for name in managers))
-    started: list[Worker] = []
-    try:
-        for _ in range(workers):
-            with interrupts_held():
-                started.append(start())
-        pool = ProcessPool(started, start)
-        yield pool
-        if pool.is_done:
-            for worker in started:
-                worker.dismiss()
-            for worker in started:
-                worker.wait()
-    finally:
-        for worker in started:
-            worker.process.kill()
-        for worker in started:
-            worker.wait()
+    usable = [] if start.needs_script else list(ready[:workers])
+    end(ready[len(usable) :])
+    with workers_started(workers - len(usable), start) as started:
+        crew = usable + started
+        pool = ProcessPool(crew, start)
+        try:
+            yield pool
+            if pool.is_done:
+                for worker in crew:
+                    worker.dismiss()
+                for worker in crew:
+                    worker.wait()
+        finally:
+            end(crew)
 
 
 class _Crew:

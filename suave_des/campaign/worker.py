@@ -1,8 +1,12 @@
-"""One worker process: how it is started, what it is given, what it sends, and how it is ended."""
+"""One worker process: how it is started, what it is given, what it sends, and how it is ended.
+
+Little is imported here: workers start before the process that asks for them has imported what it needs itself.
+"""
 
 from __future__ import annotations
 
 import atexit
+import gc
 import multiprocessing
 import os
 import signal
@@ -10,18 +14,21 @@ import sys
 import time
 import traceback
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
+from typing import TYPE_CHECKING
 
-from suave_des.campaign.outcomes import Job
-from suave_des.campaign.plan import Chunk
 from suave_des.errors import SuaveDesError
-from suave_des.imports import main_hidden
+from suave_des.imports import collecting_later, main_hidden
 from suave_des.interrupts import INTERRUPTS, interrupts_later
+
+if TYPE_CHECKING:
+    from suave_des.campaign.outcomes import Job
+    from suave_des.campaign.plan import Chunk
 
 STOP_TIMEOUT_S = 5.0
 _OUT_OF_MEMORY = 12
@@ -124,16 +131,39 @@ def interrupts_held() -> Iterator[None]:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+@contextmanager
+def workers_started(number: int, start: StartWorker) -> Iterator[list[Worker]]:
+    """New workers, which are killed at the end if they have not ended by then."""
+    started: list[Worker] = []
+    try:
+        for _ in range(number):
+            with interrupts_held():
+                started.append(start())
+        yield started
+    finally:
+        end(started)
+
+
+def end(workers: Sequence[Worker]) -> None:
+    """End workers at once; those that have ended stay as they are."""
+    for worker in workers:
+        worker.process.kill()
+    for worker in workers:
+        worker.wait()
+
+
 def _work(connection: Connection) -> None:
     """Life of a worker process: a job and chunks in, outcomes out, until there are no more or the parent is gone."""
     atexit.register(_end)  # first of all, so that it is called last
-    from suave_des.campaign.missions import MissionRunner  # with it comes the compiler, before the job is there
-
     try:
-        job: Job | None = connection.recv()
-        if job is None:
-            return
-        runner = MissionRunner(job)
+        with collecting_later():
+            from suave_des.campaign.missions import MissionRunner  # with it comes the compiler, before the job is there
+
+            job: Job | None = connection.recv()
+            if job is None:
+                return
+            runner = MissionRunner(job)
+        gc.freeze()  # or the first look for garbage afterwards goes through all of that
         while (chunk := connection.recv()) is not None:
             connection.send(runner.run(chunk))
     except (EOFError, BrokenPipeError, ConnectionResetError):

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import gc
+import os
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,9 +22,12 @@ from suave_des.cli.options import (
     RuleFiles,
     command_line,
 )
+from suave_des.errors import InputError
+from suave_des.imports import collecting_later
 
 if TYPE_CHECKING:
     from suave_des.campaign.campaign import CampaignResult
+    from suave_des.campaign.worker import Worker
 
 
 _FAILURES_TOLD = 20
@@ -117,13 +124,9 @@ def campaign(
     A campaign file has all of it, and says what is swept or drawn anew in each run; options go before what it says.
     What is done is kept while the campaign runs; after an interruption, --resume DIR does the rest.
     """
-    from suave_des.campaign.campaign import resume_campaign, run_campaign
-    from suave_des.cli.console import output, progress
-    from suave_des.cli.tables import print_stops, print_summary
-    from suave_des.errors import InputError
-
     if workers is None:
         workers = _WORKERS if scheduler is None else 1
+    names = None if managers is None else [name.strip() for name in managers.split(",") if name.strip()]
     if resume is not None:
         fixed = {
             "SCENARIO": scenario,
@@ -147,43 +150,61 @@ def campaign(
                     f"{option} has no use with --resume: the campaign goes on as it began",
                     remedy="leave it out, or start anew in another folder",
                 )
-        with progress(str(resume), quiet=quiet) as show:
-            result = resume_campaign(
-                resume, workers, runs=runs, until_ci=until_ci, on_progress=show, scheduler=scheduler
-            )
     elif scenario is None or out is None:
         missing = "SCENARIO" if scenario is None else "--out DIR"
         raise InputError(f"{missing} is missing", remedy="see suave-des campaign --help")
-    else:
-        names = None if managers is None else [name.strip() for name in managers.split(",") if name.strip()]
-        with progress(scenario, quiet=quiet) as show:
-            result = run_campaign(
-                scenario,
-                names,
-                runs,
-                seed,
-                workers,
-                out,
-                ontologies=ontology or (),
-                modes_file=modes,
-                reasoner=reasoner,
-                rules=rules or (),
-                disabled_rules=disable_rule or (),
-                suave_format=also is Format.SUAVE,
-                record_knowledge=record_knowledge,
-                time_out_s=time_out,
-                until_ci=until_ci,
-                confirmed=yes,
-                overwrite=overwrite,
-                command=command_line(),
-                on_progress=show,
-                scheduler=scheduler,
-            )
+    useful = workers if names is None or runs is None else min(workers, len(names) * runs)
+    with _started_ahead(useful if scheduler is None else 1) as ready:
+        with collecting_later():
+            from suave_des.campaign.campaign import resume_campaign, run_campaign
+            from suave_des.cli.console import output, progress
+            from suave_des.cli.tables import print_stops, print_summary
+        gc.freeze()  # or the first look for garbage afterwards goes through all of that
+
+        with progress(str(resume or scenario), quiet=quiet) as show:
+            if resume is not None:
+                result = resume_campaign(
+                    resume, workers, runs=runs, until_ci=until_ci, on_progress=show, scheduler=scheduler, ready=ready
+                )
+            else:
+                assert scenario is not None
+                result = run_campaign(
+                    scenario,
+                    names,
+                    runs,
+                    seed,
+                    workers,
+                    out,
+                    ontologies=ontology or (),
+                    modes_file=modes,
+                    reasoner=reasoner,
+                    rules=rules or (),
+                    disabled_rules=disable_rule or (),
+                    suave_format=also is Format.SUAVE,
+                    record_knowledge=record_knowledge,
+                    time_out_s=time_out,
+                    until_ci=until_ci,
+                    confirmed=yes,
+                    overwrite=overwrite,
+                    command=command_line(),
+                    on_progress=show,
+                    scheduler=scheduler,
+                    ready=ready,
+                )
     console = output()
     print_summary(console, result)
     print_stops(console, result)
     console.print(f"{result.done} missions are in {result.folder}/runs.csv", soft_wrap=True)
     exit_telling_failures(result)
+
+
+def _started_ahead(workers: int) -> AbstractContextManager[Sequence[Worker]]:
+    """Workers that start while this process still imports what it needs; nothing is checked yet, so not too many."""
+    if workers < 2:
+        return nullcontext(())
+    from suave_des.campaign.worker import StartWorker, workers_started
+
+    return workers_started(min(workers, os.cpu_count() or 1), StartWorker(needs_script=False))
 
 
 def exit_telling_failures(result: CampaignResult) -> None:

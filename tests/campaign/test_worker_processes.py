@@ -12,6 +12,9 @@ import pytest
 
 import suave_des
 from suave_des.campaign import machine_code
+from suave_des.campaign.campaign import run_campaign
+from suave_des.campaign.worker import StartWorker, workers_started
+from suave_des.errors import InputError
 
 GUARD = 'if __name__ == "__main__":\n    '
 CALL = "print(run_campaign({scenario!r}, {managers}, runs=12, seed=1, workers={workers}).to_csv(index=False))\n"
@@ -103,3 +106,19 @@ def test_a_cache_folder_that_may_not_be_entered_is_as_none(tmp_path: Path, monke
     monkeypatch.setattr(Path, "exists", refused)
     machine_code.note_stored()
     assert not machine_code.is_stored()
+
+
+def test_workers_started_ahead_are_used_and_those_too_many_ended(scenario: Path) -> None:
+    with workers_started(3, StartWorker(needs_script=False)) as ready:
+        processes = [worker.process for worker in ready]
+        assert all(process.is_alive() for process in processes)
+        result = run_campaign(scenario, ["none"], 4, seed=1, workers=2, ready=ready)
+        assert result.done == 4
+        assert [process.exitcode for process in processes] == [0, 0, -9]
+
+
+def test_workers_started_ahead_end_when_the_input_is_bad(scenario: Path) -> None:
+    with pytest.raises(InputError, match="runs"), workers_started(2, StartWorker(needs_script=False)) as ready:
+        processes = [worker.process for worker in ready]
+        run_campaign(scenario, ["none"], 0, seed=1, workers=2, ready=ready)
+    assert [process.exitcode for process in processes] == [-9, -9]
