@@ -5,12 +5,10 @@ Little is imported here: workers start before the process that asks for them has
 
 from __future__ import annotations
 
-import atexit
 import gc
 import multiprocessing
 import os
 import signal
-import sys
 import time
 import traceback
 from collections import deque
@@ -154,32 +152,24 @@ def end(workers: Sequence[Worker]) -> None:
 
 def _work(connection: Connection) -> None:
     """Life of a worker process: a job and chunks in, outcomes out, until there are no more or the parent is gone."""
-    atexit.register(_end)  # first of all, so that it is called last
     try:
         with collecting_later():
             from suave_des.campaign.missions import MissionRunner  # with it comes the compiler, before the job is there
+            from suave_des.managing.registry import is_built_in
 
             job: Job | None = connection.recv()
             if job is None:
                 return
             runner = MissionRunner(job)
         gc.freeze()  # or the first look for garbage afterwards goes through all of that
+        has_only_ours = all(map(is_built_in, job.managers))
         while (chunk := connection.recv()) is not None:
             connection.send(runner.run(chunk))
+        if has_only_ours:
+            os._exit(0)  # to take down piece by piece what was loaded lasts half a second; others may have files open
     except (EOFError, BrokenPipeError, ConnectionResetError):
         return
     except MemoryError:
         os._exit(_OUT_OF_MEMORY)  # as if it had been killed for it: a new worker begins with little
     except Exception as error:
         connection.send(Crash(error if isinstance(error, SuaveDesError) else None, traceback.format_exc()))
-    except BaseException:
-        atexit.unregister(_end)  # which ends with the status of a worker that has done its work
-        raise
-
-
-def _end() -> None:
-    """End, as all is in order, without taking down piece by piece what was loaded: with a compiler, half a second."""
-    for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError, ValueError):  # nobody reads it any more
-            stream.flush()
-    os._exit(0)

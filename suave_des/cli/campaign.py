@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import os
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -159,7 +158,6 @@ def campaign(
             from suave_des.campaign.campaign import resume_campaign, run_campaign
             from suave_des.cli.console import output, progress
             from suave_des.cli.tables import print_stops, print_summary
-        gc.freeze()  # or the first look for garbage afterwards goes through all of that
 
         with progress(str(resume or scenario), quiet=quiet) as show:
             if resume is not None:

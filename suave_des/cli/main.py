@@ -104,6 +104,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """
     arguments = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     remember_command_line(arguments)
+    atexit.unregister(gc.freeze)  # as of an earlier call
     atexit.register(gc.freeze)  # or Python looks for garbage in all that was imported, which takes a tenth of a second
     abandoned = _abandoned()
     command = typer.main.get_command(app)

@@ -123,8 +123,8 @@ class ManagingSubsystem:
         """Between which measured values calls of `adapt` would do nothing, until the manager is told something.
 
         Asked after each `adapt` that returned None. The calls are then left out until a value is published that is not
-        between its bounds, or the manager is told of a task or a component's status; `adapt` comes again at the first
-        of its times from then on. An attribute without bounds may have any value.
+        between its bounds (of several pairs, any), or the manager is told of a task or a component's status; `adapt`
+        comes again at the first of its times from then on. An attribute without bounds may have any value.
 
         A record is to show what every call does: a mission that is recorded leaves none out. What holds for a class
         need not hold for one derived from it, which is asked only if it has this method of its own.
@@ -137,6 +137,7 @@ class ManagingSubsystem:
     def rests_after(self) -> Bounds | None:
         """The same, asked at the end of each `adapt` that took time; and likewise only of a class's own method.
 
-        A call that does nothing may take time, too, but must be over before the next one, or that would be left out.
+        It is about the values that are measured by then. A call that does nothing may take time, too, but must be over
+        before the next one, or that would be left out.
         """
         return None

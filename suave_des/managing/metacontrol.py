@@ -50,7 +50,8 @@ class Metacontrol(ManagingSubsystem):
         self._listens_since_s = 0.0
         self._heard_before: dict[str, float | None] = {}
         self._values: Values = (None,) * len(self._attributes)
-        # What changes nothing but the record is left out where nobody keeps it, and `adapt` is known to do no more.
+        # What changes nothing but the record is left out where nobody keeps it, and no derived class does more.
+        self._is_brief = not system.recorded and type(self) is Metacontrol
         self._is_complete = system.recorded or "rests_while" not in vars(type(self))
         self._situations = self._situations_of_missions_like_this()
         self._situation = self._situations.first()
@@ -149,7 +150,13 @@ class Metacontrol(ManagingSubsystem):
         if situations.regions is None or self._on_the_bridge or not self._are_in_force(situation.groundings.items()):
             return None
         region = situations.region(values)
-        return situations.bounds(region) if self._waits_for(values) else situation.rest(region)
+        if self._waits_for(values):
+            return situations.bounds(region)
+        if self._is_brief:
+            return situation.rest(region)
+        conclusion = situation.conclusion(region)
+        is_done = conclusion is not None and situation.is_met_by(conclusion) and self._is_told(conclusion)
+        return situations.bounds(region) if is_done else None
 
     def _is_over_in_time(self, latency_s: float) -> bool:
         """Whether a cycle is over before the next one, with all rounding errors."""
@@ -182,7 +189,7 @@ class Metacontrol(ManagingSubsystem):
         The clock comes to the next cycle from here as from the end of this one: times until twice the present one are
         not rounded.
         """
-        in_time = not self._is_complete and self._is_over_in_time(latency_s)
+        in_time = self._is_brief and self._is_over_in_time(latency_s)
         return in_time and self.period_s is not None and self.period_s <= self.system.env.now
 
     def _is_told(self, conclusion: Conclusion) -> bool:

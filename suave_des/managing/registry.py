@@ -22,6 +22,11 @@ _BUILT_IN = {
 }
 
 
+def is_built_in(name: str) -> bool:
+    """Whether a manager is the project's own."""
+    return name in _BUILT_IN
+
+
 def manager_names() -> tuple[str, ...]:
     """Names that need no module:Class: built in first, then registered ones in alphabetical order."""
     return (*_BUILT_IN, *(name for name in sorted(_registered()) if name not in _BUILT_IN))
@@ -53,6 +58,8 @@ def _load(name: str, target: str) -> type[ManagingSubsystem]:
             _look_here()
         module = importlib.import_module(module_name)
     except (Exception, SystemExit) as error:  # whatever the module's own code raises on import
+        if isinstance(error.__cause__, KeyboardInterrupt):  # Python 3.11 wraps it while a class is made
+            raise error.__cause__ from None
         raise InputError(
             f"manager {name!r}: {type(error).__name__}: {error}",
             remedy="module must be importable: installed, or in the current folder or one on PYTHONPATH",

@@ -74,12 +74,14 @@ class Measurements:
         return tick_at_or_after(t_s, self.phase_s, self.period_s)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=64)
 def _outside(values: bytes, bounds: tuple[float, ...]) -> list[int]:
     """Places of the values (float64) that are between no pair of bounds.
 
     Without noise they are the same in most runs.
     """
+    if len(bounds) % 2:
+        raise ValueError(f"bounds come in pairs, and {bounds} is not that")
     import numpy as np  # a process that only hands out missions does without
 
     measured, edges = np.frombuffer(values), np.array(bounds)

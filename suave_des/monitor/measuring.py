@@ -82,7 +82,7 @@ def _news(values: NDArray[np.float64]) -> _News:
     return _News(places, tuple(array.tolist()), array)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=16)
 def _looked_up(signal: Signal, times_s: bytes) -> tuple[NDArray[np.float64], _News]:
     """Values of a signal at times (float64), and what is new among them.
 

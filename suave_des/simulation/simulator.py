@@ -101,7 +101,7 @@ class Simulator:
             MissionError: the manager raised; the error names it, the run and the mission time.
             InputError: the manager or the knowledge base cannot be used.
         """
-        if gc.get_count()[1] < _MISSIONS_FREED:
+        if gc.isenabled() and gc.get_count()[1] < _MISSIONS_FREED:
             gc.collect(0)
         memory = self._spare_memory.pop() if self._spare_memory else self._make_memory()
         try:

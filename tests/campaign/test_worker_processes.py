@@ -122,3 +122,21 @@ def test_workers_started_ahead_end_when_the_input_is_bad(scenario: Path) -> None
         processes = [worker.process for worker in ready]
         run_campaign(scenario, ["none"], 0, seed=1, workers=2, ready=ready)
     assert [process.exitcode for process in processes] == [-9, -9]
+
+
+WRITER = """
+import os
+from suave_des.managing.simple import NoManager
+FILE = open(f"written_{os.getpid()}.txt", "w")
+class Writer(NoManager):
+    def __init__(self, system):
+        super().__init__(system)
+        print("a mission", file=FILE)
+"""
+
+
+def test_what_a_manager_has_written_is_there_when_workers_have_ended(scenario: Path, tmp_path: Path) -> None:
+    (tmp_path / "writer.py").write_text(WRITER)
+    done = run_script(call(scenario, ["writer:Writer"], 2), tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert sum(path.read_text().count("a mission") for path in tmp_path.glob("written_*.txt")) == 12

@@ -228,6 +228,49 @@ class Hasty(Metacontrol):
         self.period_s = 0.4
 
 
+class Meddling(Metacontrol):
+    """Requests a mode at once when a component's status is reported, and rests as metacontrol did at first."""
+
+    rests_while = Metacontrol.rests_while
+
+    def diagnostic(self, diagnostic):
+        super().diagnostic(diagnostic)
+        self.system.change_mode("f_generate_search_path", "fd_spiral_high")
+
+
+class MeddlingToo(Meddling):
+    """The same, and rests after executions as well."""
+
+    rests_while = Metacontrol.rests_while
+    rests_after = Metacontrol.rests_after
+
+
+class CountsIdleCycles(Metacontrol):
+    """Requests a mode in the 25th cycle that changes nothing, and so never rests."""
+
+    def __init__(self, system: ManagedSystem) -> None:
+        super().__init__(system)
+        self._idle = 0
+
+    def rests_while(self):
+        return None
+
+    def adapt(self):
+        execution = super().adapt()
+        self._idle += execution is None
+        if self._idle == 25:
+            self.system.change_mode("f_generate_search_path", "fd_spiral_low")
+        return execution
+
+
+class TakesBoundsApart(Metacontrol):
+    """Knows of one pair of bounds for an attribute."""
+
+    def rests_while(self):
+        bounds = super().rests_while()
+        return None if bounds is None else {name: (low, high) for name, (low, high) in bounds.items()}
+
+
 class DoesMore(Metacontrol):
     """Notes when metacontrol's cycles are over."""
 

@@ -152,6 +152,7 @@ def test_metacontrol_leaves_no_cycle_out_with(values: dict, calls) -> None:
     assert rested == calls
 
 
+SLOW = {"managers.metacontrol.reasoning_period_s": 7.3, "latencies.inference_s": 5.0}
 FAULT = {"thruster_events": [{"thruster": 1, "event": "failure", "time_s": 40.0}], "mission.time_limit_s": 60.0}
 
 
@@ -172,7 +173,19 @@ def test_metacontrol_does_the_same_with_and_without_a_record(manager: str, value
         assert found[0] == found[1] == found[2]
 
 
-FAULT = Diagnostic(0.0, Kind.COMPONENT_STATUS, "c_thruster_1", FAILED)
+@pytest.mark.parametrize("manager", ["Meddling", "MeddlingToo", "CountsIdleCycles", "TakesBoundsApart"])
+@pytest.mark.parametrize("values", [{}, SLOW], ids=["as shipped", "slow to reason"])
+@pytest.mark.parametrize("name", sorted(LOADED))
+def test_what_is_derived_from_metacontrol_does_the_same_with_and_without_a_record(
+    name: str, values: dict, manager: str
+) -> None:
+    simulator = Simulator(with_values(LOADED[name], values))
+    for run in range(1, 13):
+        found = [outcome(simulator, f"outside_managers:{manager}", run, record=each) for each in (True, False, False)]
+        assert found[0] == found[1] == found[2]
+
+
+FAILURE = Diagnostic(0.0, Kind.COMPONENT_STATUS, "c_thruster_1", FAILED)
 
 
 @given(
@@ -205,7 +218,7 @@ def test_calls_that_are_not_left_out_come_at_the_very_same_times(period_s, start
         )
         ManagerHost("outside_managers:AnyGrid", 1, system, bus, may_rest=may_rest)
         for time in told:
-            call_at(env, time * period_s, lambda _, publish=bus.publish: publish(FAULT))
+            call_at(env, time * period_s, lambda _, publish=bus.publish: publish(FAILURE))
         env.run(until=12.0 * period_s)
         found.append(outside_managers.CALLED_S.copy())
     every, rested = found
