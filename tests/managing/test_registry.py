@@ -83,3 +83,11 @@ def test_a_module_that_another_thread_still_imports_is_waited_for(
         time.sleep(0.01)
     assert manager_class("slow_to_import:Slow").__name__ == "Slow"
     first.join()
+
+
+def test_ctrl_c_while_a_manager_is_imported_is_ctrl_c(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = "try:\n    raise KeyboardInterrupt\nexcept KeyboardInterrupt as error:\n    raise RuntimeError from error\n"
+    (tmp_path / "stopped_while_made.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        manager_class("stopped_while_made:Manager")
