@@ -310,7 +310,7 @@ def check_knowledge(loaded: LoadedScenario, managers: Sequence[str], *, given: b
         from suave_des.simulation.knowledge import open_knowledge
 
         knowledge = open_knowledge(loaded)
-        knowledge.conclude(KnowledgeState())
+        knowledge.analyze_and_plan(KnowledgeState())
         for path in knowledge.base.files:
             files.ontology(path)
     return {**loaded.inputs, **files.inputs}

@@ -1,10 +1,10 @@
-"""Analyze and plan in one: a pure function of the state, and so remembered like the inferences that it rests on."""
+"""Analyze and plan: what the managing subsystem asks of its knowledge base in each cycle of the MAPE-K loop."""
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 from suave_des.knowledge.base import KnowledgeBase
@@ -13,18 +13,18 @@ from suave_des.knowledge.reasoners import Reasoner
 from suave_des.knowledge.regions import Regions
 from suave_des.knowledge.state import Inference, KnowledgeState, Plan
 
-#: Conclusions that are remembered.
+#: Conclusions kept by a Deliberation; the least recently used are dropped.
 REMEMBERED: Final = 16384
 
 
 @dataclass(frozen=True, slots=True)
 class Conclusion:
-    """What a state entails and asks for.
+    """The result of analyzing a state and planning on it.
 
     Attributes:
         inference: what the reasoner added to the state.
         plan: decisions for the objectives to adapt.
-        statuses: what was inferred of objectives and groundings, in words.
+        statuses: inferred statuses of objectives and groundings, as text for events.
     """
 
     inference: Inference
@@ -33,23 +33,30 @@ class Conclusion:
 
 
 class Deliberation:
-    """A knowledge base with a reasoner, asked for conclusions.
+    """A knowledge base with a reasoner; analyzes states and plans on them.
+
+    Both are pure functions of the state, so conclusions are cached.
+
+        base = KnowledgeBase.load()
+        deliberation = Deliberation(base, make_reasoner("pellet", base))
+        state = KnowledgeState.of([ObjectiveState("f_generate_search_path", "UNGROUNDED")])
+        deliberation.analyze_and_plan(state).plan.decisions[0].design  # "fd_spiral_high"
 
     Args:
         base: the knowledge base.
         reasoner: does the analysis.
 
     Attributes:
-        regions: the regions of measured values that the reasoner takes as one; none if it tells all values apart.
+        regions: the regions of measured values within which inferences are equal; None if the reasoner has none.
     """
 
     def __init__(self, base: KnowledgeBase, reasoner: Reasoner) -> None:
         self.base = base
         self.reasoner = reasoner
         self.regions: Regions | None = getattr(reasoner, "regions", None)
-        self._memory: OrderedDict[tuple[KnowledgeState, bool], Conclusion] = OrderedDict()
+        self._cached = lru_cache(maxsize=REMEMBERED)(self._analyze_and_plan)
 
-    def conclude(self, state: KnowledgeState, *, improve_exceeded: bool = False) -> Conclusion:
+    def analyze_and_plan(self, state: KnowledgeState, *, improve_exceeded: bool = False) -> Conclusion:
         """Analyze a state and plan on it.
 
         Args:
@@ -60,16 +67,14 @@ class Deliberation:
         Raises:
             KnowledgeError: the state and the ontologies contradict one another.
         """
-        key = (state, improve_exceeded)
-        known = self._memory.get(key)
-        if known is None:
-            inference = self.reasoner.infer(state)
-            to_adapt = dict(self._exceeded(state)) if improve_exceeded else {}
-            decided = plan(self.base, state, inference, to_adapt=to_adapt)
-            known = self._memory[key] = Conclusion(inference, decided, frozenset(_statuses(inference)))
-            if len(self._memory) > REMEMBERED:
-                self._memory.popitem(last=False)
-        return known
+        return self._cached(state, improve_exceeded)
+
+    def _analyze_and_plan(self, state: KnowledgeState, improve_exceeded: bool) -> Conclusion:
+        inference = self.reasoner.infer(state)
+        to_adapt = dict(self._exceeded(state)) if improve_exceeded else {}
+        return Conclusion(
+            inference, plan(self.base, state, inference, to_adapt=to_adapt), frozenset(_statuses(inference))
+        )
 
     def _exceeded(self, state: KnowledgeState) -> Iterator[tuple[str, str]]:
         measured = dict(state.measurements)

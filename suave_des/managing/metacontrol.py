@@ -169,7 +169,7 @@ class Metacontrol(ManagingSubsystem):
         region = self._situations.region(values)
         conclusion = self._situation.conclusion(region)
         if conclusion is None:
-            conclusion = self._deliberation.conclude(
+            conclusion = self._deliberation.analyze_and_plan(
                 self._state(values), improve_exceeded=self._revision.search_improves_when_exceeded
             )
             self._situation.remember(region, conclusion)

@@ -130,7 +130,7 @@ class KnowledgeBase:
         Raises:
             KnowledgeError: the state contradicts the ontologies, or the reasoner takes too long.
         """
-        return self._deliberation.conclude(state, improve_exceeded=self.loop.improves_exceeded)
+        return self._deliberation.analyze_and_plan(state, improve_exceeded=self.loop.improves_exceeded)
 
     def explain(self, state: KnowledgeState, question: str = "") -> Explanation:
         """Why a fact or a decision follows in a state, or why the state contradicts itself.

@@ -125,7 +125,7 @@ def explain(base: KnowledgeBase, state: KnowledgeState, question: str, improves_
     tracer = Tracer(base, state)
     reasoner = make_reasoner("pellet", base)
     try:
-        conclusion = Deliberation(base, reasoner).conclude(state, improve_exceeded=improves_exceeded)
+        conclusion = Deliberation(base, reasoner).analyze_and_plan(state, improve_exceeded=improves_exceeded)
     except KnowledgeError:
         problem, clashes, rules = tracer.clashes()
         if not rules and not clashes:
