@@ -14,6 +14,7 @@ from suave_des.campaign.campaign import CampaignInterrupted, resume_campaign, ru
 from suave_des.campaign.executors import WorkerError
 from suave_des.campaign.missions import MissionRunner
 from suave_des.errors import InputError
+from tests.helpers import AWKWARD
 
 RUNS = 12
 
@@ -25,7 +26,7 @@ def rows_of(folder: Path) -> list[dict[str, str]]:
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_manager_that_raises_costs_its_own_mission_only(workers: int, tmp_path: Path) -> None:
-    manager = "awkward_managers:RaisesInHalf"
+    manager = f"{AWKWARD}:RaisesInHalf"
     result = run_campaign("seams2023", [manager, "none"], RUNS, 1, workers, tmp_path / "out")
     failed = [failure.run for failure in result.failures]
     assert 0 < len(failed) < RUNS
@@ -44,16 +45,16 @@ def test_a_manager_that_raises_costs_its_own_mission_only(workers: int, tmp_path
 
 
 def test_a_manager_that_calls_exit_is_a_manager_that_raises() -> None:
-    result = run_campaign("seams2023", ["awkward_managers:Quits", "none"], 1, 1)
+    result = run_campaign("seams2023", [f"{AWKWARD}:Quits", "none"], 1, 1)
     assert [failure.cause for failure in result.failures] == ["SystemExit: no more"]
     assert len(result.rows) == 1
 
 
 def test_when_all_missions_fail_there_are_no_rows(tmp_path: Path) -> None:
-    result = run_campaign("seams2023", ["awkward_managers:RaisesAlways"], 2, 1, out=tmp_path / "out")
+    result = run_campaign("seams2023", [f"{AWKWARD}:RaisesAlways"], 2, 1, out=tmp_path / "out")
     assert len(result.failures) == 2
     assert rows_of(tmp_path / "out") == []
-    assert (tmp_path / "out" / "summary.csv").read_text().splitlines()[1].startswith("awkward_managers:RaisesAlways,0,")
+    assert (tmp_path / "out" / "summary.csv").read_text().splitlines()[1].startswith(f"{AWKWARD}:RaisesAlways,0,")
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -61,7 +62,7 @@ def test_interrupted_finished_missions_are_kept(workers: int, tmp_path: Path, mo
     monkeypatch.setenv("AWKWARD_TARGET", str(os.getpid()))
     monkeypatch.setenv("AWKWARD_ONCE", str(tmp_path / "once"))
     (tmp_path / "once").touch()
-    managers = ["none", "awkward_managers:InterruptsOnce"]
+    managers = ["none", f"{AWKWARD}:InterruptsOnce"]
     with pytest.raises(CampaignInterrupted, match=r"\d+ of 200 missions are done, and kept in ") as stopped:
         run_campaign("seams2023", managers, 100, 1, workers, tmp_path / "out")
     assert isinstance(stopped.value, KeyboardInterrupt)
@@ -93,7 +94,7 @@ def test_interrupted_before_the_first_mission_is_done_leaves_nothing(
 
 
 def test_a_mission_that_kills_its_worker_again_and_again_has_failed_and_the_others_go_on(tmp_path: Path) -> None:
-    manager = "awkward_managers:DiesInSome"
+    manager = f"{AWKWARD}:DiesInSome"
     result = run_campaign("seams2023", ["none", manager], 12, 1, 2, tmp_path / "out")
     assert 0 < len(result.failures) < 6
     assert {failure.manager for failure in result.failures} == {manager}
@@ -107,22 +108,20 @@ def test_a_mission_that_kills_its_worker_again_and_again_has_failed_and_the_othe
 
 def test_when_every_worker_dies_the_campaign_stops_with_one_line(tmp_path: Path) -> None:
     with pytest.raises(WorkerError, match=r"8 worker processes in a row ended before a mission was done"):
-        run_campaign("seams2023", ["awkward_managers:DiesAlways"], 20, 1, 2, tmp_path / "out")
+        run_campaign("seams2023", [f"{AWKWARD}:DiesAlways"], 20, 1, 2, tmp_path / "out")
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_mission_that_takes_too_long_has_failed_and_the_others_go_on(workers: int) -> None:
-    result = run_campaign("seams2023", ["awkward_managers:HangsInSome", "none"], 12, 1, workers, time_out_s=2.0)
+    result = run_campaign("seams2023", [f"{AWKWARD}:HangsInSome", "none"], 12, 1, workers, time_out_s=2.0)
     assert 0 < len(result.failures) < 12
     for failure in result.failures:
-        assert str(failure) == (
-            f"manager awkward_managers:HangsInSome, run {failure.run}: not done after 2 s (time-out)"
-        )
+        assert str(failure) == (f"manager {AWKWARD}:HangsInSome, run {failure.run}: not done after 2 s (time-out)")
     assert result.done == 24 - len(result.failures)
 
 
 def test_missions_run_in_as_many_processes_as_asked_for() -> None:
-    manager = "awkward_managers:TellsItsProcess"
+    manager = f"{AWKWARD}:TellsItsProcess"
     alone = run_campaign("seams2023", [manager], 2, 1)
     assert {failure.cause for failure in alone.failures} == {f"RuntimeError: process {os.getpid()}"}
     shared = run_campaign("seams2023", [manager], 40, 1, 2)
@@ -139,7 +138,7 @@ class TestRefusedBeforeAnythingIsWritten:
             ({"managers": ["metacontrl"]}, "there is no manager 'metacontrl' (did you mean metacontrol?"),
             ({"managers": ["none", "none"]}, "'none' is given twice"),
             ({"managers": ["no_such_module:Manager"]}, "no_such_module"),
-            ({"managers": ["awkward_managers:NoSuchClass"]}, "NoSuchClass"),
+            ({"managers": [f"{AWKWARD}:NoSuchClass"]}, "NoSuchClass"),
             ({"runs": 0}, "runs: 0 is out of range"),
             ({"runs": -5}, "runs: -5"),
             ({"time_out_s": 0.0}, "time-out: 0 is out of range"),

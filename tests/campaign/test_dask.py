@@ -11,16 +11,17 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-import chaos
 import pytest
-from clusters import Cluster, kill, wait_until
 
+from benchmarks import chaos
 from suave_des.campaign import dask_cluster
 from suave_des.campaign.campaign import CampaignInterrupted, Progress, resume_campaign, run_campaign
 from suave_des.campaign.executors import WorkerError
 from suave_des.campaign.store import STORE_FILE
 from suave_des.errors import InputError
 from suave_des.resources import shipped_folder
+from tests.helpers import AWKWARD
+from tests.helpers.clusters import Cluster, kill, wait_until
 
 MINE = "my_managers.careful:Careful"
 
@@ -102,7 +103,9 @@ def test_a_worker_dies_and_another_comes_and_the_bytes_are_the_same(
     assert cluster.opened() == []
 
 
-def test_the_hook_that_watches_workers_would_tell(cluster: Cluster, users_folder: Path, tmp_path: Path) -> None:
+def test_the_hook_that_watches_workers_would_tell(
+    cluster: Cluster, users_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (users_folder / "opens_a_file.py").write_text(
         "from pathlib import Path\n"
         "from suave_des.managing.simple import NoManager\n"
@@ -110,11 +113,8 @@ def test_the_hook_that_watches_workers_would_tell(cluster: Cluster, users_folder
         "    def task_requested(self, task):\n"
         f"        Path({str(users_folder / 'sea.csv')!r}).read_text()\n"
     )
-    sys.path.append(str(users_folder))
-    try:
-        run_campaign("seams2023", ["opens_a_file:Reader"], 1, 1, scheduler=cluster.address)
-    finally:
-        sys.path.remove(str(users_folder))
+    monkeypatch.syspath_prepend(users_folder)
+    run_campaign("seams2023", ["opens_a_file:Reader"], 1, 1, scheduler=cluster.address)
     assert set(cluster.opened()) == {str(users_folder / "sea.csv")}
 
 
@@ -124,7 +124,7 @@ def test_managers_that_end_or_block_their_process_cost_their_own_missions_only(c
         "HangsInSome": "not done after 3 s (time-out)",
         "RaisesInHalf": "ValueError: I do not know what to do",
     }
-    managers = [f"awkward_managers:{name}" for name in causes]
+    managers = [f"{AWKWARD}:{name}" for name in causes]
     result = run_campaign("seams2023", managers, 8, 1, scheduler=cluster.address, time_out_s=3.0)
     assert {failure.manager.partition(":")[2]: failure.cause for failure in result.failures} == causes
     assert len(result.rows) + len(result.failures) == 24
@@ -205,7 +205,7 @@ def test_a_mission_with_which_workers_die_has_failed_and_no_other(tmp_path: Path
     try:
         cluster.add_worker(replaced=True)
         cluster.wait_for_workers(1)
-        manager = "awkward_managers:KillsClusterWorkerInSome"
+        manager = f"{AWKWARD}:KillsClusterWorkerInSome"
         result = run_campaign("seams2023", [manager], 9, 1, scheduler=cluster.address)
     finally:
         cluster.stop()

@@ -13,14 +13,15 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import chaos
 import pytest
 
 import suave_des
+from benchmarks import chaos
 from suave_des.campaign import store as stores
 from suave_des.campaign.campaign import CampaignInterrupted, Progress, resume_campaign, run_campaign
 from suave_des.campaign.store import STORE_FILE, Store, StoreError
 from suave_des.errors import InputError
+from tests.helpers import AWKWARD
 
 MANAGERS = ["none", "random"]
 
@@ -309,7 +310,7 @@ def test_what_a_killed_campaign_leaves_before_it_began_is_no_hindrance(scenario:
 def test_missions_that_took_too_long_are_run_again_when_resumed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    manager = "awkward_managers:HangsOnce"
+    manager = f"{AWKWARD}:HangsOnce"
     monkeypatch.setenv("AWKWARD_MARKS", str(tmp_path))
     result = run_campaign("seams2023", [manager], 12, 1, out=tmp_path / "out", time_out_s=2.0)
     assert 0 < len(result.failures) < 12

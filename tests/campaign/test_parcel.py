@@ -20,6 +20,7 @@ from suave_des.campaign.variation import Variation, vary
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.memory import DiskMemory
 from suave_des.scenario.loader import load_scenario
+from tests.helpers import AWKWARD
 
 
 def job(*managers: str, time_out_s: float = 60.0) -> Job:
@@ -123,7 +124,7 @@ class TestOnAWorker:
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(dask_worker, "_MARGIN_S", 0.5)
-        found, report = self.run(job("awkward_managers:BlocksInSome", time_out_s=3.0), range(2, 3), tmp_path, "blocks")
+        found, report = self.run(job(f"{AWKWARD}:BlocksInSome", time_out_s=3.0), range(2, 3), tmp_path, "blocks")
         assert (found, report.lost) == ({}, [((0, 0, 2), None)])
 
     def test_what_reasoners_learn_comes_home(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

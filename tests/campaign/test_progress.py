@@ -8,10 +8,10 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
-import chaos
 import pytest
 from rich.console import Console
 
+from benchmarks import chaos
 from suave_des.campaign import display
 from suave_des.campaign.campaign import CampaignInterrupted, resume_campaign, run_campaign
 from suave_des.campaign.early_stop import UntilCi
@@ -19,6 +19,7 @@ from suave_des.campaign.outcomes import COLUMNS, Failure, Finished
 from suave_des.campaign.plan import MissionKey
 from suave_des.campaign.progress import GROUPS_TOLD, OnProgress, Progress, Watch
 from suave_des.estimates import estimate
+from tests.helpers import AWKWARD
 
 PLACE = COLUMNS.index("search_time_s")
 
@@ -188,7 +189,7 @@ class TestDuringACampaign:
     @pytest.mark.parametrize("workers", [1, 2])
     def test_the_last_that_is_told_is_what_summary_csv_says(self, workers: int, tmp_path: Path) -> None:
         seen: list[Progress] = []
-        managers = ["none", "awkward_managers:RaisesInHalf"]
+        managers = ["none", f"{AWKWARD}:RaisesInHalf"]
         result = run_campaign("seams2023", managers, 12, 1, workers, tmp_path / "out", on_progress=seen.append)
         last = seen[-1]
         assert (last.done, last.failed, last.total) == (24, len(result.failures), 24)

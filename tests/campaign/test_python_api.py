@@ -9,14 +9,15 @@ import sys
 import tracemalloc
 from pathlib import Path
 
-import chaos
 import pandas
 import pytest
 
 import suave_des
+from benchmarks import chaos
 from suave_des.campaign.campaign import CampaignInterrupted
 from suave_des.campaign.store import Store
 from suave_des.errors import InputError
+from tests.helpers import AWKWARD
 
 
 @pytest.fixture
@@ -84,7 +85,7 @@ class TestRunCampaign:
         ) as told:
             frame = suave_des.run_campaign(
                 "seams2023",
-                ["awkward_managers:RaisesInHalf"],
+                [f"{AWKWARD}:RaisesInHalf"],
                 runs=3,
                 out=tmp_path / "out",
                 sweep={"visibility.period_s": [40, 80]},
@@ -111,7 +112,7 @@ class TestRunCampaign:
 
     def test_without_any_row_the_types_are_the_same(self, scenario: Path) -> None:
         with pytest.warns(UserWarning, match="1 of 1 missions failed"):
-            nothing = suave_des.run_campaign(scenario, ["awkward_managers:RaisesAlways"], 1)
+            nothing = suave_des.run_campaign(scenario, [f"{AWKWARD}:RaisesAlways"], 1)
         some = suave_des.run_campaign(scenario, ["none"], 1)
         assert len(nothing) == 0
         assert [str(kind) for kind in nothing.dtypes] == [str(kind) for kind in some.dtypes]

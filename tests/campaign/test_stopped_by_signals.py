@@ -12,9 +12,9 @@ from multiprocessing.context import SpawnProcess
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-import chaos
 import pytest
 
+from benchmarks import chaos
 from suave_des.campaign.campaign import resume_campaign, run_campaign
 from suave_des.campaign.lock import LOCK_FILE
 from suave_des.campaign.pool import process_pool

@@ -18,6 +18,7 @@ from suave_des.errors import InputError
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.overrides import with_values
 from suave_des.simulation.simulator import Simulator
+from tests.helpers import AWKWARD
 
 HEAD = "campaign: 1\nscenario: seams2023\nmanagers: [none, random]\nruns: 4\nseed: 7\n"
 UNIFORM = "{distribution: uniform, minimum: %s, maximum: %s}"
@@ -204,7 +205,7 @@ def test_more_than_a_million_missions_have_to_be_confirmed(tmp_path: Path) -> No
 
 def test_a_failure_in_a_sweep_names_its_point(tmp_path: Path) -> None:
     sweep = {"visibility.period_s": [40.0, 80.0]}
-    result = run_campaign("seams2023", ["awkward_managers:RaisesAlways"], 1, 1, sweep=sweep, out=tmp_path / "out")
+    result = run_campaign("seams2023", [f"{AWKWARD}:RaisesAlways"], 1, 1, sweep=sweep, out=tmp_path / "out")
     assert [failure.point for failure in result.failures] == [0, 1]
     assert '"visibility.period_s": 80.0' in (tmp_path / "out" / "manifest.json").read_text(encoding="utf-8")
 

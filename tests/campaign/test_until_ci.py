@@ -7,18 +7,19 @@ import json
 import random
 from pathlib import Path
 
-import chaos
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from benchmarks import chaos
 from suave_des.campaign.campaign import CampaignInterrupted, Progress, resume_campaign, run_campaign
 from suave_des.campaign.early_stop import FEWEST_RUNS, METRICS, Standing
 from suave_des.campaign.outcomes import COLUMNS, Failure, Outcome
 from suave_des.campaign.progress import OnProgress
 from suave_des.errors import InputError
 from suave_des.estimates import Running, estimate
+from tests.helpers import AWKWARD
 
 LIMIT = "initial_y_m:0.002"
 """Of a drawn start position, so that missions may be short: reached after some eighty runs."""
@@ -155,7 +156,7 @@ def test_killed_at_random_moments_the_bytes_are_the_same(scenario: Path, tmp_pat
 
 
 def test_failed_missions_do_not_count_and_the_manifest_says_where_each_manager_ended(tmp_path: Path) -> None:
-    manager = "awkward_managers:RaisesInHalf"
+    manager = f"{AWKWARD}:RaisesInHalf"
     result = run_campaign("seams2023", [manager, "none"], 60, 1, out=tmp_path / "out", until_ci="initial_y_m:0.003")
     raises, none = json.loads((tmp_path / "out" / "manifest.json").read_text())["until_ci"]["managers"]
     assert none["why"] == "the interval is narrow"

@@ -7,10 +7,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-import chaos
 import pytest
 
 import suave_des
+from benchmarks import chaos
 from suave_des.campaign import machine_code
 from suave_des.campaign.campaign import run_campaign
 from suave_des.campaign.worker import StartWorker, workers_started

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from command import suave_des_command
 
 from suave_des.campaign.early_stop import RUNS_LIMIT_DEFAULT
 from suave_des.cli.main import main
+from tests.helpers.command import suave_des_command
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from command import suave_des_command
 from rich.console import Console
 
 import suave_des
 from suave_des.campaign.single import run_mission
 from suave_des.cli.status import mission_status
+from tests.helpers.command import suave_des_command
 
 SLOW = """
 import os, time

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -11,8 +11,7 @@ import pytest
 from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.resources import shipped_folder
-
-MakeOntology = Callable[..., Path]
+from tests.helpers.owl_text import MakeOntology
 
 
 @pytest.fixture(autouse=True)

@@ -6,13 +6,13 @@ import random
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from knowledge_states import FOLLOW, MOTION, SEARCH, searching
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.planning import plan
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.knowledge.state import Inference, KnowledgeState, ObjectiveState
+from tests.helpers.knowledge_states import FOLLOW, MOTION, SEARCH, searching
 
 THRESHOLDS = ("1.25", "2.25", "3.25")
 #: Just below, on and just above each threshold, and numbers that binary floats write with an exponent.

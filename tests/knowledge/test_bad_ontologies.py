@@ -7,13 +7,12 @@ from decimal import Decimal
 from pathlib import Path
 
 import pytest
-from conftest import MakeOntology
-from knowledge_states import FOLLOW, searching
-from owl_text import individual, rule
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.reasoners import make_reasoner
+from tests.helpers.knowledge_states import FOLLOW, searching
+from tests.helpers.owl_text import MakeOntology, individual, rule
 
 HEAD = '<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#" xmlns:owl="http://www.w3.org/2002/07/owl#">\n'
 NESTED = "".join(f'<!ENTITY e{n} "{f"&e{n - 1};" * 10}">\n' for n in range(1, 10))

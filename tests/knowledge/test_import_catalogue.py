@@ -6,14 +6,14 @@ import itertools
 from pathlib import Path
 
 import pytest
-from conftest import MakeOntology
-from exemplar_files import MROS_IMPORT, write_exemplar_files
-from knowledge_states import MOTION, SEARCH, searching
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.planning import plan
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
+from tests.helpers.exemplar_files import MROS_IMPORT, write_exemplar_files
+from tests.helpers.knowledge_states import MOTION, SEARCH, searching
+from tests.helpers.owl_text import MakeOntology
 
 IMPORT = "https://raw.githubusercontent.com/meta-control/mc_mdl_tomasys/ros2/owl/tomasys.owl"
 STORY = [

@@ -7,10 +7,10 @@ import sys
 from decimal import Decimal
 
 import pytest
-from knowledge_states import SEARCH, searching
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.state import Fact, KnowledgeState, ObjectiveState, exact
+from tests.helpers.knowledge_states import SEARCH, searching
 
 
 @pytest.mark.parametrize(

@@ -6,15 +6,14 @@ from decimal import Decimal
 from pathlib import Path
 
 import pytest
-from conftest import MakeOntology
-from knowledge_states import FOLLOW, MOTION, SEARCH, searching
-from owl_text import individual
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.planning import plan
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.knowledge.state import Decision, KnowledgeState, ObjectiveState
+from tests.helpers.knowledge_states import FOLLOW, MOTION, SEARCH, searching
+from tests.helpers.owl_text import MakeOntology, individual
 
 
 def decide(kb: KnowledgeBase, reasoner: Reasoner, state: KnowledgeState, **options: list[str]) -> dict[str, Decision]:

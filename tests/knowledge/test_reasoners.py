@@ -10,12 +10,13 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from knowledge_states import SEARCH, searching
 
+import suave_des
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge import java
 from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.reasoners import BACKENDS, REMEMBERED, Reasoner, make_reasoner
+from tests.helpers.knowledge_states import SEARCH, searching
 
 
 def test_an_unknown_reasoner_is_told_with_those_known(kb: KnowledgeBase) -> None:
@@ -108,9 +109,7 @@ def test_spawned_workers_reason_each_with_a_java_of_its_own(pellet: Reasoner) ->
 
 
 QUIET = """
-import sys
-sys.path.insert(0, {tests!r})
-from knowledge_states import searching
+from tests.helpers.knowledge_states import searching
 from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.reasoners import make_reasoner
 reasoner = make_reasoner("pellet", KnowledgeBase.load())
@@ -120,8 +119,11 @@ reasoner.infer(searching("fd_spiral_high", 2.0))
 
 
 def run(more: str) -> subprocess.CompletedProcess[str]:
-    code = QUIET.format(tests=str(Path(__file__).parent), more=more)
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
+    code = QUIET.format(more=more)
+    environment = {**os.environ, "PYTHONPATH": str(Path(suave_des.__file__).parents[1])}
+    return subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=120, check=False
+    )
 
 
 def test_reasoning_prints_nothing() -> None:

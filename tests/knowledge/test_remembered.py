@@ -13,8 +13,6 @@ from tempfile import mkdtemp
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from knowledge_states import MOTION, SEARCH, searching
-from owl_text import individual
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.base import KnowledgeBase
@@ -24,6 +22,8 @@ from suave_des.knowledge.regions import Regions, regions_of
 from suave_des.knowledge.remembered import Remembered, memory_digest
 from suave_des.knowledge.state import Inference, KnowledgeState, ObjectiveState, exact
 from suave_des.resources import shipped_folder
+from tests.helpers.knowledge_states import MOTION, SEARCH, searching
+from tests.helpers.owl_text import individual
 
 MORE_DESIGNS = "".join(
     individual(f"qa_extra_{n}", "QAvalue", ("isQAtype", ":water_visibility"), ("hasValue", f"{n}.{n}"))

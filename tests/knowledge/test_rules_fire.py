@@ -7,14 +7,13 @@ from decimal import Decimal
 from pathlib import Path
 
 import pytest
-from conftest import MakeOntology
-from knowledge_states import MOTION, SEARCH, searching
-from owl_text import individual, rule
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.knowledge.state import Fact, KnowledgeState, ObjectiveState
+from tests.helpers.knowledge_states import MOTION, SEARCH, searching
+from tests.helpers.owl_text import MakeOntology, individual, rule
 
 
 def inferred(reasoner: Reasoner, state: KnowledgeState) -> set[str]:

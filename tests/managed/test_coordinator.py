@@ -5,10 +5,10 @@ from types import SimpleNamespace
 
 import pytest
 import simpy
-from stand_ins import revision
 
 from suave_des.managed.coordinator import MissionCoordinator
 from suave_des.managed.task import Task
+from tests.helpers.stand_ins import revision
 
 BOTH = pytest.mark.parametrize("name", ["2023", "1.5"])
 POLL_PHASE_S, LIMIT_PHASE_S = 0.35, 0.2

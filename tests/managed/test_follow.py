@@ -7,11 +7,11 @@ import pytest
 import simpy
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from stand_ins import ACTIVE, INACTIVE, MovingVehicle, PlacedVehicle, revision, sender
 
 from suave_des.managed.follow import FollowPipeline, Way
 from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle, row_at
+from tests.helpers.stand_ins import ACTIVE, INACTIVE, MovingVehicle, PlacedVehicle, revision, sender
 
 BOTH = pytest.mark.parametrize("name", ["2023", "1.5"])
 LINE = [(-0.5 * n, 0.0) for n in range(21)]

@@ -2,10 +2,10 @@
 
 import pytest
 import simpy
-from stand_ins import ACTIVE, INACTIVE, revision
 
 from suave_des.managed.motion import MaintainMotion
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
+from tests.helpers.stand_ins import ACTIVE, INACTIVE, revision
 
 BOTH = pytest.mark.parametrize("name", ["2023", "1.5"])
 

@@ -5,12 +5,12 @@ from collections.abc import Callable
 
 import pytest
 import simpy
-from stand_ins import silent
 
 from suave_des.managed.mode_manager import ModeManager
 from suave_des.managed.node import FunctionNode
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.modes import Mode
+from tests.helpers.stand_ins import silent
 
 SEARCH, FOLLOW = "f_generate_search_path", "f_follow_pipeline"
 TABLE = load_scenario("seams2023").modes

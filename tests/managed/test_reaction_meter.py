@@ -8,12 +8,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import simpy
-from stand_ins import ACTIVE, INACTIVE, spiral_at
 
 from suave_des.managed.reactions import ReactionMeter
 from suave_des.monitor.diagnostics import Diagnostic, Kind
 from suave_des.monitor.measurements import Measurements
 from suave_des.scenario.models import ReactionMetric
+from tests.helpers.stand_ins import ACTIVE, INACTIVE, spiral_at
 
 SEARCH, MOTION, RECHARGE = "f_generate_search_path", "f_maintain_motion", "generate_recharge_path"
 

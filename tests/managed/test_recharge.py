@@ -1,9 +1,9 @@
 """Generate recharge path: the way to the recharge station."""
 
 import simpy
-from stand_ins import ACTIVE, INACTIVE, PlacedVehicle, sender
 
 from suave_des.managed.recharge import GenerateRechargePath
+from tests.helpers.stand_ins import ACTIVE, INACTIVE, PlacedVehicle, sender
 
 
 def recharging() -> tuple[simpy.Environment, PlacedVehicle, GenerateRechargePath]:

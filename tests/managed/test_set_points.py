@@ -4,9 +4,9 @@ import random
 
 import pytest
 import simpy
-from stand_ins import Place, PlacedVehicle
 
 from suave_des.managed.node import Frame, SetPointSender
+from tests.helpers.stand_ins import Place, PlacedVehicle
 
 
 def sent(count: int, loss_probability: float, frame: Frame | None = None) -> list[Place]:

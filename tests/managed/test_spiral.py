@@ -6,11 +6,11 @@ import pytest
 import simpy
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from stand_ins import INACTIVE, START, PlacedVehicle, revision, sender, spiral_at
 
 from suave_des.managed.search import GenerateSearchPath
 from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle, row_at
+from tests.helpers.stand_ins import INACTIVE, START, PlacedVehicle, revision, sender, spiral_at
 
 ORIGIN = (-17.0, 2.3)
 PHASE_S = 0.25

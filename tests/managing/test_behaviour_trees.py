@@ -1,7 +1,8 @@
 """The behaviour tree managers bt and bt_extended."""
 
 import pytest
-from managers_at_work import FOLLOW, MOTION, SEARCH, AtWork
+
+from tests.helpers.managers_at_work import FOLLOW, MOTION, SEARCH, AtWork
 
 RECHARGE = "generate_recharge_path"
 BOTH_REVISIONS = pytest.mark.parametrize("revision", ["2023", "1.5"])

@@ -1,6 +1,5 @@
 """Metacontrol by what it does in mission time, with the shipped knowledge base and with others."""
 
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -13,9 +12,7 @@ from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.overrides import with_values
 from suave_des.simulation.result import MissionResult
 from suave_des.simulation.simulator import Simulator
-
-sys.path.append(str(Path(__file__).parents[1] / "knowledge"))
-from exemplar_files import write_exemplar_files
+from tests.helpers.exemplar_files import write_exemplar_files
 
 MOTION, SEARCH, FOLLOW = "f_maintain_motion", "f_generate_search_path", "f_follow_pipeline"
 REASONED_AT_ONCE = {"latencies.inference_s": 0.0, "latencies.mode_change_s": 0.0}

@@ -3,7 +3,8 @@
 from collections import Counter
 
 import pytest
-from managers_at_work import FOLLOW, MODES, MOTION, SEARCH, AtWork
+
+from tests.helpers.managers_at_work import FOLLOW, MODES, MOTION, SEARCH, AtWork
 
 BOTH = pytest.mark.parametrize("revision", ["2023", "1.5"])
 

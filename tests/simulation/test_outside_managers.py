@@ -6,12 +6,13 @@ import pytest
 
 from suave_des.errors import MissionError
 from suave_des.simulation.result import MissionResult
+from tests.helpers import OUTSIDE
 
 QUIET = {"calibration": {"altitude_error_m": 0.0, "real_time_factor_loss": 0.0}}
 
 
 def mission(simulator, manager: str, scenario: str = "seams2023", **changes: object) -> MissionResult:
-    return simulator(scenario, **changes).run(f"outside_managers:{manager}", 1, 1, record=True)
+    return simulator(scenario, **changes).run(f"{OUTSIDE}:{manager}", 1, 1, record=True)
 
 
 def times_of(result: MissionResult, event: str, detail: str = "") -> list[float]:
@@ -33,7 +34,7 @@ def test_adapt_is_called_every_period(simulator) -> None:
 
 
 def test_a_call_that_would_come_during_an_earlier_one_is_left_out(simulator) -> None:
-    settings = {"managers": {"outside_managers:Deliberate": {"takes_s": 5.0}}}
+    settings = {"managers": {f"{OUTSIDE}:Deliberate": {"takes_s": 5.0}}}
     assert times_of(mission(simulator, "Deliberate", **settings), "thinks")[:4] == pytest.approx([1.0, 7.0, 13.0, 19.0])
 
 
@@ -48,7 +49,7 @@ def test_it_hears_measured_values_and_components(simulator) -> None:
 
 def test_its_random_stream_depends_on_the_run_alone(simulator) -> None:
     def drawn(run: int, **changes: object) -> list[str]:
-        result = simulator("seams2023", **changes).run("outside_managers:Drawing", run, 1, record=True)
+        result = simulator("seams2023", **changes).run(f"{OUTSIDE}:Drawing", run, 1, record=True)
         return [each.detail for each in result.events if each.event == "drew"][:1]
 
     assert drawn(1) == drawn(1, **QUIET) != drawn(2)
@@ -72,9 +73,9 @@ def test_what_a_manager_raises_names_manager_run_and_time(
     simulator, manager: str, cause: str, earliest_s: float, latest_s: float
 ) -> None:
     with pytest.raises(MissionError) as raised:
-        simulator().run(f"outside_managers:{manager}", 4, 1)
+        simulator().run(f"{OUTSIDE}:{manager}", 4, 1)
     error = raised.value
-    assert (error.manager, error.run) == (f"outside_managers:{manager}", 4)
+    assert (error.manager, error.run) == (f"{OUTSIDE}:{manager}", 4)
     assert earliest_s <= error.time_s <= latest_s
     assert error.cause.startswith(cause)
 
@@ -92,5 +93,5 @@ def test_a_missions_error_survives_the_trip_from_a_worker() -> None:
 def test_other_missions_are_not_disturbed_by_one_that_failed(simulator) -> None:
     before = simulator().run("none", 1, 1)
     with pytest.raises(MissionError):
-        simulator().run("outside_managers:FailsInAdapt", 1, 1)
+        simulator().run(f"{OUTSIDE}:FailsInAdapt", 1, 1)
     assert simulator().run("none", 1, 1) == before

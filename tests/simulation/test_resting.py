@@ -6,7 +6,6 @@ from itertools import pairwise
 from unittest import mock
 
 import numpy as np
-import outside_managers
 import pytest
 import simpy
 from hypothesis import given, settings
@@ -25,6 +24,7 @@ from suave_des.scenario.modes import Mode
 from suave_des.scenario.overrides import with_values
 from suave_des.simulation.host import ManagerHost
 from suave_des.simulation.simulator import Simulator
+from tests.helpers import OUTSIDE, outside_managers
 
 NO_FAULTS = {"thruster_events": [], "mission.time_limit_s": 60.0}
 LOADED = {name: load_scenario(name) for name in ("seams2023", "release15")}
@@ -37,7 +37,7 @@ def steps(before: float, after: float, time_s: float) -> dict:
 def called_s(values: dict, manager: str = "Resting", *, record: bool = False) -> list[float]:
     """Times at which the manager's adapt is called, once the first task is under way."""
     simulator = Simulator(with_values(LOADED["seams2023"], {**NO_FAULTS, **values}))
-    simulator.run(f"outside_managers:{manager}", 1, 1, record=record)
+    simulator.run(f"{OUTSIDE}:{manager}", 1, 1, record=record)
     return [t_s for t_s in outside_managers.CALLED_S if t_s > 10.0]
 
 
@@ -91,7 +91,7 @@ def test_a_manager_can_tell_whether_the_record_is_kept() -> None:
     outside_managers.RECORDED.clear()
     simulator = Simulator(LOADED["seams2023"])
     for record in (True, False):
-        simulator.run("outside_managers:AsksForTheRecord", 1, 1, record=record)
+        simulator.run(f"{OUTSIDE}:AsksForTheRecord", 1, 1, record=record)
     assert outside_managers.RECORDED == [True, False]
 
 
@@ -130,7 +130,7 @@ def test_a_measured_value_that_is_no_number_is_an_error_at_once() -> None:
     told = []
     for record in (True, False, False):
         with pytest.raises(MissionError, match="not a finite number") as raised:
-            simulator.run("outside_managers:BlindInTheDark", 1, 1, record=record)
+            simulator.run(f"{OUTSIDE}:BlindInTheDark", 1, 1, record=record)
         told.append(str(raised.value))
     assert told[0] == told[1] == told[2]
 
@@ -156,7 +156,7 @@ SLOW = {"managers.metacontrol.reasoning_period_s": 7.3, "latencies.inference_s":
 FAULT = {"thruster_events": [{"thruster": 1, "event": "failure", "time_s": 40.0}], "mission.time_limit_s": 60.0}
 
 
-@pytest.mark.parametrize("manager", ["metacontrol", "outside_managers:Hasty", "outside_managers:DoesMore"])
+@pytest.mark.parametrize("manager", ["metacontrol", f"{OUTSIDE}:Hasty", f"{OUTSIDE}:DoesMore"])
 @pytest.mark.parametrize(
     "values",
     [{}, *({**FAULT, **steps(3.5, 1.5, time_s)} for time_s in (38.5, 39.5, 40.5, 41.5, 42.5))],
@@ -181,7 +181,7 @@ def test_what_is_derived_from_metacontrol_does_the_same_with_and_without_a_recor
 ) -> None:
     simulator = Simulator(with_values(LOADED[name], values))
     for run in range(1, 13):
-        found = [outcome(simulator, f"outside_managers:{manager}", run, record=each) for each in (True, False, False)]
+        found = [outcome(simulator, f"{OUTSIDE}:{manager}", run, record=each) for each in (True, False, False)]
         assert found[0] == found[1] == found[2]
 
 
@@ -216,7 +216,7 @@ def test_calls_that_are_not_left_out_come_at_the_very_same_times(period_s, start
             knowledge=lambda: None,
             measurements={measured.key: measured},
         )
-        ManagerHost("outside_managers:AnyGrid", 1, system, bus, may_rest=may_rest)
+        ManagerHost(f"{OUTSIDE}:AnyGrid", 1, system, bus, may_rest=may_rest)
         for time in told:
             call_at(env, time * period_s, lambda _, publish=bus.publish: publish(FAILURE))
         env.run(until=12.0 * period_s)

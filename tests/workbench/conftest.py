@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import pytest
 
 from suave_des.cli.main import main
 from suave_des.resources import shipped_folder
 from suave_des.workbench import KnowledgeBase
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "knowledge"))
 
 
 @pytest.fixture(scope="session")

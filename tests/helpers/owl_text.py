@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
+from pathlib import Path
 from xml.sax.saxutils import escape
+
+MakeOntology = Callable[..., Path]
+"""Makes a changed copy of suave.owl: the fixture `suave_copy`."""
 
 SUAVE = "http://www.metacontrol.org/suave#"
 TOMASYS = "http://metacontrol.org/tomasys#"

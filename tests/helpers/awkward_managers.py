@@ -1,4 +1,4 @@
-"""Managers that misbehave; given to campaigns as awkward_managers:CLASS."""
+"""Managers that misbehave; given to campaigns as tests.helpers.awkward_managers:CLASS."""
 
 from __future__ import annotations
 

@@ -1,0 +1,1 @@
+"""Long-running checks and measurements, each run as `python benchmarks/NAME.py`."""
