@@ -15,8 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from suave_des.estimates import estimate
-from suave_des.scenario.loader import load_scenario
-from suave_des.scenario.overrides import with_values
+from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
 
 MANAGERS = ("none", "random", "metacontrol")

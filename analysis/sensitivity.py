@@ -21,8 +21,7 @@ from SALib.sample import morris as sample_morris
 
 from suave_des.calibration.parameters import read_parameters
 from suave_des.resources import find
-from suave_des.scenario.loader import LoadedScenario, load_scenario
-from suave_des.scenario.overrides import with_values
+from suave_des.scenario.loader import LoadedScenario, load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
 
 MANAGERS = ("none", "random", "metacontrol")

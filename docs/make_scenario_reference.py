@@ -13,12 +13,11 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from suave_des.scenario.distributions import LONGEST_S, Choice, Exponential, Normal, Uniform
-from suave_des.scenario.models import Scenario
+from suave_des.scenario.models import ManagerSettings, Scenario
+from suave_des.scenario.quantities import LONGEST_S, Choice, Exponential, Normal, Uniform
 from suave_des.scenario.revision import Revision
 from suave_des.scenario.schema import field_docs
-from suave_des.scenario.settings import ManagerSettings
-from suave_des.scenario.signals import ConstantSignal, SinusoidSignal, StepSignal, TableSignal
+from suave_des.scenario.signal_kinds import ConstantSignal, SinusoidSignal, StepSignal, TableSignal
 
 PAGE = Path(__file__).parent / "reference" / "scenario.md"
 SIGNALS = (SinusoidSignal, ConstantSignal, StepSignal, TableSignal)

@@ -10,8 +10,7 @@ if _TYPE_CHECKING:
     from suave_des.api import resume_campaign, run_campaign, stream_campaign
     from suave_des.campaign.single import run_mission
     from suave_des.errors import InputError, MissionError
-    from suave_des.scenario.loader import load_scenario
-    from suave_des.scenario.overrides import with_values
+    from suave_des.scenario.loader import load_scenario, with_values
 
 __version__ = "0.1.0"
 
@@ -34,7 +33,7 @@ _HOMES = {
     "run_campaign": "suave_des.api",
     "run_mission": "suave_des.campaign.single",
     "stream_campaign": "suave_des.api",
-    "with_values": "suave_des.scenario.overrides",
+    "with_values": "suave_des.scenario.loader",
 }
 """Where the names are that the package itself has; each module is imported when its name is first used."""
 

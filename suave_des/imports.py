@@ -14,11 +14,10 @@ _one_at_a_time: Final = threading.RLock()
 
 
 @contextmanager
-def collecting_later() -> Iterator[None]:
-    """Look for no garbage meanwhile: what imports and the reading of files make, stays.
+def gc_paused() -> Iterator[None]:
+    """Pause the garbage collector: the objects that imports and the reading of files create, stay.
 
-    To look through it again and again, as Python does whenever there is a little more of it, takes a seventh of the
-    time that a process needs until it can work.
+    Repeated collections while they are created take a seventh of the time that a process needs to start.
     """
     was_enabled = gc.isenabled()
     gc.disable()

@@ -1,4 +1,4 @@
-"""Ctrl-C and kill, kept waiting while something must not be left half done."""
+"""Deferral of Ctrl-C and kill while something must not be left half done."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
 
 
 @contextmanager
-def interrupts_later() -> Iterator[None]:
-    """Ctrl-C and kill are heard at the end, if they are heard by Python at all.
+def signals_deferred() -> Iterator[None]:
+    """Defer Ctrl-C and kill to the end of the block, if Python handles them at all.
 
-    To block them would not do: the system gives them to any thread that does not, those of numpy among them, and
-    Python then interrupts the main thread all the same. Processes that are started do not inherit this.
+    Blocking them would not do: the system delivers them to any thread that does not block them, those of numpy among
+    them, and Python then interrupts the main thread all the same. Processes started meanwhile do not inherit this.
     """
     if threading.current_thread() is not threading.main_thread():  # others are not interrupted
         yield

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import suave_des
 from suave_des.errors import SuaveDesError
-from suave_des.interrupts import interrupts_later
+from suave_des.interrupts import signals_deferred
 
 _PROC = Path("/proc")
 _SAMPLE_S = 0.1
@@ -66,7 +66,7 @@ def run(arguments: Sequence[str], folder: Path, environment: Mapping[str, str]) 
         begun, cpu_before_s = time.perf_counter(), _cpu_s()
         process: subprocess.Popen[str] | None = None
         try:
-            with interrupts_later():  # or it would be left to itself in the middle of its start
+            with signals_deferred():  # or it would be left to itself in the middle of its start
                 process = subprocess.Popen(
                     [sys.executable, "-m", *arguments],
                     cwd=folder,
@@ -97,7 +97,7 @@ def _cpu_s() -> float:
 
 def _end(process: subprocess.Popen[str]) -> None:
     """End a process in which nobody is interested any more: as Ctrl-C does, so that it ends its workers."""
-    with interrupts_later():
+    with signals_deferred():
         if process.poll() is None:
             process.send_signal(signal.SIGINT)
             try:

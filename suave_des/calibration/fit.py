@@ -11,8 +11,7 @@ import numpy as np
 
 from suave_des.calibration.distance import SCALES, Array, energy_distance, missions_as_vectors
 from suave_des.imports import main_hidden
-from suave_des.scenario.loader import LoadedScenario
-from suave_des.scenario.overrides import with_values
+from suave_des.scenario.loader import LoadedScenario, with_values
 from suave_des.simulation.simulator import Simulator
 from suave_des.validation.shares import Share, count
 

@@ -9,11 +9,10 @@ from pydantic import Field, ValidationError, model_validator
 
 from suave_des.calibration.fit import FreeParameter
 from suave_des.errors import InputError
-from suave_des.scenario.distributions import Number, Strict, ordered
 from suave_des.scenario.layers import Layer
-from suave_des.scenario.loader import LoadedScenario
-from suave_des.scenario.overrides import value_at, with_values
+from suave_des.scenario.loader import LoadedScenario, value_at, with_values
 from suave_des.scenario.problems import input_error
+from suave_des.scenario.quantities import Number, Strict, ordered
 from suave_des.scenario.yamlfile import read_yaml
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from suave_des.calibration.distance import Array, energy_distance
 from suave_des.calibration.fit import Evaluation, FreeParameter, Problem, evaluator, simulate
-from suave_des.scenario.overrides import with_values
+from suave_des.scenario.loader import with_values
 from suave_des.simulation.simulator import Simulator
 
 POINTS = 9

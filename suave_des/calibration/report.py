@@ -12,7 +12,7 @@ import yaml
 
 from suave_des.calibration.fit import Evaluation, FreeParameter, Problem
 from suave_des.calibration.profile import Profile
-from suave_des.scenario.overrides import value_at, with_values
+from suave_des.scenario.loader import value_at, with_values
 
 SCENARIO, TABLE, RECORD, FIGURE = "fitted.yaml", "parameters.csv", "calibration.json", "profiles.png"
 FILES = (SCENARIO, TABLE, RECORD, FIGURE)

@@ -31,9 +31,9 @@ from suave_des.campaign.store import (
 )
 from suave_des.campaign.variation import Variation, vary
 from suave_des.errors import InputError
-from suave_des.imports import collecting_later
+from suave_des.imports import gc_paused
 from suave_des.managing.registry import manager_class
-from suave_des.scenario.bases import Files
+from suave_des.scenario.layers import Files
 from suave_des.scenario.loader import LoadedScenario, load_scenario
 
 if TYPE_CHECKING:
@@ -285,7 +285,7 @@ def _read(request: Request, sheet: Sheet | None) -> tuple[LoadedScenario, Variat
         loaded, variation = vary(loaded, request.sweep, request.perturbations, request.runs_per_draw, request.seed)
     except InputError as error:
         raise error if sheet is None else sheet.located(error) from None
-    with collecting_later():
+    with gc_paused():
         inputs = check_knowledge(loaded, request.managers, given=given)
     return loaded, variation, inputs if sheet is None else {**inputs, **sheet.inputs}
 

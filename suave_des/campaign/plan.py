@@ -7,10 +7,9 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from itertools import islice
 from typing import NamedTuple
 
-from suave_des.errors import InputError
-from suave_des.imports import collecting_later
+from suave_des.errors import InputError, shown
+from suave_des.imports import gc_paused
 from suave_des.managing.registry import manager_class
-from suave_des.scenario.wording import shown
 
 RUNS_LIMIT = 1_000_000
 SEED_LIMIT = 2**63 - 1
@@ -97,7 +96,7 @@ def check_plan(managers: Sequence[str], runs: int, workers: int) -> None:
     if not managers:
         raise InputError("no managers are given", remedy="for instance none,random,metacontrol")
     for place, manager in enumerate(managers):
-        with collecting_later():  # it is imported
+        with gc_paused():  # it is imported
             manager_class(manager)
         if manager in managers[:place]:
             raise InputError(f"manager {manager!r} is given twice", remedy="name each manager once")

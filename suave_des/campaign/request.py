@@ -13,10 +13,9 @@ from typing import Any
 
 from suave_des.campaign.early_stop import parse_until_ci
 from suave_des.campaign.provenance import versions
-from suave_des.errors import InputError
+from suave_des.errors import InputError, shown
 from suave_des.managing.registry import manager_class
 from suave_des.scenario.loader import LoadedScenario
-from suave_des.scenario.wording import shown
 
 _LONGEST_TIME_OUT_S = 1e6
 

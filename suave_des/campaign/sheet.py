@@ -9,13 +9,11 @@ from typing import Annotated, Any
 
 from pydantic import Field, ValidationError
 
-from suave_des.errors import InputError
+from suave_des.errors import InputError, KeyPath, shown
 from suave_des.resources import find
-from suave_des.scenario.bases import Files, find_named
-from suave_des.scenario.distributions import Number, Strict
-from suave_des.scenario.layers import Layer
+from suave_des.scenario.layers import Files, Layer, find_named
 from suave_des.scenario.problems import input_error
-from suave_des.scenario.wording import KeyPath, shown
+from suave_des.scenario.quantities import Number, Strict
 
 FORMAT = 1
 """Version of the format."""

@@ -11,12 +11,10 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from suave_des.campaign.sweep import METHODS, SOBOL_DIMENSIONS, Sample, Sweep
-from suave_des.errors import InputError
-from suave_des.scenario.distributions import Distribution, stated
-from suave_des.scenario.loader import LoadedScenario
+from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.scenario.loader import LoadedScenario, value_at, with_values
 from suave_des.scenario.models import Mission
-from suave_des.scenario.overrides import value_at, with_values
-from suave_des.scenario.wording import did_you_mean, shown
+from suave_des.scenario.quantities import Distribution, stated
 
 _FORMS = ("grid", "zip", "sample")
 _CHECKED_POINTS = 300

@@ -21,8 +21,8 @@ from multiprocessing.process import BaseProcess
 from typing import TYPE_CHECKING
 
 from suave_des.errors import SuaveDesError
-from suave_des.imports import collecting_later, main_hidden
-from suave_des.interrupts import INTERRUPTS, interrupts_later
+from suave_des.imports import gc_paused, main_hidden
+from suave_des.interrupts import INTERRUPTS, signals_deferred
 
 if TYPE_CHECKING:
     from suave_des.campaign.outcomes import Job
@@ -121,7 +121,7 @@ class StartWorker:
 def interrupts_held() -> Iterator[None]:
     """Hold Ctrl-C and kill back while a worker starts: it inherits that, so that they reach this process alone."""
     resource_tracker.ensure_running()  # or the first worker's start starts it, which lets them through again
-    with interrupts_later():
+    with signals_deferred():
         before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
         try:
             yield
@@ -153,7 +153,7 @@ def end(workers: Sequence[Worker]) -> None:
 def _work(connection: Connection) -> None:
     """Life of a worker process: a job and chunks in, outcomes out, until there are no more or the parent is gone."""
     try:
-        with collecting_later():
+        with gc_paused():
             from suave_des.campaign.missions import MissionRunner  # with it comes the compiler, before the job is there
             from suave_des.managing.registry import is_built_in
 

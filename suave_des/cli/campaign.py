@@ -22,7 +22,7 @@ from suave_des.cli.options import (
     command_line,
 )
 from suave_des.errors import InputError
-from suave_des.imports import collecting_later
+from suave_des.imports import gc_paused
 
 if TYPE_CHECKING:
     from suave_des.campaign.campaign import CampaignResult
@@ -154,7 +154,7 @@ def campaign(
         raise InputError(f"{missing} is missing", remedy="see suave-des campaign --help")
     useful = workers if names is None or runs is None else min(workers, len(names) * runs)
     with _started_ahead(useful if scheduler is None else 1) as ready:
-        with collecting_later():
+        with gc_paused():
             from suave_des.campaign.campaign import resume_campaign, run_campaign
             from suave_des.cli.console import output, progress
             from suave_des.cli.tables import print_stops, print_summary

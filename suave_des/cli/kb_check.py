@@ -56,7 +56,8 @@ def check(
 
     Exit status: 0 nothing to complain of; 1 findings; 2 something cannot be read.
     """
-    from suave_des.scenario.loader import MISSION_FUNCTIONS, load_scenario
+    from suave_des.domain import MISSION_FUNCTIONS
+    from suave_des.scenario.loader import load_scenario
     from suave_des.workbench.check import Subject
     from suave_des.workbench.check import check as find
     from suave_des.workbench.findings import Level, fails

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-MAINTAIN_MOTION = "f_maintain_motion"
-SEARCH = "f_generate_search_path"
-FOLLOW = "f_follow_pipeline"
-RECHARGE = "generate_recharge_path"
+from suave_des.domain import FOLLOW_PIPELINE as FOLLOW
+from suave_des.domain import GENERATE_RECHARGE_PATH as RECHARGE
+from suave_des.domain import GENERATE_SEARCH_PATH as SEARCH
+from suave_des.domain import MAINTAIN_MOTION as MAINTAIN_MOTION
+
+__all__ = ["FOLLOW", "MAINTAIN_MOTION", "RECHARGE", "SEARCH", "Task"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,8 +21,8 @@ from suave_des.managed.task import SEARCH, Task
 from suave_des.managing.base import AdaptationProcess, Bounds, ManagedSystem, ManagingSubsystem
 from suave_des.managing.situations import UNGROUNDED, Situations, Values, cancelled, executed, reported, requested
 from suave_des.monitor.diagnostics import Diagnostic, Kind
-from suave_des.scenario.distributions import draw
 from suave_des.scenario.modes import UNGROUND_MODE
+from suave_des.scenario.quantities import draw
 
 _memories: WeakKeyDictionary[Deliberation, dict[object, Situations]] = WeakKeyDictionary()
 """Situations that were met, by what is the same in a mission."""

@@ -17,11 +17,11 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 from matplotlib.transforms import Bbox
 
+from suave_des.domain import SEA_BED_Z_M
 from suave_des.report import style
 from suave_des.report.mission import MissionRecord, read_mission
 
 _IDLE_MODES = ("", "fd_unground")
-_SEA_BED_Z_M = -20.0
 _ZOOM_MARGIN_M = 0.6
 _PIPELINE_COLOUR, _PIPELINE_WIDTH = "#CFCFCF", 4.0
 _VISIBILITY_COLOUR = "#A8A8A8"
@@ -186,7 +186,7 @@ def _search_frame(record: MissionRecord) -> Bbox:
 
 
 def _draw_over_time(axes: Axes, record: MissionRecord, colours: dict[str, str], marks: list[_Mark]) -> None:
-    way = record.trajectory.assign(altitude_m=record.trajectory["z_m"] - _SEA_BED_Z_M)
+    way = record.trajectory.assign(altitude_m=record.trajectory["z_m"] - SEA_BED_Z_M)
     axes.plot(way["t_s"], way["visibility_m"], color=_VISIBILITY_COLOUR, lw=1.0)
     _draw_way(axes, MissionRecord(record.metrics, record.scenario, record.events, way), colours, "t_s", "altitude_m")
     top = max(way["altitude_m"].max(), way["visibility_m"].max()) * 1.18

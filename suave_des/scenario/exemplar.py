@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from suave_des.errors import InputError
+from suave_des.errors import InputError, KeyPath, place_text
 from suave_des.resources import find, shipped_folder
-from suave_des.scenario.bases import Files, scenario_layer
 from suave_des.scenario.exemplar_campaign import Campaign, campaign_of
 from suave_des.scenario.exemplar_nodes import (
     COUNTERPARTS,
@@ -24,10 +23,9 @@ from suave_des.scenario.exemplar_nodes import (
     read_configuration,
 )
 from suave_des.scenario.exemplar_text import Entry, campaign_text, scenario_text
-from suave_des.scenario.layers import Layer, Place, merge
+from suave_des.scenario.layers import Files, Layer, Location, merge, scenario_layer
 from suave_des.scenario.loader import LoadedScenario, load_layer
 from suave_des.scenario.models import ThrusterEvent
-from suave_des.scenario.wording import KeyPath, place_text
 
 _EVENTS: KeyPath = ("thruster_events",)
 _MODES: KeyPath = ("modes_file",)
@@ -160,16 +158,16 @@ def _checked(
         InputError: a value cannot be right, or two modes files are given.
     """
     data: dict[str, Any] = {}
-    places: dict[KeyPath, Place] = {(): Place(0, 1, out)}
+    places: dict[KeyPath, Location] = {(): Location(0, 1, out)}
     for path, found in settings.items():
         here = data
         for key in path[:-1]:
             here = here.setdefault(str(key), {})
         here[str(path[-1])] = found.value
-        places[path] = Place(0, found.line, found.document.path)
+        places[path] = Location(0, found.line, found.document.path)
         for index in range(len(found.value) if isinstance(found.value, list) else 0):
             line = found.document.line((*found.key_path, index))
-            places[(*path, index)] = Place(0, line, found.document.path)
+            places[(*path, index)] = Location(0, line, found.document.path)
     if "battery_monitor" in configuration.nodes:
         data.setdefault("battery", {})
     if configuration.modes:
@@ -179,7 +177,7 @@ def _checked(
                 "there are two System Modes files", file=others[0].path, remedy=f"give one: {first.path} is the other"
             )
         data["modes_file"] = str(first.path.resolve())
-        places[_MODES] = Place(0, 1, first.path)
+        places[_MODES] = Location(0, 1, first.path)
     try:
         return load_layer(files, merge(below, Layer(data, places)), out)
     except InputError as error:

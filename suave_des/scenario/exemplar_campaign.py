@@ -9,11 +9,9 @@ from difflib import get_close_matches
 from pathlib import PurePath
 from typing import Any
 
-from suave_des.errors import InputError
+from suave_des.errors import InputError, shown
 from suave_des.scenario.exemplar_nodes import COUNTERPARTS, RUNNER, Found, no_counterpart
-from suave_des.scenario.loader import LoadedScenario
-from suave_des.scenario.overrides import value_at
-from suave_des.scenario.wording import shown
+from suave_des.scenario.loader import LoadedScenario, value_at
 
 _INTERVAL = "_random_interval"
 _NOMINAL = {"initial_pos_x": -17.0, "initial_pos_y": 2.0}

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from suave_des.errors import InputError
+from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH
+from suave_des.errors import InputError, KeyPath, did_you_mean, place_text
 from suave_des.scenario.modes import modes_of
-from suave_des.scenario.wording import KeyPath, did_you_mean, place_text
 from suave_des.scenario.yamlfile import YamlDocument, read_yaml
 
 RUNNER = "suave_runner_node"
@@ -23,8 +23,8 @@ _SIGNAL = ("signals", "water_visibility")
 COUNTERPARTS: Mapping[str, Mapping[str, KeyPath]] = {
     "mission_node": {
         "time_limit": ("mission", "time_limit_s"),
-        "f_generate_search_path_mode": ("default_modes", "f_generate_search_path"),
-        "f_follow_pipeline_mode": ("default_modes", "f_follow_pipeline"),
+        "f_generate_search_path_mode": ("default_modes", GENERATE_SEARCH_PATH),
+        "f_follow_pipeline_mode": ("default_modes", FOLLOW_PIPELINE),
     },
     "water_visibility_observer_node": {
         "qa_publishing_period": (*_SIGNAL, "publishing_period_s"),
@@ -36,7 +36,7 @@ COUNTERPARTS: Mapping[str, Mapping[str, KeyPath]] = {
     "thruster_monitor": {"thruster_events": ("thruster_events",)},
     "task_bridge": {
         "adapt_period": ("managers", "random", "adaptation_period_s"),
-        "f_generate_search_path_mode": ("default_modes", "f_generate_search_path"),
+        "f_generate_search_path_mode": ("default_modes", GENERATE_SEARCH_PATH),
     },
     "battery_monitor": {
         "discharge_time": ("battery", "discharge_time_s"),

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from suave_des.errors import KeyPath
 from suave_des.scenario.exemplar_campaign import Campaign
 from suave_des.scenario.models import Scenario
-from suave_des.scenario.wording import KeyPath
 
 _COMMENT_COLUMN = 43
 _SPACES_A_LEVEL = 2

@@ -1,15 +1,17 @@
-"""Layers of a scenario: a file merged deeply over its base, each value knowing its file and line."""
+"""A scenario file merged over the files that it builds on, each value with its file and line."""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from suave_des.errors import InputError
-from suave_des.scenario.wording import KeyPath, place_text
-from suave_des.scenario.yamlfile import YamlDocument
+from suave_des.errors import InputError, KeyPath, did_you_mean, place_text, shown
+from suave_des.resources import find, shipped_folder
+from suave_des.scenario.revision import Revision
+from suave_des.scenario.yamlfile import YamlDocument, read_bytes, read_yaml
 
 _KIND_KEYS = ("kind", "distribution")
 """Keys that say what a mapping is: one of another kind replaces the base's, whose keys would not fit."""
@@ -18,7 +20,7 @@ _REMOVABLE_IN: tuple[KeyPath, ...] = (("signals",), ("knowledge", "values"))
 """Mappings of freely named entries, in which a null removes the base's entry."""
 
 
-class Place(NamedTuple):
+class Location(NamedTuple):
     """Where a value stands; depth 0 is the file that the user named, its base is 1, and so on."""
 
     depth: int
@@ -31,16 +33,16 @@ class Layer:
     """Plain data of one or several merged files, with the place of each key path."""
 
     data: dict[str, Any]
-    places: Mapping[KeyPath, Place]
+    places: Mapping[KeyPath, Location]
 
     @staticmethod
     def of(document: YamlDocument, depth: int) -> Layer:
         """The layer of one file."""
-        places = {path: Place(depth, line, document.path) for path, line in document.lines.items()}
+        places = {path: Location(depth, line, document.path) for path, line in document.lines.items()}
         return Layer(document.data, places)
 
-    def place(self, key_path: KeyPath) -> Place:
-        """Place of a key path, or of the nearest part that holds it."""
+    def place(self, key_path: KeyPath) -> Location:
+        """Location of a key path, or of the nearest part that holds it."""
         for length in range(len(key_path), 0, -1):
             if (place := self.places.get(key_path[:length])) is not None:
                 return place
@@ -102,3 +104,134 @@ def _merge(base: dict[str, Any], over: dict[str, Any], path: KeyPath, replaced: 
 
 def _same_kind(base: dict[str, Any], over: dict[str, Any]) -> bool:
     return all(over[key] == base.get(key, over[key]) for key in _KIND_KEYS if key in over)
+
+
+_ONTOLOGY_LIMIT_BYTES = 100_000_000
+_CHAIN_LIMIT = 20
+_REVISIONS = "scenarios/revisions"
+
+
+class Files:
+    """Reads files and keeps the hash of each, for a manifest.
+
+    Attributes:
+        inputs: SHA-256 of each file read, as "shipped/KIND/NAME" if it is shipped, else its path as given.
+    """
+
+    def __init__(self) -> None:
+        """Nothing read yet."""
+        self.inputs: dict[str, str] = {}
+
+    def yaml(self, path: Path) -> YamlDocument:
+        """A YAML file."""
+        document = read_yaml(path)
+        self.note(path, document.sha256)
+        return document
+
+    def ontology(self, path: Path) -> None:
+        """An ontology, which is only hashed here."""
+        self.note(path, hashlib.sha256(read_bytes(path, _ONTOLOGY_LIMIT_BYTES)).hexdigest())
+
+    def note(self, path: Path, sha256: str) -> None:
+        """Keep the hash of a file that was read."""
+        self.inputs[_shown_name(path)] = sha256
+
+
+def _shown_name(path: Path) -> str:
+    for kind in ("ontology", "scenarios"):
+        folder = shipped_folder(kind)
+        if path.is_relative_to(folder):
+            return f"shipped/{kind}/{path.relative_to(folder).as_posix()}"
+    return path.as_posix()
+
+
+def scenario_layer(files: Files, path: Path, above: tuple[Path, ...] = ()) -> Layer:
+    """A scenario file merged over its base, its revision written out in full.
+
+    Args:
+        files: reader.
+        path: of the scenario.
+        above: files of which this one is the base.
+
+    Raises:
+        InputError: a file that cannot be read, or is its own base; a revision that is not known.
+    """
+    layer = Layer.of(files.yaml(path), len(above))
+    base = None
+    if "base" in layer.data:
+        base = find_named(layer, ("base",), layer.data["base"], "scenarios")
+        _check_chain(layer, ("base",), (*above, path, base))
+    layer = _with_whole_revision(files, layer.without("base"), len(above), inherited=base is not None)
+    if base is None:
+        return layer
+    below = scenario_layer(files, base, (*above, path))
+    if "revision" in layer.data and set(Revision.model_fields) <= set(layer.data["revision"]):
+        below = below.without("revision")
+    return merge(below, layer)
+
+
+def find_named(layer: Layer, key_path: KeyPath, name: object, kind: str, remedy: str | None = None) -> Path:
+    """A file that a layer names: beside the file in which its name stands, or shipped.
+
+    Raises:
+        InputError: there is none, with the line that names it.
+    """
+    if not isinstance(name, str) or not name:
+        raise layer.error(f"{shown(name)} is no file name", key_path, "a path, or the name of a shipped file")
+    try:
+        return find(name, kind, beside=layer.place(key_path).file.parent)
+    except InputError as error:
+        raise layer.error(f"{error.problem}: {shown(name)}", key_path, remedy or error.remedy) from None
+
+
+def _check_chain(layer: Layer, key_path: KeyPath, chain: tuple[Path, ...]) -> None:
+    resolved = [path.resolve() for path in chain]
+    if len(set(resolved)) < len(resolved) or len(resolved) > _CHAIN_LIMIT:
+        names = " -> ".join(path.name for path in chain)
+        raise layer.error(f"the bases never end: {names}", key_path, "a file must not be its own base")
+
+
+def _with_whole_revision(files: Files, layer: Layer, depth: int, *, inherited: bool) -> Layer:
+    """The layer with its revision written out; parts of an inherited one are left as they are."""
+    value = layer.data.get("revision")
+    if isinstance(value, dict) and "base" in value:
+        own = layer.below("revision").without("base")
+        whole = merge(_revision_layer(files, layer, ("revision", "base"), value["base"], depth + 1), own)
+    elif isinstance(value, dict):
+        missing = [key for key in Revision.model_fields if key not in value]
+        if missing and not inherited:
+            remedy = 'name the revision to start from, such as base: "2023", beside what differs from it'
+            raise layer.error(f"has no {missing[0]}", ("revision",), remedy)
+        return layer
+    elif "revision" in layer.data:
+        whole = _revision_layer(files, layer, ("revision",), value, depth + 1)
+    else:
+        return layer
+    return layer.replaced("revision", whole)
+
+
+def _revision_layer(
+    files: Files, named: Layer, key_path: KeyPath, name: object, depth: int, above: tuple[Path, ...] = ()
+) -> Layer:
+    """A revision by its name or path, merged over its own base."""
+    path = _revision_path(named, key_path, name)
+    _check_chain(named, key_path, (*above, path))
+    layer = Layer.of(files.yaml(path), depth)
+    if "base" not in layer.data:
+        return layer
+    below = _revision_layer(files, layer, ("base",), layer.data["base"], depth + 1, (*above, path))
+    return merge(below, layer.without("base"))
+
+
+def _revision_path(named: Layer, key_path: KeyPath, name: object) -> Path:
+    if isinstance(name, int | float) and not isinstance(name, bool):
+        name = f"{name:g}"  # 2023 and 1.5 need no quotes
+    shipped = sorted(path.stem for path in shipped_folder(_REVISIONS).glob("*.yaml"))
+    if not isinstance(name, str) or not name:
+        remedy = f"one of {', '.join(shipped)}, the path of a revision file, or a mapping with base"
+        raise named.error(f"{shown(name)} is no revision", key_path, remedy)
+    try:
+        return find(name, _REVISIONS, beside=named.place(key_path).file.parent)
+    except InputError:
+        remedy = f"{did_you_mean(name, shipped, 'shipped')}; or the path of a revision file"
+        raise named.error(f"there is no revision {shown(name)}", key_path, remedy) from None

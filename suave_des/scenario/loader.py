@@ -4,26 +4,25 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from importlib.metadata import entry_points
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
-from suave_des.errors import InputError
+from suave_des.domain import GENERATE_SEARCH_PATH, MISSION_FUNCTIONS
+from suave_des.errors import InputError, KeyPath, did_you_mean, shown
 from suave_des.resources import find
-from suave_des.scenario.bases import Files, find_named, scenario_layer
-from suave_des.scenario.layers import Layer
+from suave_des.scenario.layers import Files, Layer, Location, find_named, scenario_layer
 from suave_des.scenario.models import REASONERS, ManagerSettings, Scenario, TableSignal
 from suave_des.scenario.modes import UNGROUND_MODE, ModeTable, modes_of
 from suave_des.scenario.problems import input_error
-from suave_des.scenario.tables import Table, read_table
-from suave_des.scenario.wording import KeyPath, did_you_mean, shown
+from suave_des.scenario.signal_kinds import SignalTable, read_table
 
 MANAGER_GROUP = "suave_des.managers"
 """Entry point group in which packages register their managers."""
-MISSION_FUNCTIONS = ("f_maintain_motion", "f_generate_search_path", "f_follow_pipeline")
-"""Functions that the mission's two tasks need, so that a modes file must have them."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,7 @@ class LoadedScenario:
     ontologies: tuple[Path, ...]
     modes: ModeTable
     modes_path: Path
-    tables: Mapping[str, Table]
+    tables: Mapping[str, SignalTable]
     inputs: Mapping[str, str]
     layer: Layer = field(repr=False)
     rules: tuple[Path, ...] = ()
@@ -241,11 +240,11 @@ def check_modes(layer: Layer, scenario: Scenario, modes: ModeTable) -> None:
             raise layer.error(f"function {function} has no mode {shown(mode)}", key_path, remedy)
     for index, mode in enumerate(scenario.managers.bt.search_modes):
         listed: KeyPath = ("managers", "bt", "search_modes", index)
-        known = modes.modes("f_generate_search_path")
+        known = modes.modes(GENERATE_SEARCH_PATH)
         # The default names the shipped modes, which another modes file need not have: it matters only to bt.
         if layer.stands(listed) and mode not in known:
             remedy = did_you_mean(mode, known, f"modes in {modes.source}")
-            raise layer.error(f"f_generate_search_path has no mode {shown(mode)}", listed, remedy)
+            raise layer.error(f"{GENERATE_SEARCH_PATH} has no mode {shown(mode)}", listed, remedy)
 
 
 def _check_managers(layer: Layer, scenario: Scenario) -> None:
@@ -259,3 +258,82 @@ def _check_managers(layer: Layer, scenario: Scenario) -> None:
             raise layer.error(f"there is no manager {shown(name)} with settings", key_path, f"{remedy}, module:Class")
         if not isinstance(settings, dict):
             raise layer.error(f"{shown(settings)} is not a mapping", key_path, "write `key: value` lines under it")
+
+
+def with_values(loaded: LoadedScenario, values: Mapping[str, Any]) -> LoadedScenario:
+    """A scenario in which the values at some key paths are others.
+
+    Args:
+        loaded: the scenario to start from; it is left as it is.
+        values: new values by key path, such as "signals.water_visibility.period_s" or "thruster_events.0.time_s"; the
+            path of a distribution's own parameter ("calibration.altitude_error_m.mean") works where the scenario has
+            one, and a whole distribution (a mapping) may stand for a number.
+
+    Raises:
+        InputError: a path leads nowhere, or a value is not allowed there or names another file.
+    """
+    data = loaded.scenario.model_dump(mode="json")
+    for path, value in values.items():
+        set_value(data, path, value)
+    layer = Layer(data, {(): Location(0, 1, loaded.path)})
+    try:
+        scenario = Scenario.model_validate(data)
+    except ValidationError as error:
+        raise input_error(error, layer, Scenario) from None
+    if _named_files(scenario) != _named_files(loaded.scenario):
+        remedy = "write a scenario for each, with `base` and the files that differ"
+        raise InputError("files were read with the scenario and stay as they are", remedy=remedy)
+    check_modes(layer, scenario, loaded.modes)
+    return replace(loaded, scenario=scenario)
+
+
+def _named_files(scenario: Scenario) -> tuple[object, ...]:
+    tables = tuple((name, getattr(signal, "file", None)) for name, signal in sorted(scenario.signals.items()))
+    return scenario.knowledge.ontologies, scenario.knowledge.rules, scenario.modes_file, tables
+
+
+def value_at(loaded: LoadedScenario, path: str) -> Any:
+    """The value at a key path, as plain data.
+
+    Raises:
+        InputError: the path leads nowhere.
+    """
+    here: Any = loaded.scenario.model_dump(mode="json")
+    for part in path.split("."):
+        if not isinstance(here, dict | list):
+            raise InputError(f"{path}: {part} is below a plain value", remedy="leave the rest out")
+        here = _step(here, part, path)
+    return here
+
+
+def set_value(data: dict[str, Any], path: str, value: Any) -> None:
+    """Replace the value at a key path of a scenario as plain data.
+
+    Raises:
+        InputError: the path leads nowhere.
+    """
+    *parents, last = path.split(".")
+    here: Any = data
+    for depth, part in enumerate(parents):
+        here = _step(here, part, ".".join(parents[: depth + 1]))
+        if not isinstance(here, dict | list):
+            raise InputError(f"{path}: {'.'.join(parents[: depth + 1])} is a plain value", remedy="leave the rest out")
+    _step(here, last, path)
+    here[_key(here, last)] = value
+
+
+def _step(here: Any, part: str, path: str) -> Any:
+    key = _key(here, part)
+    if isinstance(here, list):
+        if isinstance(key, int) and 0 <= key < len(here):
+            return here[key]
+        raise InputError(f"{path}: there is no entry {part}", remedy=f"entries are 0 to {len(here) - 1}")
+    if key not in here:
+        close = get_close_matches(part, [str(each) for each in here], n=1)
+        known = ", ".join(sorted(str(each) for each in here))
+        raise InputError(f"{path}: unknown key", remedy=f"did you mean {close[0]}?" if close else f"known: {known}")
+    return here[key]
+
+
+def _key(here: Any, part: str) -> str | int:
+    return int(part) if isinstance(here, list) and part.isdigit() else part

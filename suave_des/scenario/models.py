@@ -7,40 +7,32 @@ import re
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
-from suave_des.scenario.distributions import (
-    Distribution,
-    Number,
-    Period,
-    Strict,
-    lower_bound,
-    stated,
-    wrong,
-)
+from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, SEA_BED_Z_M, SURFACE_Z_M
+from suave_des.errors import shown
 from suave_des.scenario.quantities import (
     Coordinate,
     CoordinateDistribution,
     CurrentDistribution,
     DelayDistribution,
+    Distribution,
     Duration,
     HeadingDistribution,
     Length,
+    Number,
     OffsetDistribution,
+    Period,
     Speed,
+    Strict,
     TimeDistribution,
     Within,
+    lower_bound,
+    stated,
+    wrong,
 )
 from suave_des.scenario.revision import Revision
-from suave_des.scenario.settings import (
-    BehaviourTreeSettings,
-    ManagerSettings,
-    MetacontrolSettings,
-    RandomSettings,
-    paired,
-)
-from suave_des.scenario.signals import ConstantSignal, Signal, SinusoidSignal, StepSignal, TableSignal
-from suave_des.scenario.wording import shown
+from suave_des.scenario.signal_kinds import ConstantSignal, Signal, SinusoidSignal, StepSignal, TableSignal
 
 __all__ = [
     "Battery",
@@ -71,8 +63,6 @@ FileName = Annotated[str, Field(min_length=1)]
 Reasoner = Literal["remembered", "pellet", "owlready2"]
 REASONERS: tuple[str, ...] = get_args(Reasoner)
 
-SEA_BED_Z_M = -20.0
-SURFACE_Z_M = 0.0
 THRUSTERS = 6
 _LONGEST_MISSION_S = 100_000.0
 
@@ -277,7 +267,59 @@ class Knowledge(Strict):
     """Which reasoner analyzes; owlready2 is the reference, and slow."""
 
 
-_DEFAULT_MODES = {"f_generate_search_path": "fd_spiral_low", "f_follow_pipeline": "fd_follow_pipeline"}
+def paired(part: Strict, one: str, other: str) -> None:
+    """Raise an error unless two lists of a part have the same length."""
+    lengths = len(getattr(part, one)), len(getattr(part, other))
+    if lengths[0] != lengths[1]:
+        raise wrong(f"{one} has {lengths[0]} entries, {other} {lengths[1]}", "give as many of both", other, one)
+
+
+class RandomSettings(Strict):
+    """The random manager."""
+
+    adaptation_period_s: Period = 15.0
+    """Period at which it picks modes."""
+
+
+class MetacontrolSettings(Strict):
+    """The metacontrol manager."""
+
+    reasoning_period_s: Period = 2.0
+    """Period of its MAPE-K loop."""
+
+
+class BehaviourTreeSettings(Strict):
+    """The behaviour tree manager of revision 1.5."""
+
+    tick_period_s: Period = 0.1
+    """Period at which the tree is ticked."""
+    visibility_thresholds_m: tuple[Number, ...] = (3.25, 2.25, 1.25)
+    """Visibility from which on each of search_modes is chosen; the first that is reached wins."""
+    search_modes: tuple[str, ...] = ("fd_spiral_high", "fd_spiral_medium", "fd_spiral_low")
+    """Search modes, one for each threshold."""
+    battery_limit: Number = 0.25
+    """Battery level below which the extended tree goes to recharge."""
+
+    @model_validator(mode="after")
+    def _paired(self) -> Self:
+        paired(self, "visibility_thresholds_m", "search_modes")
+        return self
+
+
+class ManagerSettings(Strict):
+    """Settings of managing subsystems by name; an outside manager finds its own under its own name."""
+
+    model_config = ConfigDict(extra="allow")
+
+    random: RandomSettings = RandomSettings()
+    """The random manager."""
+    metacontrol: MetacontrolSettings = MetacontrolSettings()
+    """The metacontrol manager."""
+    bt: BehaviourTreeSettings = BehaviourTreeSettings()
+    """The behaviour tree manager."""
+
+
+_DEFAULT_MODES = {GENERATE_SEARCH_PATH: "fd_spiral_low", FOLLOW_PIPELINE: "fd_follow_pipeline"}
 
 
 class Scenario(Strict):

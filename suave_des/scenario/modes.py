@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from suave_des.errors import InputError
+from suave_des.errors import InputError, KeyPath, did_you_mean, shown
 from suave_des.scenario.quantities import FARTHEST_M
-from suave_des.scenario.wording import KeyPath, did_you_mean, shown
 from suave_des.scenario.yamlfile import YamlDocument, read_yaml
 
 DEFAULT_MODE = "__DEFAULT__"

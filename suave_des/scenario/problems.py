@@ -10,11 +10,10 @@ from typing import Annotated, Any, Union
 from pydantic import BaseModel, Tag, ValidationError
 from pydantic_core import ErrorDetails
 
-from suave_des.errors import InputError
-from suave_des.scenario.distributions import LONGEST_S, Choice, Distribution, Exponential, Normal, Uniform
+from suave_des.errors import InputError, KeyPath, did_you_mean, place_text, shown
 from suave_des.scenario.layers import Layer
-from suave_des.scenario.signals import Signal
-from suave_des.scenario.wording import KeyPath, did_you_mean, place_text, shown
+from suave_des.scenario.quantities import LONGEST_S, Choice, Distribution, Exponential, Normal, Uniform
+from suave_des.scenario.signal_kinds import Signal
 
 
 def _tags(union: Any) -> list[str]:

@@ -6,16 +6,18 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
-from suave_des.scenario.distributions import (
+from suave_des.scenario.quantities import (
+    FARTHEST_M,
     Distribution,
+    Length,
     NotNegative,
+    OffsetDistribution,
     Period,
     Strict,
     lower_bound,
     upper_bound,
     wrong,
 )
-from suave_des.scenario.quantities import FARTHEST_M, Length, OffsetDistribution
 
 
 class CoordinatorRevision(Strict):

@@ -21,8 +21,7 @@ from yaml.reader import Reader, ReaderError
 from yaml.resolver import BaseResolver
 from yaml.scanner import Scanner
 
-from suave_des.errors import InputError
-from suave_des.scenario.wording import KeyPath, place_text, shown
+from suave_des.errors import InputError, KeyPath, place_text, shown
 
 SIZE_LIMIT_BYTES = 1_000_000
 NODE_LIMIT = 100_000

@@ -6,7 +6,7 @@ import random
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from suave_des.scenario.distributions import Distribution, draw
+from suave_des.scenario.quantities import Distribution, draw
 from suave_des.streams import Streams
 
 

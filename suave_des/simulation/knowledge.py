@@ -6,11 +6,12 @@ from decimal import Decimal
 from functools import lru_cache
 from pathlib import Path
 
+from suave_des.domain import MISSION_FUNCTIONS
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.deliberation import Deliberation
 from suave_des.knowledge.reasoners import make_reasoner
-from suave_des.scenario.loader import MISSION_FUNCTIONS, LoadedScenario
+from suave_des.scenario.loader import LoadedScenario
 
 
 def open_base(loaded: LoadedScenario) -> KnowledgeBase:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from suave_des.scenario.distributions import Distribution
 from suave_des.scenario.models import ConstantSignal, Signal, SinusoidSignal, StepSignal, TableSignal
-from suave_des.scenario.tables import Table
+from suave_des.scenario.quantities import Distribution
+from suave_des.scenario.signal_kinds import SignalTable
 from suave_des.world import signals
 
 Draw = Callable[[str, Distribution], float]
 
 
-def build_signal(name: str, description: Signal, tables: Mapping[str, Table], draw: Draw) -> signals.Signal:
+def build_signal(name: str, description: Signal, tables: Mapping[str, SignalTable], draw: Draw) -> signals.Signal:
     """The signal of one run.
 
     Args:

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from suave_des.errors import InputError
-from suave_des.scenario.wording import did_you_mean, shown
+from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.scenario.yamlfile import decode, read_bytes
 
 if TYPE_CHECKING:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from suave_des.scenario.distributions import Number, Strict, ordered, wrong
 from suave_des.scenario.layers import Layer
 from suave_des.scenario.problems import input_error
+from suave_des.scenario.quantities import Number, Strict, ordered, wrong
 from suave_des.scenario.yamlfile import read_yaml
 from suave_des.validation.statistics import Interval, share_interval
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from suave_des.errors import InputError, KnowledgeError
+from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
 from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.deliberation import Conclusion, Deliberation
 from suave_des.knowledge.model import facts_of
@@ -16,7 +16,6 @@ from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.situation import Triple
 from suave_des.knowledge.state import Decision, Fact, KnowledgeState
 from suave_des.knowledge.vocabulary import objective_name
-from suave_des.scenario.wording import did_you_mean, shown
 from suave_des.workbench.derivation import Clash, Derivation
 from suave_des.workbench.nearest import near_rules
 from suave_des.workbench.tracing import Tracer

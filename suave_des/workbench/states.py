@@ -7,19 +7,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from suave_des.errors import InputError, KnowledgeError
+from suave_des.domain import GENERATE_SEARCH_PATH, MAINTAIN_MOTION
+from suave_des.errors import InputError, KeyPath, KnowledgeError, did_you_mean, shown
 from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.planning import calls
 from suave_des.knowledge.situation import Lit
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.knowledge.vocabulary import TOMASYS, XSD, nearest
 from suave_des.scenario.models import Scenario
-from suave_des.scenario.wording import KeyPath, did_you_mean, shown
 from suave_des.scenario.yamlfile import YamlDocument, read_yaml
 
 UNGROUNDED: Final = "UNGROUNDED"
-SEARCH: Final = "f_generate_search_path"
-LASTING: Final = ("f_maintain_motion",)
+SEARCH: Final = GENERATE_SEARCH_PATH
+LASTING: Final = (MAINTAIN_MOTION,)
 _STATUSES: Final = {"components": "c_status", "objectives": "o_status"}
 _KEYS: Final = ("objectives", "groundings", "components", "measurements")
 

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suave_des.compiling import compiled
+from suave_des.domain import SEA_BED_Z_M as SEA_BED_Z_M
+from suave_des.domain import SURFACE_Z_M as SURFACE_Z_M
 
 FIELD_OF_VIEW_RAD = math.radians(60.0)
 VIEW_TANGENT = math.tan(FIELD_OF_VIEW_RAD / 2.0)
-SEA_BED_Z_M = -20.0
-SURFACE_Z_M = 0.0
 
 
 @cache

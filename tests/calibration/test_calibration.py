@@ -16,8 +16,7 @@ from suave_des.calibration.report import fitted_scenario, fitted_values, profile
 from suave_des.cli.main import main
 from suave_des.errors import InputError
 from suave_des.resources import shipped_folder
-from suave_des.scenario.loader import load_scenario
-from suave_des.scenario.overrides import value_at, with_values
+from suave_des.scenario.loader import load_scenario, value_at, with_values
 from suave_des.simulation.simulator import Simulator
 
 GAIN = "calibration.position_gain_per_s"

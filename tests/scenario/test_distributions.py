@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from suave_des.scenario.distributions import Distribution, draw, lower_bound, stated
+from suave_des.scenario.quantities import Distribution, draw, lower_bound, stated
 
 ADAPTER: TypeAdapter[Distribution] = TypeAdapter(Distribution)
 NUMBERS = st.floats(-1e6, 1e6)

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.errors import InputError
-from suave_des.scenario.tables import read_table
+from suave_des.scenario.signal_kinds import read_table
 
 
 def test_a_table_gives_times_and_values(write):

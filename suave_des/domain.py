@@ -1,0 +1,14 @@
+"""Facts of the exemplar that several rooms share: the depth of the water, and the names of the mission's functions."""
+
+from __future__ import annotations
+
+SEA_BED_Z_M = -20.0
+"""The sea bed is the plane of this height in the world frame (z up)."""
+SURFACE_Z_M = 0.0
+
+MAINTAIN_MOTION = "f_maintain_motion"
+GENERATE_SEARCH_PATH = "f_generate_search_path"
+FOLLOW_PIPELINE = "f_follow_pipeline"
+GENERATE_RECHARGE_PATH = "generate_recharge_path"
+MISSION_FUNCTIONS = (MAINTAIN_MOTION, GENERATE_SEARCH_PATH, FOLLOW_PIPELINE)
+"""Functions that the mission's two tasks need, so that a modes file must have them."""
