@@ -12,13 +12,13 @@ from typing import Any
 
 from suave_des.bench.children import Ended, run
 from suave_des.bench.machine import machine
-from suave_des.bench.mission_cost import MANAGER, SCENARIO, SEED
+from suave_des.bench.ratio import MANAGER, SCENARIO, SEED
 
 MISSIONS = 10_000
 SMALL, LARGE = 1_000, 100_000
 """Missions for which memory is compared."""
 _WORKERS = 2
-_COST_MISSIONS = 300
+_RATIO_MISSIONS = 100
 _STOCK_S = 20.0
 """Mission time that the loop with stock owlready2 and Pellet is run for: a reasoning step each 2 s."""
 
@@ -34,7 +34,7 @@ class Bench:
         missions: of a campaign.
         took_s: time that measuring took.
         campaigns: seconds (wall and CPU), missions a second and memory of each campaign, by its name.
-        cost: of a mission; see mission_cost.figures.
+        ratio: times of a mission and of its kernel calls; see ratio.figures.
         stock: of the loop with stock owlready2 and Pellet; see stock_loop.figures.
     """
 
@@ -42,7 +42,7 @@ class Bench:
     missions: int
     took_s: float
     campaigns: Mapping[str, Mapping[str, float | None]]
-    cost: Mapping[str, float]
+    ratio: Mapping[str, float]
     stock: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -67,7 +67,7 @@ def measure(missions: int = MISSIONS, *, large: bool = False, say: Say = lambda 
     with tempfile.TemporaryDirectory(prefix="suave-des-bench-", ignore_cleanup_errors=True) as name:
         lab = _Lab(Path(name), steps, say)
         campaigns = {"cold": lab.campaign("from a cold start", missions, _WORKERS)}
-        cost = lab.figures("missions beside bare events", "mission_cost", max(20, int(_COST_MISSIONS * quick)))
+        ratio = lab.figures("missions and their vehicle kernel", "ratio", max(20, int(_RATIO_MISSIONS * quick)))
         campaigns["warm"] = lab.campaign("with filled memory and caches", missions, _WORKERS)
         campaigns["one_worker"] = lab.campaign("the same", missions, 1)
         if small:
@@ -76,7 +76,7 @@ def measure(missions: int = MISSIONS, *, large: bool = False, say: Say = lambda 
             campaigns["large"] = lab.campaign("for their memory", LARGE, _WORKERS)
         stock = lab.figures("stock owlready2 and Pellet", "stock_loop", max(4.0, _STOCK_S * quick))
     took_s = time.perf_counter() - begun
-    return Bench(found_machine, missions, took_s, campaigns, cost, stock)
+    return Bench(found_machine, missions, took_s, campaigns, ratio, stock)
 
 
 class _Lab:

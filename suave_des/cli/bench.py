@@ -30,8 +30,8 @@ def bench(
 ) -> None:
     """Measure how fast missions are on this machine.
 
-    Takes some two minutes, best with nothing else running. Beside the figures stand the goals of the project, and
-    two stand-ins for what one would write otherwise. The memory and caches that you have are left alone.
+    Takes some two minutes, best with nothing else running. Beside the figures stand the goals of the project, and a
+    program as one would write it with stock libraries. Your own memory of inferences and caches are not used.
     """
     from suave_des.bench.bench import measure
     from suave_des.campaign.output import write_files
@@ -70,7 +70,7 @@ def _print(measured: Bench) -> None:
     for each in programs(measured):
         others.add_row(each.what, _time(each.mission_s), _times(each.times_a_mission), each.note)
     console.print()
-    print_table(console, "A mission in one process, and in two programs that one would write otherwise", others)
+    print_table(console, "A mission in one process, here and with stock libraries", others)
     if is_busy(measured.machine):
         console.print(
             "\nThe machine was busy with other things before this began: what took time would take less alone."
@@ -95,7 +95,7 @@ def _json(measured: Bench) -> str:
     from suave_des.campaign.output import json_text
 
     rows = {
-        "format": 1,
+        "format": 2,
         "command": command_line(),
         **asdict(measured),
         "rows": [asdict(row) for row in goal_rows(measured)],

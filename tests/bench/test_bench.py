@@ -11,18 +11,17 @@ import time
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import ClassVar
-from unittest.mock import patch
 
 import jsonschema
+import numpy as np
 import pytest
-import simpy
 
 import suave_des
 from suave_des.bench.bench import Bench
 from suave_des.bench.children import MeasurementError, run
 from suave_des.bench.goals import goal_rows, programs
 from suave_des.bench.machine import in_words, is_busy, machine
-from suave_des.bench.mission_cost import MANAGER, SCENARIO, SEED, bare_program, count, kernel_ns_per_substep
+from suave_des.bench.ratio import MANAGER, SCENARIO, SEED, KernelCall, Replay, record
 from suave_des.bench.stock_loop import TASKS, Known, Mission, Reasoner
 from suave_des.cli.main import main
 from suave_des.cli.signals import told_by_exceptions
@@ -39,7 +38,7 @@ CAMPAIGN = {
 SCHEMA = {
     "type": "object",
     "properties": {
-        "format": {"const": 1},
+        "format": {"const": 2},
         "command": {"type": "array", "items": {"type": "string"}},
         "machine": {"type": "object", "required": ["processor", "cores", "load", "system", "python", "simpy"]},
         "missions": {"const": 20},
@@ -49,7 +48,7 @@ SCHEMA = {
             "additionalProperties": CAMPAIGN,
             "required": ["cold", "warm", "one_worker"],
         },
-        "cost": {"type": "object", "additionalProperties": NUMBER},
+        "ratio": {"type": "object", "additionalProperties": NUMBER},
         "stock": {"type": "object", "additionalProperties": NUMBER},
         "rows": {"type": "array", "items": {"type": "object", "required": ["what", "goal", "value", "unit", "met"]}},
         "programs": {"type": "array", "items": {"type": "object", "required": ["what", "mission_s", "note"]}},
@@ -107,7 +106,7 @@ class TestCommand:
         for row in figures["rows"]:
             line = next(line for line in out.splitlines() if line.startswith(row["what"]))
             assert row["goal"] in line
-        for program in ("suave-des, metacontrol", "bare SimPy loop", "SimPy with stock owlready2 and Pellet"):
+        for program in ("suave-des, metacontrol", "SimPy with stock owlready2 and Pellet"):
             assert program in out
         assert "extrapolated from" in out
         assert "measured in" in out
@@ -124,9 +123,9 @@ class TestCommand:
         figures = quick[2]
         for campaign in figures["campaigns"].values():
             assert campaign["missions"] / campaign["wall_s"] == pytest.approx(campaign["missions_a_second"])
-        cost = figures["cost"]
-        kernel_us = cost["substeps_a_mission"] * cost["kernel_ns_a_substep"] / 1000
-        assert cost["mission_cpu_us"] - kernel_us == pytest.approx(cost["mission_without_kernel_cpu_us"])
+        ratio = figures["ratio"]
+        assert ratio["mission_over_kernel"] == pytest.approx(ratio["mission_cpu_us"] / ratio["kernel_cpu_us"])
+        assert ratio["mission_over_kernel"] > 1
 
     @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="this system does not tell")
     def test_measures_memory_of_parent_and_workers(self, quick) -> None:
@@ -191,45 +190,38 @@ class TestCommand:
         assert Path("there.json").read_text() == "kept"
 
 
-class TestCounting:
-    def test_leaves_missions_as_they_are(self, simulator) -> None:
+class TestRatio:
+    def test_recording_leaves_missions_as_they_are(self, simulator) -> None:
         before = simulator.run(MANAGER, 3, SEED).metrics
-        counted = count(lambda: simulator.run(MANAGER, 3, SEED))
+        replay = record(lambda: simulator.run(MANAGER, 3, SEED))
         assert simulator.run(MANAGER, 3, SEED).metrics == before
-        assert count(lambda: simulator.run(MANAGER, 3, SEED)) == counted
+        assert len(record(lambda: simulator.run(MANAGER, 3, SEED)).calls) == len(replay.calls)
 
-    def test_a_shorter_mission_has_fewer_of_everything(self, simulator) -> None:
-        scenario = simulator.loaded.scenario
-        short = scenario.model_copy(update={"mission": scenario.mission.model_copy(update={"time_limit_s": 60.0})})
-        few = count(lambda: Simulator(replace(simulator.loaded, scenario=short)).run(MANAGER, 3, SEED))
-        many = count(lambda: simulator.run(MANAGER, 3, SEED))
-        assert few.events < many.events
-        assert few.substeps < many.substeps
-        assert few.substeps > 60 / 0.05
+    def test_a_replay_computes_the_same_track_each_time(self, simulator) -> None:
+        replay = record(lambda: simulator.run(MANAGER, 3, SEED))
+        tracks = [np.zeros(replay.shape) for _ in range(2)]
+        assert all(replay.cpu_ns(track) > 0 for track in tracks)
+        assert np.array_equal(*tracks)
+        assert np.count_nonzero(tracks[0].any(axis=1)) > 100 / 0.05  # rows of 0.05 s
 
-    def test_nothing_to_count_is_an_error(self) -> None:
-        with pytest.raises(RuntimeError, match="without events"):
-            count(lambda: None)
+    def test_a_call_that_was_not_recorded_is_an_error(self, simulator) -> None:
+        replay = record(lambda: simulator.run(MANAGER, 3, SEED))
+        track = np.zeros(replay.shape)
+        replay.cpu_ns(track)
+        Replay(replay.calls, track)
+        with pytest.raises(RuntimeError, match="was not recorded"):
+            Replay([replay.calls[0], *replay.calls[2:]], track)
+        with pytest.raises(RuntimeError, match="do not give the mission's track"):
+            Replay(replay.calls, track + 1.0)
 
-    @pytest.mark.parametrize(("events", "processes"), [(24, 12), (25, 12), (990, 12), (373, 40)])
-    def test_the_bare_program_has_as_many_events_and_processes(self, events, processes) -> None:
-        seen = []
+    def test_a_mission_without_calls_is_an_error(self) -> None:
+        with pytest.raises(RuntimeError, match="do not give the mission's track"):
+            record(lambda: None)
 
-        class Watching(simpy.Environment):
-            def step(self):
-                super().step()  # raises at the end, when there is no event left
-                seen.append("event")
-
-            def process(self, generator):
-                seen.append("process")
-                return simpy.Process(self, generator)
-
-        with patch.object(simpy, "Environment", Watching):
-            bare_program(events, processes)
-        assert (seen.count("event"), seen.count("process")) == (events, processes)
-
-    def test_the_kernel_takes_some_time(self) -> None:
-        assert kernel_ns_per_substep() > 0
+    def test_a_substep_takes_some_time(self, simulator) -> None:
+        replay = record(lambda: simulator.run(MANAGER, 3, SEED))
+        assert isinstance(replay.calls[0], KernelCall)
+        assert replay.ns_per_substep(np.zeros(replay.shape)) > 0
 
 
 class TestStockLoop:
@@ -277,14 +269,7 @@ class TestGoals:
         "parent_mb": 200.0,
         "worker_mb": 200.0,
     }
-    COST: ClassVar = {
-        "mission_without_kernel_over_bare": 1.5,
-        "kernel_ns_a_substep": 70.0,
-        "mission_wall_us": 1000.0,
-        "bare_wall_us": 500.0,
-        "events_a_mission": 400.0,
-        "processes_a_mission": 12.0,
-    }
+    RATIO: ClassVar = {"mission_over_kernel": 2.0, "kernel_ns_a_substep": 70.0, "mission_wall_us": 1000.0}
     MUCH: ClassVar = {"memory of a worker, 10,000 missions", "  the same for few and many: worker"}
     STOCK: ClassVar = {"inferences_measured": 10.0, "inferences_a_mission": 150.0, "mission_s": 150.0}
 
@@ -295,7 +280,7 @@ class TestGoals:
             "one_worker": {**self.CAMPAIGN, "wall_s": 9.8},
             "small": {**self.CAMPAIGN, "missions": 1000},
         }
-        return replace(Bench({}, 10_000, 60.0, campaigns, self.COST, self.STOCK), **changed)
+        return replace(Bench({}, 10_000, 60.0, campaigns, self.RATIO, self.STOCK), **changed)
 
     def test_met(self) -> None:
         assert {row.met for row in goal_rows(self.bench())} == {True}
@@ -323,7 +308,7 @@ class TestGoals:
         assert rows and all(row.met is None and row.measured == "not told by this system" for row in rows)
 
     def test_programs_are_compared_with_a_mission_here(self) -> None:
-        assert [each.times_a_mission for each in programs(self.bench())] == [1.0, 0.5, 150_000.0]
+        assert [each.times_a_mission for each in programs(self.bench())] == [1.0, 150_000.0]
 
     def test_can_be_written_as_json(self) -> None:
         assert json.loads(json.dumps(asdict(self.bench())))["missions"] == 10_000
