@@ -65,7 +65,7 @@ def add_rule(
     rule: Annotated[str, typer.Argument(metavar="RULE", help='The rule: "name: body -> head".')],
 ) -> None:
     """Add a rule to an OWL file, and leave the rest of it as it is."""
-    from suave_des.workbench.owl_edit import add_rule as add
+    from suave_des.workbench.rule_editor import add_rule as add
 
     added = add(file, rule)
     print(f"rule {added.name} is in {file} now; {file}.bak is as it was")
@@ -73,7 +73,7 @@ def add_rule(
 
 def remove_rule(file: OwlFile, name: RuleName) -> None:
     """Remove a rule from an OWL file, and leave the rest of it as it is."""
-    from suave_des.workbench.owl_edit import remove_rule as remove
+    from suave_des.workbench.rule_editor import remove_rule as remove
 
     remove(file, name)
     print(f"rule {name} is not in {file} any more; {file}.bak is as it was")
@@ -90,7 +90,7 @@ def disable_rule(file: OwlFile, name: RuleName) -> None:
 
 
 def _switch(file: Path, name: str, *, enabled: bool) -> None:
-    from suave_des.workbench.owl_edit import set_enabled
+    from suave_des.workbench.rule_editor import set_enabled
 
     word = "enabled" if enabled else "disabled"
     if set_enabled(file, name, enabled=enabled):

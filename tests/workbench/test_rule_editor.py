@@ -15,7 +15,7 @@ from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.knowledge.vocabulary import SWRLB
 from suave_des.resources import shipped_folder
-from suave_des.workbench.owl_edit import add_rule, remove_rule, set_enabled
+from suave_des.workbench.rule_editor import add_rule, remove_rule, set_enabled
 
 SEARCH = "f_generate_search_path"
 BATTERY = (
@@ -63,6 +63,7 @@ def test_add_switch_and_remove(owl: Path, style: str) -> None:
     (new,) = said(owl) - before
     assert new == ("Battery", BATTERY.partition(": ")[2], True)
     assert (owl.parent / "suave.owl.bak").read_bytes() == original
+    assert b"None" not in added
     at = next(n for n, (one, other) in enumerate(zip(original, added, strict=False)) if one != other)
     rest = original[at:]
     assert original[:at] + added[at : len(added) - len(rest)] + rest == added  # nothing but an insertion
