@@ -13,7 +13,7 @@ import re
 import shutil
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 from xml.parsers import expat
@@ -42,7 +42,6 @@ _NAMESPACES: Final = {"rdf": RDF_NS, "rdfs": RDFS, "owl": str(OWL), "swrl": SWRL
 _ENABLED: Final = SWRLA + "isRuleEnabled"
 #: In these encodings, markup and references to characters are written in the bytes of ASCII.
 _ENCODINGS: Final = ("UTF-8", "US-ASCII", "ASCII", "ISO-8859-1")
-_Prefixes = dict[str | None, str]
 #: What a file says of a rule: its name, whether it is enabled, its body and head.
 _Statement = tuple[str, bool, tuple[Any, Any]]
 
@@ -62,10 +61,11 @@ class _Document:
 
     def __init__(self, file: OntologyFile) -> None:
         parser = etree.XMLParser(huge_tree=True, no_network=True)  # read_ontology has refused entity bombs
-        self.root = etree.fromstring(file.content, parser)
-        if (self.root.getroottree().docinfo.encoding or "UTF-8").upper() not in _ENCODINGS:
+        root = etree.fromstring(file.content, parser)
+        if (root.getroottree().docinfo.encoding or "UTF-8").upper() not in _ENCODINGS:
             raise InputError("is not encoded in UTF-8", file=file.path, remedy="save it as UTF-8")
-        self.elements = [element for element in self.root if isinstance(element.tag, str)]
+        self.prefixes = {prefix: iri for prefix, iri in root.nsmap.items() if prefix}
+        self.elements = [element for element in root if isinstance(element.tag, str)]
         spans, self.closing = _spans(file.content)
         if len(spans) != len(self.elements):
             raise _cannot(file.path)
@@ -167,7 +167,7 @@ def add_rule(path: Path, text: str) -> Rule:
         )
     document = _Document(file)
     known = {str(subject) for subject in file.graph.subjects(RDF.type, None)}
-    added = _rule_xml(rule, document.root.nsmap, known)
+    added = _rule_xml(rule, document.prefixes, known)
     at = file.content.rfind(b"\n", 0, document.closing) + 1
     if file.content[at : document.closing].strip():
         at = document.closing
@@ -214,7 +214,7 @@ def set_enabled(path: Path, name: str, *, enabled: bool) -> bool:
         if not marks:
             tag = _TAG.match(changed)
             at = tag.end() if tag else 0
-            changed = changed[:at] + _mark_xml(document.root.nsmap, enabled=enabled) + changed[at:]
+            changed = changed[:at] + _mark_xml(document.prefixes, enabled=enabled) + changed[at:]
         content = content[:start] + changed + content[end:]
     _replace(file, content, lambda said: [(each[0], enabled, each[2]) if each[0] == name else each for each in said])
     return True
@@ -241,7 +241,7 @@ def _without(content: bytes, start: int, end: int) -> bytes:
     return content[:start] + content[blank.end() if blank and start == line else end :]
 
 
-def _rule_xml(rule: Rule, prefixes: _Prefixes, declared: Collection[str]) -> bytes:
+def _rule_xml(rule: Rule, prefixes: Mapping[str, str], declared: Collection[str]) -> bytes:
     """The elements to add to a file for a rule: declarations of what the file does not declare, and the rule."""
     variables = [triple[0] for triple in rule.triples if triple[2] == URIRef(SWRL + "Variable")]
     kinds = {
@@ -258,7 +258,7 @@ def _rule_xml(rule: Rule, prefixes: _Prefixes, declared: Collection[str]) -> byt
     return _inside(root)
 
 
-def _mark_xml(prefixes: _Prefixes, *, enabled: bool) -> bytes:
+def _mark_xml(prefixes: Mapping[str, str], *, enabled: bool) -> bytes:
     """The mark swrla:isRuleEnabled, as a line to insert below the first tag of a rule."""
     root = etree.Element(_DESCRIPTION, nsmap=prefixes)
     _add_property(root, URIRef(_ENABLED), _mark(enabled))
@@ -269,7 +269,7 @@ def _mark(enabled: bool) -> Literal:
     return Literal(str(enabled).lower(), datatype=URIRef(XSD + "boolean"))
 
 
-def _missing(prefixes: _Prefixes) -> dict[str, str]:
+def _missing(prefixes: Mapping[str | None, str]) -> dict[str, str]:
     """Prefixes for the namespaces that a file has none for; they are declared in the elements that are added."""
     missing = {wish: iri for wish, iri in _NAMESPACES.items() if iri not in prefixes.values()}
     return {wish + "_" if wish in prefixes else wish: iri for wish, iri in missing.items()}
