@@ -52,8 +52,7 @@ def _print(measured: Bench) -> None:
     from suave_des.bench.bench import MISSIONS
     from suave_des.bench.goals import MET, goal_rows, programs
     from suave_des.bench.machine import in_words, is_busy
-    from suave_des.cli.console import output
-    from suave_des.cli.tables import plain_table, print_table
+    from suave_des.cli.console import output, plain_table, print_table
 
     console = output()
     console.print(f"{in_words(measured.machine)}\n", soft_wrap=True, markup=False)

@@ -157,7 +157,7 @@ def campaign(
         with gc_paused():
             from suave_des.campaign.campaign import resume_campaign, run_campaign
             from suave_des.cli.console import output, progress
-            from suave_des.cli.tables import print_stops, print_summary
+            from suave_des.cli.summary import print_stops, print_summary
 
         with progress(str(resume or scenario), quiet=quiet) as show:
             if resume is not None:

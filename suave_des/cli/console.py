@@ -1,17 +1,39 @@
-"""Where commands print: styled on a terminal, plain and wide enough for the tables elsewhere."""
+"""Output of commands: styled on a terminal; elsewhere plain, and wide enough for the tables."""
 
 from __future__ import annotations
 
 import os
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 from rich.console import Console
+from rich.table import Table
+from rich.text import Text
 
 if TYPE_CHECKING:
     from suave_des.campaign.progress import OnProgress
+    from suave_des.simulation.result import Event, MissionMetrics, MissionResult
 
 _PLAIN_WIDTH = 120
+_LEAST_WIDTH = 72
+"""Lines of a timeline are not wrapped shorter than this: a narrower terminal wraps them itself."""
+_STYLES = {
+    "task_requested": "bold",
+    "task_done": "bold",
+    "mission_ended": "bold",
+    "pipeline_detected": "bold green",
+    "component_status": "red",
+    "first_measurement": "cyan",
+    "visibility_crossing": "cyan",
+    "inferred": "magenta",
+    "adaptation": "yellow",
+    "no_design_left": "red",
+    "refused": "red",
+    "mode_requested": "dim",
+}
+"""Of a timeline's events; one that is not here, such as an outside manager's, has none."""
 
 
 def output() -> Console:
@@ -23,12 +45,110 @@ def output() -> Console:
 
 
 def errors() -> Console:
-    """The console for what went wrong and for progress."""
+    """The console for errors and progress."""
     return Console(stderr=True, highlight=False)
 
 
 def progress(label: str, *, quiet: bool) -> AbstractContextManager[OnProgress | None]:
-    """Shows the progress of a campaign on standard error, unless nothing is to be said."""
+    """Show the progress of a campaign on standard error, unless `quiet`."""
     from suave_des.campaign.display import shown
 
     return shown(label, errors(), quiet=quiet)
+
+
+@contextmanager
+def mission_status(scenario: str, console: Console) -> Iterator[Callable[[float, float], None] | None]:
+    """Show the mission time reached until the mission ends; yields None where the console is no terminal.
+
+    Args:
+        scenario: its name, as given.
+        console: where to show it.
+    """
+    if not console.is_terminal:
+        yield None
+        return
+    with console.status(f"{scenario}: starting") as status:
+
+        def show(t_s: float, limit_s: float) -> None:
+            status.update(f"{scenario}: mission time {t_s:.0f} of {limit_s:.0f} s")
+
+        yield show
+
+
+def plain_table() -> Table:
+    """A table that reads well on a terminal and in a plain log."""
+    return Table(box=None, padding=(0, 1), pad_edge=False)
+
+
+def print_table(console: Console, title: str, table: Table) -> None:
+    """Print a table under its title."""
+    console.print(Text(title, "bold"))
+    print_trimmed(console, table)
+
+
+def print_trimmed(console: Console, table: Table) -> None:
+    """Print a table without trailing blanks."""
+    with console.capture() as lines:
+        console.print(table)
+    for line in lines.get().splitlines():
+        console.file.write(line.rstrip() + "\n")
+
+
+def number(value: object) -> str:
+    """Two decimals, as in the paper's table; empty for None."""
+    return f"{value:.2f}" if isinstance(value, float) else ""
+
+
+def interval(low: object, high: object) -> str:
+    """An interval; empty for None."""
+    return f"{low:.1f} to {high:.1f}" if isinstance(low, float) and isinstance(high, float) else ""
+
+
+def print_timeline(console: Console, result: MissionResult) -> None:
+    """Print a mission's events and metrics."""
+    metrics = result.metrics
+    title = f"{metrics.scenario}, manager {metrics.manager}, run {metrics.run}, seed {metrics.seed}"
+    sources = max((len(event.source) for event in result.events), default=0)
+    names = max((len(event.event) for event in result.events), default=0)
+    heading = f"\n{'time, s':>8}  {'source':<{sources}}  {'event':<{names}}  detail"
+    console.print(Text(title, "bold"), soft_wrap=True)
+    console.print(Text(heading, "italic"), soft_wrap=True)
+    # Where the console is no terminal an event is one line, for tools that search.
+    width = max(console.width, _LEAST_WIDTH) if console.is_terminal or "COLUMNS" in os.environ else None
+    for event in result.events:
+        console.print(_event_line(event, sources, names, width), soft_wrap=True)
+    console.print()
+    print_trimmed(console, _metrics_table(metrics))
+
+
+def _event_line(event: Event, sources: int, names: int, width: int | None) -> Text:
+    """An event; one that does not fit into a width has its detail in lines of its own."""
+    source, name = event.source.replace("_", " "), event.event.replace("_", " ")
+    time_text = f"{event.t_s:8.2f}  "
+    begin = f"{time_text}{source:<{sources}}  {name:<{names}}  "
+    line = f"{begin}{event.detail}"
+    if width is not None and len(line) > width:
+        indent = " " * (len(time_text) + 2)
+        detail = fill(event.detail, width, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)
+        line = f"{begin.rstrip()}\n{detail}"
+    text = Text(line, no_wrap=True)
+    text.stylize(_STYLES.get(event.event, ""), len(time_text))
+    return text
+
+
+def _metrics_table(metrics: MissionMetrics) -> Table:
+    table = Table.grid(padding=(0, 2))
+    table.add_column()
+    table.add_column(justify="right")
+    table.add_column()
+    reaction_s = metrics.mean_reaction_time_s
+    not_found = "" if metrics.pipeline_found else "not found: the time limit counts"
+    table.add_row("search time", f"{metrics.search_time_s:.1f} s", not_found)
+    table.add_row("distance inspected", f"{metrics.distance_inspected_m:.2f} m")
+    if reaction_s is None:
+        table.add_row("mean reaction time", "none", "no reaction was completed")
+    else:
+        table.add_row("mean reaction time", f"{reaction_s:.2f} s")
+    table.add_row("adaptations", str(metrics.adaptations))
+    table.add_row("mission duration", f"{metrics.mission_duration_s:.1f} s")
+    return table

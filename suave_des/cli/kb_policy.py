@@ -74,8 +74,7 @@ def policy(
 
 
 def _print_table(table: FunctionTable) -> None:
-    from suave_des.cli.console import output
-    from suave_des.cli.tables import plain_table, print_table
+    from suave_des.cli.console import output, plain_table, print_table
 
     shown = plain_table()
     others = [name for name, _ in table.rows[0].groundings if name != table.function]

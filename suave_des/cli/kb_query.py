@@ -51,8 +51,7 @@ def query(
     Without any option that gives a state, the ontologies alone are asked.
     """
     from suave_des.campaign.output import csv_text
-    from suave_des.cli.console import output
-    from suave_des.cli.tables import plain_table, print_trimmed
+    from suave_des.cli.console import output, plain_table, print_trimmed
     from suave_des.workbench import KnowledgeBase
     from suave_des.workbench.states import state_from
 

@@ -13,39 +13,27 @@ import typer
 from typer.core import TyperGroup
 
 from suave_des import __version__
-from suave_des.cli import (
-    bench,
-    calibrate,
-    campaign,
-    figure,
-    import_config,
-    kb,
-    reproduce,
-    run,
-    scenarios,
-    schema,
-    validate,
-)
+from suave_des.cli import bench, calibrate, campaign, kb, missions, reproduce, validate
 from suave_des.cli.options import remember_command_line
 from suave_des.cli.signals import exit_status, told_by_exceptions
 from suave_des.errors import InputError, SuaveDesError
 
 BAD_INPUT, MISSIONS_MISSING = 2, 3
-"""Exit statuses besides 0 and those of signals; 3: done, but missions have no row, because they failed."""
+"""Exit statuses besides 0 and those of signals; 3: done, but failed missions have no row."""
 
 
 class _Commands(TyperGroup):
-    """Takes interruptions before typer does, which would say nothing of what is kept."""
+    """Handles interruptions before typer does, which would not report what is kept."""
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command."""
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt as error:
-            raise typer.Exit(_tell(str(error) or "interrupted", exit_status())) from None
+            raise typer.Exit(_report(str(error) or "interrupted", exit_status())) from None
 
 
-def _tell(message: str, status: int) -> int:
+def _report(message: str, status: int) -> int:
     print("suave-des: " + " ".join(message.splitlines()), file=sys.stderr)
     return status
 
@@ -66,16 +54,16 @@ app = typer.Typer(
     epilog="Exit status: 0 done; 2 bad input; 3 done, but missions failed; 130 interrupted, 143 by kill.",
 )
 app.command("reproduce")(reproduce.reproduce)
-app.command("run")(run.run)
+app.command("run")(missions.run)
 app.command("campaign")(campaign.campaign)
 app.command("validate")(validate.validate)
 app.command("calibrate")(calibrate.calibrate)
 app.add_typer(kb.app, name="kb")
-app.command("figure")(figure.figure)
-app.command("import-config")(import_config.import_config)
+app.command("figure")(missions.figure)
+app.command("import-config")(missions.import_config)
 app.command("bench")(bench.bench)
-app.command("scenarios")(scenarios.scenarios)
-app.command("schema")(schema.schema)
+app.command("scenarios")(missions.scenarios)
+app.command("schema")(missions.schema)
 
 
 def _print_version(wanted: bool) -> None:
@@ -94,10 +82,10 @@ def _options(
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Entry point of the command `suave-des`: every error that is meant for the user is one line and an exit status.
+    """Run the command `suave-des`; an error that is meant for the user is reported in one line, with an exit status.
 
     Args:
-        arguments: of the command line; left out, the process's own. None at all: the help is printed.
+        arguments: of the command line; left out: the process's own. Without any, the help is printed.
 
     Raises:
         SystemExit: always, with the exit status.
@@ -105,30 +93,30 @@ def main(arguments: Sequence[str] | None = None) -> None:
     arguments = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     remember_command_line(arguments)
     atexit.unregister(gc.freeze)  # as of an earlier call
-    atexit.register(gc.freeze)  # or Python looks for garbage in all that was imported, which takes a tenth of a second
+    atexit.register(gc.freeze)  # a last collection of all that was imported would take a tenth of a second
     abandoned = _abandoned()
     command = typer.main.get_command(app)
     try:
         with told_by_exceptions():
             status = command.main(arguments, prog_name="suave-des", standalone_mode=False) or 0
     except SuaveDesError as error:
-        status = _tell(str(error), BAD_INPUT if isinstance(error, InputError) else MISSIONS_MISSING)
+        status = _report(str(error), BAD_INPUT if isinstance(error, InputError) else MISSIONS_MISSING)
     except Exception as error:
         # A wrong option or argument: a class that is private to typer, and was click's in earlier versions of it.
         if not hasattr(error, "format_message"):
             raise
-        status = _tell(_usage_line(error), BAD_INPUT)
+        status = _report(_usage_line(error), BAD_INPUT)
     _leave(status, by_force=_abandoned() > abandoned)
 
 
 def _abandoned() -> int:
-    """How often a reasoner was given up on in this process."""
+    """Count the reasoners that this process has abandoned after a time-out."""
     limit = sys.modules.get("suave_des.knowledge.limit")
     return 0 if limit is None else int(limit.times_abandoned())
 
 
 def _leave(status: int, *, by_force: bool) -> None:
-    """End with a status, even while a reasoner that was given up on still runs in Java, which cannot be stopped."""
+    """Exit with a status, even while an abandoned reasoner still runs in Java, which cannot be stopped."""
     if by_force:
         sys.stdout.flush()
         sys.stderr.flush()

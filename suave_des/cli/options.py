@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+import inspect
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, TypedDict
 
 import typer
 
@@ -37,6 +39,56 @@ Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress.")]
 Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="Replace results of the same kind that are in the output folder already.")
 ]
+
+
+class Replacements(TypedDict):
+    """What the options of replaces_files give, as keywords of load_scenario and whatever passes them on to it."""
+
+    ontologies: Sequence[Path]
+    rules: Sequence[Path]
+    disabled_rules: Sequence[str]
+    modes_file: Path | None
+    reasoner: str | None
+
+
+def replaces_files(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options --ontology, --rules, --disable-rule, --modes and --reasoner to a command.
+
+    The command has a keyword parameter `replacements`, which gets what they give:
+
+        @replaces_files
+        def show(scenario: Scenario, *, replacements: Replacements) -> None:
+            loaded = load_scenario(scenario, **replacements)
+    """
+    options: dict[str, Any] = {
+        "ontology": Ontologies,
+        "rules": RuleFiles,
+        "disable_rule": DisabledRules,
+        "modes": Modes,
+        "reasoner": Reasoner,
+    }
+
+    @functools.wraps(command)
+    def with_options(**given: Any) -> None:
+        ontology, rules, disable_rule, modes, reasoner = (given.pop(name) for name in options)
+        replacements = Replacements(
+            ontologies=ontology or (),
+            rules=rules or (),
+            disabled_rules=disable_rule or (),
+            modes_file=modes,
+            reasoner=reasoner,
+        )
+        command(**given, replacements=replacements)
+
+    own = inspect.signature(command, eval_str=True)
+    parameters = [each for each in own.parameters.values() if each.name != "replacements"]
+    parameters += [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=option)
+        for name, option in options.items()
+    ]
+    vars(with_options)["__signature__"] = own.replace(parameters=parameters)
+    with_options.__annotations__ = {each.name: each.annotation for each in parameters}
+    return with_options
 
 
 _arguments: list[str] = []

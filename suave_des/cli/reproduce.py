@@ -1,4 +1,4 @@
-"""suave-des reproduce: the paper's experiment, and its table beside ours."""
+"""suave-des reproduce: the paper's experiment, and its results beside the published ones."""
 
 from __future__ import annotations
 
@@ -10,16 +10,13 @@ import typer
 
 from suave_des.cli.campaign import exit_telling_failures
 from suave_des.cli.options import (
-    DisabledRules,
-    Modes,
-    Ontologies,
     Overwrite,
     Quiet,
-    Reasoner,
-    RuleFiles,
+    Replacements,
     Seed,
     Workers,
     command_line,
+    replaces_files,
 )
 
 if TYPE_CHECKING:
@@ -34,6 +31,7 @@ SCENARIO = "seams2023"
 _TEXT_WIDTH = 95
 
 
+@replaces_files
 def reproduce(
     runs: Annotated[int, typer.Option("--runs", help="Missions for each manager; the paper has 20.")] = 200,
     workers: Workers = 2,
@@ -43,15 +41,12 @@ def reproduce(
     ] = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
-    ontology: Ontologies = None,
-    rules: RuleFiles = None,
-    disable_rule: DisabledRules = None,
-    modes: Modes = None,
-    reasoner: Reasoner = None,
+    *,
+    replacements: Replacements,
 ) -> None:
     """Run the paper's experiment and compare the results.
 
-    Prints the table of the paper (SEAMS 2023, arXiv:2303.09220) beside ours.
+    Prints the table of the paper (SEAMS 2023, arXiv:2303.09220) beside the simulated results.
     """
     from suave_des.campaign.campaign import run_campaign
     from suave_des.campaign.output import write_files
@@ -69,14 +64,10 @@ def reproduce(
             seed,
             workers,
             out,
-            ontologies=ontology or (),
-            modes_file=modes,
-            reasoner=reasoner,
-            rules=rules or (),
-            disabled_rules=disable_rule or (),
             overwrite=overwrite,
             command=command_line(),
             on_progress=show,
+            **replacements,
         )
     comparison = compare(result.frame(), published)
     console = output()
@@ -90,8 +81,8 @@ def reproduce(
 
 
 def print_comparison(console: Console, comparison: Comparison) -> None:
-    """Print the paper's table beside ours, and what can be said of it."""
-    from suave_des.cli.tables import print_table
+    """Print the paper's table beside the simulated results, with remarks on their differences."""
+    from suave_des.cli.console import print_table
     from suave_des.report.published import METRICS
 
     for metric, title in METRICS.items():
@@ -102,7 +93,7 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
 
 
 def _table(figures: Sequence[Figure]) -> Table:
-    from suave_des.cli.tables import interval, number, plain_table
+    from suave_des.cli.console import interval, number, plain_table
     from suave_des.report.comparison import MARK
 
     table = plain_table()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from suave_des.campaign.summary import METRIC_TITLES
-from suave_des.cli.tables import number, plain_table, print_table
+from suave_des.cli.console import number, plain_table, print_table
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

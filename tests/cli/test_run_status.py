@@ -13,7 +13,7 @@ from rich.console import Console
 
 import suave_des
 from suave_des.campaign.single import run_mission
-from suave_des.cli.status import mission_status
+from suave_des.cli.console import mission_status
 from tests.helpers.command import suave_des_command
 
 SLOW = """

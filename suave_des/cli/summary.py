@@ -1,4 +1,4 @@
-"""Result tables on the terminal."""
+"""Summary of a campaign on the terminal."""
 
 from __future__ import annotations
 
@@ -7,41 +7,22 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
-from rich.text import Text
 
 from suave_des.campaign.display import estimated
 from suave_des.campaign.early_stop import parse_until_ci
 from suave_des.campaign.plan import Group
 from suave_des.campaign.summary import METRIC_TITLES, METRICS, SUMMARY_COLUMNS
 from suave_des.campaign.sweep import cell_of
+from suave_des.cli.console import number, plain_table, print_table
 
 if TYPE_CHECKING:
     from suave_des.campaign.campaign import CampaignResult
 
-_STOPS_TOLD = 8
-
-
-def plain_table() -> Table:
-    """A table that reads well on a terminal and in a plain log."""
-    return Table(box=None, padding=(0, 1), pad_edge=False)
-
-
-def print_table(console: Console, title: str, table: Table) -> None:
-    """Print a table under its title."""
-    console.print(Text(title, "bold"))
-    print_trimmed(console, table)
-
-
-def print_trimmed(console: Console, table: Table) -> None:
-    """Print a table without the blanks that would fill its lines."""
-    with console.capture() as lines:
-        console.print(table)
-    for line in lines.get().splitlines():
-        console.file.write(line.rstrip() + "\n")
+_STOPS_LISTED = 8
 
 
 def print_summary(console: Console, result: CampaignResult) -> None:
-    """Print what summary.csv says; what does not fit into the console's width is broken up, then left out."""
+    """Print the rows of summary.csv; what does not fit into the console's width is broken up, then left out."""
     for breaks_names, has_std in ((False, True), (True, True), (True, False)):
         table = _summary(result, breaks_names=breaks_names, has_std=has_std)
         if console.measure(table, options=console.options.update(width=1000)).maximum <= console.width:
@@ -82,25 +63,25 @@ def _figures(cells: Mapping[str, object], metric: str) -> tuple[str, str]:
 
 
 def print_stops(console: Console, result: CampaignResult) -> None:
-    """Say which managers were stopped early, and of which the interval is still too wide."""
+    """Print which managers were stopped early, and whose interval is still too wide."""
     if result.until_ci is None:
         return
     until = parse_until_ci(result.until_ci)
     narrow = [stop for stop in result.stops if stop.reached]
     if narrow:
-        told = ", ".join(f"{_group(result, stop.group)} after run {stop.last_run}" for stop in narrow[:_STOPS_TOLD])
-        told += f", and {len(narrow) - _STOPS_TOLD} more" if len(narrow) > _STOPS_TOLD else ""
-        console.print(f"stopped with {until.metric} ± less than {until.half_width:g}: {told}", soft_wrap=True)
+        listed = ", ".join(f"{_group(result, stop.group)} after run {stop.last_run}" for stop in narrow[:_STOPS_LISTED])
+        listed += f", and {len(narrow) - _STOPS_LISTED} more" if len(narrow) > _STOPS_LISTED else ""
+        console.print(f"stopped with {until.metric} ± less than {until.half_width:g}: {listed}", soft_wrap=True)
     wide = [stop for stop in result.stops if not stop.reached]
-    for stop in wide[:_STOPS_TOLD]:
+    for stop in wide[:_STOPS_LISTED]:
         width = "has no interval" if stop.half_width is None else f"± {stop.half_width:.4g}"
         console.print(
             f"not reached: {_group(result, stop.group)}: {until.metric} {width} after all {stop.last_run} runs,"
             f" not less than {until.half_width:g}",
             soft_wrap=True,
         )
-    if len(wide) > _STOPS_TOLD:
-        console.print(f"not reached: {len(wide) - _STOPS_TOLD} more, all in {result.folder}/manifest.json")
+    if len(wide) > _STOPS_LISTED:
+        console.print(f"not reached: {len(wide) - _STOPS_LISTED} more, all in {result.folder}/manifest.json")
     if wide:
         console.print(f"more runs: suave-des campaign --resume {result.folder} --runs N", soft_wrap=True)
 
@@ -109,13 +90,3 @@ def _group(result: CampaignResult, group: Group) -> str:
     point, manager = group
     values = result.variation.sweep.values(point)
     return " ".join([result.managers[manager], *(f"{name}={cell_of(value)}" for name, value in values.items())])
-
-
-def number(value: object) -> str:
-    """Two decimals, as the paper's table has; nothing for none."""
-    return f"{value:.2f}" if isinstance(value, float) else ""
-
-
-def interval(low: object, high: object) -> str:
-    """An interval; nothing for none."""
-    return f"{low:.1f} to {high:.1f}" if isinstance(low, float) and isinstance(high, float) else ""

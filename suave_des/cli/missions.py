@@ -1,0 +1,170 @@
+"""suave-des run, figure, scenarios, schema and import-config: single missions, and the files that describe them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from suave_des.cli.options import Overwrite, Replacements, Scenario, Seed, command_line, replaces_files
+
+
+@replaces_files
+def run(
+    scenario: Scenario,
+    manager: Annotated[
+        str, typer.Option("--manager", metavar="NAME", help="Managing subsystem by name, or your own as module:Class.")
+    ] = "metacontrol",
+    seed: Seed = 1,
+    run_number: Annotated[
+        int, typer.Option("--run", metavar="K", help="Run of a campaign with this seed: the same mission again.")
+    ] = 1,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="DIR", help="Folder for mission.json, events.csv, trajectory.csv, knowledge.jsonl."
+        ),
+    ] = None,
+    overwrite: Overwrite = False,
+    *,
+    replacements: Replacements,
+) -> None:
+    """Run one mission and print its timeline."""
+    from suave_des.campaign.single import run_mission
+    from suave_des.cli.console import errors, mission_status, output, print_timeline
+
+    with mission_status(scenario, errors()) as show:
+        result = run_mission(
+            scenario,
+            manager,
+            run_number,
+            seed,
+            out,
+            overwrite=overwrite,
+            command=command_line(),
+            on_time=show,
+            **replacements,
+        )
+    console = output()
+    print_timeline(console, result)
+    if out is not None:
+        console.print(f"\nmission.json, events.csv and trajectory.csv are in {out}", soft_wrap=True)
+
+
+def figure(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Output folder of run, campaign or reproduce.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Picture to write: .png, .pdf or .svg.")],
+) -> None:
+    """Draw a mission's map or a campaign's results.
+
+    Which of the two depends on what is in DIR.
+    """
+    from suave_des.report.figures import draw_folder
+
+    draw_folder(folder, out)
+    print(f"drawn in {out}")
+
+
+def scenarios() -> None:
+    """List the shipped scenarios and other inputs."""
+    from suave_des.cli.console import output, plain_table, print_table
+    from suave_des.resources import shipped_folder
+    from suave_des.scenario.loader import load_scenario
+
+    folder = shipped_folder("scenarios")
+    table = plain_table()
+    for heading in ("name", "revision", "what it is"):
+        table.add_column(heading)
+    files = sorted(folder.glob("*.yaml"))
+    modes = [path for path in files if path.stem.endswith("_modes")]
+    for path in files:
+        if path not in modes:
+            scenario = load_scenario(path).scenario
+            table.add_row(path.stem, scenario.revision.name, scenario.description)
+    console = output()
+    print_table(console, "Scenarios", table)
+    ontologies = sorted(shipped_folder("ontology").glob("*.owl"))
+    console.print(f"\nModes files: {', '.join(path.name for path in modes)}", soft_wrap=True)
+    console.print(f"Ontologies: {', '.join(path.name for path in ontologies)}", soft_wrap=True)
+    console.print(f"They are in {folder.parent}: copy what you want to change.", soft_wrap=True)
+
+
+def schema() -> None:
+    """Print the JSON Schema of scenario files.
+
+    Editors and other tools use it to complete and check scenarios.
+    """
+    import json
+
+    from suave_des.scenario.schema import scenario_schema
+
+    print(json.dumps(scenario_schema(), indent=2))
+
+
+def import_config(
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE...", help="Mission, campaign and System Modes files of the exemplar, in any order."
+        ),
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Scenario file to write.")],
+    campaign: Annotated[
+        Path | None,
+        typer.Option("--campaign", metavar="FILE", help="Campaign file to write, from a campaign configuration."),
+    ] = None,
+    base: Annotated[
+        str | None,
+        typer.Option(
+            "--base",
+            metavar="SCENARIO",
+            help="Scenario to build on; left out, the shipped one of the revision that the files look like.",
+        ),
+    ] = None,
+    overwrite: Overwrite = False,
+) -> None:
+    """Import the exemplar's configuration files.
+
+    What has no counterpart is reported, a line each. Both revisions' files are read, with or without leading slashes.
+    """
+    from suave_des.campaign.output import write_files
+    from suave_des.errors import InputError
+    from suave_des.managing.registry import manager_names
+    from suave_des.scenario.exemplar import import_config as imported_from
+
+    targets = [out] if campaign is None else [out, campaign]
+    if campaign is not None and campaign.resolve() == out.resolve():
+        raise InputError("scenario and campaign cannot be one file", file=out, remedy="give --campaign another name")
+    for target in targets:
+        _check_target(target, files, overwrite=overwrite)
+    imported = imported_from(files, out, base=base, campaign=campaign, managers=manager_names())
+    written: dict[Path, dict[str, str | bytes | Iterable[str]]] = {}
+    for target, text in zip(targets, filter(None, (imported.scenario, imported.campaign)), strict=True):
+        written.setdefault(target.parent, {})[target.name] = text
+    for folder, contents in written.items():
+        write_files(folder, contents)
+    for note in imported.notes:
+        print(note)
+    print(f"{out} is written, over the base {imported.base}: {imported.why}")
+    if campaign is not None:
+        print(f"{campaign} is written")
+
+
+def _check_target(target: Path, files: list[Path], *, overwrite: bool) -> None:
+    """Check that a file can be written, without changing anything.
+
+    Raises:
+        InputError: its folder does not exist, it is one of the files to import, or it exists already.
+    """
+    from suave_des.errors import InputError
+
+    if not target.name or target.is_dir():
+        raise InputError("is a folder", file=target, remedy="name a file in it")
+    if not target.parent.is_dir():
+        raise InputError(f"there is no folder {target.parent} to write it in", file=target, remedy="make it first")
+    if target.resolve() in [file.resolve() for file in files]:
+        raise InputError("is one of the files to import", file=target, remedy="give the output another name")
+    if target.exists() and not overwrite:
+        raise InputError("exists already", file=target, remedy="give another name, or --overwrite to replace it")
