@@ -1,4 +1,4 @@
-"""Code blocks of README and docs: finds them, runs them page by page, and tells what they show when run.
+"""Find the code blocks of README and docs, run them page by page, and give what each shows when run.
 
 What a block is follows from its language and the words after it, which readers do not see:
 
@@ -235,7 +235,10 @@ def _going_on(command: str) -> Iterator[None]:
 def _run_console(block: Block, port: str, *, quick: bool) -> str:
     shown, status = "", 0
     for command in _commands(block, port):
-        output, status = _run(_shortened(command, block.marks.get("test", "")) if quick else command, status)
+        if quick:
+            output, status = _run(_shortened(command, block.marks.get("test", "")), status, workers="1")
+        else:
+            output, status = _run(command, status, workers="2")
         line = f"$ {command}".replace(port, _PORT)
         shown += f"{line}\n{_cut(output, block.marks)}"
     if status != int(block.marks.get("status", 0)):
@@ -253,14 +256,14 @@ def _shortened(command: str, options: str) -> str:
     return command
 
 
-def _run(command: str, status_before: int) -> tuple[str, int]:
+def _run(command: str, status_before: int, workers: str) -> tuple[str, int]:
     """Output and exit status; suave-des runs in this process, which saves starting Java each time."""
     if not command.startswith("suave-des "):
         return _shell(f"(exit {status_before}); {command}", "")
     own, _, rest = command.partition(" | ")
     words = shlex.split(own)
     if words[1] in ("campaign", "reproduce") and "--workers" not in words:
-        words += ["--workers", "1"]  # the same bytes as with more
+        words += ["--workers", workers]  # the same bytes with any number
     if words[1] in ("campaign", "reproduce", "validate"):
         words.append("--quiet")  # pages show what is printed where that takes less than ten seconds
     output, status = io.StringIO(), 0

@@ -73,7 +73,7 @@ def setup_commands():
 
 
 def test_the_set_up_takes_one_command_each():
-    assert setup_commands() == [RUN_ALL, TEST_ALL, "source .venv/bin/activate"]
+    assert setup_commands() == [RUN_ALL, TEST_ALL]
 
 
 def test_the_set_up_commands_name_what_the_package_declares():

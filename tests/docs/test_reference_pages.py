@@ -6,6 +6,7 @@ import tomllib
 
 import make_cli_reference
 import pytest
+import yaml
 from doc_blocks import ROOT
 
 from suave_des import __version__
@@ -14,7 +15,7 @@ from suave_des.campaign.single import EVENT_COLUMNS, TRAJECTORY_COLUMNS, run_mis
 from suave_des.campaign.suave_format import suave_text
 from suave_des.campaign.summary import SUMMARY_COLUMNS
 
-PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 CSV_PAGE = ROOT / "docs" / "reference" / "csv.md"
 UNITS = {"_s": "s", "_m": "m", "_rad": "rad"}
 
@@ -43,7 +44,6 @@ def unit(column):
 @pytest.mark.parametrize(
     ("page", "heading", "names"),
     [
-        (ROOT / "README.md", "Result files", COLUMNS),
         (CSV_PAGE, "runs.csv", COLUMNS),
         (CSV_PAGE, "summary.csv", SUMMARY_COLUMNS),
         (CSV_PAGE, "events.csv", EVENT_COLUMNS),
@@ -115,13 +115,37 @@ def test_links_lead_somewhere(page):
         assert not anchor or anchor in anchors(linked), target
 
 
-def test_every_page_can_be_reached_from_the_index():
-    index = ROOT / "docs" / "index.md"
-    linked = {
-        (index.parent / target.partition("#")[0]).resolve()
-        for target in re.findall(r"\]\(([^)]+)\)", index.read_text(encoding="utf-8"))
-    }
-    assert set((ROOT / "docs").rglob("*.md")) - {index} <= linked
+def linked_from(page):
+    targets = re.findall(r"\]\(([^)]+)\)", page.read_text(encoding="utf-8"))
+    return {(page.parent / target.partition("#")[0]).resolve() for target in targets}
+
+
+def test_every_page_can_be_reached_from_the_readme():
+    from_readme = linked_from(ROOT / "README.md")
+    pages = set((ROOT / "docs").rglob("*.md"))
+    api = {page for page in pages if page.parent.name == "api"}
+    assert pages - api <= from_readme
+    assert api <= linked_from(ROOT / "docs" / "reference" / "python-api.md")
+
+
+def test_the_readme_is_short():
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
+
+
+def test_the_citation_names_this_version_and_the_readme_s_authors():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert (citation["version"], citation["license"]) == (__version__, "Apache-2.0")
+    bibtex = (ROOT / "README.md").read_text(encoding="utf-8").partition("@inproceedings")[2]
+    for author in citation["preferred-citation"]["authors"]:
+        assert author["given-names"].split()[-1] in bibtex
+    assert bibtex.partition("title")[0].count(" and") == len(citation["preferred-citation"]["authors"]) - 1
+
+
+def test_what_the_container_copies_exists():
+    text = (ROOT / "Containerfile").read_text(encoding="utf-8")
+    sources = [name for copied in re.findall(r"^COPY (.*) \S+$", text, flags=re.MULTILINE) for name in copied.split()]
+    assert "suave_des" in sources
+    assert all((ROOT / name).exists() for name in sources)
 
 
 def test_the_change_log_has_this_version():
@@ -131,6 +155,10 @@ def test_the_change_log_has_this_version():
 def test_dependencies_are_explained():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     page = (ROOT / "docs" / "background" / "dependencies.md").read_text(encoding="utf-8")
-    for requirement in project["dependencies"]:
-        name = re.match(r"[\w-]+", requirement)[0]
-        assert f"| {name} |" in page, name
+    required = [
+        *project["dependencies"],
+        *(each for extra in project["optional-dependencies"].values() for each in extra),
+    ]
+    names = {re.match(r"[\w-]+", requirement)[0] for requirement in required} - {"suave-des"}
+    explained = set(re.findall(r"^\| (\w[\w-]*) \|", page, flags=re.MULTILINE)) - {"package"}
+    assert explained == names
