@@ -25,9 +25,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.cached_pellet import CachedPellet
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
-from suave_des.knowledge.remembered import Remembered
 from suave_des.knowledge.state import Inference, KnowledgeState, ObjectiveState
 from suave_des.resources import shipped_folder
 from suave_des.workbench import KnowledgeBase as Workbench
@@ -38,12 +38,12 @@ GROWTH = (10, 30, 100, 300)
 MOTION = "f_maintain_motion"
 SEARCH = "f_generate_search_path"
 _FIRST = """
-from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 state = KnowledgeState.of([ObjectiveState({search!r})], groundings={{{search!r}: "fd_spiral_high"}},
                           measurements={{"water_visibility": "1"}})
-assert make_reasoner({name!r}, KnowledgeBase.load()).infer(state).facts
+assert make_reasoner({name!r}, Ontology.load()).infer(state).facts
 """
 _MORE_DESIGNS = """
 <owl:NamedIndividual rdf:about="http://www.metacontrol.org/suave#qa_{n}">
@@ -112,7 +112,7 @@ def empty_memory() -> Iterator[Path]:
                 os.environ["SUAVE_DES_CACHE_DIR"] = before
 
 
-def measure_backends(kb: KnowledgeBase, count: int, draw: random.Random) -> dict[str, Any]:
+def measure_backends(kb: Ontology, count: int, draw: random.Random) -> dict[str, Any]:
     """Time all backends over the same states; remembered once it has met their like.
 
     Raises:
@@ -123,7 +123,7 @@ def measure_backends(kb: KnowledgeBase, count: int, draw: random.Random) -> dict
     timed(pellet, [random_state(draw) for _ in range(WARM_UP)])
     stock = make_reasoner("owlready2", kb)
     stock.infer(random_state(draw))  # its first call has the in-process Pellet check the rules
-    remembered = Remembered(kb)
+    remembered = CachedPellet(kb)
     timed(remembered, states)
     summaries, found = {}, []
     # The same states as new objects: nothing about them is known but what they say.
@@ -165,10 +165,10 @@ def growth(draw: random.Random) -> list[dict[str, float]]:
             more = "".join(_MORE_DESIGNS.format(n=n, value=f"{4 * (n + 1) / designs:.4f}") for n in range(designs - 6))
             path = folder / "suave.owl"
             path.write_text(text.replace("</rdf:RDF>", more + "</rdf:RDF>"), encoding="utf-8")
-            kb = KnowledgeBase.load([path])
+            kb = Ontology.load([path])
             states = [random_state(draw) for _ in range(200)]
             pellet_s, _ = timed(make_reasoner("pellet", kb), states)
-            remembered = Remembered(kb)
+            remembered = CachedPellet(kb)
             timed(remembered, states)
             hits_s, _ = timed(remembered, states * 5)
             rows.append(
@@ -188,7 +188,7 @@ def resident_mb() -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
-def leak_mb(kb: KnowledgeBase, draw: random.Random) -> float | None:
+def leak_mb(kb: Ontology, draw: random.Random) -> float | None:
     """Growth of this process over many inferences of Pellet; None where the system does not tell."""
     if not Path("/proc/self/statm").exists():
         return None
@@ -203,9 +203,9 @@ def leak_mb(kb: KnowledgeBase, draw: random.Random) -> float | None:
 def measure(count: int, seed: int) -> dict[str, Any]:
     """Load, warm up and time everything."""
     draw = random.Random(seed)
-    kb = KnowledgeBase.load()
+    kb = Ontology.load()
     with empty_memory() as folder:
-        load_s = seconds(KnowledgeBase.load)
+        load_s = seconds(Ontology.load)
         summaries = measure_backends(kb, count, draw)
         subprocess.run(
             [sys.executable, "-m", "suave_des.knowledge.java_archive"], check=True, stdout=subprocess.DEVNULL

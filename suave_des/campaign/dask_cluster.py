@@ -29,7 +29,7 @@ from suave_des.campaign.outcomes import Finished, Job, time_out_cause
 from suave_des.campaign.parcel import pack
 from suave_des.campaign.plan import Chunk, MissionKey
 from suave_des.errors import InputError
-from suave_des.knowledge.memory import DiskMemory
+from suave_des.knowledge.inference_cache import InferenceCache
 
 ANSWER_TIMEOUT_S = 10.0
 """Time for a scheduler to answer at all."""
@@ -409,7 +409,7 @@ class _Flow:
     def _reported(self, report: Report) -> Iterator[Finished]:
         for learned in report.learned:
             for digest, entries in learned.items():
-                DiskMemory(digest).take_over(entries)
+                InferenceCache(digest).take_over(entries)
         self._left -= report.missions
         if report.missions:
             each_s = report.seconds / report.missions

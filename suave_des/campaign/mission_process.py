@@ -88,17 +88,17 @@ def _serve(connection: Connection, requests: SimpleQueue[bytes]) -> None:
     try:
         unpacked, runner = _opened(requests.get())
         connection.send(Ready())
-        from suave_des.knowledge.memory import grown
+        from suave_des.knowledge.inference_cache import new_cache_entries
 
         sizes: dict[str, int] = {}
-        grown(sizes)
+        new_cache_entries(sizes)
         while True:
             try:
                 chunk, singly = pickle.loads(requests.get(timeout=_IDLE_S))
             except Empty:
                 return
             _run(connection, runner, unpacked, chunk, 0.0 if singly else FLUSH_S)
-            connection.send(Done(grown(sizes)))
+            connection.send(Done(new_cache_entries(sizes)))
     except SuaveDesError as error:
         known = error if unpacked is None else unpacked.error_as_known(error)
         connection.send(Trouble(pickle.dumps(known), ""))

@@ -13,7 +13,7 @@ from suave_des.campaign.outcomes import Failure, Finished, Job
 from suave_des.campaign.own_modules import own_modules
 from suave_des.campaign.request import manager_code
 from suave_des.errors import InputError, SuaveDesError
-from suave_des.knowledge.memory import DiskMemory
+from suave_des.knowledge.inference_cache import InferenceCache
 from suave_des.managing.registry import manager_class
 from suave_des.scenario.loader import LoadedScenario
 
@@ -61,7 +61,7 @@ def pack(job: Job) -> Parcel:
 
 
 def _with_imports(loaded: LoadedScenario) -> list[Path]:
-    from suave_des.knowledge.catalogue import collect
+    from suave_des.knowledge.ontology_file import collect
 
     try:
         return sorted(source.path for source in collect(loaded.ontologies))
@@ -72,15 +72,15 @@ def _with_imports(loaded: LoadedScenario) -> list[Path]:
 def _memories(job: Job) -> dict[str, bytes]:
     if not any(manager_class(name).needs_knowledge for name in job.managers):
         return {}
-    from suave_des.knowledge.remembered import memory_digest
+    from suave_des.knowledge.cached_pellet import cache_digest
     from suave_des.simulation.knowledge import open_base
 
     digests = []
     for loaded in _knowledge_bases(job):
         if loaded.scenario.knowledge.reasoner == "remembered":
             with suppress(InputError):  # told by the missions that reason with it
-                digests.append(memory_digest(open_base(loaded)))
-    return {digest: DiskMemory(digest).content() for digest in digests}
+                digests.append(cache_digest(open_base(loaded)))
+    return {digest: InferenceCache(digest).content() for digest in digests}
 
 
 def _knowledge_bases(job: Job) -> Iterator[LoadedScenario]:
@@ -148,7 +148,7 @@ def unpack(parcel: Parcel, folder: Path) -> Unpacked:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
     for digest, content in parcel.memories.items():
-        DiskMemory(digest).take_over(content)
+        InferenceCache(digest).take_over(content)
     ontologies, rules = (_written(files, folder, names) for files in (parcel.ontologies, parcel.rules))
     loaded = replace(parcel.job.loaded, ontologies=ontologies, rules=rules)
     return Unpacked(replace(parcel.job, loaded=loaded), names)

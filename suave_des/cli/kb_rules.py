@@ -11,7 +11,7 @@ from suave_des.cli.kb_options import Format, Formats, ScenarioOption, print_json
 from suave_des.cli.options import DisabledRules, Ontologies, RuleFiles
 
 if TYPE_CHECKING:
-    from suave_des.knowledge.base import KnowledgeBase
+    from suave_des.knowledge.ontology import Ontology
 
 OwlFile = Annotated[Path, typer.Argument(metavar="FILE", help="An OWL file; FILE.bak keeps what it was before.")]
 RuleName = Annotated[str, typer.Argument(metavar="NAME", help="Name of a rule of the file.")]
@@ -41,10 +41,10 @@ def rules(
         print(rules_text(base), end="")
 
 
-def rules_text(base: KnowledgeBase) -> str:
+def rules_text(base: Ontology) -> str:
     """All rules of a knowledge base as one text, by file."""
-    from suave_des.knowledge.rule_syntax import EXPRESSION
-    from suave_des.knowledge.rule_writer import naming, write_rule
+    from suave_des.knowledge.rules.syntax import EXPRESSION
+    from suave_des.knowledge.rules.writer import naming, write_rule
 
     named = naming(lambda iri: not base.vocabulary.means_itself(iri))
     blocks = []

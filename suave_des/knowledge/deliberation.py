@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
 
-from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.planning import plan
 from suave_des.knowledge.reasoners import Reasoner
 from suave_des.knowledge.regions import Regions
@@ -37,7 +37,7 @@ class Deliberation:
 
     Both are pure functions of the state, so conclusions are cached.
 
-        base = KnowledgeBase.load()
+        base = Ontology.load()
         deliberation = Deliberation(base, make_reasoner("pellet", base))
         state = KnowledgeState.of([ObjectiveState("f_generate_search_path", "UNGROUNDED")])
         deliberation.analyze_and_plan(state).plan.decisions[0].design  # "fd_spiral_high"
@@ -50,7 +50,7 @@ class Deliberation:
         regions: the regions of measured values within which inferences are equal; None if the reasoner has none.
     """
 
-    def __init__(self, base: KnowledgeBase, reasoner: Reasoner) -> None:
+    def __init__(self, base: Ontology, reasoner: Reasoner) -> None:
         self.base = base
         self.reasoner = reasoner
         self.regions: Regions | None = getattr(reasoner, "regions", None)

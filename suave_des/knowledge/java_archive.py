@@ -158,15 +158,15 @@ _INFERENCE: Final = """
 import sys
 from suave_des.knowledge import jvm
 jvm.start(f"-XX:DumpLoadedClassList={sys.argv[1]}")
-from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import InProcessPellet
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
-kb = KnowledgeBase.load()
+kb = Ontology.load()
 search = "f_generate_search_path"
 state = KnowledgeState.of(
     [ObjectiveState(search)], groundings={search: "fd_spiral_high"}, measurements={"water_visibility": "1"}
 )
-InProcessPellet(kb).infer(kb.situation(state))
+InProcessPellet(kb).infer(kb.assertions(state))
 """
 
 

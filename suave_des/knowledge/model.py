@@ -1,26 +1,24 @@
-"""Find the functions, designs, components and quality attributes in the triples of the ontologies."""
+"""The functions, designs, components and quality attributes of an ontology, and the triples of a state in its terms."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
-from decimal import Decimal, InvalidOperation
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from decimal import Decimal
 from typing import Final
 
 from suave_des.errors import KnowledgeError
+from suave_des.knowledge.content import Content
 from suave_des.knowledge.ontology_file import OntologyFile
-from suave_des.knowledge.situation import STATE_PROPERTIES, Individual, Lit, Model, Triple
-from suave_des.knowledge.state import Fact, Value
-from suave_des.knowledge.triples import Content
+from suave_des.knowledge.rdf import EXACT, Lit, Names, Triple, is_fact, value_of
+from suave_des.knowledge.state import KnowledgeState, Value
 from suave_des.knowledge.vocabulary import (
-    DECISION_PROPERTIES,
-    LANGUAGE_NAMESPACES,
+    HAS_VALUE,
     MROS,
     OWL,
     RDF_TYPE,
     RDFS,
-    SWRL,
     TOMASYS,
     XSD,
     grounding_name,
@@ -30,114 +28,130 @@ from suave_des.knowledge.vocabulary import (
     objective_name,
 )
 
-_SUBCLASS: Final = RDFS + "subClassOf"
-_HAS_VALUE: Final = TOMASYS + "hasValue"
+#: Comparison operators that a quality attribute type may have.
+OPERATORS: Final = ("<", "<=", ">", ">=")
 _C_STATUS: Final = TOMASYS + "c_status"
-_WHOLE: Final = (
-    *("integer", "int", "long", "short", "byte"),
-    *("nonNegativeInteger", "positiveInteger", "nonPositiveInteger", "negativeInteger"),
-    *("unsignedInt", "unsignedLong", "unsignedShort", "unsignedByte"),
+_HAS_QA_ESTIMATION: Final = TOMASYS + "hasQAestimation"
+_HAS_QA_VALUE: Final = TOMASYS + "hasQAvalue"
+_IS_QA_TYPE: Final = TOMASYS + "isQAtype"
+_O_STATUS: Final = TOMASYS + "o_status"
+_ALWAYS: Final = TOMASYS + "o_always_improve"
+_OPERATOR: Final = TOMASYS + "qa_comparison_operator"
+_SOLVES_F: Final = TOMASYS + "solvesF"
+_SOLVES_O: Final = TOMASYS + "solvesO"
+_TYPE_F: Final = TOMASYS + "typeF"
+_TYPE_FD: Final = TOMASYS + "typeFD"
+#: What a state asserts of an objective, a grounding or a measurement, in place of what an ontology asserts of it.
+_STATE_PROPERTIES: Final = frozenset(
+    {_TYPE_F, _TYPE_FD, _SOLVES_O, _O_STATUS, _ALWAYS, _HAS_QA_VALUE, _IS_QA_TYPE, HAS_VALUE}
+    | {TOMASYS + "fg_status", TOMASYS + "o_updatable"}
 )
-#: Datatypes of exact numbers.
-EXACT: Final = frozenset(XSD + name for name in ("decimal", *_WHOLE))
-_NUMERIC: Final = EXACT | {XSD + "float", XSD + "double"}
 
 
-def value_of(value: str | Lit, names: Names) -> Value:
-    """The value of a fact: a short name, a number, a truth value or text."""
-    if isinstance(value, str):
-        return names.short(value)
-    if value.datatype == XSD + "boolean":
-        return value.text.strip() in ("true", "1")
-    if value.datatype in _NUMERIC:
-        try:
-            return Decimal(value.text.strip())
-        except InvalidOperation:
-            return value.text
-    return value.text
+@dataclass(frozen=True)
+class Individual:
+    """An individual that exists only in some states, with what the ontologies assert of it (for example hasNFR)."""
+
+    iri: str
+    own: tuple[Triple, ...] = ()
 
 
-class Names:
-    """Short names of IRIs: the last part, or the whole IRI where two would share it."""
+@dataclass(frozen=True)
+class Model:
+    """The named things of an ontology that states are made of.
 
-    def __init__(self, content: Content) -> None:
-        things = {
-            term
-            for triple in content.triples
-            for term in (triple[0], triple[2])
-            if isinstance(term, str) and not term.startswith(LANGUAGE_NAMESPACES) and triple[2] != SWRL + "Variable"
-        }
-        shared = Counter(map(local_name, things))
-        self._long = {iri for iri in things if shared[local_name(iri)] > 1 and not iri.startswith((TOMASYS, MROS))}
+    Attributes:
+        functions, designs, components, attributes: IRI by name.
+        objectives: the objective that a function may get, by the function's name.
+        groundings: the grounding that a function design may get, by the design's name.
+        measurements: the measured value that a quality attribute type may get, by the type's name.
+        estimated: the quality attribute types of which a design has an expected value, by the design's name.
+        initial: what the ontologies assert of a component's status, by the component's name.
+    """
 
-    def short(self, iri: str) -> str:
-        """The name of an IRI in facts."""
-        return iri if iri in self._long else local_name(iri)
+    functions: Mapping[str, str]
+    designs: Mapping[str, str]
+    components: Mapping[str, str]
+    attributes: Mapping[str, str]
+    objectives: Mapping[str, Individual]
+    groundings: Mapping[str, Individual]
+    measurements: Mapping[str, Individual]
+    estimated: Mapping[str, frozenset[str]]
+    initial: Mapping[str, tuple[Triple, ...]]
+
+    def individuals(self) -> Iterator[Individual]:
+        """All objectives, groundings and measurements that states may have."""
+        for group in (self.objectives, self.groundings, self.measurements):
+            yield from group.values()
+
+    def assertions(self, state: KnowledgeState) -> tuple[Triple, ...]:
+        """Return the triples that assert a state, for every reasoner in the same order.
+
+        A component or a quality attribute that the ontology does not have can match no rule, and is left out:
+        monitors may report more than an ontology describes.
+
+        Raises:
+            KnowledgeError: a function or a function design is not in the ontology.
+        """
+        for objective in state.objectives:
+            _known(objective.function, self.functions, "function")
+        for function, design in state.groundings:
+            _known(function, self.functions, "function")
+            _known(design, self.designs, "function design")
+        present = {self.objectives[objective.function].iri for objective in state.objectives}
+        present |= {self.groundings[design].iri for _, design in state.groundings}
+        present |= {self.measurements[name].iri for name, _ in state.measurements if name in self.attributes}
+        absent = {individual.iri for individual in self.individuals()} - present
+        return tuple(triple for triple in self._triples(state) if triple[2] not in absent)
+
+    def _triples(self, state: KnowledgeState) -> Iterator[Triple]:
+        for objective in state.objectives:
+            individual = self.objectives[objective.function]
+            yield individual.iri, RDF_TYPE, TOMASYS + "Objective"
+            yield from individual.own
+            yield individual.iri, _TYPE_F, self.functions[objective.function]
+            if objective.status is not None:
+                yield individual.iri, _O_STATUS, Lit(objective.status, XSD + "string")
+            if objective.always_improve:
+                yield individual.iri, _ALWAYS, Lit("true", XSD + "boolean")
+        yield from self._groundings(state)
+        reported = dict(state.components)
+        for name, iri in self.components.items():
+            if name in reported:
+                yield iri, _C_STATUS, Lit(reported[name], XSD + "string")
+            else:
+                yield from self.initial.get(name, ())
+        for name, value in state.measurements:
+            if name in self.attributes:
+                individual = self.measurements[name]
+                yield individual.iri, RDF_TYPE, TOMASYS + "QAvalue"
+                yield from individual.own
+                yield individual.iri, _IS_QA_TYPE, self.attributes[name]
+                yield individual.iri, HAS_VALUE, Lit(format(value, "f"), XSD + "decimal")
+
+    def _groundings(self, state: KnowledgeState) -> Iterator[Triple]:
+        required = {objective.function for objective in state.objectives}
+        for function, design in state.groundings:
+            individual = self.groundings[design]
+            yield individual.iri, RDF_TYPE, TOMASYS + "FunctionGrounding"
+            yield from individual.own
+            yield individual.iri, _TYPE_FD, self.designs[design]
+            if function in required:
+                yield individual.iri, _SOLVES_O, self.objectives[function].iri
+            for name, _ in state.measurements:
+                if name in self.estimated[design]:
+                    yield individual.iri, _HAS_QA_VALUE, self.measurements[name].iri
 
 
-def _is_fact(triple: Triple) -> bool:
-    """Whether a triple says something of an individual, and not in terms of the languages themselves."""
-    term = triple[2] if triple[1] == RDF_TYPE else triple[1]
-    return isinstance(term, str) and not term.startswith(LANGUAGE_NAMESPACES)
+def _known(name: str, names: Mapping[str, str], what: str) -> None:
+    if name not in names:
+        raise KnowledgeError(
+            f"the knowledge base has no {what} {name}", remedy=f"known: {', '.join(sorted(names)) or 'none'}"
+        )
 
 
-def facts_of(triples: Iterable[Triple], names: Names) -> Iterator[Fact]:
-    """What triples assert of individuals: property values, not the terms of the languages themselves."""
-    for triple in triples:
-        if _is_fact(triple):
-            subject, predicate, value = triple
-            name = "type" if predicate == RDF_TYPE else names.short(predicate)
-            yield Fact(names.short(subject), name, value_of(value, names))
-
-
-def wrong_in(subject: str, sources: Sequence[OntologyFile], problem: str, remedy: str) -> KnowledgeError:
-    """An error on an individual, with the file and line where it is described."""
-    name = local_name(subject)
-    for source in sources:
-        place = source.line_of(name)
-        if place is not None:
-            return KnowledgeError(f"{name}: {problem}", file=source.path, place=place, remedy=remedy)
-    return KnowledgeError(f"{name}: {problem}", file=sources[0].path, remedy=remedy)
-
-
-class _Individuals:
-    """Lookups over the triples: individuals by class, by property, by name."""
-
-    def __init__(self, content: Content, sources: Sequence[OntologyFile]) -> None:
-        self.sources = sources
-        self.triples = content.triples
-        self.children: dict[str, set[str]] = {}
-        self.subjects = {triple[0] for triple in self.triples}
-        for subject, predicate, value in self.triples:
-            if predicate == _SUBCLASS and isinstance(value, str):
-                self.children.setdefault(value, set()).add(subject)
-
-    def by_name(self, iris: Iterable[str], what: str) -> dict[str, str]:
-        """IRI by name, sorted; two of one kind must not share a name, since states are written with names."""
-        found: dict[str, str] = {}
-        for iri in sorted(set(iris)):
-            other = found.setdefault(local_name(iri), iri)
-            if other != iri:
-                raise wrong_in(iri, self.sources, f"two {what} have this name: {other} and {iri}", "rename one of them")
-        return dict(sorted(found.items()))
-
-    def of_class(self, name: str) -> set[str]:
-        wanted, waiting = {TOMASYS + name}, [TOMASYS + name]
-        while waiting:
-            for child in self.children.get(waiting.pop(), set()) - wanted:
-                wanted.add(child)
-                waiting.append(child)
-        return {subject for subject, predicate, value in self.triples if predicate == RDF_TYPE and value in wanted}
-
-    def with_property(self, iri: str) -> set[str]:
-        return {subject for subject, predicate, _ in self.triples if predicate == iri}
-
-    def values_of(self, iri: str) -> set[str]:
-        return {value for _, predicate, value in self.triples if predicate == iri and isinstance(value, str)}
-
-
-def build_model(content: Content, names: Names, sources: Sequence[OntologyFile]) -> tuple[Model, Content]:
-    """The model, and the content without what belongs to states only.
+def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Model, Content]:
+    """Find the model, and return the content without what belongs to states only.
 
     Objectives, groundings and measurements that the ontologies describe already (an objective's hasNFR, a
     grounding's requiresO) are taken out, and come with the states that have them.
@@ -145,116 +159,151 @@ def build_model(content: Content, names: Names, sources: Sequence[OntologyFile])
     Raises:
         KnowledgeError: two functions, designs, components or quality attribute types share a name.
     """
-    find = _Individuals(content, sources)
-    functions = find.by_name(find.of_class("Function") | find.values_of(TOMASYS + "solvesF"), "functions")
-    designs = find.by_name(
-        find.of_class("FunctionDesign") | find.with_property(TOMASYS + "solvesF"), "function designs"
-    )
-    components = find.by_name(
-        find.of_class("Component") | find.with_property(MROS + "requiredBy") | find.with_property(_C_STATUS),
-        "components",
-    )
-    attributes = find.by_name(
-        find.of_class("QualityAttributeType") | find.values_of(TOMASYS + "isQAtype"), "quality attribute types"
-    )
-    existing = {local_name(iri): iri for iri in sorted(find.subjects, reverse=True)}
+    triples = content.triples
 
-    def iri_in_states(iri: str, name: str) -> str:
-        return existing.get(name, namespace(iri) + name)
+    def subjects(predicate: str) -> set[str]:
+        return {s for s, p, _ in triples if p == predicate}
 
-    objectives = {name: iri_in_states(iri, objective_name(name)) for name, iri in functions.items()}
-    groundings = {name: iri_in_states(iri, grounding_name(name)) for name, iri in designs.items()}
-    measurements = {name: iri_in_states(iri, measurement_name(name)) for name, iri in attributes.items()}
-    in_states = {*objectives.values(), *groundings.values(), *measurements.values()}
-    if len(in_states) < len(objectives) + len(groundings) + len(measurements):
+    def objects(predicate: str) -> set[str]:
+        return {o for _, p, o in triples if p == predicate and isinstance(o, str)}
+
+    def by_name(iris: Iterable[str], what: str) -> dict[str, str]:
+        """IRI by name; two of one kind must not share a name, since states are written with names."""
+        found: dict[str, str] = {}
+        for iri in sorted(iris):
+            other = found.setdefault(local_name(iri), iri)
+            if other != iri:
+                raise wrong_in(iri, sources, f"two {what} have this name: {other} and {iri}", "rename one of them")
+        return dict(sorted(found.items()))
+
+    functions = by_name(_members(triples, "Function") | objects(_SOLVES_F), "functions")
+    designs = by_name(_members(triples, "FunctionDesign") | subjects(_SOLVES_F), "function designs")
+    parts = _members(triples, "Component") | subjects(MROS + "requiredBy") | subjects(_C_STATUS)
+    components = by_name(parts, "components")
+    attributes = by_name(_members(triples, "QualityAttributeType") | objects(_IS_QA_TYPE), "quality attribute types")
+    existing = {local_name(iri): iri for iri in sorted({triple[0] for triple in triples}, reverse=True)}
+    groups = [
+        {name: existing.get(rename(name), namespace(iri) + rename(name)) for name, iri in things.items()}
+        for things, rename in (
+            (functions, objective_name),
+            (designs, grounding_name),
+            (attributes, measurement_name),
+        )
+    ]
+    in_states = {iri for group in groups for iri in group.values()}
+    if len(in_states) < sum(map(len, groups)):
         raise KnowledgeError(
             "two functions, function designs or quality attribute types differ in their prefix only",
             file=sources[0].path,
             remedy="rename one, for example f_search and search",
         )
+    own: dict[str, list[Triple]] = {iri: [] for iri in in_states}
+    for triple in triples:
+        subject, predicate, value = triple
+        holder = subject if subject in in_states else value
+        if isinstance(holder, str) and holder in own and predicate not in _STATE_PROPERTIES and is_fact(triple):
+            own[holder].append(triple)
+    objectives, groundings, measurements = (
+        {name: Individual(iri, tuple(own[iri])) for name, iri in group.items()} for group in groups
+    )
+    estimated: dict[str, set[str]] = {name: set() for name in designs}
+    for design, attribute, _ in _estimations(triples, designs, attributes):
+        estimated[design].add(attribute)
     model = Model(
         functions=functions,
         designs=designs,
         components=components,
         attributes=attributes,
-        objectives=_with_own(objectives, content, in_states),
-        groundings=_with_own(groundings, content, in_states),
-        measurements=_with_own(measurements, content, in_states),
-        estimated=_estimated(content, designs, attributes),
+        objectives=objectives,
+        groundings=groundings,
+        measurements=measurements,
+        estimated={name: frozenset(found) for name, found in estimated.items()},
         initial={
-            name: tuple(t for t in content.triples if t[0] == iri and t[1] == _C_STATUS)
+            name: tuple(triple for triple in triples if triple[:2] == (iri, _C_STATUS))
             for name, iri in components.items()
         },
     )
-    kept = tuple(
-        triple
-        for triple in content.triples
-        if triple[0] not in in_states and triple[2] not in in_states and triple[1] != _C_STATUS
-    )
+    kept = tuple(t for t in triples if t[0] not in in_states and t[2] not in in_states and t[1] != _C_STATUS)
     return model, replace(content, triples=kept)
 
 
-def _with_own(iris: dict[str, str], content: Content, in_states: set[str]) -> dict[str, Individual]:
-    """Individuals of states with what the ontologies say of them, or of other things with reference to them."""
-    own: dict[str, list[Triple]] = {}
-    for triple in content.triples:
-        subject, predicate, value = triple
-        holder = subject if subject in in_states else value
-        if holder in in_states and isinstance(holder, str) and predicate not in STATE_PROPERTIES and _is_fact(triple):
-            own.setdefault(holder, []).append(triple)
-    return {name: Individual(iri, tuple(own.get(iri, ()))) for name, iri in iris.items()}
+def _members(triples: Iterable[Triple], name: str) -> set[str]:
+    """Individuals of a class of TOMASys or of its subclasses."""
+    classes = {TOMASYS + name}
+    below = [(s, o) for s, p, o in triples if p == RDFS + "subClassOf"]
+    while more := {child for child, parent in below if parent in classes} - classes:
+        classes |= more
+    return {s for s, p, o in triples if p == RDF_TYPE and o in classes}
 
 
-def _estimated(content: Content, designs: dict[str, str], attributes: dict[str, str]) -> dict[str, frozenset[str]]:
-    estimations = _pairs(content, TOMASYS + "hasQAestimation")
-    types = dict(_pairs(content, TOMASYS + "isQAtype"))
+def _estimations(
+    triples: Iterable[Triple], designs: Mapping[str, str], attributes: Mapping[str, str]
+) -> Iterator[tuple[str, str, str]]:
+    """(design, quality attribute type, IRI of the QAvalue individual) of each hasQAestimation."""
+    design_names = {iri: name for name, iri in designs.items()}
     attribute_names = {iri: name for name, iri in attributes.items()}
-    found: dict[str, set[str]] = {name: set() for name in designs}
-    names = {iri: name for name, iri in designs.items()}
-    for design, value in estimations:
-        if design in names and value in types:
-            found[names[design]].add(attribute_names[types[value]])
-    return {name: frozenset(kinds) for name, kinds in found.items()}
-
-
-def _pairs(content: Content, predicate: str) -> list[tuple[str, str]]:
-    return [(s, o) for s, p, o in content.triples if p == predicate and isinstance(o, str)]
+    types = {s: attribute_names[o] for s, p, o in triples if p == _IS_QA_TYPE and isinstance(o, str)}
+    for subject, predicate, value in triples:
+        if predicate == _HAS_QA_ESTIMATION and subject in design_names and value in types:
+            yield design_names[subject], types[str(value)], str(value)
 
 
 def expectations(content: Content, model: Model) -> dict[str, dict[str, Decimal]]:
     """Expected value by design and quality attribute type; the smallest where a design has several."""
-    types = dict(_pairs(content, TOMASYS + "isQAtype"))
     numbers = {
         subject: Decimal(value.text.strip())
         for subject, predicate, value in content.triples
-        if predicate == _HAS_VALUE and isinstance(value, Lit)
+        if predicate == HAS_VALUE and isinstance(value, Lit)
     }
-    attribute_names = {iri: name for name, iri in model.attributes.items()}
-    design_names = {iri: name for name, iri in model.designs.items()}
     found: dict[str, dict[str, Decimal]] = {name: {} for name in model.designs}
-    for design, value in _pairs(content, TOMASYS + "hasQAestimation"):
-        if design in design_names and value in types and value in numbers:
-            expected = found[design_names[design]]
-            kind = attribute_names[types[value]]
-            expected[kind] = min(numbers[value], expected.get(kind, numbers[value]))
+    for design, attribute, individual in _estimations(content.triples, model.designs, model.attributes):
+        if individual in numbers:
+            value = numbers[individual]
+            found[design][attribute] = min(value, found[design].get(attribute, value))
     return {name: dict(sorted(expected.items())) for name, expected in found.items()}
 
 
-def properties_to_read(content: Content) -> tuple[str, ...]:
-    """Properties whose values are read after inference.
+def check_values(content: Content, sources: Sequence[OntologyFile]) -> None:
+    """Check that numbers are decimals, operators known, and functional properties have one value each.
 
-    Those that a rule can assert, with their super-properties and inverses, and all that decisions rest on.
+    A reasoner would not explain the first two. Of two values that an ontology asserts for one functional data
+    property Pellet silently keeps the one that it read last.
+
+    Raises:
+        KnowledgeError: with the file and line of the individual.
     """
-    wanted = set(content.head_properties()) | set(DECISION_PROPERTIES)
-    edges = (RDFS + "subPropertyOf", OWL + "inverseOf", OWL + "equivalentProperty")
-    while True:
-        more = set()
-        for subject, predicate, value in content.triples:
-            if predicate in edges and isinstance(value, str):
-                if subject in wanted:
-                    more.add(value)
-                if value in wanted and predicate != edges[0]:
-                    more.add(subject)
-        if more <= wanted:
-            return tuple(sorted(name for name in wanted if not name.startswith(LANGUAGE_NAMESPACES)))
-        wanted |= more
+    functional = {s for s, p, o in content.triples if p == RDF_TYPE and o == OWL + "FunctionalProperty"}
+    names = Names(content.triples)
+    seen: dict[tuple[str, str], Value] = {}
+    for subject, predicate, value in content.triples:
+        shown = value.text if isinstance(value, Lit) else value
+        if predicate == HAS_VALUE and not _is_decimal(value):
+            raise wrong_in(subject, sources, f"hasValue {shown!r} is not an xsd:decimal", "a number such as 2.25")
+        if predicate == _OPERATOR and shown not in OPERATORS:
+            problem = f"qa_comparison_operator {shown!r} is unknown"
+            raise wrong_in(subject, sources, problem, f"one of {' '.join(OPERATORS)}")
+        if predicate in functional and isinstance(value, Lit):
+            one = value_of(value, names)
+            other = seen.setdefault((subject, predicate), one)
+            if one != other:
+                name = local_name(predicate)
+                problem = f"contradiction: the functional property {name} has the values {other} and {one}"
+                raise wrong_in(subject, sources, problem, "keep one of them")
+
+
+def _is_decimal(value: str | Lit) -> bool:
+    return (
+        isinstance(value, Lit)
+        and value.datatype in EXACT
+        and re.fullmatch(r"\s*[+-]?(\d+(\.\d*)?|\.\d+)\s*", value.text, re.ASCII) is not None
+    )
+
+
+def wrong_in(subject: str, sources: Sequence[OntologyFile], problem: str, remedy: str) -> KnowledgeError:
+    """Return an error on an individual, with the file and line where it is described."""
+    name = local_name(subject)
+    for source in sources:
+        place = source.line_of(name)
+        if place is not None:
+            return KnowledgeError(f"{name}: {problem}", file=source.path, place=place, remedy=remedy)
+    return KnowledgeError(f"{name}: {problem}", file=sources[0].path, remedy=remedy)

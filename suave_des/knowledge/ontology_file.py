@@ -1,44 +1,48 @@
-"""Read one ontology file: hardened XML first, then RDF.
+"""Read ontology files in RDF/XML, and resolve their imports to local files. Nothing is ever fetched.
 
-The XML is read by expat before anything else sees it: for line numbers, and to refuse what could reach for
-other files or blow up. Simple internal entities, as Protégé writes them, are accepted.
+lxml reads the XML first: it stops at entities that expand too far, reads no other file, and knows line numbers. Simple
+internal entities, as Protégé writes them, are accepted.
+
+An import is looked for among the files that were given, then among the files beside the importing one, then among the
+shipped ones: by the IRI (of the ontology, or xml:base), then by the last part of the IRI, which for the exemplar's
+ontologies is the name of the file (tomasys, mros, suave).
 """
 
 from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 from urllib.parse import urldefrag, urljoin
-from xml.parsers import expat
 from xml.sax import SAXParseException
 
 import rdflib
+from lxml import etree
 from rdflib import Graph, URIRef
-from rdflib.namespace import OWL
+from rdflib.namespace import OWL as OWL_TERMS
 from rdflib.namespace import RDF as RDF_TERMS
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.vocabulary import OWL as OWL_NS
-from suave_des.knowledge.vocabulary import RDF as RDF_NS
+from suave_des.knowledge.vocabulary import MROS, OWL, RDF, local_name
+from suave_des.resources import shipped_folder
 
 MAX_BYTES: Final = 64 * 2**20
-MAX_ENTITIES: Final = 256
-MAX_ENTITY_CHARS: Final = 512
-MAX_EXPANSION: Final = 20
-_XML_NS: Final = "http://www.w3.org/XML/1998/namespace"
+_BASE: Final = "{http://www.w3.org/XML/1998/namespace}base"
 _SAVE_AS: Final = "an OWL ontology in RDF/XML is expected, as Protégé saves it"
-#: Characters that no IRI may contain (RFC 3987) and that would break the text handed to a reasoner.
+#: Characters that no IRI may contain (RFC 3987) and that would break the N-Triples given to a reasoner.
 _NOT_IN_IRI: Final = frozenset('<>"{}|\\^`') | {chr(code) for code in range(0x21)}
+_ENDINGS: Final = (".owl", ".rdf", ".xml")
+#: The shipped tomasys.owl also holds the terms that the exemplar keeps in mros.owl.
+_SHIPPED: Final = {"tomasys": "tomasys.owl", "mros": "tomasys.owl", "suave": "suave.owl"}
 
 
 @dataclass(frozen=True)
 class OntologyFile:
-    """An ontology file that has been read and can be parsed.
+    """An ontology file that has been read and parsed.
 
     Attributes:
         path: where it is.
@@ -66,113 +70,35 @@ class OntologyFile:
         return None
 
 
-class _Scan:
-    """What one pass of expat finds out: refusals, the root element and the lines of the imports."""
-
-    def __init__(self, path: Path, size: int) -> None:
-        self.path = path
-        self.budget = MAX_EXPANSION * size + 2**20
-        self.entities = 0
-        self.root: str | None = None
-        self.base: str | None = None
-        self.imports: list[tuple[str, int]] = []
-        # With namespace_separator set, names arrive as "namespace name".
-        self.parser = expat.ParserCreate(namespace_separator=" ")
-        self.parser.SetParamEntityParsing(expat.XML_PARAM_ENTITY_PARSING_NEVER)
-        self.parser.StartDoctypeDeclHandler = self._doctype
-        self.parser.EntityDeclHandler = self._entity
-        self.parser.StartElementHandler = self._element
-        self.parser.CharacterDataHandler = self._text
-
-    def refuse(self, problem: str, remedy: str | None = None) -> KnowledgeError:
-        return KnowledgeError(problem, file=self.path, place=f"line {self.parser.CurrentLineNumber}", remedy=remedy)
-
-    def _doctype(self, name: str, system_id: str | None, public_id: str | None, _internal: bool) -> None:
-        if name.lower() == "html":
-            raise self.refuse("this is a web page, not an ontology", _SAVE_AS)
-        if system_id or public_id:
-            raise self.refuse("the DOCTYPE refers to another file", "declare entities in the file itself")
-
-    def _entity(
-        self,
-        name: str,
-        is_parameter: bool,
-        value: str | None,
-        _base: str | None,
-        system_id: str | None,
-        public_id: str | None,
-        _notation: str | None,
-    ) -> None:
-        self.entities += 1
-        if is_parameter or value is None or system_id or public_id:
-            raise self.refuse(
-                f"entity {name} is external or a parameter entity", "only simple internal entities are read"
-            )
-        if "&" in value or ("%" in value and ";" in value):
-            raise self.refuse(f"entity {name} refers to other entities", "write its value out")
-        if len(value) > MAX_ENTITY_CHARS or self.entities > MAX_ENTITIES:
-            raise self.refuse(
-                f"entity {name} is too large, or one too many",
-                f"at most {MAX_ENTITIES} entities of {MAX_ENTITY_CHARS} characters",
-            )
-
-    def _spend(self, characters: int) -> None:
-        self.budget -= characters
-        if self.budget < 0:
-            raise self.refuse("the entities in this file expand to far more than its size")
-
-    def _element(self, name: str, attributes: dict[str, str]) -> None:
-        self._spend(sum(map(len, attributes.values())))
-        if self.root is None:
-            self.root = name
-            self.base = attributes.get(f"{_XML_NS} base")
-        elif name == f"{OWL_NS} imports":
-            target = attributes.get(f"{RDF_NS} resource")
-            if target is not None:
-                iri = urljoin(self.base, target) if self.base else target
-                self.imports.append((iri, self.parser.CurrentLineNumber))
-
-    def _text(self, text: str) -> None:
-        self._spend(len(text))
-
-
 def read_ontology(path: Path, content: bytes | None = None) -> OntologyFile:
     """Read and check one ontology file.
 
     Args:
         path: where it is.
-        content: what to take for its content, instead of reading it.
+        content: its content, if it is not to be read from the file.
 
     Raises:
-        KnowledgeError: missing, a folder, empty, too large, not XML, not OWL in RDF/XML, or with external,
-            nested or oversized entities; with the line where it is known.
+        KnowledgeError: missing, a folder, empty, too large, not XML, not OWL in RDF/XML, or with external entities or
+            entities that expand too far; with the line where it is known.
     """
     if content is None:
         content = _read_bytes(path)
-    scan = _Scan(path, len(content))
-    try:
-        scan.parser.Parse(content, True)
-    except expat.ExpatError as error:
-        problem = f"not well-formed XML: {expat.ErrorString(error.code)}"
-        raise KnowledgeError(
-            problem, file=path, place=f"line {error.lineno}, column {error.offset + 1}", remedy=_SAVE_AS
-        ) from error
-    if scan.root == f"{OWL_NS} Ontology":
-        raise KnowledgeError("this is OWL/XML", file=path, remedy="save it in Protégé as RDF/XML")
-    if scan.root != f"{RDF_NS} RDF":
-        root = (scan.root or "").split(" ")[-1]
-        raise KnowledgeError(f"not OWL: the root element is <{root}>", file=path, remedy=_SAVE_AS)
+    root: Any = _parse_xml(path, content)  # lxml-stubs lack sourceline
     graph = _parse_rdf(path, content)
-    ontologies = sorted(graph.subjects(RDF_TERMS.type, OWL.Ontology), key=str)
+    ontologies = sorted(graph.subjects(RDF_TERMS.type, OWL_TERMS.Ontology), key=str)
     if not ontologies:
         raise KnowledgeError("not OWL: there is no owl:Ontology in it", file=path, remedy=_SAVE_AS)
-    lines = dict(reversed(scan.imports))
-    imports = {str(iri): lines.get(str(iri), 0) for iri in graph.objects(None, OWL.imports)}
+    base = root.get(_BASE)
+    lines: dict[str, int] = {}
+    for element in root.iter(f"{{{OWL}}}imports"):
+        iri = urljoin(base or "", element.get(f"{{{RDF}}}resource", ""))
+        lines.setdefault(iri, element.sourceline or 0)
+    imports = {str(iri): lines.get(str(iri), 0) for iri in graph.objects(None, OWL_TERMS.imports)}
     return OntologyFile(
         path=path,
         content=content,
         iris=tuple(str(iri) for iri in ontologies if isinstance(iri, URIRef)),
-        base=scan.base,
+        base=None if base is None else str(base),
         imports=tuple(sorted(imports.items(), key=lambda item: (item[1], item[0]))),
         graph=graph,
     )
@@ -184,11 +110,8 @@ def _read_bytes(path: Path) -> bytes:
     try:
         size = path.stat().st_size
         if size > MAX_BYTES:
-            raise KnowledgeError(
-                f"{size / 2**20:.0f} MiB is too large for an ontology",
-                file=path,
-                remedy=f"at most {MAX_BYTES // 2**20} MiB are read",
-            )
+            problem = f"{size / 2**20:.0f} MiB is too large for an ontology"
+            raise KnowledgeError(problem, file=path, remedy=f"at most {MAX_BYTES // 2**20} MiB are read")
         content = path.read_bytes()
     except FileNotFoundError as error:
         raise KnowledgeError("no such file", file=path, remedy="give an existing ontology file") from error
@@ -199,9 +122,50 @@ def _read_bytes(path: Path) -> bytes:
     return content
 
 
+def _parse_xml(path: Path, content: bytes) -> etree._Element:
+    """Return the root element, once it is sure that nothing in the file reaches for others or expands too far."""
+    if re.match(rb"\s*<!doctype\s+html", content, re.IGNORECASE):
+        raise KnowledgeError("this is a web page, not an ontology", file=path, place="line 1", remedy=_SAVE_AS)
+    # lxml-stubs knows neither "internal" nor what a DOCTYPE has.
+    options: Any = {"resolve_entities": "internal", "no_network": True, "load_dtd": False, "huge_tree": False}
+    try:
+        root = etree.fromstring(content, etree.XMLParser(**options))
+    except etree.XMLSyntaxError as error:
+        line, column = error.position
+        place = f"line {line}, column {column}"
+        said = re.sub(r", line \d+, column \d+$", "", error.msg or "")
+        external = re.search(rb"<!ENTITY\s+(?:%\s*)?\S+\s+(?:SYSTEM|PUBLIC)\b", content)
+        if "amplification" in said:
+            problem = "the entities in this file expand to far more than its size"
+            raise KnowledgeError(problem, file=path, remedy="write their values out") from error
+        if external is None:
+            raise KnowledgeError(f"not well-formed XML: {said}", file=path, place=place, remedy=_SAVE_AS) from error
+        raise _external_entity(path, external.group().split()[-2].decode(errors="replace"), content) from error
+    document: Any = root.getroottree().docinfo
+    if document.system_url or document.public_id:
+        remedy = "declare entities in the file itself"
+        raise KnowledgeError("the DOCTYPE refers to another file", file=path, place="line 1", remedy=remedy)
+    for entity in () if document.internalDTD is None else document.internalDTD.iterentities():
+        if entity.content is None or entity.system_url:
+            raise _external_entity(path, str(entity.name), content)
+    if root.tag == f"{{{OWL}}}Ontology":
+        raise KnowledgeError("this is OWL/XML", file=path, remedy="save it in Protégé as RDF/XML")
+    if root.tag != f"{{{RDF}}}RDF":
+        name = etree.QName(root).localname
+        raise KnowledgeError(f"not OWL: the root element is <{name}>", file=path, remedy=_SAVE_AS)
+    return root
+
+
+def _external_entity(path: Path, name: str, content: bytes) -> KnowledgeError:
+    found = re.search(rb"<!ENTITY[^>]*\s" + re.escape(name.encode()) + rb"\s", content)
+    line = content.count(b"\n", 0, found.start()) + 1 if found else 1
+    remedy = "only simple internal entities are read"
+    return KnowledgeError(f"entity {name} is external", file=path, place=f"line {line}", remedy=remedy)
+
+
 @contextmanager
 def without_log() -> Iterator[None]:
-    """Keep what rdflib logs of odd terms off the terminal."""
+    """Keep rdflib's warnings about odd terms off the terminal."""
     logger = logging.getLogger("rdflib.term")
     before = logger.level
     logger.setLevel(logging.CRITICAL)
@@ -212,11 +176,8 @@ def without_log() -> Iterator[None]:
 
 
 @contextmanager
-def _literally() -> Iterator[None]:
-    """Let rdflib take literals as they are written: it would otherwise write the ill-formed decimal 1e3 as 1000.
-
-    What it logs is checked after parsing.
-    """
+def _literals_as_written() -> Iterator[None]:
+    """Keep rdflib from normalising literals: it would write the ill-formed decimal 1e3 as 1000."""
     before = rdflib.NORMALIZE_LITERALS
     rdflib.NORMALIZE_LITERALS = False
     try:
@@ -229,15 +190,14 @@ def _literally() -> Iterator[None]:
 def _parse_rdf(path: Path, content: bytes) -> Graph:
     graph = Graph()
     try:
-        with _literally():
-            # A file without xml:base gets a base that says nothing about this machine's folders.
+        with _literals_as_written():
+            # A file without xml:base gets a base that reveals nothing of this machine's folders.
             graph.parse(data=content, format="xml", publicID=f"http://ontology.invalid/{path.stem}")
     except Exception as error:  # the parser raises many kinds; each means that this file is not RDF/XML
         text = error.getMessage() if isinstance(error, SAXParseException) else str(error)
         place = f"line {error.getLineNumber()}" if isinstance(error, SAXParseException) else None
-        raise KnowledgeError(
-            f"not RDF/XML: {' '.join(text.split())}", file=path, place=place, remedy=_SAVE_AS
-        ) from error
+        problem = f"not RDF/XML: {' '.join(text.split())}"
+        raise KnowledgeError(problem, file=path, place=place, remedy=_SAVE_AS) from error
     for triple in graph:
         for term in triple:
             if isinstance(term, URIRef) and not _NOT_IN_IRI.isdisjoint(term):
@@ -245,6 +205,98 @@ def _parse_rdf(path: Path, content: bytes) -> Graph:
     return graph
 
 
-def same_iri(iri: str) -> str:
-    """An IRI in the form in which two that mean the same ontology are equal: no scheme, no end mark."""
+def collect(given: Sequence[Path]) -> tuple[OntologyFile, ...]:
+    """Read the given files and all that they import, directly or not, each once.
+
+    Raises:
+        KnowledgeError: a file cannot be used, two different files supply one ontology, or an import does not
+            resolve.
+    """
+    files: list[OntologyFile] = []
+    for path in given:
+        _add(files, read_ontology(path))
+    for file in files:  # grows meanwhile, by imports of imports
+        for iri, line in file.imports:
+            if _supplier(files, iri) is None:
+                found = _beside(file, iri) or _shipped(files, iri)
+                if found is not None:
+                    _add(files, found)
+                elif not _holds_terms_of(files, iri):
+                    raise KnowledgeError(
+                        f"import {iri} does not resolve to a local file",
+                        file=file.path,
+                        place=f"line {line}" if line else None,
+                        remedy="give the imported ontology's file too, or put it beside this one; "
+                        "nothing is fetched from the network",
+                    )
+    return tuple(files)
+
+
+def supplies(file: OntologyFile, iri: str, *, by_name: bool = True) -> bool:
+    """Whether a file supplies an imported ontology: by an IRI of its own, or else by name."""
+    known = (*file.iris, file.base) if file.base else file.iris
+    if _comparable(iri) in map(_comparable, known):
+        return True
+    return by_name and _name(iri) in {file.path.stem, *map(_name, file.iris)}
+
+
+def _add(files: list[OntologyFile], new: OntologyFile) -> None:
+    for old in files:
+        if old.path.resolve() == new.path.resolve() or old.content == new.content:
+            return
+        if set(map(_comparable, old.iris)) & set(map(_comparable, new.iris)):
+            problem = f"supplies the ontology {new.iris[0]}, and so does {old.path}"
+            raise KnowledgeError(problem, file=new.path, remedy="give one of the two")
+    files.append(new)
+
+
+def _comparable(iri: str) -> str:
+    """An IRI without scheme and end mark: two that mean the same ontology are equal in this form."""
     return urldefrag(iri)[0].partition("://")[2].rstrip("/") or iri
+
+
+def _name(iri: str) -> str:
+    """The name of an ontology by its IRI: its last part without the ending of a file."""
+    return Path(local_name(_comparable(iri))).stem
+
+
+def _supplier(files: Sequence[OntologyFile], iri: str) -> OntologyFile | None:
+    """The file that supplies an imported ontology: by IRI, else by name."""
+    found = (file for by_name in (False, True) for file in files if supplies(file, iri, by_name=by_name))
+    return next(found, None)
+
+
+def _beside(file: OntologyFile, iri: str) -> OntologyFile | None:
+    """The file of that name, or else with that IRI, in the folder of the importing file."""
+    folder = file.path.parent
+    for path in (folder / (_name(iri) + ending) for ending in _ENDINGS):
+        if path.is_file() and path.resolve() != file.path.resolve():
+            return read_ontology(path)
+    for path in sorted(entry for entry in folder.iterdir() if entry.suffix in _ENDINGS[:2] and entry.is_file()):
+        try:
+            if _name(iri).encode() not in path.read_bytes():
+                continue
+            candidate = read_ontology(path)
+        except (KnowledgeError, OSError):
+            continue  # an unrelated file that happens to be in the folder
+        if _comparable(iri) in map(_comparable, candidate.iris):
+            return candidate
+    return None
+
+
+def _shipped(files: Sequence[OntologyFile], iri: str) -> OntologyFile | None:
+    name = _SHIPPED.get(_name(iri))
+    if name is None:
+        return None
+    found = read_ontology(shipped_folder("ontology") / name)
+    # A given tomasys ontology is not mixed with the shipped one for the sake of its mros terms.
+    return None if any(_supplier(files, known) for known in found.iris) else found
+
+
+def _holds_terms_of(files: Iterable[OntologyFile], iri: str) -> bool:
+    """Whether a file, such as an edited copy of the shipped tomasys.owl, defines the terms for robots itself."""
+    return _name(iri) == "mros" and any(
+        isinstance(subject, URIRef) and subject.startswith(MROS) and len(set(file.graph.predicates(subject))) > 1
+        for file in files
+        for subject in file.graph.subjects(RDF_TERMS.type, None)
+    )

@@ -14,11 +14,10 @@ from typing import Any, Final
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge import jvm
-from suave_des.knowledge.base import KnowledgeBase
-from suave_des.knowledge.model import facts_of, properties_to_read
-from suave_des.knowledge.rules import Rule
-from suave_des.knowledge.situation import Lit, Triple
-from suave_des.knowledge.triples import RULE_IRI, canonical, n_triple
+from suave_des.knowledge.content import RULE_IRI
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rdf import Lit, Triple, canonical, facts_of, n_triple
+from suave_des.knowledge.rules.syntax import Rule
 from suave_des.knowledge.vocabulary import RDF_TYPE, XSD
 
 _LITERAL: Final = re.compile(r"literal\((.*),([^,]*),([^,]*)\)", re.DOTALL)
@@ -41,7 +40,7 @@ def load_n_triples(text: str, *, explain: bool = False) -> Any:
 
 
 @contextmanager
-def _java_errors(kb: KnowledgeBase) -> Iterator[None]:
+def _java_errors(kb: Ontology) -> Iterator[None]:
     """What Java throws, as an error for the user: Pellet meets something that it cannot use at all."""
     try:
         yield
@@ -59,7 +58,7 @@ class InProcessPellet:
         KnowledgeError: the ontologies are inconsistent by themselves, or Pellet drops one of the rules.
     """
 
-    def __init__(self, kb: KnowledgeBase) -> None:
+    def __init__(self, kb: Ontology) -> None:
         self._kb = kb
         with one_at_a_time, _java_errors(kb):
             jvm.start()
@@ -68,7 +67,7 @@ class InProcessPellet:
             self._make_plain = jvm.java_class(_PELLET + "utils.ATermUtils").makePlainLiteral
             self._base = load_n_triples(kb.content.n_triples())
             self._terms: dict[str, Any] = {}
-            self._properties = [(name, self._term(name)) for name in properties_to_read(kb.content)]
+            self._properties = [(name, self._term(name)) for name in kb.content.properties_to_read()]
             self._classes = [(name, self._term(name)) for name in sorted(kb.content.head_classes())]
             if not self._base.isConsistent():
                 raise contradiction(kb, ())
@@ -155,7 +154,7 @@ class InProcessPellet:
                 raise KnowledgeError(f"Pellet does not use part of a rule: {warning}", file=_files(self._kb))
 
 
-def contradiction(kb: KnowledgeBase, situation: Sequence[Triple]) -> KnowledgeError:
+def contradiction(kb: Ontology, situation: Sequence[Triple]) -> KnowledgeError:
     """The error for a state that contradicts itself: on what, by which rules, and what in the state they need.
 
     Loads everything once more, with Pellet's tracing switched on: it is off otherwise, for it costs time.
@@ -201,7 +200,7 @@ def _dropped(rule: Rule, warning: str) -> KnowledgeError:
     )
 
 
-def _files(kb: KnowledgeBase) -> str:
+def _files(kb: Ontology) -> str:
     return ", ".join(map(str, kb.files))
 
 

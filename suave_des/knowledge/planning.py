@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import Final
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.state import Decision, Inference, KnowledgeState, ObjectiveState, Plan, Rejection
 from suave_des.knowledge.vocabulary import PERFORMANCE, objective_name
 
@@ -28,7 +28,7 @@ _COMPARE: Final[Mapping[str, Callable[[Decimal, Decimal], bool]]] = MappingProxy
 
 
 def plan(
-    kb: KnowledgeBase, state: KnowledgeState, inference: Inference, *, to_adapt: Mapping[str, str] | None = None
+    kb: Ontology, state: KnowledgeState, inference: Inference, *, to_adapt: Mapping[str, str] | None = None
 ) -> Plan:
     """Decide on every objective that is ungrounded, in error, updatable or always to be improved.
 
@@ -65,7 +65,7 @@ def _call(objective: ObjectiveState, inference: Inference) -> str | None:
     return "always to be improved" if True in inference.values(name, "o_always_improve") else None
 
 
-def _decide(kb: KnowledgeBase, inference: Inference, function: str, call: str) -> Decision:
+def _decide(kb: Ontology, inference: Inference, function: str, call: str) -> Decision:
     designs = [name for name in inference.subjects("solvesF", function) if name in kb.model.designs]
     rejected = []
     left = []
@@ -132,7 +132,7 @@ def _operator(inference: Inference, attribute: str, objective: str) -> tuple[Cal
     )
 
 
-def performance(kb: KnowledgeBase, inference: Inference, design: str) -> Decimal:
+def performance(kb: Ontology, inference: Inference, design: str) -> Decimal:
     """What the planner maximises: the design's expected performance."""
     name = kb.names.short(PERFORMANCE)
     return max(

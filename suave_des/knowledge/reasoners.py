@@ -11,10 +11,9 @@ from types import MappingProxyType
 from typing import Final, Protocol
 
 from suave_des.errors import InputError
-from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.limit import LOADING, TimeLimit, reasoning_on
-from suave_des.knowledge.model import facts_of
-from suave_des.knowledge.situation import Triple
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rdf import Triple, facts_of
 from suave_des.knowledge.state import Inference, KnowledgeState
 
 #: Inferences that a reasoner remembers; about 20 kB each.
@@ -41,7 +40,7 @@ class _Remembering:
     """A backend with a bounded memory of exact states."""
 
     def __init__(
-        self, name: str, kb: KnowledgeBase, entailed: Callable[[KnowledgeState, tuple[Triple, ...]], Iterable[Triple]]
+        self, name: str, kb: Ontology, entailed: Callable[[KnowledgeState, tuple[Triple, ...]], Iterable[Triple]]
     ) -> None:
         self.name = name
         self._kb = kb
@@ -60,13 +59,13 @@ class _Remembering:
         return known
 
     def _infer(self, state: KnowledgeState) -> Inference:
-        situation = self._kb.situation(state)
+        situation = self._kb.assertions(state)
         asserted = self._kb.facts.union(facts_of(situation, self._kb.names))
         entailed = facts_of(self._entailed(state, situation), self._kb.names)
         return Inference(state, asserted, frozenset(entailed) - asserted)
 
 
-def _pellet(kb: KnowledgeBase, limit: TimeLimit) -> Reasoner:
+def _pellet(kb: Ontology, limit: TimeLimit) -> Reasoner:
     from suave_des.knowledge.pellet import InProcessPellet
 
     pellet = limit.run(lambda: InProcessPellet(kb), LOADING)
@@ -77,7 +76,7 @@ def _pellet(kb: KnowledgeBase, limit: TimeLimit) -> Reasoner:
     return _Remembering("pellet", kb, entailed)
 
 
-def _owlready2(kb: KnowledgeBase, limit: TimeLimit) -> Reasoner:
+def _owlready2(kb: Ontology, limit: TimeLimit) -> Reasoner:
     from suave_des.knowledge.pellet import InProcessPellet
     from suave_des.knowledge.stock import StockPellet
 
@@ -98,18 +97,18 @@ def _owlready2(kb: KnowledgeBase, limit: TimeLimit) -> Reasoner:
     return _Remembering("owlready2", kb, entailed)
 
 
-def _remembered(kb: KnowledgeBase, limit: TimeLimit) -> Reasoner:
-    from suave_des.knowledge.remembered import Remembered
+def _remembered(kb: Ontology, limit: TimeLimit) -> Reasoner:
+    from suave_des.knowledge.cached_pellet import CachedPellet
 
-    return Remembered(kb, limit=limit)
+    return CachedPellet(kb, limit=limit)
 
 
-BACKENDS: Final[Mapping[str, Callable[[KnowledgeBase, TimeLimit], Reasoner]]] = MappingProxyType(
+BACKENDS: Final[Mapping[str, Callable[[Ontology, TimeLimit], Reasoner]]] = MappingProxyType(
     {"owlready2": _owlready2, "pellet": _pellet, "remembered": _remembered}
 )
 
 
-def make_reasoner(name: str, kb: KnowledgeBase, limit: TimeLimit | None = None) -> Reasoner:
+def make_reasoner(name: str, kb: Ontology, limit: TimeLimit | None = None) -> Reasoner:
     """A reasoner by name.
 
     Args:

@@ -14,21 +14,18 @@ from dataclasses import dataclass
 from decimal import Decimal
 from functools import cached_property
 from math import inf
-from typing import Any, Final
+from typing import Final
 
-from suave_des.knowledge.base import KnowledgeBase
-from suave_des.knowledge.rule_syntax import EXPRESSION, Variable
-from suave_des.knowledge.rules import Rule
-from suave_des.knowledge.situation import Lit
+from suave_des.knowledge.inference_cache import Key
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rdf import Lit
+from suave_des.knowledge.rules.syntax import EXPRESSION, Rule, Variable
 from suave_des.knowledge.state import MAX_EXPONENT, KnowledgeState
-from suave_des.knowledge.vocabulary import OWL, RDF_TYPE, RDFS, SWRLB, TOMASYS, XSD, local_name
+from suave_des.knowledge.vocabulary import HAS_VALUE, OWL, RDF_TYPE, RDFS, SWRLB, XSD, local_name
 
-#: What a reasoner can be asked about: all of a state but its measured values, and where these lie.
-Key = tuple[Any, ...]
 _COMPARING: Final = frozenset(
     SWRLB + name for name in ("equal", "notEqual", "lessThan", "lessThanOrEqual", "greaterThan", "greaterThanOrEqual")
 )
-_HAS_VALUE: Final = TOMASYS + "hasValue"
 _SAME_VALUES: Final = (RDFS + "subPropertyOf", OWL + "equivalentProperty")
 _BINARY: Final = frozenset((XSD + "float", XSD + "double"))
 #: Datatypes of which a number is or is not by its size alone, or in which there is no number.
@@ -98,16 +95,16 @@ def _ranked(state: KnowledgeState, where: list[tuple[str, int]]) -> tuple[tuple[
     )
 
 
-def regions_of(kb: KnowledgeBase) -> Regions:
+def regions_of(kb: Ontology) -> Regions:
     """The regions of a knowledge base, or why it has none."""
     carriers = _carriers(kb)
     reasons = [*_of_rules(kb, carriers), *_of_ontologies(kb, carriers)]
     return Regions(tuple(sorted(set(_numbers(kb)))), tuple(dict.fromkeys(reasons)))
 
 
-def _carriers(kb: KnowledgeBase) -> frozenset[str]:
+def _carriers(kb: Ontology) -> frozenset[str]:
     """Properties that can have a measured value: hasValue, and what holds wherever it does."""
-    found = {_HAS_VALUE}
+    found = {HAS_VALUE}
     while True:
         more = {
             one
@@ -120,7 +117,7 @@ def _carriers(kb: KnowledgeBase) -> frozenset[str]:
         found |= more
 
 
-def _of_rules(kb: KnowledgeBase, carriers: frozenset[str]) -> Iterator[str]:
+def _of_rules(kb: Ontology, carriers: frozenset[str]) -> Iterator[str]:
     for rule in kb.content.enabled_rules:
         for atom in rule.atoms:
             if atom.kind == "builtin" and atom.predicate not in _COMPARING:
@@ -143,8 +140,8 @@ def _measured_variables(rule: Rule, carriers: frozenset[str]) -> set[str]:
     return {term.name for term in values if isinstance(term, Variable)}
 
 
-def _of_ontologies(kb: KnowledgeBase, carriers: frozenset[str]) -> Iterator[str]:
-    for name in sorted(carriers - {_HAS_VALUE}):
+def _of_ontologies(kb: Ontology, carriers: frozenset[str]) -> Iterator[str]:
+    for name in sorted(carriers - {HAS_VALUE}):
         yield f"{local_name(name)} has the values of hasValue"
     for subject, predicate, value in kb.content.triples:
         if isinstance(value, Lit) and value.datatype in _BINARY:
@@ -161,7 +158,7 @@ def _of_ontologies(kb: KnowledgeBase, carriers: frozenset[str]) -> Iterator[str]
             yield "a class expression has a binary number, which is compared inexactly"
 
 
-def _numbers(kb: KnowledgeBase) -> Iterator[Decimal]:
+def _numbers(kb: Ontology) -> Iterator[Decimal]:
     """Every number in the knowledge base, whatever its datatype, and texts that look like one."""
     model = kb.model
     groups = (model.objectives, model.groundings, model.measurements)

@@ -20,13 +20,10 @@ from rdflib.namespace import OWL, RDF, RDFS
 from rdflib.term import Node
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.java import java_executable
-from suave_des.knowledge.model import properties_to_read
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import unescape
-from suave_des.knowledge.rules import literal
-from suave_des.knowledge.situation import Lit, Triple
-from suave_des.knowledge.triples import n_triple
+from suave_des.knowledge.rdf import Lit, Triple, literal, n_triple
 from suave_des.knowledge.vocabulary import RDF as RDF_IRI
 from suave_des.knowledge.vocabulary import RDF_TYPE, XSD
 
@@ -37,9 +34,9 @@ _STATE_IRI: Final = "urn:suave-des:state"
 class StockPellet:
     """owlready2 with its own way to run Pellet."""
 
-    def __init__(self, kb: KnowledgeBase) -> None:
+    def __init__(self, kb: Ontology) -> None:
         self._text = kb.content.n_triples()
-        self._properties = properties_to_read(kb.content)
+        self._properties = kb.content.properties_to_read()
         self._classes = sorted(kb.content.head_classes())
 
     def infer(self, situation: Sequence[Triple], limit_s: float | None = None) -> frozenset[Triple] | None:

@@ -26,6 +26,7 @@ SWRLA: Final = "http://swrl.stanford.edu/ontologies/3.3/swrla.owl#"
 LANGUAGE_NAMESPACES: Final = (RDF, RDFS, OWL, XSD, SWRL, SWRLB, SWRLA)
 
 RDF_TYPE: Final = RDF + "type"
+HAS_VALUE: Final = TOMASYS + "hasValue"
 
 #: What the planner and the loop read, whether or not a rule can conclude it.
 DECISION_PROPERTIES: Final = tuple(

@@ -8,13 +8,13 @@ from pathlib import Path
 
 from suave_des.domain import MISSION_FUNCTIONS
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.deliberation import Deliberation
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.scenario.loader import LoadedScenario
 
 
-def open_base(loaded: LoadedScenario) -> KnowledgeBase:
+def open_base(loaded: LoadedScenario) -> Ontology:
     """The scenario's knowledge base with its values and rules, and no reasoner.
 
     Raises:
@@ -22,7 +22,7 @@ def open_base(loaded: LoadedScenario) -> KnowledgeBase:
     """
     knowledge = loaded.scenario.knowledge
     try:
-        return KnowledgeBase.load(
+        return Ontology.load(
             loaded.ontologies,
             values={name: Decimal(repr(value)) for name, value in knowledge.values.items()},
             rules=loaded.rules,
@@ -76,5 +76,5 @@ def _open(
     reasoner: str,
 ) -> Deliberation:
     """Kept between scenarios that differ in other things: what was inferred stays true while the files' hashes do."""
-    base = KnowledgeBase.load(ontologies, values=dict(values), rules=rules, disabled_rules=disabled_rules)
+    base = Ontology.load(ontologies, values=dict(values), rules=rules, disabled_rules=disabled_rules)
     return Deliberation(base, make_reasoner(reasoner, base))

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from suave_des.knowledge.base import KnowledgeBase as Ontologies
 from suave_des.knowledge.deliberation import Conclusion, Deliberation
 from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit, in_words
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import KnowledgeState, Number
 from suave_des.scenario.loader import load_scenario
@@ -28,7 +28,7 @@ def _several(files: str | Path | Sequence[str | Path]) -> Sequence[str | Path]:
 
 @dataclass(frozen=True, eq=False)
 class KnowledgeBase:
-    """Ontologies with a reasoner, and the loop that they are used in.
+    """An ontology with a reasoner, and the loop that they are used in.
 
     Attributes:
         base: the ontologies.
@@ -37,7 +37,7 @@ class KnowledgeBase:
         limit: of the reasoner's time for one state.
     """
 
-    base: Ontologies
+    base: Ontology
     loop: Loop
     reasoner: str
     limit: TimeLimit = field(repr=False)
@@ -81,7 +81,7 @@ class KnowledgeBase:
         return cls.of(open_base(loaded), Loop.of(loaded.scenario), reasoner, limit)
 
     @classmethod
-    def of(cls, base: Ontologies, loop: Loop, reasoner: str, limit: TimeLimit) -> KnowledgeBase:
+    def of(cls, base: Ontology, loop: Loop, reasoner: str, limit: TimeLimit) -> KnowledgeBase:
         """A workbench on ontologies that are loaded already."""
         return cls(base, loop, reasoner, limit, Deliberation(base, make_reasoner(reasoner, base, limit)))
 

@@ -12,22 +12,19 @@ from pathlib import Path
 from typing import Final
 
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.knowledge.base import KnowledgeBase
-from suave_des.knowledge.catalogue import collect
-from suave_des.knowledge.checks import check_values
+from suave_des.knowledge.content import Content, merge, with_rules
 from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit
-from suave_des.knowledge.model import Names, build_model, expectations
-from suave_des.knowledge.ontology_file import OntologyFile
+from suave_des.knowledge.model import Model, build_model, check_values, expectations
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.ontology_file import OntologyFile, collect
+from suave_des.knowledge.rdf import Triple
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.regions import regions_of
-from suave_des.knowledge.rule_checks import check_rule
-from suave_des.knowledge.rule_files import RulesFile, with_rules
-from suave_des.knowledge.rule_names import Vocabulary, rule_from_text
-from suave_des.knowledge.rule_syntax import Atom, Named
-from suave_des.knowledge.rules import Rule
-from suave_des.knowledge.situation import Model, Triple
+from suave_des.knowledge.rules.checks import check_rule
+from suave_des.knowledge.rules.files import RulesFile
+from suave_des.knowledge.rules.names import Vocabulary, rule_from_text
+from suave_des.knowledge.rules.syntax import Atom, Named, Rule
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
-from suave_des.knowledge.triples import Content, merge
 from suave_des.knowledge.vocabulary import LANGUAGE_NAMESPACES, PERFORMANCE, RDF_TYPE, TOMASYS, local_name, nearest
 from suave_des.resources import shipped_folder
 from suave_des.workbench.findings import Finding, Level, fails, finding_of, in_order, shown_path
@@ -91,9 +88,9 @@ def check(subject: Subject) -> tuple[Finding, ...]:
     attempt(lambda: check_values(content, sources))
     values_are_right = not findings
     built: list[tuple[Model, Content]] = []
-    attempt(lambda: built.append(build_model(content, Names(content), sources)))
+    attempt(lambda: built.append(build_model(content, sources)))
     model = built[0][0] if built else None
-    vocabulary = Vocabulary.of(content.triples, model)
+    vocabulary = Vocabulary.of(content.triples, [] if model is None else [each.iri for each in model.individuals()])
     findings += _undefined(content, model, vocabulary, sources)
     groups = []
     for file in files:
@@ -274,7 +271,7 @@ def _facts(content: Content) -> Iterator[Triple]:
 
 def _of_reasoner(subject: Subject) -> Iterator[Finding]:
     """What comes to light when the knowledge base is used: contradictions, rules that Pellet drops."""
-    base = KnowledgeBase.load(
+    base = Ontology.load(
         subject.ontologies, values=subject.values, rules=subject.rules, disabled_rules=subject.disabled_rules
     )
     for reason in regions_of(base).reasons:
@@ -290,7 +287,7 @@ def _of_reasoner(subject: Subject) -> Iterator[Finding]:
         yield finding_of(error)
 
 
-def _plain_states(base: KnowledgeBase) -> Iterator[KnowledgeState]:
+def _plain_states(base: Ontology) -> Iterator[KnowledgeState]:
     """Each design in use, with one attribute measured in each region that makes a difference; with none at first."""
     attributes = [name for name in base.quality_attributes if matters(base, name)]
     regions = regions_between(numbers_in(base))

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from typing import Final
 
 from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
-from suave_des.knowledge.base import KnowledgeBase
 from suave_des.knowledge.deliberation import Conclusion, Deliberation
-from suave_des.knowledge.model import facts_of
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.planning import performance
+from suave_des.knowledge.rdf import Triple, facts_of
 from suave_des.knowledge.reasoners import make_reasoner
-from suave_des.knowledge.situation import Triple
 from suave_des.knowledge.state import Decision, Fact, KnowledgeState
 from suave_des.knowledge.vocabulary import objective_name
 from suave_des.workbench.derivation import Clash, Derivation
@@ -116,8 +115,8 @@ class Explanation:
             yield "nothing is inferred, and nothing decided"
 
 
-def explain(base: KnowledgeBase, state: KnowledgeState, question: str, improves_exceeded: bool) -> Explanation:
-    """Answer a question about a state; see KnowledgeBase.explain."""
+def explain(base: Ontology, state: KnowledgeState, question: str, improves_exceeded: bool) -> Explanation:
+    """Answer a question about a state; see Ontology.explain."""
     why, atom = _WHY.fullmatch(question.strip()), _ATOM.fullmatch(question.strip())
     if question.strip() and not why and not atom:
         raise InputError(f"{shown(question)} is no question about a state", remedy=_FORMS)
@@ -142,7 +141,7 @@ def explain(base: KnowledgeBase, state: KnowledgeState, question: str, improves_
 class _Teller:
     """Finds the facts behind a conclusion and how they follow."""
 
-    def __init__(self, base: KnowledgeBase, conclusion: Conclusion, tracer: Tracer) -> None:
+    def __init__(self, base: Ontology, conclusion: Conclusion, tracer: Tracer) -> None:
         self.base = base
         self.conclusion = conclusion
         self.tracer = tracer

@@ -7,9 +7,8 @@ from typing import Any
 
 from suave_des.knowledge import jvm
 from suave_des.knowledge.pellet import read_term
-from suave_des.knowledge.rule_syntax import Atom, Named, Term, Variable
-from suave_des.knowledge.situation import Lit, Triple
-from suave_des.knowledge.triples import canonical
+from suave_des.knowledge.rdf import Lit, Triple, canonical
+from suave_des.knowledge.rules.syntax import Atom, Named, Term, Variable
 from suave_des.knowledge.vocabulary import LANGUAGE_NAMESPACES, RDF_TYPE
 
 #: What the variables of a rule stand for: IRIs and literals by name.

@@ -9,11 +9,9 @@ from operator import eq, ge, gt, le, lt, ne
 from types import MappingProxyType
 from typing import Final
 
-from suave_des.knowledge.base import KnowledgeBase
-from suave_des.knowledge.model import value_of
-from suave_des.knowledge.rule_syntax import Atom, Named, Term, Variable
-from suave_des.knowledge.rules import Rule
-from suave_des.knowledge.situation import Lit, Triple
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rdf import Lit, Triple, value_of
+from suave_des.knowledge.rules.syntax import Atom, Named, Rule, Term, Variable
 from suave_des.knowledge.state import Value
 from suave_des.knowledge.vocabulary import SWRLB
 from suave_des.workbench.matching import Binding, matched
@@ -57,9 +55,7 @@ class NearRule:
         return f"rule {self.rule}: {self.fails} does not hold{f' with {bound}' if bound else ''}"
 
 
-def near_rules(
-    base: KnowledgeBase, name: str, subject: str, wanted: str, known: Sequence[Triple]
-) -> tuple[NearRule, ...]:
+def near_rules(base: Ontology, name: str, subject: str, wanted: str, known: Sequence[Triple]) -> tuple[NearRule, ...]:
     """Rules whose head could say a fact that does not follow, those that lack least first.
 
     Args:
@@ -80,7 +76,7 @@ def near_rules(
     return tuple(sorted(found, key=lambda each: (each.missing, each.rule)))
 
 
-def _start(base: KnowledgeBase, atom: Atom, name: str, subject: str, wanted: str) -> dict[str, str | Lit] | None:
+def _start(base: Ontology, atom: Atom, name: str, subject: str, wanted: str) -> dict[str, str | Lit] | None:
     """What a head's variables must be for it to say the fact; None if it cannot. One for the value is left free."""
     says = "type" if atom.kind == "class" else base.names.short(atom.predicate)
     if atom.kind not in _FACTS or says != name:
@@ -96,14 +92,14 @@ def _start(base: KnowledgeBase, atom: Atom, name: str, subject: str, wanted: str
     return {} if first == Named(subject) else None
 
 
-def _words(base: KnowledgeBase, term: Term) -> str:
+def _words(base: Ontology, term: Term) -> str:
     if isinstance(term, Lit):
         value = value_of(term, base.names)
         return str(value).lower() if isinstance(value, bool) else str(value)
     return base.names.short(term.iri) if isinstance(term, Named) else ""
 
 
-def _furthest(base: KnowledgeBase, rule: Rule, start: Binding, known: Sequence[Triple]) -> NearRule | None:
+def _furthest(base: Ontology, rule: Rule, start: Binding, known: Sequence[Triple]) -> NearRule | None:
     """The way to match a rule's body that comes furthest; None if all holds: the rule concludes something else."""
     best, furthest = start, -1
     for looked_at, (depth, binding) in enumerate(_ways(rule.body, 0, start, known)):

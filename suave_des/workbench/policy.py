@@ -10,8 +10,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.knowledge.base import KnowledgeBase as Ontologies
 from suave_des.knowledge.deliberation import Conclusion
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.workbench.regions import Region, matters, numbers_in, regions_between, rules_that_compute, values_in
 from suave_des.workbench.states import LASTING, Loop
@@ -124,7 +124,7 @@ class Space:
     words: tuple[str, ...]
 
     @classmethod
-    def of(cls, base: Ontologies, loop: Loop) -> Space:
+    def of(cls, base: Ontology, loop: Loop) -> Space:
         """What can make a difference to these ontologies."""
         attributes = tuple(name for name in _measured(base, loop) if matters(base, name))
         return cls(attributes, numbers_in(base), alike(base), statuses(base))
@@ -147,7 +147,7 @@ class Space:
 
 
 def make_policy(
-    base: Ontologies,
+    base: Ontology,
     loop: Loop,
     infer: Callable[[KnowledgeState], Conclusion],
     max_failed: int,
@@ -211,11 +211,11 @@ def make_policy(
     )
 
 
-def _measured(base: Ontologies, loop: Loop) -> list[str]:
+def _measured(base: Ontology, loop: Loop) -> list[str]:
     return [name for name in loop.measured if name in base.quality_attributes]
 
 
-def _situations(base: Ontologies) -> Iterator[tuple[tuple[str, ...], dict[str, str]]]:
+def _situations(base: Ontology) -> Iterator[tuple[tuple[str, ...], dict[str, str]]]:
     """Functions asked for together, as the mission's tasks do, with each way to ground them."""
     solvable = [name for name in base.functions if base.designs(name)]
     lasting = [name for name in LASTING if name in solvable]

@@ -12,11 +12,10 @@ from rdflib.compare import to_canonical_graph
 from rdflib.namespace import RDFS
 
 from suave_des.errors import InputError
-from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import InProcessPellet
-from suave_des.knowledge.situation import Triple
+from suave_des.knowledge.rdf import Triple, n_triple
 from suave_des.knowledge.state import KnowledgeState
-from suave_des.knowledge.triples import n_triple
 from suave_des.knowledge.vocabulary import MROS, OWL, RDF, SUAVE, SWRL, TOMASYS, XSD
 
 _UNNAMED: Final = re.compile(r"(?<![^\s])_:([A-Za-z0-9]+)(?=\s)")
@@ -45,7 +44,7 @@ class QueryResult:
     rows: tuple[tuple[str | None, ...], ...]
 
 
-def run_query(base: KnowledgeBase, text: str, state: KnowledgeState | None, *, inferred: bool) -> QueryResult:
+def run_query(base: Ontology, text: str, state: KnowledgeState | None, *, inferred: bool) -> QueryResult:
     """Ask a query.
 
     Args:
@@ -59,14 +58,14 @@ def run_query(base: KnowledgeBase, text: str, state: KnowledgeState | None, *, i
         InputError: it is no query, or wants to read something else than the knowledge base.
         KnowledgeError: the state contradicts itself.
     """
-    situation = () if state is None else base.situation(state)
+    situation = () if state is None else base.assertions(state)
     more: Iterable[Triple] = InProcessPellet(base).infer(situation) if inferred else ()
     content = replace(base.content, structure=_with_fixed_names(base.content.structure))
     graph = rdflib.Graph("SimpleMemory")  # goes through triples in the order in which they came
     lines = content.n_triples(content.rules) + "".join(map(n_triple, (*situation, *more)))
     names = {name: rdflib.BNode(name) for name in _UNNAMED.findall(lines)}
     graph.parse(data=lines, format="nt", bnode_context=names)
-    for source in base._sources:
+    for source in base.sources:
         for predicate in (RDFS.label, RDFS.comment):
             for subject, value in sorted(source.graph.subject_objects(predicate)):
                 if isinstance(subject, rdflib.URIRef):

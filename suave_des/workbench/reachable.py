@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from suave_des.knowledge.rule_syntax import EXPRESSION, Atom, Named
-from suave_des.knowledge.rule_writer import write_atom
-from suave_des.knowledge.rules import Rule
-from suave_des.knowledge.situation import Lit, Model, Triple
-from suave_des.knowledge.triples import Content, canonical
+from suave_des.knowledge.content import Content
+from suave_des.knowledge.model import Model
+from suave_des.knowledge.rdf import Lit, Triple, canonical
+from suave_des.knowledge.rules.syntax import EXPRESSION, Atom, Named, Rule
+from suave_des.knowledge.rules.writer import write_atom
 from suave_des.knowledge.vocabulary import LANGUAGE_NAMESPACES, OWL, RDF_TYPE, RDFS, TOMASYS, XSD
 
 _ANY: Final = "any value"

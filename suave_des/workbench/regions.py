@@ -12,11 +12,9 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Final
 
-from suave_des.knowledge.base import KnowledgeBase
-from suave_des.knowledge.model import value_of
-from suave_des.knowledge.rule_syntax import Atom, Named, Variable
-from suave_des.knowledge.rules import Rule
-from suave_des.knowledge.situation import Lit
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rdf import Lit, value_of
+from suave_des.knowledge.rules.syntax import Atom, Named, Rule, Variable
 from suave_des.knowledge.state import exact
 from suave_des.knowledge.vocabulary import OWL, RDFS, SWRLB, TOMASYS
 
@@ -82,7 +80,7 @@ class Region:
 MISSING: Final = Region(is_missing=True)
 
 
-def numbers_in(base: KnowledgeBase) -> tuple[Decimal, ...]:
+def numbers_in(base: Ontology) -> tuple[Decimal, ...]:
     """Every number that the ontologies or an enabled rule have, rising."""
     literals = [triple[2] for triple in base.content.triples if isinstance(triple[2], Lit)]
     literals += [
@@ -137,7 +135,7 @@ def _weak_orders(size: int) -> Iterator[tuple[int, ...]]:
             yield ranks
 
 
-def rules_that_compute(base: KnowledgeBase) -> tuple[str, ...]:
+def rules_that_compute(base: Ontology) -> tuple[str, ...]:
     """Names of enabled rules that do more with numbers than compare them: for these regions prove nothing."""
     return tuple(sorted({rule.name for rule in base.content.enabled_rules if _computes(rule)}))
 
@@ -150,7 +148,7 @@ def _computes(rule: Rule) -> bool:
     return any(atom.kind == "data" and isinstance(atom.arguments[-1], Variable) for atom in rule.head)
 
 
-def matters(base: KnowledgeBase, attribute: str) -> bool:
+def matters(base: Ontology, attribute: str) -> bool:
     """Whether a measured value of a quality attribute can make any difference.
 
     It cannot when no design expects one and no rule can match the individual that carries it: what is known of that
@@ -174,7 +172,7 @@ def matters(base: KnowledgeBase, attribute: str) -> bool:
     return any(_can_match(rule, iri, measured.iri, classes) for rule in base.content.enabled_rules)
 
 
-def _classes(base: KnowledgeBase) -> frozenset[str]:
+def _classes(base: Ontology) -> frozenset[str]:
     """All classes that a measured value's individual is in: QAvalue, what its properties' domains say, and above."""
     found = {TOMASYS + "QAvalue", OWL + "Thing"}
     while True:

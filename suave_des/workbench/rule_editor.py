@@ -24,12 +24,14 @@ from rdflib.namespace import OWL, RDF
 from rdflib.term import Node
 
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, read_ontology
-from suave_des.knowledge.rule_checks import check_rule, first_error
-from suave_des.knowledge.rule_names import rule_from_text
-from suave_des.knowledge.rule_parser import parse_rule
-from suave_des.knowledge.rules import RdfTriple, Rule, rules_of
+from suave_des.knowledge.rdf import RdfTriple
+from suave_des.knowledge.rules.checks import check_rule, first_error
+from suave_des.knowledge.rules.names import rule_from_text
+from suave_des.knowledge.rules.parser import parse_rule
+from suave_des.knowledge.rules.rdf import rules_of
+from suave_des.knowledge.rules.syntax import Rule
 from suave_des.knowledge.vocabulary import RDF as RDF_NS
 from suave_des.knowledge.vocabulary import RDFS, SWRL, SWRLA, XSD, local_name, nearest
 
@@ -155,7 +157,7 @@ def add_rule(path: Path, text: str) -> Rule:
         InputError: the file cannot be edited.
         KnowledgeError: the file cannot be read or has a rule of that name already, or the rule is wrong.
     """
-    base = KnowledgeBase.load([path])
+    base = Ontology.load([path])
     rule = rule_from_text(parse_rule(text, _GIVEN), base.vocabulary, _GIVEN)
     error = first_error(rule, check_rule(rule, base.vocabulary))
     if error is not None:

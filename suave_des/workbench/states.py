@@ -9,9 +9,9 @@ from typing import Any, Final
 
 from suave_des.domain import GENERATE_SEARCH_PATH, MAINTAIN_MOTION
 from suave_des.errors import InputError, KeyPath, KnowledgeError, did_you_mean, shown
-from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.planning import calls
-from suave_des.knowledge.situation import Lit
+from suave_des.knowledge.rdf import Lit
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.knowledge.vocabulary import TOMASYS, XSD, nearest
 from suave_des.scenario.models import Scenario
@@ -60,7 +60,7 @@ class Loop:
 class StateParts:
     """A state under construction. Later additions win over earlier ones."""
 
-    base: KnowledgeBase
+    base: Ontology
     objectives: dict[str, str | None] = field(default_factory=dict)
     groundings: dict[str, str] = field(default_factory=dict)
     components: dict[str, str] = field(default_factory=dict)
@@ -144,7 +144,7 @@ class StateParts:
 
 
 def state_from(
-    base: KnowledgeBase,
+    base: Ontology,
     loop: Loop,
     file: Path | None = None,
     *,

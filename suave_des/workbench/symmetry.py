@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from math import comb
 from typing import Final
 
-from suave_des.knowledge.base import KnowledgeBase
-from suave_des.knowledge.rule_syntax import Named
-from suave_des.knowledge.situation import Lit, Triple
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rdf import Lit, Triple
+from suave_des.knowledge.rules.syntax import Named
 from suave_des.knowledge.vocabulary import TOMASYS, XSD
 
 _C_STATUS: Final = TOMASYS + "c_status"
@@ -31,7 +31,7 @@ class Reports:
     combinations: int
 
 
-def alike(base: KnowledgeBase) -> tuple[tuple[str, ...], ...]:
+def alike(base: Ontology) -> tuple[tuple[str, ...], ...]:
     """Groups of components that can be exchanged: doing so maps ontologies and rules onto themselves."""
     groups: list[list[str]] = []
     for name in base.components:
@@ -43,7 +43,7 @@ def alike(base: KnowledgeBase) -> tuple[tuple[str, ...], ...]:
     return tuple(map(tuple, groups))
 
 
-def _exchangeable(base: KnowledgeBase, one: str, other: str) -> bool:
+def _exchangeable(base: Ontology, one: str, other: str) -> bool:
     model, content = base.model, base.content
     a, b = model.components[one], model.components[other]
     if any(iri in line for iri in (f"<{a}>", f"<{b}>") for line in content.structure):
@@ -64,7 +64,7 @@ def _exchangeable(base: KnowledgeBase, one: str, other: str) -> bool:
     return {swapped(triple) for triple in own} == own
 
 
-def statuses(base: KnowledgeBase) -> tuple[str, ...]:
+def statuses(base: Ontology) -> tuple[str, ...]:
     """Values of c_status to look at: what monitors report, and what enabled rules ask for."""
     asked = {
         term.text

@@ -15,14 +15,12 @@ from functools import cached_property
 from typing import Final
 
 from suave_des.knowledge import jvm
-from suave_des.knowledge.base import KnowledgeBase
-from suave_des.knowledge.model import facts_of, value_of
+from suave_des.knowledge.content import RULE_IRI, Content
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import InProcessPellet, load_n_triples, one_at_a_time
-from suave_des.knowledge.rule_syntax import Atom
-from suave_des.knowledge.rules import Rule
-from suave_des.knowledge.situation import Lit, Triple
+from suave_des.knowledge.rdf import Lit, Triple, facts_of, n_triple, value_of
+from suave_des.knowledge.rules.syntax import Atom, Rule
 from suave_des.knowledge.state import Fact, KnowledgeState, Value
-from suave_des.knowledge.triples import RULE_IRI, Content, n_triple
 from suave_des.knowledge.vocabulary import OWL, RDF_TYPE
 from suave_des.workbench.derivation import Clash, Derivation
 from suave_des.workbench.matching import Binding, canonical_triple, is_fact, matched, matches, values_of
@@ -47,7 +45,7 @@ class _Traced:
 class Tracer:
     """Derives facts of one state."""
 
-    base: KnowledgeBase
+    base: Ontology
     state: KnowledgeState
     _steps: dict[tuple[int, frozenset[Triple]], frozenset[Triple]] = field(default_factory=dict, repr=False)
     _found: dict[Triple, Derivation] = field(default_factory=dict, repr=False)
@@ -55,7 +53,7 @@ class Tracer:
     @cached_property
     def situation(self) -> tuple[Triple, ...]:
         """What the state asserts."""
-        return self.base.situation(self.state)
+        return self.base.assertions(self.state)
 
     @cached_property
     def asserted(self) -> frozenset[Triple]:

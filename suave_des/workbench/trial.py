@@ -13,11 +13,12 @@ from pydantic import ValidationError
 from suave_des.campaign.knowledge_file import KNOWLEDGE_FILE, read_knowledge
 from suave_des.campaign.knowledge_lines import CAMPAIGN_KNOWLEDGE_FILE, read_missions
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.knowledge.base import KnowledgeBase as Ontologies
+from suave_des.knowledge.content import with_rules
 from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit
-from suave_des.knowledge.rule_files import RulesFile, hash_with_rules, with_rules
-from suave_des.knowledge.rule_parser import parse_rule, parse_rules
-from suave_des.knowledge.rules import Rule
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rules.files import RulesFile, hash_with_rules
+from suave_des.knowledge.rules.parser import parse_rule, parse_rules
+from suave_des.knowledge.rules.syntax import Rule
 from suave_des.knowledge.state import Fact, KnowledgeState, Value
 from suave_des.resources import find
 from suave_des.scenario.loader import load_scenario
@@ -184,7 +185,7 @@ def _scenario(path: Path) -> Scenario:
         raise InputError("is not a mission's record", file=path, remedy="run the mission again") from None
 
 
-def _with(base: Ontologies, text: str) -> Ontologies:
+def _with(base: Ontology, text: str) -> Ontology:
     file = RulesFile(Path("the rule to try"), text, parse_rules(text, "the rule to try"))
     content = with_rules(base.content, [file.rules(base.vocabulary)], ())
     return replace(
@@ -192,7 +193,7 @@ def _with(base: Ontologies, text: str) -> Ontologies:
     )
 
 
-def _without(base: Ontologies, name: str) -> Ontologies:
+def _without(base: Ontology, name: str) -> Ontology:
     try:
         content = with_rules(base.content, [], [name])
     except KnowledgeError as error:
@@ -215,7 +216,7 @@ class _Pair:
             named = () if change.ontologies else used.knowledge.ontologies
             ontologies = tuple(find(each, "ontology") for each in named)
             rules = tuple(find(each, "ontology") for each in used.knowledge.rules)
-        base = Ontologies.load(
+        base = Ontology.load(
             change.ontologies or ontologies,
             values={name: Decimal(repr(value)) for name, value in used.knowledge.values.items()},
             rules=[*rules, *change.rules],

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from suave_des.knowledge.rule_names import Vocabulary
-from suave_des.knowledge.situation import Model
-from suave_des.knowledge.triples import Content
+from suave_des.knowledge.content import Content
+from suave_des.knowledge.model import Model
+from suave_des.knowledge.rules.names import Vocabulary
 from suave_des.knowledge.vocabulary import LANGUAGE_NAMESPACES, RDF_TYPE, local_name, namespace, nearest
 
 _PROPERTIES: Final = frozenset(("object property", "data property", "annotation property"))

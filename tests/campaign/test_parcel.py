@@ -18,7 +18,7 @@ from suave_des.campaign.parcel import Parcel, pack, unpack
 from suave_des.campaign.plan import MissionKey
 from suave_des.campaign.variation import Variation, vary
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.knowledge.memory import DiskMemory
+from suave_des.knowledge.inference_cache import InferenceCache
 from suave_des.scenario.loader import load_scenario
 from tests.helpers import AWKWARD
 
@@ -132,8 +132,8 @@ class TestOnAWorker:
         (tmp_path / "scratch").mkdir()
         first, report = self.run(job("metacontrol"), range(1, 2), tmp_path / "scratch", "learns")
         ((digest, entries),) = (item for learned in report.learned for item in learned.items())
-        DiskMemory(digest).take_over(entries)
-        assert pack(job("metacontrol")).memories == {digest: DiskMemory(digest).content()}
+        InferenceCache(digest).take_over(entries)
+        assert pack(job("metacontrol")).memories == {digest: InferenceCache(digest).content()}
         monkeypatch.setenv("JAVA_HOME", str(tmp_path / "no_java"))
         again, report = self.run(job("metacontrol"), range(1, 2), tmp_path / "scratch", "knows")
         assert again == first

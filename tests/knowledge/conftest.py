@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.resources import shipped_folder
 from tests.helpers.owl_text import MakeOntology
@@ -29,12 +29,12 @@ def shipped() -> Path:
 
 
 @pytest.fixture(scope="session")
-def kb() -> KnowledgeBase:
-    return KnowledgeBase.load()
+def kb() -> Ontology:
+    return Ontology.load()
 
 
 @pytest.fixture(scope="session")
-def pellet(kb: KnowledgeBase) -> Reasoner:
+def pellet(kb: Ontology) -> Reasoner:
     return make_reasoner("pellet", kb)
 
 

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.planning import plan
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.knowledge.state import Inference, KnowledgeState, ObjectiveState
@@ -54,7 +54,7 @@ def outcome(reasoner: Reasoner, state: KnowledgeState) -> Inference | str:
 
 
 def test_both_backends_infer_the_same_on_random_states(
-    kb: KnowledgeBase, pellet: Reasoner, monkeypatch: pytest.MonkeyPatch
+    kb: Ontology, pellet: Reasoner, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # For Java processes that live a second: less compiling, one thread less. It changes nothing else.
     monkeypatch.setenv("JAVA_TOOL_OPTIONS", "-XX:TieredStopAtLevel=1 -XX:+UseSerialGC")
@@ -75,7 +75,7 @@ def test_both_backends_infer_the_same_on_random_states(
         assert plan(kb, one.state, one) == plan(kb, one.state, stock.infer(one.state))
 
 
-def test_an_inference_does_not_depend_on_those_before_it(kb: KnowledgeBase) -> None:
+def test_an_inference_does_not_depend_on_those_before_it(kb: Ontology) -> None:
     draw = random.Random(7)
     states = [random_state(draw) for _ in range(150)]
     forth = make_reasoner("pellet", kb)

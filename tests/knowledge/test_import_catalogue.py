@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.planning import plan
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from tests.helpers.exemplar_files import MROS_IMPORT, write_exemplar_files
@@ -27,17 +27,17 @@ STORY = [
 ]
 
 
-def decisions(base: KnowledgeBase, reasoner: Reasoner) -> list[dict[str, str | None]]:
+def decisions(base: Ontology, reasoner: Reasoner) -> list[dict[str, str | None]]:
     plans = [plan(base, state, reasoner.infer(state)) for state in STORY]
     return [{d.function: d.design for d in one.decisions} for one in plans]
 
 
 @pytest.mark.parametrize("oldest", [False, True])
 def test_the_exemplars_three_files_decide_as_the_shipped_two(
-    kb: KnowledgeBase, pellet: Reasoner, shipped: Path, tmp_path: Path, oldest: bool
+    kb: Ontology, pellet: Reasoner, shipped: Path, tmp_path: Path, oldest: bool
 ) -> None:
     files = write_exemplar_files(shipped, tmp_path / "owl", oldest=oldest)
-    base = KnowledgeBase.load(list(files.values()))
+    base = Ontology.load(list(files.values()))
     assert set(base.files) == set(files.values())
     assert len(base.rules) == len(kb.rules)
     found = decisions(base, make_reasoner("pellet", base))
@@ -49,7 +49,7 @@ def test_the_exemplars_three_files_decide_as_the_shipped_two(
 def test_the_order_of_files_does_not_matter_and_those_beside_are_found(shipped: Path, tmp_path: Path) -> None:
     files = write_exemplar_files(shipped, tmp_path / "owl")
     given = [*itertools.permutations(files.values()), (files["suave"],), (files["suave"], files["tomasys"])]
-    bases = [KnowledgeBase.load(one) for one in given]
+    bases = [Ontology.load(one) for one in given]
     assert {base.files for base in bases} == {tuple(sorted(files.values()))}
     assert len({base.content_hash for base in bases}) == 1
 
@@ -61,7 +61,7 @@ def test_files_in_different_folders_and_under_other_names_are_matched_by_iri(shi
         folder = tmp_path / str(number)
         folder.mkdir()
         moved.append(file.rename(folder / f"mine_{number}.owl"))
-    assert set(KnowledgeBase.load(moved).files) == set(moved)
+    assert set(Ontology.load(moved).files) == set(moved)
 
 
 def test_a_file_beside_under_another_name_is_matched_by_its_iri(suave_copy: MakeOntology, shipped: Path) -> None:
@@ -69,21 +69,21 @@ def test_a_file_beside_under_another_name_is_matched_by_its_iri(suave_copy: Make
     beside = path.with_name("vocabulary.owl")
     beside.write_bytes((shipped / "tomasys.owl").read_bytes() + b"<!-- mine -->")
     path.with_name("broken.owl").write_text("tomasys, but no XML")
-    assert set(KnowledgeBase.load([path]).files) == {path, beside}
+    assert set(Ontology.load([path]).files) == {path, beside}
 
 
 def test_a_given_file_wins_over_the_one_beside_and_that_over_the_shipped(
     suave_copy: MakeOntology, shipped: Path, tmp_path: Path
 ) -> None:
     path = suave_copy()
-    assert set(KnowledgeBase.load([path]).files) == {path, shipped / "tomasys.owl"}
+    assert set(Ontology.load([path]).files) == {path, shipped / "tomasys.owl"}
     beside = path.with_name("tomasys.owl")
     beside.write_bytes((shipped / "tomasys.owl").read_bytes() + b"<!-- beside -->")
-    assert set(KnowledgeBase.load([path]).files) == {path, beside}
+    assert set(Ontology.load([path]).files) == {path, beside}
     given = tmp_path / "elsewhere" / "tomasys.owl"
     given.parent.mkdir()
     given.write_bytes((shipped / "tomasys.owl").read_bytes() + b"<!-- given -->")
-    assert set(KnowledgeBase.load([path, given]).files) == {path, given}
+    assert set(Ontology.load([path, given]).files) == {path, given}
 
 
 @pytest.mark.parametrize(
@@ -92,26 +92,26 @@ def test_a_given_file_wins_over_the_one_beside_and_that_over_the_shipped(
 )
 def test_known_iris_resolve_to_the_shipped_files(suave_copy: MakeOntology, shipped: Path, iri: str) -> None:
     path = suave_copy(replace={IMPORT: iri})
-    assert set(KnowledgeBase.load([path]).files) == {path, shipped / "tomasys.owl"}
+    assert set(Ontology.load([path]).files) == {path, shipped / "tomasys.owl"}
 
 
 def test_an_edited_copy_of_the_shipped_tomasys_also_supplies_the_robots_terms(
-    suave_copy: MakeOntology, shipped: Path, kb: KnowledgeBase
+    suave_copy: MakeOntology, shipped: Path, kb: Ontology
 ) -> None:
     path = suave_copy(replace={IMPORT: MROS_IMPORT})
     copy = path.with_name("tomasys_mine.owl")
     copy.write_bytes((shipped / "tomasys.owl").read_bytes() + b"<!-- mine -->")
-    base = KnowledgeBase.load([path, copy])
+    base = Ontology.load([path, copy])
     assert set(base.files) == {path, copy}
     assert len(base.rules) == len(kb.rules)
 
 
 def test_a_given_mros_file_stands_in_for_the_shipped_rules_of_that_part(
-    shipped: Path, tmp_path: Path, kb: KnowledgeBase
+    shipped: Path, tmp_path: Path, kb: Ontology
 ) -> None:
     files = write_exemplar_files(shipped, tmp_path / "owl")
     files["tomasys"].unlink()
-    base = KnowledgeBase.load([files["mros"], files["suave"]])
+    base = Ontology.load([files["mros"], files["suave"]])
     assert shipped / "tomasys.owl" in base.files
     assert sorted(rule.name for rule in base.rules) == sorted(rule.name for rule in kb.rules)
 
@@ -120,7 +120,7 @@ def test_a_given_tomasys_is_not_mixed_with_the_shipped_one(shipped: Path, tmp_pa
     files = write_exemplar_files(shipped, tmp_path / "owl")
     files["mros"].unlink()
     with pytest.raises(KnowledgeError) as error:
-        KnowledgeBase.load([files["tomasys"], files["suave"]])
+        Ontology.load([files["tomasys"], files["suave"]])
     assert f"import {MROS_IMPORT} does not resolve" in str(error.value)
     assert str(files["suave"]) in str(error.value)
 
@@ -128,11 +128,11 @@ def test_a_given_tomasys_is_not_mixed_with_the_shipped_one(shipped: Path, tmp_pa
 def test_an_unknown_import_is_an_error_with_file_and_line(suave_copy: MakeOntology) -> None:
     path = suave_copy(replace={IMPORT: "http://example.org/wind.owl"})
     with pytest.raises(KnowledgeError) as error:
-        KnowledgeBase.load([path])
+        Ontology.load([path])
     assert str(error.value).startswith(f"{path}: line 15: import http://example.org/wind.owl does not resolve")
 
 
-def test_import_cycles_end(suave_copy: MakeOntology, shipped: Path, kb: KnowledgeBase) -> None:
+def test_import_cycles_end(suave_copy: MakeOntology, shipped: Path, kb: Ontology) -> None:
     path = suave_copy()
     text = (shipped / "tomasys.owl").read_text(encoding="utf-8")
     ontology = '<owl:Ontology rdf:about="http://metacontrol.org/tomasys">'
@@ -140,16 +140,16 @@ def test_import_cycles_end(suave_copy: MakeOntology, shipped: Path, kb: Knowledg
     cycle = ontology + '<owl:imports rdf:resource="http://www.metacontrol.org/suave"/>'
     path.with_name("tomasys.owl").write_text(text.replace(ontology, cycle), encoding="utf-8")
     for name in ("suave.owl", "tomasys.owl"):
-        assert len(KnowledgeBase.load([path.with_name(name)]).rules) == len(kb.rules)
+        assert len(Ontology.load([path.with_name(name)]).rules) == len(kb.rules)
 
 
 def test_a_file_given_twice_counts_once_and_two_versions_of_one_ontology_are_refused(
     suave_copy: MakeOntology, shipped: Path
 ) -> None:
     path = suave_copy("<!-- mine -->")
-    assert set(KnowledgeBase.load([path, path, path.parent / "." / path.name]).files) >= {path}
+    assert set(Ontology.load([path, path, path.parent / "." / path.name]).files) >= {path}
     with pytest.raises(KnowledgeError, match="supplies the ontology"):
-        KnowledgeBase.load([path, shipped / "suave.owl"])
+        Ontology.load([path, shipped / "suave.owl"])
 
 
 def test_an_ontology_of_ones_own_may_add_to_the_shipped_ones(tmp_path: Path, shipped: Path) -> None:
@@ -162,7 +162,7 @@ def test_an_ontology_of_ones_own_may_add_to_the_shipped_ones(tmp_path: Path, shi
         '<tomasys:FunctionDesign rdf:ID="fd_zigzag"><tomasys:solvesF '
         'rdf:resource="http://www.metacontrol.org/suave#f_generate_search_path"/></tomasys:FunctionDesign></rdf:RDF>'
     )
-    base = KnowledgeBase.load([path])
+    base = Ontology.load([path])
     assert "fd_zigzag" in base.designs(SEARCH)
     assert set(base.files) == {path, shipped / "suave.owl", shipped / "tomasys.owl"}
     assert make_reasoner("pellet", base).infer(searching("fd_zigzag")).facts == frozenset()

@@ -12,9 +12,9 @@ from suave_des.knowledge import java_archive
 
 _FIRST = """
 from suave_des.knowledge import jvm
-from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import InProcessPellet
-assert InProcessPellet(KnowledgeBase.load()).infer(())
+assert InProcessPellet(Ontology.load()).infer(())
 print(jvm.java_class("java.lang.System").getProperty("java.vm.info"))
 """
 

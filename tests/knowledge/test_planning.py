@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.planning import plan
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.knowledge.state import Decision, KnowledgeState, ObjectiveState
@@ -16,14 +16,14 @@ from tests.helpers.knowledge_states import FOLLOW, MOTION, SEARCH, searching
 from tests.helpers.owl_text import MakeOntology, individual
 
 
-def decide(kb: KnowledgeBase, reasoner: Reasoner, state: KnowledgeState, **options: list[str]) -> dict[str, Decision]:
+def decide(kb: Ontology, reasoner: Reasoner, state: KnowledgeState, **options: list[str]) -> dict[str, Decision]:
     decisions = plan(kb, state, reasoner.infer(state), **options).decisions
     assert [d.function for d in decisions] == sorted(d.function for d in decisions)
     return {decision.function: decision for decision in decisions}
 
 
 def decide_with(file: Path, state: KnowledgeState) -> Decision:
-    base = KnowledgeBase.load([file])
+    base = Ontology.load([file])
     return decide(base, make_reasoner("pellet", base), state)[SEARCH]
 
 
@@ -40,13 +40,13 @@ def decide_with(file: Path, state: KnowledgeState) -> Decision:
     ],
 )
 def test_an_ungrounded_search_gets_the_highest_altitude_that_visibility_allows(
-    kb: KnowledgeBase, pellet: Reasoner, visibility: float | None, design: str | None
+    kb: Ontology, pellet: Reasoner, visibility: float | None, design: str | None
 ) -> None:
     decision = decide(kb, pellet, searching(None, visibility, status="UNGROUNDED"))[SEARCH]
     assert decision.design == design
 
 
-def test_each_design_left_out_has_its_numbers(kb: KnowledgeBase, pellet: Reasoner) -> None:
+def test_each_design_left_out_has_its_numbers(kb: Ontology, pellet: Reasoner) -> None:
     decision = decide(kb, pellet, searching("fd_spiral_high", 1.8))[SEARCH]
     assert decision.design == "fd_spiral_low"
     assert [(rejection.design, rejection.reason) for rejection in decision.rejected] == [
@@ -56,23 +56,23 @@ def test_each_design_left_out_has_its_numbers(kb: KnowledgeBase, pellet: Reasone
     assert decision.reason == "o_status IN_ERROR_NFR: highest performance, 0.25, of 1 left among 3"
 
 
-def test_numbers_that_look_alike_are_shown_with_more_digits(kb: KnowledgeBase, pellet: Reasoner) -> None:
+def test_numbers_that_look_alike_are_shown_with_more_digits(kb: Ontology, pellet: Reasoner) -> None:
     decision = decide(kb, pellet, searching("fd_spiral_medium", "2.2499999"))[SEARCH]
     assert "water_visibility 2.2499999 measured < 2.25 expected" in [r.reason for r in decision.rejected]
 
 
-def test_with_no_design_left_the_present_one_is_kept_and_it_is_said(kb: KnowledgeBase, pellet: Reasoner) -> None:
+def test_with_no_design_left_the_present_one_is_kept_and_it_is_said(kb: Ontology, pellet: Reasoner) -> None:
     decision = decide(kb, pellet, searching("fd_spiral_low", 1.0))[SEARCH]
     assert decision.design is None
     assert decision.reason == "o_status IN_ERROR_NFR: no function design is left, fd_spiral_low is kept"
     assert len(decision.rejected) == 3
 
 
-def test_an_objective_that_is_well_is_left_alone(kb: KnowledgeBase, pellet: Reasoner) -> None:
+def test_an_objective_that_is_well_is_left_alone(kb: Ontology, pellet: Reasoner) -> None:
     assert decide(kb, pellet, searching("fd_spiral_low", 3.5)) == {}
 
 
-def test_an_objective_is_adapted_on_request_or_when_always_to_be_improved(kb: KnowledgeBase, pellet: Reasoner) -> None:
+def test_an_objective_is_adapted_on_request_or_when_always_to_be_improved(kb: Ontology, pellet: Reasoner) -> None:
     asked = decide(kb, pellet, searching("fd_spiral_low", 3.5), to_adapt={SEARCH: "the water is clearer"})
     assert asked[SEARCH].design == "fd_spiral_high"
     always = decide(kb, pellet, searching("fd_spiral_low", 3.5, always_improve=True))
@@ -84,19 +84,19 @@ def test_an_objective_is_adapted_on_request_or_when_always_to_be_improved(kb: Kn
     "status",
     ["UNGROUNDED", "IN_ERROR_FR", "IN_ERROR_COMPONENT", "IN_ERROR_OF_MINE", "INTERNAL_ERROR", "EXTERNAL_ERROR"],
 )
-def test_statuses_of_either_family_call_for_adaptation(kb: KnowledgeBase, pellet: Reasoner, status: str) -> None:
+def test_statuses_of_either_family_call_for_adaptation(kb: Ontology, pellet: Reasoner, status: str) -> None:
     assert SEARCH in decide(kb, pellet, searching(None, 3.5, status=status))
 
 
-def test_the_older_updatable_status_calls_for_adaptation(kb: KnowledgeBase, pellet: Reasoner) -> None:
+def test_the_older_updatable_status_calls_for_adaptation(kb: Ontology, pellet: Reasoner) -> None:
     assert SEARCH in decide(kb, pellet, searching("fd_spiral_low", 3.5, status="UPDATABLE"))
 
 
-def test_other_statuses_do_not(kb: KnowledgeBase, pellet: Reasoner) -> None:
+def test_other_statuses_do_not(kb: Ontology, pellet: Reasoner) -> None:
     assert decide(kb, pellet, searching(None, 3.5, status="OK")) == {}
 
 
-def test_a_failed_thruster_is_recovered_and_then_all_thrusters_used_again(kb: KnowledgeBase, pellet: Reasoner) -> None:
+def test_a_failed_thruster_is_recovered_and_then_all_thrusters_used_again(kb: Ontology, pellet: Reasoner) -> None:
     failed = {"c_thruster_1": "FALSE"}
     state = searching("fd_spiral_high", 3.5, motion="fd_all_thrusters", components=failed)
     decision = decide(kb, pellet, state)
@@ -195,7 +195,7 @@ def test_the_operator_of_the_attribute_decides_what_is_bad(
         + individual("qa_current", "QAvalue", ("isQAtype", ":current"), ("hasValue", "0.5"))
         + individual("fd_spiral_high", "FunctionDesign", ("hasQAestimation", ":qa_current"))
     )
-    base = KnowledgeBase.load([path])
+    base = Ontology.load([path])
     reasoner = make_reasoner("pellet", base)
 
     def chosen(current: float) -> str | None:
@@ -214,9 +214,9 @@ def test_a_design_without_performance_counts_little_and_ties_go_by_name(suave_co
     assert decide_with(path, searching(None, 0.5, status="UNGROUNDED")).design == "fd_0"
 
 
-def test_overridden_values_decide_and_show_in_the_hash(kb: KnowledgeBase) -> None:
+def test_overridden_values_decide_and_show_in_the_hash(kb: Ontology) -> None:
     values = {"qa_water_visibility_high": Decimal(2), "qa_water_visibility_medium": Decimal(1)}
-    base = KnowledgeBase.load(values=values)
+    base = Ontology.load(values=values)
     assert base.expected("fd_spiral_high")["water_visibility"] == 2
     state = searching(None, 2.0, status="UNGROUNDED")
     assert decide(base, make_reasoner("pellet", base), state)[SEARCH].design == "fd_spiral_high"

@@ -14,12 +14,12 @@ import pytest
 import suave_des
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge import java
-from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoners import BACKENDS, REMEMBERED, Reasoner, make_reasoner
 from tests.helpers.knowledge_states import SEARCH, searching
 
 
-def test_an_unknown_reasoner_is_told_with_those_known(kb: KnowledgeBase) -> None:
+def test_an_unknown_reasoner_is_told_with_those_known(kb: Ontology) -> None:
     with pytest.raises(InputError, match=r"there is no reasoner 'hermit' \(one of owlready2, pellet, remembered\)"):
         make_reasoner("hermit", kb)
     assert all(make_reasoner(name, kb).name == name for name in BACKENDS)
@@ -29,7 +29,7 @@ def test_the_same_state_is_reasoned_on_once(pellet: Reasoner) -> None:
     assert pellet.infer(searching("fd_spiral_low", 1.30)) is pellet.infer(searching("fd_spiral_low", "1.3"))
 
 
-def test_the_memory_of_states_is_bounded(kb: KnowledgeBase, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_memory_of_states_is_bounded(kb: Ontology, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("suave_des.knowledge.reasoners.REMEMBERED", 2)
     reasoner = make_reasoner("pellet", kb)
     first = reasoner.infer(searching("fd_spiral_low", 1))
@@ -54,7 +54,7 @@ def fake_java(folder: Path, says: str) -> Path:
     [('openjdk version "17.0.9" 2023-10-17', "17"), ('java version "1.8.0_392"', "8"), ('x version "24-ea"', "24")],
 )
 def test_a_java_that_is_too_old_is_told_with_both_versions(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kb: KnowledgeBase, says: str, found: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kb: Ontology, says: str, found: str
 ) -> None:
     monkeypatch.setenv("JAVA_HOME", str(fake_java(tmp_path / "jdk", says)))
     with pytest.raises(InputError, match=f"has Java {found}, but Java 25 is needed"):
@@ -82,7 +82,7 @@ def test_a_java_home_that_is_new_enough_is_used(tmp_path: Path, monkeypatch: pyt
 
 @pytest.mark.parametrize("visibility", [3.0, 4.0])
 def test_owlready2_leaves_no_temporary_file_behind(
-    kb: KnowledgeBase, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, visibility: float
+    kb: Ontology, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, visibility: float
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     reasoner = make_reasoner("owlready2", kb)
@@ -96,7 +96,7 @@ def test_owlready2_leaves_no_temporary_file_behind(
 
 
 def infer_in_worker(design: str) -> tuple[int, str | None]:
-    reasoner = make_reasoner("pellet", KnowledgeBase.load())
+    reasoner = make_reasoner("pellet", Ontology.load())
     return os.getpid(), reasoner.infer(searching(design, 2.0)).objective_status(SEARCH)
 
 
@@ -110,9 +110,9 @@ def test_spawned_workers_reason_each_with_a_java_of_its_own(pellet: Reasoner) ->
 
 QUIET = """
 from tests.helpers.knowledge_states import searching
-from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoners import make_reasoner
-reasoner = make_reasoner("pellet", KnowledgeBase.load())
+reasoner = make_reasoner("pellet", Ontology.load())
 reasoner.infer(searching("fd_spiral_high", 2.0))
 {more}
 """

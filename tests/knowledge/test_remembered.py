@@ -1,4 +1,4 @@
-"""Remembered answers are Pellet's answers: on several ontologies, around every threshold, and from a file."""
+"""CachedPellet answers are Pellet's answers: on several ontologies, around every threshold, and from a file."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.base import KnowledgeBase
-from suave_des.knowledge.memory import DiskMemory
+from suave_des.knowledge.cached_pellet import CachedPellet, cache_digest
+from suave_des.knowledge.inference_cache import InferenceCache
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.knowledge.regions import Regions, regions_of
-from suave_des.knowledge.remembered import Remembered, memory_digest
 from suave_des.knowledge.state import Inference, KnowledgeState, ObjectiveState, exact
 from suave_des.resources import shipped_folder
 from tests.helpers.knowledge_states import MOTION, SEARCH, searching
@@ -66,14 +66,14 @@ ONTOLOGIES = {
 
 
 @lru_cache
-def loaded(name: str) -> tuple[KnowledgeBase, Reasoner, Remembered]:
+def loaded(name: str) -> tuple[Ontology, Reasoner, CachedPellet]:
     extra, rules = ONTOLOGIES[name]
     folder = Path(mkdtemp())
     text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
     (folder / "suave.owl").write_text(text.replace("</rdf:RDF>", extra + "</rdf:RDF>"), encoding="utf-8")
     (folder / "mine.swrl").write_text(rules, encoding="utf-8")
-    kb = KnowledgeBase.load([folder / "suave.owl"], rules=[folder / "mine.swrl"])
-    return kb, make_reasoner("pellet", kb), Remembered(kb, folder)
+    kb = Ontology.load([folder / "suave.owl"], rules=[folder / "mine.swrl"])
+    return kb, make_reasoner("pellet", kb), CachedPellet(kb, folder)
 
 
 def outcome(reasoner: Reasoner, state: KnowledgeState) -> Inference | str:
@@ -83,7 +83,7 @@ def outcome(reasoner: Reasoner, state: KnowledgeState) -> Inference | str:
         return str(error)
 
 
-def near(kb: KnowledgeBase) -> st.SearchStrategy[Decimal]:
+def near(kb: Ontology) -> st.SearchStrategy[Decimal]:
     """Just below, on and just above each number of the knowledge base, and anything else."""
     thresholds = st.sampled_from(regions_of(kb).thresholds)
     steps = st.sampled_from([Decimal(0), *(sign * Decimal(10) ** -power for sign in (1, -1) for power in (1, 6, 25))])
@@ -91,7 +91,7 @@ def near(kb: KnowledgeBase) -> st.SearchStrategy[Decimal]:
 
 
 @st.composite
-def states(draw: st.DrawFn, kb: KnowledgeBase) -> KnowledgeState:
+def states(draw: st.DrawFn, kb: Ontology) -> KnowledgeState:
     grounded = {SEARCH: draw(st.sampled_from(kb.designs(SEARCH))), MOTION: draw(st.sampled_from(kb.designs(MOTION)))}
     functions = draw(st.lists(st.sampled_from([SEARCH, MOTION]), unique=True))
     measured = draw(st.lists(st.sampled_from(kb.quality_attributes), unique=True, max_size=3))
@@ -103,7 +103,7 @@ def states(draw: st.DrawFn, kb: KnowledgeBase) -> KnowledgeState:
     )
 
 
-def moved(draw: random.Random, kb: KnowledgeBase, state: KnowledgeState) -> KnowledgeState:
+def moved(draw: random.Random, kb: Ontology, state: KnowledgeState) -> KnowledgeState:
     """The state with its values moved about inside their gaps, their order kept where they share one."""
     regions = regions_of(kb)
     bounds = [Decimal(-10), *regions.thresholds, Decimal(100)]
@@ -192,13 +192,13 @@ def test_rules_that_only_compare_need_regions_only() -> None:
 )
 def test_why_exact_values_count(rules: str, reason: str, tmp_path: Path) -> None:
     (tmp_path / "mine.swrl").write_text(rules, encoding="utf-8")
-    kb = KnowledgeBase.load(rules=[tmp_path / "mine.swrl"])
+    kb = Ontology.load(rules=[tmp_path / "mine.swrl"])
     regions = regions_of(kb)
     assert reason in " ".join(regions.reasons)
     one, other = searching("fd_spiral_low", "2.0"), searching("fd_spiral_low", "2.1")
     assert regions.key(one) != regions.key(other)
     (tmp_path / "mine.swrl").write_text(f"disabled {rules.strip()}", encoding="utf-8")
-    assert regions_of(KnowledgeBase.load(rules=[tmp_path / "mine.swrl"])).is_sound
+    assert regions_of(Ontology.load(rules=[tmp_path / "mine.swrl"])).is_sound
 
 
 @pytest.fixture
@@ -213,30 +213,30 @@ STATES = [searching(f"fd_spiral_{name}", value) for name in ("low", "high") for 
 
 
 @pytest.fixture
-def filled(kb: KnowledgeBase, tmp_path: Path) -> Path:
-    remembered = Remembered(kb, tmp_path)
+def filled(kb: Ontology, tmp_path: Path) -> Path:
+    remembered = CachedPellet(kb, tmp_path)
     for state in STATES:
         remembered.infer(state)
     (file,) = (tmp_path / "memory").iterdir()
     return file
 
 
-def test_a_filled_memory_asks_nobody(kb: KnowledgeBase, pellet: Reasoner, filled: Path, no_pellet: None) -> None:
-    remembered = Remembered(kb, filled.parent.parent)
+def test_a_filled_memory_asks_nobody(kb: Ontology, pellet: Reasoner, filled: Path, no_pellet: None) -> None:
+    remembered = CachedPellet(kb, filled.parent.parent)
     for state in [*STATES, searching("fd_spiral_high", "2.1234")]:
         assert remembered.infer(state) == pellet.infer(state)
     with pytest.raises(AssertionError, match="asked"):
         remembered.infer(searching("fd_spiral_medium", "1.0"))
 
 
-def test_another_knowledge_base_does_not_use_it(filled: Path, tmp_path: Path, kb: KnowledgeBase) -> None:
-    other = KnowledgeBase.load(disabled_rules=["S1b"])
-    assert memory_digest(other) != memory_digest(kb)
-    assert DiskMemory(memory_digest(other), filled.parent.parent).load() == {}
+def test_another_knowledge_base_does_not_use_it(filled: Path, tmp_path: Path, kb: Ontology) -> None:
+    other = Ontology.load(disabled_rules=["S1b"])
+    assert cache_digest(other) != cache_digest(kb)
+    assert InferenceCache(cache_digest(other), filled.parent.parent).load() == {}
 
 
-def test_damaged_entries_are_left_out_and_the_file_is_mended(kb: KnowledgeBase, filled: Path) -> None:
-    disk = DiskMemory(memory_digest(kb), filled.parent.parent)
+def test_damaged_entries_are_left_out_and_the_file_is_mended(kb: Ontology, filled: Path) -> None:
+    disk = InferenceCache(cache_digest(kb), filled.parent.parent)
     whole = disk.load()
     assert len(whole) == len(STATES)
     lines = filled.read_bytes().split(b"\n")
@@ -255,15 +255,15 @@ def test_damaged_entries_are_left_out_and_the_file_is_mended(kb: KnowledgeBase, 
 @pytest.mark.parametrize(
     "content", [b"", b"\x80\x04pickled", b"suave-des memory 1 other\n" + b"x" * 24 + b" [[],[]]\n"]
 )
-def test_a_foreign_file_is_rebuilt(kb: KnowledgeBase, filled: Path, content: bytes) -> None:
+def test_a_foreign_file_is_rebuilt(kb: Ontology, filled: Path, content: bytes) -> None:
     filled.write_bytes(content)
-    remembered = Remembered(kb, filled.parent.parent)
+    remembered = CachedPellet(kb, filled.parent.parent)
     remembered.infer(STATES[0])
-    assert len(DiskMemory(memory_digest(kb), filled.parent.parent).load()) == 1
+    assert len(InferenceCache(cache_digest(kb), filled.parent.parent).load()) == 1
 
 
-def test_random_bytes_never_break_the_memory(kb: KnowledgeBase, filled: Path) -> None:
-    whole = DiskMemory(memory_digest(kb), filled.parent.parent).load()
+def test_random_bytes_never_break_the_memory(kb: Ontology, filled: Path) -> None:
+    whole = InferenceCache(cache_digest(kb), filled.parent.parent).load()
     original = filled.read_bytes()
     draw = random.Random(5)
     for _ in range(300):
@@ -271,17 +271,17 @@ def test_random_bytes_never_break_the_memory(kb: KnowledgeBase, filled: Path) ->
         for _ in range(draw.randint(1, 20)):
             content[draw.randrange(len(content))] = draw.randrange(256)
         filled.write_bytes(bytes(content[: draw.randrange(len(content))]))
-        assert DiskMemory(memory_digest(kb), filled.parent.parent).load().items() <= whole.items()
+        assert InferenceCache(cache_digest(kb), filled.parent.parent).load().items() <= whole.items()
 
 
-def test_a_folder_that_cannot_be_written_is_no_obstacle(kb: KnowledgeBase, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_no_obstacle(kb: Ontology, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("not a folder", encoding="utf-8")
-    remembered = Remembered(kb, tmp_path / "file")
+    remembered = CachedPellet(kb, tmp_path / "file")
     assert remembered.infer(STATES[0]).grounding_status(SEARCH) == "IN_ERROR_NFR"
 
 
 def _add_many(folder: str, digest: str, number: int) -> None:
-    disk = DiskMemory(digest, Path(folder))
+    disk = InferenceCache(digest, Path(folder))
     for count in range(200):
         state = KnowledgeState.of(components={f"c_{number}": str(count)})
         disk.add((state.objectives, state.groundings, state.components, ()), frozenset())
@@ -290,11 +290,11 @@ def _add_many(folder: str, digest: str, number: int) -> None:
 def test_several_processes_share_a_file(tmp_path: Path) -> None:
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         list(pool.map(_add_many, [str(tmp_path)] * 2, ["d" * 64] * 2, range(2)))
-    assert len(DiskMemory("d" * 64, tmp_path).load()) == 400
+    assert len(InferenceCache("d" * 64, tmp_path).load()) == 400
 
 
-def test_a_contradiction_is_told_for_each_state_with_its_own_values(kb: KnowledgeBase, tmp_path: Path) -> None:
-    remembered = Remembered(kb, tmp_path)
+def test_a_contradiction_is_told_for_each_state_with_its_own_values(kb: Ontology, tmp_path: Path) -> None:
+    remembered = CachedPellet(kb, tmp_path)
     for _ in range(2):
         with pytest.raises(KnowledgeError, match="o_status"):
             remembered.infer(searching("fd_spiral_high", "1.0", status="UNGROUNDED"))

@@ -10,15 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rdf import Lit
 from suave_des.knowledge.reasoners import make_reasoner
-from suave_des.knowledge.rule_checks import check_rule
-from suave_des.knowledge.rule_names import rule_from_text
-from suave_des.knowledge.rule_parser import RuleError, parse_rule, parse_rules
-from suave_des.knowledge.rule_syntax import Atom, Named, Place, Variable
-from suave_des.knowledge.rule_writer import full_name, naming, write_rule
-from suave_des.knowledge.rules import Rule
-from suave_des.knowledge.situation import Lit
+from suave_des.knowledge.rules.checks import check_rule
+from suave_des.knowledge.rules.names import rule_from_text
+from suave_des.knowledge.rules.parser import RuleError, parse_rule, parse_rules
+from suave_des.knowledge.rules.syntax import Atom, Named, Place, Rule, Variable
+from suave_des.knowledge.rules.writer import full_name, naming, write_rule
 from suave_des.knowledge.vocabulary import MROS, SWRLB, TOMASYS, XSD
 
 RULE = "LowBattery: QAvalue(?q) ^ isQAtype(?q, battery_level) ^ hasValue(?q, ?v) ^ lessThan(?v, 0.25) -> Role(?q)\n"
@@ -36,10 +35,10 @@ disabled: A(?x) ^ tomasys:b(?x, 1e-3) → B(?x)
 """
 
 
-def rules_with(text: str, tmp_path: Path, **options: object) -> KnowledgeBase:
+def rules_with(text: str, tmp_path: Path, **options: object) -> Ontology:
     path = tmp_path / "mine.swrl"
     path.write_text(text, encoding="utf-8")
-    return KnowledgeBase.load(rules=[path], **options)  # type: ignore[arg-type]
+    return Ontology.load(rules=[path], **options)  # type: ignore[arg-type]
 
 
 def told(text: str, tmp_path: Path) -> str:
@@ -143,12 +142,12 @@ def test_an_ambiguous_name_wants_a_prefix(suave_copy, tmp_path: Path) -> None:
     path = tmp_path / "mine.swrl"
     path.write_text("A: Twin(?x) -> Role(?x)", encoding="utf-8")
     with pytest.raises(RuleError, match=r"ambiguous \(write http://a.org/#Twin or http://b.org/#Twin\)"):
-        KnowledgeBase.load([suave_copy(twins)], rules=[path])
+        Ontology.load([suave_copy(twins)], rules=[path])
     path.write_text("A: <http://a.org/#Twin>(?x) -> Role(?x)", encoding="utf-8")
-    assert KnowledgeBase.load([suave_copy(twins)], rules=[path]).rules
+    assert Ontology.load([suave_copy(twins)], rules=[path]).rules
 
 
-def test_a_file_takes_the_place_of_rules_of_its_names(kb: KnowledgeBase, tmp_path: Path) -> None:
+def test_a_file_takes_the_place_of_rules_of_its_names(kb: Ontology, tmp_path: Path) -> None:
     changed = rules_with("disabled QAenergy: Role(?x) -> Role(?x)\ncompRecov: Role(?x) -> Role(?x)\n", tmp_path)
     assert len(changed.rules) == len(kb.rules)
     by_name = {rule.name: rule for rule in changed.rules}
@@ -158,7 +157,7 @@ def test_a_file_takes_the_place_of_rules_of_its_names(kb: KnowledgeBase, tmp_pat
     assert changed.content_hash != kb.content_hash
 
 
-def test_rules_are_switched_off_by_name(kb: KnowledgeBase, tmp_path: Path) -> None:
+def test_rules_are_switched_off_by_name(kb: Ontology, tmp_path: Path) -> None:
     off = rules_with(RULE, tmp_path, disabled_rules=["LowBattery", "S1a"])
     assert [rule.name for rule in off.rules if not rule.enabled] == ["LowBattery", "S1a"]
     assert off.content_hash not in (kb.content_hash, rules_with(RULE, tmp_path).content_hash)
@@ -178,21 +177,21 @@ def test_files_that_are_no_rules(content: bytes, words: str, tmp_path: Path) -> 
     path = tmp_path / "mine.swrl"
     path.write_bytes(content)
     with pytest.raises(InputError, match=words):
-        KnowledgeBase.load(rules=[path])
+        Ontology.load(rules=[path])
 
 
 def test_missing_files_and_folders(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
-        KnowledgeBase.load(rules=[tmp_path / "none.swrl"])
+        Ontology.load(rules=[tmp_path / "none.swrl"])
     with pytest.raises(InputError, match="this is a folder"):
-        KnowledgeBase.load(rules=[tmp_path])
+        Ontology.load(rules=[tmp_path])
 
 
 def same(one: Rule, other: Rule) -> bool:
     return (one.name, one.enabled, one.body, one.head) == (other.name, other.enabled, other.body, other.head)
 
 
-def test_the_shipped_rules_written_and_read_back_are_the_same(kb: KnowledgeBase, tmp_path: Path) -> None:
+def test_the_shipped_rules_written_and_read_back_are_the_same(kb: Ontology, tmp_path: Path) -> None:
     named = naming(lambda iri: not kb.vocabulary.means_itself(iri))
     text = "\n".join(write_rule(rule.name, rule.body, rule.head, named, enabled=rule.enabled) for rule in kb.rules)
     assert "<" not in text.replace("<http", "")
@@ -230,7 +229,7 @@ def test_any_rule_that_is_written_reads_back_the_same(name, body, head, enabled)
     assert (rule.name, rule.body, rule.head, rule.enabled) == (name, tuple(body), tuple(head), enabled)
 
 
-def test_twenty_thousand_mutated_texts_give_rules_or_rule_errors(kb: KnowledgeBase) -> None:
+def test_twenty_thousand_mutated_texts_give_rules_or_rule_errors(kb: Ontology) -> None:
     draw = random.Random(3)
     alphabet = [
         *"()?,:^->\"\\#<>@{}[]' \n\t\r0129.eE+_x",
@@ -286,4 +285,4 @@ def test_what_java_throws_is_an_error_for_the_user(suave_copy) -> None:
         "</swrl:ClassAtom></swrl:head></rdf:Description>"
     )
     with pytest.raises(KnowledgeError, match=r"Pellet cannot use the ontologies: .*literal as an individual"):
-        make_reasoner("pellet", KnowledgeBase.load([suave_copy(rule)]))
+        make_reasoner("pellet", Ontology.load([suave_copy(rule)]))

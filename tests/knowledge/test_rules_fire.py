@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.knowledge.state import Fact, KnowledgeState, ObjectiveState
 from tests.helpers.knowledge_states import MOTION, SEARCH, searching
@@ -21,10 +21,10 @@ def inferred(reasoner: Reasoner, state: KnowledgeState) -> set[str]:
 
 
 def with_files(*files: Path) -> Reasoner:
-    return make_reasoner("pellet", KnowledgeBase.load(files))
+    return make_reasoner("pellet", Ontology.load(files))
 
 
-def test_all_rules_of_the_exemplar_are_there_and_enabled(kb: KnowledgeBase) -> None:
+def test_all_rules_of_the_exemplar_are_there_and_enabled(kb: Ontology) -> None:
     names = "QAWaterVisibility QAenergy QAsafety compErrFG compError compRecov mros_S4"
     numbered = "S1a S1b S1c S2 S3 S4 S5 S6a S6b S6c S9 S10 S11"
     assert {rule.name for rule in kb.rules if rule.enabled} == {*names.split(), *numbered.split()}
@@ -171,7 +171,7 @@ def test_a_status_in_the_ontology_holds_until_diagnostics_report_another(suave_c
 @pytest.mark.parametrize("name", ["pellet", "owlready2"])
 def test_a_disabled_rule_does_not_fire(suave_copy: MakeOntology, name: str) -> None:
     path = suave_copy(replace={'#boolean">true</swrla:isRuleEnabled>': '#boolean">false</swrla:isRuleEnabled>'})
-    base = KnowledgeBase.load([path])
+    base = Ontology.load([path])
     assert [rule.name for rule in base.rules if not rule.enabled] == ["QAWaterVisibility"]
     assert make_reasoner(name, base).infer(searching("fd_spiral_high", 1.0)).facts == frozenset()
 
@@ -182,7 +182,7 @@ def _clash(suave_copy: MakeOntology) -> Path:
 
 @pytest.mark.parametrize("name", ["pellet", "owlready2"])
 def test_clashing_rules_are_named_with_what_they_clash_on(suave_copy: MakeOntology, name: str) -> None:
-    reasoner = make_reasoner(name, KnowledgeBase.load([_clash(suave_copy)]))
+    reasoner = make_reasoner(name, Ontology.load([_clash(suave_copy)]))
     with pytest.raises(KnowledgeError) as error:
         reasoner.infer(searching("fd_spiral_high", 3.0))
     message = str(error.value)
@@ -203,7 +203,7 @@ def test_every_kind_of_conclusion_of_an_own_rule_is_read(suave_copy: MakeOntolog
     }
     data = {"tomasys:doubled", "tomasys:note"}
     extra = "".join(rule(name, text, data=data) for name, text in rules.items())
-    base = KnowledgeBase.load([suave_copy(extra)])
+    base = Ontology.load([suave_copy(extra)])
     state = searching(None, 1.7, components={"c_thruster_2": "FALSE"})
     inference = make_reasoner("pellet", base).infer(state)
     found = {str(fact) for fact in inference.facts}

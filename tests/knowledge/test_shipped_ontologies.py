@@ -10,7 +10,7 @@ import pytest
 from rdflib import Graph, URIRef
 from rdflib.namespace import OWL, RDF, RDFS
 
-from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.ontology import Ontology
 
 TOMASYS = "http://metacontrol.org/tomasys#"
 MROS = "http://ros/mros#"
@@ -71,7 +71,7 @@ def test_every_term_and_every_rule_has_a_label_and_a_comment(shipped: Path) -> N
             assert graph.value(term, RDFS.comment), term
 
 
-def test_the_model_has_the_exemplars_names_and_deployed_values(kb: KnowledgeBase) -> None:
+def test_the_model_has_the_exemplars_names_and_deployed_values(kb: Ontology) -> None:
     assert kb.functions == ("f_follow_pipeline", "f_generate_search_path", "f_maintain_motion")
     assert kb.components == tuple(f"c_thruster_{n}" for n in range(1, 7))
     assert set(kb.quality_attributes) == {"water_visibility", "battery_level", "performance", "energy", "safety"}

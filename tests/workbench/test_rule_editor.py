@@ -10,7 +10,7 @@ from rdflib import Graph
 from rdflib.compare import isomorphic
 
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.knowledge.base import KnowledgeBase
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.knowledge.vocabulary import SWRLB
@@ -32,7 +32,7 @@ def owl(tmp_path: Path) -> Path:
 
 
 def said(path: Path) -> set[tuple[str, str, bool]]:
-    return {(rule.name, rule.text, rule.enabled) for rule in KnowledgeBase.load([path]).rules}
+    return {(rule.name, rule.text, rule.enabled) for rule in Ontology.load([path]).rules}
 
 
 def as_protege_writes(path: Path) -> None:
@@ -119,13 +119,13 @@ def test_an_added_rule_infers_what_it_does_as_text(owl: Path, tmp_path: Path) ->
     state = KnowledgeState.of(
         [ObjectiveState(SEARCH)], groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 4}
     )
-    as_text = make_reasoner("pellet", KnowledgeBase.load([owl], rules=[tmp_path / "mine.swrl"])).infer(state)
+    as_text = make_reasoner("pellet", Ontology.load([owl], rules=[tmp_path / "mine.swrl"])).infer(state)
     add_rule(owl, BATTERY)
-    assert make_reasoner("pellet", KnowledgeBase.load([owl])).infer(state).facts == as_text.facts
+    assert make_reasoner("pellet", Ontology.load([owl])).infer(state).facts == as_text.facts
     assert as_text.error_log("fd_spiral_low") == ("o_generate_search_path",)
     set_enabled(owl, "Battery", enabled=False)
     for backend in ("pellet", "remembered"):
-        assert not make_reasoner(backend, KnowledgeBase.load([owl])).infer(state).facts
+        assert not make_reasoner(backend, Ontology.load([owl])).infer(state).facts
 
 
 def test_rules_without_a_prefix_for_swrl_declare_it(tmp_path: Path) -> None:

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Final
 
-from suave_des.knowledge.rule_parser import PREFIXES
-from suave_des.knowledge.rule_syntax import Atom, Named, Place, RuleText, Term, Variable
-from suave_des.knowledge.situation import Lit
+from suave_des.knowledge.rdf import Lit
+from suave_des.knowledge.rules.parser import PREFIXES
+from suave_des.knowledge.rules.syntax import Atom, Named, ParsedRule, Place, Term, Variable
 from suave_des.knowledge.vocabulary import SWRLB, XSD, local_name, namespace
 
 _WORD: Final = re.compile(r"[^\W\d](?:[\w.-]*\w)?")
@@ -61,7 +61,7 @@ def write_rule(name: str, body: Sequence[Atom], head: Sequence[Atom], named: Nam
     return f"{start}\n    " + "\n    ^ ".join(sides[0]) + "\n    -> " + "\n    ^ ".join(sides[1]) + "\n"
 
 
-def line_of_rule(body: Sequence[Atom], head: Sequence[Atom]) -> RuleText:
+def line_of_rule(body: Sequence[Atom], head: Sequence[Atom]) -> ParsedRule:
     """The rule as one line of text, body -> head, with the place of each name in it.
 
     Returns:
@@ -80,7 +80,7 @@ def line_of_rule(body: Sequence[Atom], head: Sequence[Atom]) -> RuleText:
                 text += _term(argument, local_name)
             text += ")"
             placed[side].append(replace(atom, places=tuple(places)))
-    return RuleText(text, tuple(placed[0]), tuple(placed[1]))
+    return ParsedRule(text, tuple(placed[0]), tuple(placed[1]))
 
 
 def write_atom(atom: Atom, named: Naming = local_name) -> str:

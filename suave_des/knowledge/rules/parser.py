@@ -21,9 +21,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
-from suave_des.errors import InputError, KnowledgeError
-from suave_des.knowledge.rule_syntax import Atom, Named, Place, RuleText, Term, Variable
-from suave_des.knowledge.situation import Lit
+from suave_des.knowledge.rdf import Lit
+from suave_des.knowledge.rules.syntax import Atom, Named, ParsedRule, Place, RuleError, Term, Variable
 from suave_des.knowledge.vocabulary import MROS, OWL, RDF, RDFS, SUAVE, SWRL, SWRLA, SWRLB, TOMASYS, XSD, nearest
 
 #: Prefixes that need not be declared.
@@ -41,7 +40,6 @@ PREFIXES: Final[Mapping[str, str]] = MappingProxyType(
         "xsd": XSD,
     }
 )
-MAX_BYTES: Final = 8 * 2**20
 MAX_DIGITS: Final = 400
 _WORD: Final = r"[^\W\d][\w.-]*(?<![.-])"
 _SPACE: Final = re.compile(r"(?:\s|#[^\n]*)*")
@@ -61,47 +59,17 @@ _HEADER: Final = re.compile(rf'^(?:disabled\s+)?(?:{_WORD}|"[^"\n]*")\s*:(?![:/]
 _FORBIDDEN: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
 
 
-class RuleError(KnowledgeError):
-    """A rule that cannot be read or used; the place names line and column."""
-
-
 @dataclass(frozen=True)
 class ParsedRules:
     """The rules of a text, and what is wrong with those that could not be read."""
 
-    rules: tuple[RuleText, ...]
+    rules: tuple[ParsedRule, ...]
     errors: tuple[RuleError, ...]
-
-
-def read_rules_file(path: Path) -> str:
-    """The text of a rules file.
-
-    Raises:
-        InputError: it is missing, a folder, too large, or not text in UTF-8.
-    """
-    try:
-        if path.is_dir():
-            raise InputError("this is a folder", file=path, remedy="give a file of rules")
-        if path.stat().st_size > MAX_BYTES:
-            raise InputError("too large for rules", file=path, remedy=f"at most {MAX_BYTES // 2**20} MiB are read")
-        content = path.read_bytes()
-    except FileNotFoundError as error:
-        raise InputError("no such file", file=path, remedy="give an existing file of rules") from error
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", file=path) from error
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content[: error.start].count(b"\n") + 1
-        raise InputError("is not UTF-8 text", file=path, place=f"line {line}", remedy="save it as UTF-8") from error
-    if text.lstrip().startswith("<?xml"):
-        raise InputError("this is XML, not rules as text", file=path, remedy="give it with --ontology")
-    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def parse_rules(text: str, file: Path | str | None = None) -> ParsedRules:
     """Read all rules of a text; after a mistake reading goes on with the next rule that begins a line."""
-    rules: list[RuleText] = []
+    rules: list[ParsedRule] = []
     errors: list[RuleError] = []
     parser = _Parser(text, file)
     while not parser.at_end():
@@ -115,7 +83,7 @@ def parse_rules(text: str, file: Path | str | None = None) -> ParsedRules:
     return ParsedRules(tuple(rules), tuple(errors))
 
 
-def parse_rule(text: str, file: Path | str | None = None) -> RuleText:
+def parse_rule(text: str, file: Path | str | None = None) -> ParsedRule:
     """Read one rule, as it is given on a command line.
 
     Raises:
@@ -167,7 +135,7 @@ class _Parser:
         found = _HEADER.search(self._text, following + 1) if following >= 0 else None
         self._at = found.start() if found else len(self._text)
 
-    def entry(self) -> RuleText | None:
+    def entry(self) -> ParsedRule | None:
         """A rule, or a declaration of a prefix (which gives None)."""
         start = self._at
         word = _NAME.match(self._text, self._at)
@@ -195,7 +163,7 @@ class _Parser:
         self._at = iri.end()
         self._prefixes[name.group()] = self._clean(iri.group(1), iri.start())
 
-    def _rule(self, place: Place, *, enabled: bool) -> RuleText:
+    def _rule(self, place: Place, *, enabled: bool) -> ParsedRule:
         name = self._rule_name()
         self._expect(":", f"after the rule's name {name}")
         self._skip()
@@ -205,7 +173,7 @@ class _Parser:
         if arrow is None:
             raise self.error(f"expected ^ or -> {self._instead()}", "a rule is name: body -> head")
         self._at = arrow.end()
-        return RuleText(name, body, self._atoms(), enabled, place)
+        return ParsedRule(name, body, self._atoms(), enabled, place)
 
     def _rule_name(self) -> str:
         word = _NAME.match(self._text, self._at)

@@ -1,39 +1,44 @@
-"""What names in rules mean: the vocabulary of a knowledge base, and rules as text turned into rules of its own."""
+"""What names in rules mean: the vocabulary of an ontology, and the lookup of the names of a parsed rule."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
-from rdflib import BNode, Literal, URIRef
-from rdflib.namespace import RDF, RDFS
-from rdflib.term import Node
+from rdflib import BNode
 
-from suave_des.knowledge.rule_parser import RuleError
-from suave_des.knowledge.rule_syntax import DIFFERENT, KINDS, SAME, Atom, Kind, Named, Place, RuleText, Term, Variable
-from suave_des.knowledge.rule_writer import line_of_rule
-from suave_des.knowledge.rules import IMP, VARIABLE_IRIS, RdfTriple, Rule
-from suave_des.knowledge.situation import Lit, Model, Triple
+from suave_des.knowledge.rdf import Lit, Triple
+from suave_des.knowledge.rules.rdf import with_triples
+from suave_des.knowledge.rules.syntax import (
+    DIFFERENT,
+    SAME,
+    Atom,
+    Kind,
+    Named,
+    ParsedRule,
+    Place,
+    Rule,
+    RuleError,
+    Term,
+)
+from suave_des.knowledge.rules.writer import line_of_rule
 from suave_des.knowledge.vocabulary import (
     LANGUAGE_NAMESPACES,
     MROS,
     OWL,
     RDF_TYPE,
-    SWRL,
+    RDFS,
     SWRLB,
     TOMASYS,
     XSD,
     local_name,
     nearest,
 )
-from suave_des.knowledge.vocabulary import (
-    RDFS as RDFS_NS,
-)
 
-#: Pellet's built-ins, as its registry has them, with the numbers of arguments that make sense.
+#: Pellet's builtins, as its registry has them, with the least and the largest number of arguments.
 BUILTINS: Final[Mapping[str, tuple[int, int]]] = MappingProxyType(
     {
         SWRLB + name: counts
@@ -59,7 +64,7 @@ BUILTINS: Final[Mapping[str, tuple[int, int]]] = MappingProxyType(
         for name in names.split()
     }
 )
-#: Built-ins that compare, of which every argument must be bound; the others compute their first one.
+#: Builtins that compare, so that every argument must be bound; the others compute their first one.
 TESTERS: Final = frozenset(
     SWRLB + name
     for name in (
@@ -69,14 +74,13 @@ TESTERS: Final = frozenset(
 )
 _DECLARED: Final = {
     OWL + "Class": "class",
-    RDFS_NS + "Class": "class",
+    RDFS + "Class": "class",
     OWL + "ObjectProperty": "object property",
     OWL + "DatatypeProperty": "data property",
     OWL + "AnnotationProperty": "annotation property",
-    RDFS_NS + "Datatype": "datatype",
+    RDFS + "Datatype": "datatype",
     OWL + "NamedIndividual": "individual",
 }
-_KIND_OF: Final[dict[str, Kind]] = {"class": "class", "object property": "object", "data property": "data"}
 
 
 @dataclass(frozen=True)
@@ -95,8 +99,8 @@ class Vocabulary:
     ranges: Mapping[str, frozenset[str]]
 
     @classmethod
-    def of(cls, triples: Collection[Triple], model: Model | None) -> Vocabulary:
-        """The names in triples, and those of the individuals that exist only in states."""
+    def of(cls, triples: Collection[Triple], individuals: Iterable[str] = ()) -> Vocabulary:
+        """Collect the names in triples, and those of further individuals (that exist only in states)."""
         kinds: dict[str, set[str]] = {OWL + "Thing": {"class"}, OWL + "Nothing": {"class"}}
         for subject, predicate, value in triples:
             if predicate == RDF_TYPE and isinstance(value, str):
@@ -109,11 +113,11 @@ class Vocabulary:
                 kinds.setdefault(subject, set()).add("individual")
                 if isinstance(value, str):
                     kinds.setdefault(value, set()).add("individual")
-        for iri in () if model is None else _in_states(model):
+        for iri in individuals:
             kinds.setdefault(iri, set()).add("individual")
         ranges: dict[str, set[str]] = {}
         for subject, predicate, value in triples:
-            if predicate == RDFS_NS + "range" and isinstance(value, str) and value.startswith(XSD):
+            if predicate == RDFS + "range" and isinstance(value, str) and value.startswith(XSD):
                 ranges.setdefault(subject, set()).add(value)
         by_name: dict[str, list[str]] = {}
         for iri in sorted(kinds):
@@ -121,12 +125,12 @@ class Vocabulary:
         return cls(
             {iri: frozenset(found) for iri, found in kinds.items()},
             {name: tuple(found) for name, found in by_name.items()},
-            # Of several ranges all hold at once: which values that leaves is not for this table to say.
+            # All ranges of a property hold at once; which values several of them leave is not worked out.
             {name: frozenset(found) for name, found in ranges.items() if len(found) == 1},
         )
 
     def candidates(self, name: str) -> tuple[str, ...]:
-        """What a bare name can mean: those of the shared vocabularies go before others of the same name."""
+        """IRIs that a bare name can mean: those of TOMASys and mros take precedence over others."""
         found = self.by_name.get(name, ())
         shared = tuple(iri for iri in found if iri.startswith((TOMASYS, MROS)))
         return shared or found or ((SWRLB + name,) if SWRLB + name in BUILTINS else ())
@@ -136,7 +140,7 @@ class Vocabulary:
         return self.candidates(local_name(iri)) == (iri,)
 
     def guess(self, name: str, wanted: Collection[str] = ()) -> str | None:
-        """A question after the name that was perhaps meant, of the wanted kinds."""
+        """Suggest a name of the wanted kinds, as a question."""
         bare = local_name(name)
         wished = {*wanted}
         known = [
@@ -149,13 +153,8 @@ class Vocabulary:
         return nearest(bare, known)
 
 
-def _in_states(model: Model) -> Iterator[str]:
-    for group in (model.objectives, model.groundings, model.measurements):
-        yield from (individual.iri for individual in group.values())
-
-
-def rule_from_text(parsed: RuleText, vocabulary: Vocabulary, file: Path) -> Rule:
-    """A rule with all its names looked up.
+def rule_from_text(parsed: ParsedRule, vocabulary: Vocabulary, file: Path) -> Rule:
+    """Look up all names of a rule.
 
     Raises:
         RuleError: a name is unknown or ambiguous; with line and column.
@@ -199,17 +198,17 @@ def _iri(name: str, place: Place | None, vocabulary: Vocabulary, file: Path, kin
         found = fitting if len(fitting) == 1 else found
     if len(found) == 1:
         return found[0]
-    where = f"line {place.line}, column {place.column}" if place else None
+    where = str(place) if place else None
     if found:
         raise RuleError(f"{name} is ambiguous", file=file, place=where, remedy=f"write {' or '.join(map(str, found))}")
     raise RuleError(f"{name} is not defined", file=file, place=where, remedy=vocabulary.guess(name, kinds))
 
 
 def _kind(predicate: str, arguments: tuple[Term, ...], vocabulary: Vocabulary) -> Kind:
-    """What an atom uses its name as: what it is declared as where that can be, else what its arguments look like."""
+    """What an atom uses its name as: as it is declared where that is possible, else as its arguments suggest."""
     if predicate in (SAME, DIFFERENT):
         return "same" if predicate == SAME else "different"
-    if predicate.startswith(SWRLB) or predicate in BUILTINS:
+    if predicate.startswith(SWRLB):
         return "builtin"
     if predicate.startswith(XSD):
         return "range"
@@ -224,56 +223,3 @@ def _kind(predicate: str, arguments: tuple[Term, ...], vocabulary: Vocabulary) -
         if "object property" in declared and "data property" not in declared:
             return "object"
     return wanted
-
-
-def with_triples(rule: Rule) -> Rule:
-    """A rule of text, with the RDF that says the same."""
-    if not rule.triples:
-        triples: list[RdfTriple] = [(rule.node, RDF.type, IMP), (rule.node, RDFS.label, Literal(rule.name))]
-        for variable in dict.fromkeys(name for atom in rule.atoms for name in atom.variables()):
-            triples.append((_variable(variable), RDF.type, URIRef(SWRL + "Variable")))
-        for side, atoms in (("body", rule.body), ("head", rule.head)):
-            nodes = [_atom_triples(atom, triples) for atom in atoms]
-            triples.append((rule.node, URIRef(SWRL + side), _list(nodes, SWRL + "AtomList", triples)))
-        return replace(rule, triples=tuple(triples))
-    return rule
-
-
-def _variable(name: str) -> URIRef:
-    return URIRef(VARIABLE_IRIS[0] + name)
-
-
-def _term(term: Term) -> Node:
-    if isinstance(term, Variable):
-        return _variable(term.name)
-    if isinstance(term, Named):
-        return URIRef(term.iri)
-    if term.datatype.startswith("@"):
-        return Literal(term.text, lang=term.datatype[1:])
-    return Literal(term.text, datatype=URIRef(term.datatype), normalize=False)
-
-
-def _atom_triples(atom: Atom, triples: list[RdfTriple]) -> Node:
-    node = BNode()
-    triples.append((node, RDF.type, URIRef(next(name for name, kind in KINDS.items() if kind == atom.kind))))
-    predicate = {"class": "classPredicate", "range": "dataRange", "builtin": "builtin"}.get(atom.kind)
-    if atom.kind in ("object", "data"):
-        predicate = "propertyPredicate"
-    if predicate is not None:
-        triples.append((node, URIRef(SWRL + predicate), URIRef(atom.predicate)))
-    if atom.kind == "builtin":
-        arguments = [_term(term) for term in atom.arguments]
-        triples.append((node, URIRef(SWRL + "arguments"), _list(arguments, str(RDF.List), triples)))
-    else:
-        for number, term in enumerate(atom.arguments[:2], start=1):
-            triples.append((node, URIRef(f"{SWRL}argument{number}"), _term(term)))
-    return node
-
-
-def _list(items: list[Node], kind: str, triples: list[RdfTriple]) -> Node:
-    rest: Node = RDF.nil
-    for item in reversed(items):
-        node = BNode()
-        triples += [(node, RDF.type, URIRef(kind)), (node, RDF.first, item), (node, RDF.rest, rest)]
-        rest = node
-    return rest

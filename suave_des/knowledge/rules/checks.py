@@ -1,4 +1,4 @@
-"""What is wrong with a rule: all that Pellet drops or ignores without a word, and what no reasoner could use.
+"""Checks of rules: all that Pellet drops or ignores silently, and what no reasoner could use.
 
 Which mistakes Pellet is silent about was found by giving it each of them (owlready2 0.51's Pellet).
 """
@@ -10,13 +10,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from suave_des.knowledge.rule_names import BUILTINS, TESTERS, Vocabulary
-from suave_des.knowledge.rule_parser import RuleError
-from suave_des.knowledge.rule_syntax import EXPRESSION, Atom, Named, Place, Variable
-from suave_des.knowledge.rule_writer import literal_text
-from suave_des.knowledge.rules import Rule
-from suave_des.knowledge.situation import Lit
-from suave_des.knowledge.vocabulary import XSD, local_name, nearest
+from suave_des.errors import KnowledgeError
+from suave_des.knowledge.rdf import Lit, Triple
+from suave_des.knowledge.rules.names import BUILTINS, TESTERS, Vocabulary
+from suave_des.knowledge.rules.syntax import EXPRESSION, Atom, Named, Place, Rule, RuleError, Variable
+from suave_des.knowledge.rules.writer import literal_text
+from suave_des.knowledge.vocabulary import OWL, RDF_TYPE, XSD, local_name, nearest
 
 _PROPERTY_OF: Final = {"object": "object property", "data": "data property"}
 _ARGUMENTS: Final = {"class": 1, "range": 1, "object": 2, "data": 2, "same": 2, "different": 2}
@@ -62,10 +61,32 @@ def first_error(rule: Rule, problems: Iterable[RuleProblem]) -> RuleError | None
     """The first fatal problem of a rule of a text file, as an error."""
     for problem in problems:
         if problem.is_fatal:
-            where = problem.place
-            place = f"line {where.line}, column {where.column}" if where else rule.place
+            place = str(problem.place) if problem.place else rule.place
             return RuleError(f"rule {rule.name}: {problem.message}", file=rule.file, place=place, remedy=problem.remedy)
     return None
+
+
+def check_property_use(triples: Iterable[Triple], rules: Iterable[Rule]) -> None:
+    """Check that rules use each property as it is declared.
+
+    Where one does not, Pellet leaves out every rule with that property, and names the wrong ones.
+
+    Raises:
+        KnowledgeError: with the file and the rule.
+    """
+    kinds = {OWL + "ObjectProperty": False, OWL + "DatatypeProperty": True}
+    declared = {s: kinds[o] for s, p, o in triples if p == RDF_TYPE and isinstance(o, str) and o in kinds}
+    words = {True: "data", False: "object"}
+    for rule in rules:
+        for name, is_data in sorted(rule.properties):
+            if declared.get(name, is_data) != is_data:
+                raise KnowledgeError(
+                    f"{local_name(name)} is declared as {words[not is_data]} property, but used as {words[is_data]} "
+                    "property",
+                    file=rule.file,
+                    place=f"rule {rule.name}",
+                    remedy=f"the rule is: {rule.text}",
+                )
 
 
 def _check_atom(atom: Atom, vocabulary: Vocabulary, *, is_head: bool) -> Iterator[RuleProblem]:

@@ -1,38 +1,45 @@
-"""The knowledge base: what the ontologies say, ready to be reasoned with and planned on."""
+"""An ontology with its imports and rules: merged and checked, ready to be reasoned with and planned on."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.catalogue import collect
-from suave_des.knowledge.checks import check_rules, check_values
-from suave_des.knowledge.model import Names, build_model, expectations, facts_of
-from suave_des.knowledge.ontology_file import OntologyFile
-from suave_des.knowledge.rule_files import RulesFile, hash_with_rules, with_rules
-from suave_des.knowledge.rule_names import Vocabulary
-from suave_des.knowledge.rules import Rule
-from suave_des.knowledge.situation import Model, Triple
+from suave_des.knowledge.content import Content, merge, with_rules
+from suave_des.knowledge.model import Model, build_model, check_values, expectations
+from suave_des.knowledge.ontology_file import OntologyFile, collect
+from suave_des.knowledge.rdf import Names, Triple, facts_of
+from suave_des.knowledge.rules.checks import check_property_use
+from suave_des.knowledge.rules.files import RulesFile, hash_with_rules
+from suave_des.knowledge.rules.names import Vocabulary
+from suave_des.knowledge.rules.syntax import Rule
 from suave_des.knowledge.state import Fact, KnowledgeState
-from suave_des.knowledge.triples import Content, merge
 from suave_des.resources import shipped_folder
 
 
 @dataclass(frozen=True, eq=False)
-class KnowledgeBase:
-    """Ontologies, merged and checked. It never changes: what changes is a KnowledgeState.
+class Ontology:
+    """Ontology files and files of rules, merged and checked. It never changes: what changes is a KnowledgeState.
+
+        ontology = Ontology.load(["suave.owl"], rules=["mine.swrl"])
+        ontology.designs("f_generate_search_path")  # ('fd_spiral_high', 'fd_spiral_low', 'fd_spiral_medium')
+        ontology.expected("fd_spiral_low")  # {'performance': Decimal('0.25'), 'water_visibility': Decimal('1.25')}
 
     Attributes:
         files: the ontology files in use, imports included, sorted by path, and the files of rules as text.
-        content_hash: SHA-256 of all their content, of the overridden values and of the names of rules switched off,
+        content_hash: SHA-256 of all their content, of the overridden values and of the names of disabled rules,
             whatever the order of ontologies.
         rules: the SWRL rules, disabled ones included.
         facts: what the ontologies assert of individuals.
         content: all triples for a reasoner.
+        names: short names of IRIs, for facts.
+        model: the functions, designs, components and quality attributes.
+        vocabulary: the names that rules may use.
+        sources: the ontology files with their graphs.
     """
 
     files: tuple[Path, ...]
@@ -43,9 +50,9 @@ class KnowledgeBase:
     names: Names = field(repr=False)
     model: Model = field(repr=False)
     vocabulary: Vocabulary = field(repr=False)
+    sources: tuple[OntologyFile, ...] = field(repr=False)
     _designs: Mapping[str, tuple[str, ...]] = field(repr=False)
     _expected: Mapping[str, Mapping[str, Decimal]] = field(repr=False)
-    _sources: tuple[OntologyFile, ...] = field(repr=False)
 
     @classmethod
     def load(
@@ -55,48 +62,46 @@ class KnowledgeBase:
         values: Mapping[str, Decimal] | None = None,
         rules: Sequence[Path | str] = (),
         disabled_rules: Collection[str] = (),
-    ) -> KnowledgeBase:
-        """Read ontologies, in any order, and what they import; without any, the shipped suave.owl.
+    ) -> Ontology:
+        """Read ontologies, in any order, and their imports; without any, the shipped suave.owl.
 
         Args:
             ontologies: files in RDF/XML.
             values: replaces the hasValue of a named QAvalue individual, such as qa_water_visibility_low.
-            rules: files of rules as text; each rule takes the place of those of its name that were read before.
-            disabled_rules: names of rules to switch off.
+            rules: files of rules as text; each rule replaces those of its name that were read before.
+            disabled_rules: names of rules to disable.
 
         Raises:
             KnowledgeError: a file or an import cannot be used, a value names no QAvalue, or there is no such rule to
-                switch off.
+                disable.
             RuleError: a rule as text cannot be read or used.
         """
-        given = [Path(path) for path in ontologies] or [shipped_folder("ontology") / "suave.owl"]
-        sources = collect(given)
-        content = merge(sources, dict(values or {}))
-        names = Names(content)
-        check_values(content, sources)
-        everything = content.triples
-        model, content = build_model(content, names, sources)
-        vocabulary = Vocabulary.of(everything, model)
+        sources = collect([Path(path) for path in ontologies] or [shipped_folder("ontology") / "suave.owl"])
+        merged = merge(sources, dict(values or {}))
+        check_values(merged, sources)
+        names = Names(merged.triples)
+        model, content = build_model(merged, sources)
+        vocabulary = Vocabulary.of(merged.triples, (individual.iri for individual in model.individuals()))
         files = [RulesFile.read(Path(path)) for path in rules]
         content = with_rules(content, [file.rules(vocabulary) for file in files], disabled_rules)
-        check_rules(replace(content, triples=everything))
-        expected = expectations(content, model)
+        check_property_use(merged.triples, content.enabled_rules)
+        facts = frozenset(facts_of(content.triples, names))
         designs: dict[str, list[str]] = {name: [] for name in model.functions}
-        for fact in facts_of(content.triples, names):
+        for fact in facts:
             if fact.property == "solvesF" and fact.value in designs and fact.subject in model.designs:
                 designs[str(fact.value)].append(fact.subject)
         return cls(
             files=(*sorted(source.path for source in sources), *(file.path for file in files)),
             content_hash=hash_with_rules(_content_hash(sources, values or {}), files, disabled_rules),
             rules=content.rules,
-            facts=frozenset(facts_of(content.triples, names)),
+            facts=facts,
             content=content,
             names=names,
             model=model,
             vocabulary=vocabulary,
+            sources=sources,
             _designs={name: tuple(sorted(found)) for name, found in designs.items()},
-            _expected=expected,
-            _sources=sources,
+            _expected=expectations(content, model),
         )
 
     @property
@@ -122,23 +127,23 @@ class KnowledgeBase:
         """Expected value of each quality attribute of a function design (its performance among them)."""
         return self._expected.get(design, {})
 
-    def situation(self, state: KnowledgeState) -> tuple[Triple, ...]:
-        """The triples that a state adds to the ontologies.
+    def assertions(self, state: KnowledgeState) -> tuple[Triple, ...]:
+        """Return the triples that assert a state.
 
         Raises:
-            KnowledgeError: a function or a function design is not in the knowledge base.
+            KnowledgeError: a function or a function design is not in the ontology.
         """
-        return self.model.situation(state)
+        return self.model.assertions(state)
 
     def asserted(self, state: KnowledgeState) -> frozenset[Fact]:
         """The facts of the ontologies and of a state."""
-        return self.facts.union(facts_of(self.situation(state), self.names))
+        return self.facts.union(facts_of(self.assertions(state), self.names))
 
     def check(self, functions: Collection[str]) -> None:
-        """See that the mission's functions can be solved at all.
+        """Check that the mission's functions have function designs.
 
         Raises:
-            KnowledgeError: the knowledge base has no such function, or no function design for it.
+            KnowledgeError: there is no such function, or no function design for it.
         """
         where = ", ".join(map(str, self.files))
         for function in sorted(functions):

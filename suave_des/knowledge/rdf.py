@@ -1,0 +1,143 @@
+"""RDF terms and triples as reasoners are given them, their N-Triples, and the facts that they state."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from decimal import Decimal, InvalidOperation
+from typing import Final, NamedTuple
+
+from rdflib import BNode, Literal
+from rdflib.term import Node
+
+from suave_des.knowledge.state import Fact, Value
+from suave_des.knowledge.vocabulary import LANGUAGE_NAMESPACES, MROS, RDF_TYPE, SWRL, TOMASYS, XSD, local_name
+
+
+class Lit(NamedTuple):
+    """A literal: its text, and the IRI of its datatype or, for text in a language, "@" and the language."""
+
+    text: str
+    datatype: str
+
+
+#: Subject IRI, predicate IRI, and an IRI or a literal.
+Triple = tuple[str, str, str | Lit]
+#: A triple of rdflib, perhaps with blank nodes.
+RdfTriple = tuple[Node, Node, Node]
+
+_WHOLE: Final = (
+    *("integer", "int", "long", "short", "byte"),
+    *("nonNegativeInteger", "positiveInteger", "nonPositiveInteger", "negativeInteger"),
+    *("unsignedInt", "unsignedLong", "unsignedShort", "unsignedByte"),
+)
+#: Datatypes of exact numbers.
+EXACT: Final = frozenset(XSD + name for name in ("decimal", *_WHOLE))
+_NUMERIC: Final = EXACT | {XSD + "float", XSD + "double"}
+_DECIMAL: Final = re.compile(r"([+-]?)(?=\.?[0-9])([0-9]*)\.?([0-9]*)")
+_ESCAPES: Final = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"})
+
+
+def literal(term: Literal) -> Lit:
+    """Convert a literal of rdflib; plain text is xsd:string (RDF 1.1)."""
+    if term.language:
+        return Lit(str(term), f"@{term.language}")
+    return Lit(str(term), str(term.datatype) if term.datatype is not None else XSD + "string")
+
+
+def term_of(term: Node) -> str | Lit:
+    """Convert an IRI or a literal of rdflib."""
+    return literal(term) if isinstance(term, Literal) else str(term)
+
+
+def canonical(value: Lit) -> Lit:
+    """Return a decimal number in its shortest form.
+
+    A rule's 2.00 is meant to match a measured 2; Pellet compares texts, and stock owlready2 rewrites some of them.
+    """
+    found = _DECIMAL.fullmatch(value.text.strip())
+    if value.datatype != XSD + "decimal" or found is None:
+        return value
+    sign, whole, part = found.groups()
+    text = (whole.lstrip("0") or "0") + (f".{part.rstrip('0')}" if part.rstrip("0") else "")
+    return Lit(f"-{text}" if sign == "-" and text != "0" else text, value.datatype)
+
+
+def _written(value: str | Lit) -> str:
+    if isinstance(value, str):
+        return f"<{value}>"
+    value = canonical(value)
+    text = "".join(char if char.isascii() else f"\\U{ord(char):08X}" for char in value.text.translate(_ESCAPES))
+    return f'"{text}"{value.datatype}' if value.datatype.startswith("@") else f'"{text}"^^<{value.datatype}>'
+
+
+def n_triple(triple: Triple) -> str:
+    """Write one line of N-Triples."""
+    return f"<{triple[0]}> <{triple[1]}> {_written(triple[2])} .\n"
+
+
+def n_triple_with_nodes(triple: RdfTriple, scope: str, renamed: Mapping[Node, str]) -> str:
+    """Write one line of N-Triples with blank nodes.
+
+    Args:
+        triple: the triple.
+        scope: begins the names of blank nodes, so that those of different files differ.
+        renamed: names that some nodes get instead.
+    """
+
+    def write(term: Node) -> str:
+        if term in renamed:
+            return renamed[term]
+        if isinstance(term, BNode):
+            return f"_:{scope}x" + "".join(char for char in str(term) if char.isascii() and char.isalnum())
+        return _written(term_of(term))
+
+    return f"{write(triple[0])} {write(triple[1])} {write(triple[2])} .\n"
+
+
+class Names:
+    """Short names of IRIs: the last part, or the whole IRI where two would share it."""
+
+    def __init__(self, triples: Iterable[Triple]) -> None:
+        things = {
+            term
+            for triple in triples
+            for term in (triple[0], triple[2])
+            if isinstance(term, str) and not term.startswith(LANGUAGE_NAMESPACES) and triple[2] != SWRL + "Variable"
+        }
+        shared = Counter(map(local_name, things))
+        self._long = {iri for iri in things if shared[local_name(iri)] > 1 and not iri.startswith((TOMASYS, MROS))}
+
+    def short(self, iri: str) -> str:
+        """Return the name of an IRI in facts."""
+        return iri if iri in self._long else local_name(iri)
+
+
+def value_of(value: str | Lit, names: Names) -> Value:
+    """Convert the object of a triple: to a short name, a number, a truth value or text."""
+    if isinstance(value, str):
+        return names.short(value)
+    if value.datatype == XSD + "boolean":
+        return value.text.strip() in ("true", "1")
+    if value.datatype in _NUMERIC:
+        try:
+            return Decimal(value.text.strip())
+        except InvalidOperation:
+            return value.text
+    return value.text
+
+
+def is_fact(triple: Triple) -> bool:
+    """Whether a triple describes an individual, and not the terms of OWL, RDF or SWRL."""
+    term = triple[2] if triple[1] == RDF_TYPE else triple[1]
+    return isinstance(term, str) and not term.startswith(LANGUAGE_NAMESPACES)
+
+
+def facts_of(triples: Iterable[Triple], names: Names) -> Iterator[Fact]:
+    """Convert the triples that describe individuals."""
+    for triple in triples:
+        if is_fact(triple):
+            subject, predicate, value = triple
+            name = "type" if predicate == RDF_TYPE else names.short(predicate)
+            yield Fact(names.short(subject), name, value_of(value, names))
