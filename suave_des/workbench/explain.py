@@ -116,7 +116,7 @@ class Explanation:
 
 
 def explain(base: Ontology, state: KnowledgeState, question: str, improves_exceeded: bool) -> Explanation:
-    """Answer a question about a state; see Ontology.explain."""
+    """Answer a question about a state; see KnowledgeBase.explain."""
     why, atom = _WHY.fullmatch(question.strip()), _ATOM.fullmatch(question.strip())
     if question.strip() and not why and not atom:
         raise InputError(f"{shown(question)} is no question about a state", remedy=_FORMS)
