@@ -117,7 +117,7 @@ def type_text(annotation: Any) -> str:
     if origin is typing.Literal:
         return " or ".join(f"`{each}`" for each in arguments)
     if origin is typing.Annotated:
-        return type_text(arguments[0]) + bounds_text(getattr(arguments[1], "metadata", ()))
+        return type_text(arguments[0]) + bounds_text(arguments[1:])
     if origin in (typing.Union, types.UnionType):
         return " or ".join(type_text(each) for each in arguments if each is not type(None))
     if origin is tuple:

@@ -69,6 +69,6 @@ def find(name: str | Path, kind: str, *, beside: Path | None = None) -> Path:
     if _is_a(Path.is_dir, candidates[0]):
         raise InputError("is a folder", file=path, remedy="name a file in it")
     if _is_a(Path.exists, candidates[0]):
-        raise InputError("is no ordinary file", file=path, remedy="name a file on disk")
+        raise InputError("is not a regular file", file=path, remedy="name a file on disk")
     known = ", ".join(sorted(entry.name for entry in shipped_folder(kind).glob(f"*{_KINDS[kind]}")))
     raise InputError("no such file", file=path, remedy=f"give a path, or one of the shipped files: {known}")

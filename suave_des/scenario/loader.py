@@ -16,10 +16,10 @@ from suave_des.domain import GENERATE_SEARCH_PATH, MISSION_FUNCTIONS
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown
 from suave_des.resources import find
 from suave_des.scenario.layers import Files, Layer, Location, find_named, scenario_layer
-from suave_des.scenario.models import REASONERS, ManagerSettings, Scenario, TableSignal
+from suave_des.scenario.models import REASONERS, ManagerSettings, Scenario
 from suave_des.scenario.modes import UNGROUND_MODE, ModeTable, modes_of
 from suave_des.scenario.problems import input_error
-from suave_des.scenario.signal_kinds import SignalTable, read_table
+from suave_des.scenario.signal_kinds import SignalTable, TableSignal, read_table
 
 MANAGER_GROUP = "suave_des.managers"
 """Entry point group in which packages register their managers."""

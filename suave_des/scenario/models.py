@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self, get_args
@@ -27,35 +26,10 @@ from suave_des.scenario.quantities import (
     Strict,
     TimeDistribution,
     Within,
-    lower_bound,
-    stated,
     wrong,
 )
 from suave_des.scenario.revision import Revision
-from suave_des.scenario.signal_kinds import ConstantSignal, Signal, SinusoidSignal, StepSignal, TableSignal
-
-__all__ = [
-    "Battery",
-    "BehaviourTreeSettings",
-    "Calibration",
-    "ConstantSignal",
-    "Current",
-    "Knowledge",
-    "Latencies",
-    "ManagerSettings",
-    "MetacontrolSettings",
-    "Mission",
-    "Pipeline",
-    "RandomSettings",
-    "ReactionMetric",
-    "Scenario",
-    "Signal",
-    "SinusoidSignal",
-    "Start",
-    "StepSignal",
-    "TableSignal",
-    "ThrusterEvent",
-]
+from suave_des.scenario.signal_kinds import Signal
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_.-]*$", max_length=100)]
 FileName = Annotated[str, Field(min_length=1)]
@@ -67,17 +41,10 @@ THRUSTERS = 6
 _LONGEST_MISSION_S = 100_000.0
 
 
-def _not_negative(value: Any) -> Any:
-    if (low := lower_bound(value)) < 0:
-        problem = "can become negative" if math.isinf(low) else f"{low:g} is negative"
-        raise wrong(problem, "give a number >= 0, or a distribution with minimum >= 0")
-    return value
-
-
 class Mission(Strict):
     """The coordinator's limit."""
 
-    time_limit_s: Annotated[float, Field(gt=0, le=_LONGEST_MISSION_S, strict=True)] = 300.0
+    time_limit_s: Annotated[float, Field(strict=True), Within(gt=0, le=_LONGEST_MISSION_S, unit="s")] = 300.0
     """When the current task is cancelled and the metrics are taken."""
 
 
@@ -88,19 +55,10 @@ class Start(Strict):
     """East."""
     y_m: CoordinateDistribution = 2.57
     """North."""
-    z_m: Annotated[Distribution, Within(SEA_BED_Z_M, SURFACE_Z_M, "m")] = -18.5
+    z_m: Annotated[Distribution, Within(gt=SEA_BED_Z_M, le=SURFACE_Z_M, unit="m, between sea bed and surface")] = -18.5
     """Up; the sea bed is at -20, the surface at 0."""
     heading_rad: HeadingDistribution = 0.0
     """Yaw, from east towards north."""
-
-    @field_validator("z_m", mode="after")
-    @classmethod
-    def _in_the_water(cls, value: Any) -> Any:
-        for z_m in stated(value):
-            if not SEA_BED_Z_M < z_m <= SURFACE_Z_M:
-                remedy = f"z must be above the sea bed at {SEA_BED_Z_M:g} m and at most {SURFACE_Z_M:g}"
-                raise wrong(f"{z_m:g} is not in the water", remedy)
-        return value
 
 
 class Current(Strict):
@@ -128,7 +86,7 @@ class Pipeline(Strict):
         (-51.56, -15.14, -20.0),
     )
     """Vertices [x, y, z] in order. The default is the exemplar's pipeline (kas-lab/suave)."""
-    points_per_piece: Annotated[int, Field(ge=1, le=1000, strict=True)] = 20
+    points_per_piece: Annotated[int, Field(strict=True), Within(1, 1000)] = 20
     """Evenly spaced points on each straight piece, its first vertex excluded and its last included."""
 
 
@@ -138,7 +96,7 @@ _EVENT_TEXT = re.compile(r"^\(\s*(?P<thruster>[^,]*?)\s*,\s*(?P<event>[^,]*?)\s*
 class ThrusterEvent(Strict):
     """A failure or recovery of one thruster; also given as the exemplar writes it: "(1,failure,35)"."""
 
-    thruster: Annotated[int, Field(ge=1, le=THRUSTERS, strict=True)]
+    thruster: Annotated[int, Field(strict=True), Within(1, THRUSTERS)]
     """1 to 4 horizontal (front right, front left, rear right, rear left), 5 and 6 vertical (right, left)."""
     event: Literal["failure", "recovery"]
     """What happens to it."""
@@ -152,19 +110,14 @@ class ThrusterEvent(Strict):
             return value
         match = _EVENT_TEXT.match(value.strip())
         if match is None:
-            raise wrong(
-                f"{shown(value)} is no thruster event",
-                "write (THRUSTER,failure or recovery,TIME), as in (1,failure,35)",
-            )
+            remedy = "write (THRUSTER,failure or recovery,TIME), as in (1,failure,35)"
+            raise wrong(f"{shown(value)} is not a thruster event", remedy)
         parts: dict[str, Any] = match.groupdict()
-        for key, convert, remedy in (
-            ("thruster", int, "a whole number from 1 to 6"),
-            ("time_s", float, "a time in s, such as 35"),
-        ):
+        for key, convert, expected in (("thruster", int, "a whole number from 1 to 6"), ("time_s", float, "a number")):
             try:
                 parts[key] = convert(parts[key])
             except ValueError:
-                raise wrong(f"the {key} {shown(parts[key])} in {shown(value)} is no number", remedy) from None
+                raise wrong(f"expected {expected} as {key}, got {shown(parts[key])}", "as in (1,failure,35)") from None
         return parts
 
 
@@ -195,38 +148,28 @@ class Latencies(Strict):
     inference_s: DelayDistribution = 1.0
     """One analyze and plan (stock Pellet starts a Java machine for each)."""
 
-    @field_validator("*", mode="after")
-    @classmethod
-    def _no_time_travel(cls, value: Any) -> Any:
-        return _not_negative(value)
-
 
 class Calibration(Strict):
     """Parameters of vehicle, autopilot and simulator that the sources leave open, alike for every manager."""
 
-    position_gain_per_s: Annotated[float, Field(gt=0, le=100, strict=True)] = 0.48
+    position_gain_per_s: Annotated[float, Field(strict=True), Within(gt=0, le=100, unit="1/s")] = 0.48
     """Wanted speed for each metre to the set-point."""
     horizontal_speed_limit_m_per_s: Speed = 0.34
     """Greatest horizontal speed that the autopilot wants."""
     vertical_speed_limit_m_per_s: Speed = 0.36
     """Greatest vertical speed that the autopilot wants."""
-    velocity_time_constant_s: Annotated[float, Field(ge=0.15, le=1000, strict=True)] = 0.5
+    velocity_time_constant_s: Annotated[float, Field(strict=True), Within(0.15, 1000, unit="s")] = 0.5
     """Lag of the velocity behind the wanted one."""
     altitude_error_m: OffsetDistribution = 0.0
     """Steady error of the autopilot's altitude, drawn once a run: it holds its set-point plus this."""
-    altitude_deadband_m: Annotated[Distribution, Within(None, 100.0, "m")] = 0.0
+    altitude_deadband_m: Annotated[Distribution, Within(0.0, 100.0, unit="m", is_floor=True)] = 0.0
     """Distance short of its altitude set-point at which the autopilot stops, drawn once a run."""
     drift_x_m: CoordinateDistribution = 0.0
     """Way east from the spawning place to where guided mode begins, the origin of the local frame."""
     drift_y_m: CoordinateDistribution = 0.0
     """The same, north."""
-    real_time_factor_loss: Annotated[Distribution, Within(None, 1000.0)] = 0.0
+    real_time_factor_loss: Annotated[Distribution, Within(0.0, 1000.0, is_floor=True)] = 0.0
     """The simulated world runs 1 / (1 + loss) as fast as the software's clock; drawn once a run."""
-
-    @field_validator("real_time_factor_loss", "altitude_deadband_m", mode="after")
-    @classmethod
-    def _never_negative(cls, value: Any) -> Any:
-        return _not_negative(value)
 
 
 class ReactionMetric(Strict):
@@ -244,11 +187,8 @@ class ReactionMetric(Strict):
         paired(self, "visibility_thresholds_m", "expected_altitudes_m")
         thresholds = self.visibility_thresholds_m
         if any(later >= earlier for earlier, later in pairwise(thresholds)):
-            raise wrong(
-                f"{list(thresholds)} does not fall",
-                "give the greatest threshold first",
-                "visibility_thresholds_m",
-            )
+            problem = f"{list(thresholds)} is not in falling order"
+            raise wrong(problem, "give the greatest threshold first", "visibility_thresholds_m")
         return self
 
 

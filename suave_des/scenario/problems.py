@@ -1,85 +1,101 @@
-"""What pydantic found wrong with a scenario, as one line with file, line, key path, value and remedy."""
+"""Validation errors of pydantic as one line with file, line, key path, value and remedy."""
 
 from __future__ import annotations
 
+import re
 import typing
-from collections.abc import Iterable, Iterator, Mapping
-from types import UnionType
-from typing import Annotated, Any, Union
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
-from pydantic import BaseModel, Tag, ValidationError
+from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from suave_des.errors import InputError, KeyPath, did_you_mean, place_text, shown
-from suave_des.scenario.layers import Layer
-from suave_des.scenario.quantities import LONGEST_S, Choice, Distribution, Exponential, Normal, Uniform
-from suave_des.scenario.signal_kinds import Signal
+from suave_des.scenario.layers import Layer, Location
 
-
-def _tags(union: Any) -> list[str]:
-    """Names of a union's members, which pydantic puts into locations although no file has them."""
-    members = typing.get_args(typing.get_args(union)[0])
-    return [mark.tag for member in members for mark in member.__metadata__ if isinstance(mark, Tag)]
-
-
-_MAPPING = "is not a mapping of keys to values"
-_BOUNDS = {"gt": "greater than", "ge": "at least", "lt": "less than", "le": "at most"}
+_MAPPING = ("expected a mapping of keys to values, got {value}", "write `key: value` lines under it, or leave it out")
+_NUMBER = ("expected a number, got {value}", "such as 12.5, without quotes")
+_BOOLEAN = ("expected true or false, got {value}", "write true or false")
 _TEXTS: Mapping[str, tuple[str, str]] = {
     # type of pydantic's error: (what is wrong with the value, what would be right)
     "missing": ("is missing", "add it"),
-    "float_type": ("{value} is no number", "such as 12.5, without quotes"),
-    "int_type": ("{value} is no whole number", "such as 3, without quotes"),
-    "int_from_float": ("{value} is no whole number", "such as 3"),
+    "float_type": _NUMBER,
+    "int_type": ("expected a whole number, got {value}", "such as 3, without quotes"),
+    "int_from_float": ("expected a whole number, got {value}", "such as 3"),
     "finite_number": ("{value} is not finite", "give a finite number"),
-    "string_type": ("{value} is no text", "put it in quotes"),
-    "bool_type": ("{value} is neither true nor false", "write true or false"),
-    "bool_parsing": ("{value} is neither true nor false", "write true or false"),
-    "dict_type": (f"{{value}} {_MAPPING}", "write `key: value` lines under it, or leave it out"),
-    "model_type": (f"{{value}} {_MAPPING}", "write `key: value` lines under it, or leave it out"),
-    "model_attributes_type": (f"{{value}} {_MAPPING}", "write `key: value` lines under it, or leave it out"),
-    "tuple_type": ("{value} is no list", "write it in brackets: [{value}]"),
+    "string_type": ("expected text, got {value}", "put it in quotes"),
+    "bool_type": _BOOLEAN,
+    "bool_parsing": _BOOLEAN,
+    "dict_type": _MAPPING,
+    "model_type": _MAPPING,
+    "tuple_type": ("expected a list, got {value}", "write it in brackets: [{value}]"),
     "string_pattern_mismatch": (
-        "{value} is no name",
+        "{value} is not a valid name",
         "use letters, digits, _ . and -, beginning with a letter",
     ),
     "string_too_long": ("{value} is too long", "at most {max_length} characters"),
     "string_too_short": ("{value} is too short", "at least {min_length} characters"),
     "too_short": ("has {actual_length} entries", "at least {min_length} needed"),
     "too_long": ("has too many entries", "at most {max_length}"),
+    "wrong": ("{problem}", "{remedy}"),
+    "value_error": ("{error}", "see docs/reference/scenario.md"),
 }
+_UNION_KEYS = ("kind", "distribution", "type")
+"""Keys whose word distinguishes the members of a union."""
+_NAME, _INDEX = "NAME", "[]"
+"""Stand for any name, and any number of an entry, in the location of a model."""
+ModelPath = tuple[str, ...]
+Models = Sequence[tuple[ModelPath, type[BaseModel]]]
 
 
-_DISTRIBUTIONS = (Normal, Uniform, Exponential, Choice)
-_UNION_TAGS = {each for union in (Distribution, Signal) for each in _tags(union)}
-
-
-def input_error(error: ValidationError, layer: Layer, model: type[BaseModel]) -> InputError:
+def input_error(error: ValidationError, layer: Layer, model: Any) -> InputError:
     """The first thing wrong, the user's own file before its base, as one error that counts the others.
 
     Args:
         error: what pydantic raised for layer.data.
         layer: the data with their places.
-        model: the model that was validated.
+        model: the model, or other type, that was validated.
     """
     details = error.errors(include_url=False)
-    first = min(details, key=lambda detail: _order(detail, layer))
-    problem, remedy = _said(first, model)
-    path = _nearest_to_user(first, layer)
+    models = list(models_within(model))
+    tags = {"number", *(_tag(inner) for _, inner in models)}
+    paths = [_key_path(detail["loc"], layer.data, tags) for detail in details]
+    path, first = min(zip(paths, details, strict=True), key=lambda found: _order(found[1], layer.place(found[0])))
+    problem, remedy = _texts(first, models)
+    path = _nearest_to_user(first, path, layer)
     place = layer.place(path)
     if more := len(details) - 1:
         remedy += f"; and {more} more"
     return InputError(problem, file=place.file, place=place_text(place.line, path), remedy=remedy)
 
 
-def _order(detail: ErrorDetails, layer: Layer) -> tuple[int, int, int]:
-    # A misspelt key is also a missing one, and a list with a wrong entry too short: these say less and come last.
-    place = layer.place(_key_path(detail["loc"], layer.data))
+def models_within(wanted: Any, path: ModelPath = ()) -> Iterator[tuple[ModelPath, type[BaseModel]]]:
+    """Yield every model that a type holds, with its location in pydantic's form: union members by their tag."""
+    if isinstance(wanted, type) and issubclass(wanted, BaseModel):
+        path = (*path, *([tag] if (tag := _tag(wanted)) else []))
+        yield path, wanted
+        for name, field in wanted.model_fields.items():
+            yield from models_within(field.annotation, (*path, name))
+        return
+    entry = {dict: (_NAME,), tuple: (_INDEX,)}.get(typing.get_origin(wanted), ())
+    for argument in typing.get_args(wanted):
+        yield from models_within(argument, (*path, *entry))
+
+
+def _tag(model: type[BaseModel]) -> str | None:
+    """The word that distinguishes a model from the others of its union."""
+    field = next((model.model_fields[key] for key in _UNION_KEYS if key in model.model_fields), None)
+    return None if field is None else str(typing.get_args(field.annotation)[0])
+
+
+def _order(detail: ErrorDetails, place: Location) -> tuple[int, int, int]:
+    # A misspelt key is also a missing one, and a list with a wrong entry too short: report these last.
     missing_key = detail["type"] == "missing" and isinstance(detail["loc"][-1], str)
     return 2 if detail["type"] == "too_short" else int(missing_key), place.depth, place.line
 
 
-def _key_path(loc: tuple[int | str, ...], data: object) -> KeyPath:
-    """The key path as it stands in the file: pydantic's location without the names of union members."""
+def _key_path(loc: KeyPath, data: object, tags: Collection[object]) -> KeyPath:
+    """The key path in the file: pydantic's location without the tags of union members."""
     path: list[str | int] = []
     for index, key in enumerate(loc):
         last = index == len(loc) - 1
@@ -87,130 +103,67 @@ def _key_path(loc: tuple[int | str, ...], data: object) -> KeyPath:
             data = data[key]
         elif isinstance(data, list) and isinstance(key, int):
             data = data[key] if key < len(data) else None
-        elif key in _UNION_TAGS or key == "[key]" or (not isinstance(data, dict | str) and not last):
+        elif key in tags or key == "[key]" or (not isinstance(data, dict | str) and not last):
             continue
         path.append(key)
     return tuple(path)
 
 
-def _nearest_to_user(detail: ErrorDetails, layer: Layer) -> KeyPath:
+def _nearest_to_user(detail: ErrorDetails, path: KeyPath, layer: Layer) -> KeyPath:
     """Key path of the value at fault; of keys that do not fit together, the one in the user's own file."""
-    path = _key_path(detail["loc"], layer.data)
-    keys = [key for key in str(detail.get("ctx", {}).get("keys", "")).split() if (*path, key) in layer.places]
+    given = _UNION_KEYS if detail["type"] == "union_tag_invalid" else str(detail.get("ctx", {}).get("keys", "")).split()
+    keys = [key for key in given if (*path, key) in layer.places]
     candidates: Iterable[KeyPath] = [(*path, key) for key in keys] or [path]
     return min(candidates, key=lambda candidate: layer.place(candidate).depth)
 
 
-def _said(detail: ErrorDetails, model: type[BaseModel]) -> tuple[str, str]:
-    kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
-    loc = detail["loc"]
-    if kind == "extra_forbidden":
-        return f"unknown key {shown(loc[-1])}", _right_key(model, loc)
-    if kind == "wrong":
-        return str(context["problem"]), str(context["remedy"])
-    if kind == "wrong_kind":
-        return _wrong_kind(value, str(context["key"]), str(context["known"]).split(), str(context["also"]))
-    if kind == "literal_error":
-        known_words = typing.get_args(_annotation_at(model, loc)) or (context["expected"],)
-        return f"{shown(value)} is not allowed", did_you_mean(value, map(str, known_words), "allowed")
-    if kind == "value_error":
-        return str(context["error"]), "see docs/reference/scenario.md"
-    if kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):
-        exceeded = next(bound for key, bound in context.items() if key in _BOUNDS)
-        return f"{shown(value)} is out of range", f"must be {_range_at(model, loc, exceeded) or _bound(context)}"
-    if kind == "float_type" and loc[-1] == "number":
-        return f"{shown(value)} is no number", "give a number without quotes, or a distribution"
-    if value is None and kind in ("dict_type", "model_type", "model_attributes_type"):
-        return "has nothing under it", "write `key: value` lines under it, or leave it out"
+def _texts(detail: ErrorDetails, models: Models) -> tuple[str, str]:
+    """What is wrong, and what would be right."""
+    kind, loc, value, context = detail["type"], detail["loc"], detail["input"], detail.get("ctx", {})
+    match kind:
+        case "extra_forbidden":
+            return f"unknown key {shown(loc[-1])}", _right_key(models, loc)
+        case "union_tag_invalid" | "union_tag_not_found" | "model_attributes_type":
+            return _wrong_kind(value, [path[-1] for path, _ in models if _matches(path[:-1], loc)])
+        case "literal_error":
+            allowed = re.findall(r"'([^']*)'", str(context["expected"]))
+            return f"{shown(value)} is not allowed", did_you_mean(value, allowed, "allowed")
+        case "float_type" if loc[-1] == "number":
+            return _NUMBER[0].format(value=shown(value)), "give a number without quotes, or a distribution"
+        case "dict_type" | "model_type" if value is None:
+            return "has nothing under it", _MAPPING[1]
     problem, remedy = _TEXTS.get(kind, (f"{{value}}: {detail['msg']}", "see docs/reference/scenario.md"))
     facts = {"value": shown(value), **context}
     return problem.format(**facts), remedy.format(**facts)
 
 
-def _right_key(model: type[BaseModel], loc: tuple[int | str, ...]) -> str:
-    """Where a key that is known elsewhere belongs; else the nearest that is known here."""
-    if homes := list(dict.fromkeys(_homes(model, str(loc[-1]), ""))):
-        return f"it belongs {' or '.join(homes)}"
-    here = model_at(model, loc[:-1])
-    return did_you_mean(loc[-1], here.model_fields if here else ())
-
-
-def _homes(model: type[BaseModel], key: str, path: str) -> Iterator[str]:
-    """Places of mappings that have a key; the parameters of distributions do not count, which may stand anywhere."""
-    for name, field in model.model_fields.items():
-        if name == key:
-            yield f"under {path}" if path else "at the top level"
-        below = f"{path}.{name}" if path else name
-        for suffix, inner in _mappings(field.annotation):
-            if inner not in _DISTRIBUTIONS:
-                yield from _homes(inner, key, below + suffix)
-
-
-def _mappings(wanted: Any) -> Iterator[tuple[str, type[BaseModel]]]:
-    """Models that a type holds, with what stands for the name or number of an entry."""
-    if isinstance(wanted, type) and issubclass(wanted, BaseModel):
-        yield "", wanted
-        return
-    entry = {dict: ".NAME", tuple: "[]"}.get(typing.get_origin(wanted), "")
-    for argument in typing.get_args(wanted):
-        yield from ((entry + suffix, inner) for suffix, inner in _mappings(argument))
-
-
-def _wrong_kind(value: object, key: str, known: list[str], also: str) -> tuple[str, str]:
-    """A mapping whose kind (or distribution) is not given or not known, or no mapping at all."""
+def _wrong_kind(value: object, known: list[str]) -> tuple[str, str]:
+    """A value in place of a member of a union: not a mapping, or of a kind that is not given or not known."""
+    key, also = {"sinusoid": ("kind", ""), "normal": ("distribution", "give a number, or ")}.get(known[0], ("type", ""))
     if not isinstance(value, dict):
-        return f"{shown(value)} {_MAPPING}", f"{also}give a mapping with {key}: {', '.join(known)}"
+        return _MAPPING[0].format(value=shown(value)), f"{also}give a mapping with {key}: {', '.join(known)}"
     if key not in value:
         return f"{key} is missing", f"{also}add {key}: {', '.join(known)}"
     return f"{key} {shown(value[key])} is not known", did_you_mean(value[key], known)
 
 
-def _range_at(model: type[BaseModel], loc: tuple[int | str, ...], exceeded: float) -> str:
-    """The range that a number of the model must lie in, in words, without bounds that nobody is near."""
-    owner = model_at(model, loc[:-1])
-    marks = owner.model_fields[str(loc[-1])].metadata if owner else []
-    bounds = {key: getattr(mark, key) for mark in marks for key in _BOUNDS if getattr(mark, key, None) is not None}
-    told = {key: bound for key, bound in bounds.items() if abs(bound) < LONGEST_S or bound == exceeded}
-    return _bound(told)
+def _right_key(models: Models, loc: KeyPath) -> str:
+    """Where a key that is known elsewhere belongs; else the nearest that is known here."""
+    key, siblings = str(loc[-1]), list[str]()
+    homes: dict[str, None] = {}
+    tags = {_tag(model) for _, model in models}
+    for path, model in models:
+        if _matches(path, loc[:-1]):
+            siblings = list(model.model_fields)
+        # The parameters of distributions do not count, which may stand anywhere.
+        if key in model.model_fields and "distribution" not in model.model_fields:
+            above = ".".join(part for part in path if part not in tags).replace(f".{_INDEX}", _INDEX)
+            homes[f"under {above}" if above else "at the top level"] = None
+    return f"it belongs {' or '.join(homes)}" if homes else did_you_mean(key, siblings)
 
 
-def _bound(context: Mapping[str, Any]) -> str:
-    return " and ".join(f"{text} {context[key]:g}" for key, text in _BOUNDS.items() if context.get(key) is not None)
-
-
-def _annotation_at(model: type[BaseModel], loc: tuple[int | str, ...]) -> Any:
-    """Type that the model wants at one of pydantic's locations; None where it has none."""
-    wanted: Any = model
-    for key in loc:
-        wanted = _step(wanted, key)
-    return _bare(wanted)
-
-
-def model_at(model: type[BaseModel], loc: tuple[int | str, ...]) -> type[BaseModel] | None:
-    """The model that stands at one of pydantic's locations, or None."""
-    wanted = _annotation_at(model, loc)
-    return wanted if isinstance(wanted, type) and issubclass(wanted, BaseModel) else None
-
-
-def _step(wanted: Any, key: int | str) -> Any:
-    wanted = _bare(wanted)
-    if typing.get_origin(wanted) in (Union, UnionType):
-        for member in typing.get_args(wanted):
-            if Tag(str(key)) in getattr(member, "__metadata__", ()):
-                return member
-        return None
-    if isinstance(wanted, type) and issubclass(wanted, BaseModel):
-        field = wanted.model_fields.get(str(key))
-        return field.annotation if field else None
-    arguments = typing.get_args(wanted)
-    return arguments[-1 if typing.get_origin(wanted) is dict else 0] if arguments else None
-
-
-def _bare(wanted: Any) -> Any:
-    """A type without Annotated and without the None of an optional one."""
-    while typing.get_origin(wanted) is Annotated:
-        wanted = typing.get_args(wanted)[0]
-    if typing.get_origin(wanted) in (Union, UnionType):
-        members = [member for member in typing.get_args(wanted) if member is not type(None)]
-        return _bare(members[0]) if len(members) == 1 else wanted
-    return wanted
+def _matches(path: ModelPath, loc: KeyPath) -> bool:
+    """Whether a location is one of those that a model's path describes."""
+    return len(path) == len(loc) and all(
+        part == key or part == (_INDEX if isinstance(key, int) else _NAME) for part, key in zip(path, loc, strict=True)
+    )

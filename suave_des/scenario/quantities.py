@@ -1,6 +1,6 @@
 """Numbers with bounds, and distributions that may stand in their place: each run draws its own value.
 
-Bounds are generous; beyond them nothing can be meant but a slip, or another unit: 10 km around the origin where the
+Bounds are generous; a value beyond them can only be a slip, or in another unit: 10 km around the origin where the
 pipeline is 60 m away, a current three times that of the strongest tides, a heading of once round either way, so that
 degrees are noticed.
 """
@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self
 
@@ -26,6 +25,11 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+LARGEST = 1e12
+"""Greatest magnitude of a number without bounds of its own, such as a measured value in a unit of the user's."""
+LONGEST_S = 1e9
+"""Longest time: 31 years, in other words never. Bounds of this magnitude are shown only to those who exceed them."""
+FARTHEST_M = 10_000.0
 _LEAST_SHARE = 0.001
 
 
@@ -42,16 +46,83 @@ def wrong(problem: str, remedy: str, *keys: str) -> PydanticCustomError:
     )
 
 
-LARGEST = 1e12
-"""Greatest magnitude of a number of which nothing else is known, such as a measured value in a unit of one's own."""
-LONGEST_S = 1e9
-"""Longest time: 31 years, in other words never. A bound of this magnitude is told only to those who exceed it."""
+def ordered(minimum: float, maximum: float) -> None:
+    """Raise an error if the minimum is above the maximum."""
+    if minimum > maximum:
+        problem = f"minimum {minimum:g} is above maximum {maximum:g}"
+        raise wrong(problem, "give the smaller one as minimum", "minimum", "maximum")
 
-Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, strict=True)]
+
+@dataclass(frozen=True)
+class Within:
+    """Bounds of a number, or of the values that a distribution states; its spread is at most their distance.
+
+    Attributes:
+        ge: least value.
+        le: greatest value.
+        gt: value that must be exceeded.
+        lt: value that must not be reached.
+        unit: for the message.
+        is_floor: whether a distribution must not be able to give values below `ge` either.
+    """
+
+    ge: float | None = None
+    le: float | None = None
+    gt: float | None = None
+    lt: float | None = None
+    unit: str = ""
+    is_floor: bool = False
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Check what the type's own checks have passed."""
+        return core_schema.no_info_after_validator_function(self._check, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """Bounds of a plain number; JSON Schema does not apply them to mappings."""
+        bounds = {
+            "minimum": self.ge,
+            "maximum": self.le,
+            "exclusiveMinimum": self.gt,
+            "exclusiveMaximum": self.lt,
+        }
+        return {**handler(schema), **{key: bound for key, bound in bounds.items() if bound is not None}}
+
+    def _check(self, value: AnyDistribution) -> AnyDistribution:
+        low = max((bound for bound in (self.ge, self.gt) if bound is not None), default=-math.inf)
+        high = min((bound for bound in (self.le, self.lt) if bound is not None), default=math.inf)
+        for key, part in _stated(value):
+            # A normal distribution that is cut at the floor may have its mean below.
+            least = -high if self.is_floor and key == "mean" else low
+            if not least <= part <= high or part in (self.gt, self.lt):
+                raise wrong(f"{part:.12g} is out of range", f"must be {self.text(part)}", key)
+        widest = high - (low if math.isfinite(low) else 0.0)
+        if isinstance(value, Normal) and value.std > widest:
+            raise wrong(f"{value.std:g} is out of range", f"must be at most {widest:g} {self.unit}".rstrip(), "std")
+        if self.is_floor and support(value)[0] < low:
+            raise wrong(f"values below {low:g} can be drawn", f"give a minimum that is at least {low:g}")
+        return value
+
+    def text(self, part: float | None = None) -> str:
+        """The bounds in words, but those that no value comes near, unless `part` exceeds them."""
+        bounds = (("greater than", self.gt), ("at least", self.ge), ("less than", self.lt), ("at most", self.le))
+        near = [
+            f"{words} {bound:g}"
+            for words, bound in bounds
+            if bound is not None and (abs(bound) < LONGEST_S or (part is not None and abs(part) > abs(bound)))
+        ]
+        return f"{' and '.join(near)} {self.unit}".rstrip()
+
+
+_Float = Annotated[float, Field(strict=True)]
 """A number written as one: "80" in quotes and true are none."""
-NotNegative = Annotated[float, Field(ge=0, le=LARGEST, strict=True)]
-Period = Annotated[float, Field(ge=0.001, le=LONGEST_S, strict=True)]
-"""Period of something that happens in mission time, in s; the limit keeps a slip from stopping the clock."""
+Number = Annotated[_Float, Within(-LARGEST, LARGEST)]
+NotNegative = Annotated[_Float, Within(0, LARGEST)]
+Coordinate = Annotated[_Float, Within(-FARTHEST_M, FARTHEST_M, unit="m")]
+Length = Annotated[_Float, Within(gt=0, le=FARTHEST_M, unit="m")]
+Duration = Annotated[_Float, Within(gt=0, le=LONGEST_S, unit="s")]
+Period = Annotated[_Float, Within(0.001, LONGEST_S, unit="s")]
+"""Period of something that happens in mission time; the lower limit keeps a slip from stopping the clock."""
+Speed = Annotated[_Float, Within(gt=0, le=100, unit="m/s")]
 
 
 class Normal(Strict):
@@ -72,21 +143,15 @@ class Normal(Strict):
     def _interval_is_likely(self) -> Self:
         low = -math.inf if self.minimum is None else self.minimum
         high = math.inf if self.maximum is None else self.maximum
-        if low > high:
-            raise _reversed(low, high)
+        ordered(low, high)
         if self.std == 0:
             share = 1.0 if low <= self.mean <= high else 0.0
         else:
             scale = self.std * math.sqrt(2)
             share = (math.erf((high - self.mean) / scale) - math.erf((low - self.mean) / scale)) / 2
         if share < _LEAST_SHARE:
-            remedy = "move or widen it, or use distribution: uniform"
-            raise wrong(
-                f"[{low:g}, {high:g}] leaves next to nothing of the distribution",
-                remedy,
-                "minimum",
-                "maximum",
-            )
+            problem = f"[{low:g}, {high:g}] leaves next to nothing of the distribution"
+            raise wrong(problem, "move or widen it, or use distribution: uniform", "minimum", "maximum")
         return self
 
     def draw(self, stream: random.Random) -> float:
@@ -109,8 +174,7 @@ class Uniform(Strict):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        if self.minimum > self.maximum:
-            raise _reversed(self.minimum, self.maximum)
+        ordered(self.minimum, self.maximum)
         return self
 
     def draw(self, stream: random.Random) -> float:
@@ -146,171 +210,71 @@ class Choice(Strict):
         return stream.choice(self.values)
 
 
-def _reversed(low: float, high: float) -> PydanticCustomError:
-    return wrong(f"minimum {low:g} is above maximum {high:g}", "give the smaller one as minimum", "minimum", "maximum")
+AnyDistribution = float | Normal | Uniform | Exponential | Choice
 
 
-def ordered(minimum: float, maximum: float) -> None:
-    """Raise the error of a minimum above the maximum."""
-    if minimum > maximum:
-        raise _reversed(minimum, maximum)
-
-
-def one_of(key: str, known: str, otherwise: str | None = None, also: str = "") -> Discriminator:
-    """Tell the members of a union apart by what a mapping says under a key.
-
-    Args:
-        key: the key.
-        known: what it may say, separated by spaces.
-        otherwise: member for what is no mapping.
-        also: begins the remedy, as in "give a number, or ".
-    """
-
-    def tag(value: Any) -> str | None:
-        found = value.get(key) if isinstance(value, dict) else getattr(value, key, otherwise)
-        return found if isinstance(found, str) else None
-
-    return Discriminator(
-        tag,
-        custom_error_type="wrong_kind",
-        custom_error_message="{key} must be one of {known}",
-        custom_error_context={"key": key, "known": known, "also": also},
-    )
+def _tag(value: Any) -> str | None:
+    if isinstance(value, dict):
+        value = value.get("distribution")
+        return value if isinstance(value, str) else None
+    return getattr(value, "distribution", "number")
 
 
 Distribution = Annotated[
-    Annotated[float, Tag("number"), Field(strict=True)]
+    Annotated[_Float, Tag("number")]
     | Annotated[Normal, Tag("normal")]
     | Annotated[Uniform, Tag("uniform")]
     | Annotated[Exponential, Tag("exponential")]
     | Annotated[Choice, Tag("choice")],
-    one_of("distribution", "normal uniform exponential choice", "number", "give a number, or "),
+    Discriminator(_tag),
 ]
+CoordinateDistribution = Annotated[Distribution, Within(-FARTHEST_M, FARTHEST_M, unit="m")]
+HeadingDistribution = Annotated[Distribution, Within(-6.3, 6.3, unit="rad")]
+CurrentDistribution = Annotated[Distribution, Within(-10.0, 10.0, unit="m/s")]
+OffsetDistribution = Annotated[Distribution, Within(-100.0, 100.0, unit="m")]
+TimeDistribution = Annotated[Distribution, Within(0.0, LONGEST_S, unit="s")]
+DelayDistribution = Annotated[Distribution, Within(0.0, LONGEST_S, unit="s", is_floor=True)]
+ShiftDistribution = Annotated[Distribution, Within(-LONGEST_S, LONGEST_S, unit="s")]
+ValueDistribution = Annotated[Distribution, Within(-LARGEST, LARGEST)]
 
 
-def draw(distribution: float | Normal | Uniform | Exponential | Choice, stream: random.Random) -> float:
+def draw(distribution: AnyDistribution, stream: random.Random) -> float:
     """One value of a distribution; a plain number is its own value and draws nothing from the stream."""
     return distribution if isinstance(distribution, float | int) else distribution.draw(stream)
 
 
-def stated(distribution: float | Normal | Uniform | Exponential | Choice) -> tuple[float, ...]:
+def stated(distribution: AnyDistribution) -> tuple[float, ...]:
     """The values that a scenario states for a distribution: itself, its mean, its bounds, its choices."""
+    return tuple(value for _, value in _stated(distribution))
+
+
+def _stated(distribution: AnyDistribution) -> list[tuple[str, float]]:
+    """The stated values with their keys."""
     match distribution:
         case Normal():
-            bounds = (distribution.mean, distribution.minimum, distribution.maximum)
-            return tuple(bound for bound in bounds if bound is not None)
+            mean, low, high = distribution.mean, distribution.minimum, distribution.maximum
+            bounds = (("minimum", low), ("maximum", high))
+            return [("mean", mean), *((key, bound) for key, bound in bounds if bound is not None)]
         case Uniform():
-            return (distribution.minimum, distribution.maximum)
+            return [("minimum", distribution.minimum), ("maximum", distribution.maximum)]
         case Exponential():
-            return (distribution.minimum, distribution.minimum + distribution.mean)
+            return [("minimum", distribution.minimum), ("mean", distribution.minimum + distribution.mean)]
         case Choice():
-            return distribution.values
+            return [("values", value) for value in distribution.values]
         case number:
-            return (float(number),)
+            return [("", float(number))]
 
 
-def upper_bound(distribution: float | Normal | Uniform | Exponential | Choice) -> float:
-    """The greatest value that a distribution can give (inf for an exponential one, or a normal one without maximum)."""
+def support(distribution: AnyDistribution) -> tuple[float, float]:
+    """Smallest and greatest value that a distribution can give, infinite where nothing limits it."""
     match distribution:
+        case Normal(std=0):
+            return distribution.mean, distribution.mean
         case Normal():
-            high = distribution.mean if distribution.std == 0 else float("inf")
-            return high if distribution.maximum is None else distribution.maximum
-        case Uniform():
-            return distribution.maximum
+            low, high = distribution.minimum, distribution.maximum
+            return -math.inf if low is None else low, math.inf if high is None else high
         case Exponential():
-            return distribution.minimum if distribution.mean == 0 else float("inf")
-        case Choice():
-            return max(distribution.values)
-        case number:
-            return float(number)
-
-
-def lower_bound(distribution: float | Normal | Uniform | Exponential | Choice) -> float:
-    """The smallest value that a distribution can give (-inf for a normal one without minimum)."""
-    match distribution:
-        case Normal():
-            low = distribution.mean if distribution.std == 0 else float("-inf")
-            return low if distribution.minimum is None else distribution.minimum
-        case Uniform() | Exponential():
-            return distribution.minimum
-        case Choice():
-            return min(distribution.values)
-        case number:
-            return float(number)
-
-
-AnyDistribution = float | Normal | Uniform | Exponential | Choice
-FARTHEST_M = 10_000.0
-
-
-@dataclass(frozen=True)
-class Within:
-    """Bounds of a number, or of the values that a distribution states; its spread is at most their distance.
-
-    Attributes:
-        ge: least value; none where another check looks at that.
-        le: greatest value.
-        unit: for the message.
-    """
-
-    ge: float | None
-    le: float
-    unit: str = ""
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Check what the distribution's own checks have passed."""
-        return core_schema.no_info_after_validator_function(self._check, handler(source))
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """The bounds of a plain number; JSON Schema does not apply them to mappings."""
-        least = {} if self.ge is None else {"minimum": self.ge}
-        return {**handler(schema), **least, "maximum": self.le}
-
-    def _check(self, value: AnyDistribution) -> AnyDistribution:
-        widest = self.le - (self.ge or 0.0)
-        for key, part in _stated(value):
-            if part > self.le or (self.ge is not None and part < self.ge):
-                raise self._error(part, self.ge, self.le, key)
-        for key, spread in _spreads(value):
-            if spread > widest:
-                raise self._error(spread, None, widest, key)
-        return value
-
-    def _error(self, part: float, least: float | None, greatest: float, key: str) -> Exception:
-        bounds = f"at most {greatest:g}" if least is None else f"at least {least:g} and at most {greatest:g}"
-        return wrong(f"{part:g} is out of range", f"must be {bounds} {self.unit}".rstrip(), key)
-
-
-def _stated(value: AnyDistribution) -> Iterator[tuple[str, float]]:
-    """The values that a distribution states, with their keys."""
-    match value:
-        case Choice():
-            yield from (("values", each) for each in value.values)
-        case Normal() | Uniform() | Exponential():
-            keys = ("minimum", "maximum", *(("mean",) if isinstance(value, Normal) else ()))
-            found = ((key, getattr(value, key, None)) for key in keys)
-            yield from ((key, part) for key, part in found if part is not None)
-        case number:
-            yield "", float(number)
-
-
-def _spreads(value: AnyDistribution) -> Iterator[tuple[str, float]]:
-    if isinstance(value, Normal):
-        yield "std", value.std
-    elif isinstance(value, Exponential):
-        yield "mean", value.mean
-
-
-Coordinate = Annotated[float, Field(ge=-FARTHEST_M, le=FARTHEST_M, strict=True)]
-Length = Annotated[float, Field(gt=0, le=FARTHEST_M, strict=True)]
-Duration = Annotated[float, Field(gt=0, le=LONGEST_S, strict=True)]
-Speed = Annotated[float, Field(gt=0, le=100, strict=True)]
-
-CoordinateDistribution = Annotated[Distribution, Within(-FARTHEST_M, FARTHEST_M, "m")]
-HeadingDistribution = Annotated[Distribution, Within(-6.3, 6.3, "rad")]
-CurrentDistribution = Annotated[Distribution, Within(-10.0, 10.0, "m/s")]
-OffsetDistribution = Annotated[Distribution, Within(-100.0, 100.0, "m")]
-TimeDistribution = Annotated[Distribution, Within(0.0, LONGEST_S, "s")]
-DelayDistribution = Annotated[Distribution, Within(None, LONGEST_S, "s")]
-ShiftDistribution = Annotated[Distribution, Within(-LONGEST_S, LONGEST_S, "s")]
-ValueDistribution = Annotated[Distribution, Within(-LARGEST, LARGEST)]
+            return distribution.minimum, distribution.minimum if distribution.mean == 0 else math.inf
+        case _:
+            values = stated(distribution)
+            return min(values), max(values)

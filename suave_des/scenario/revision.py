@@ -14,8 +14,8 @@ from suave_des.scenario.quantities import (
     OffsetDistribution,
     Period,
     Strict,
-    lower_bound,
-    upper_bound,
+    Within,
+    support,
     wrong,
 )
 
@@ -73,14 +73,14 @@ class MonitorsRevision(Strict):
     """What the time of a thruster event counts from: the event before, or the start of the mission."""
     visibility_publishing_period_s: Period
     """Period at which signals are measured that give none themselves."""
-    detected_point_height_m: Annotated[float, Field(ge=0, le=FARTHEST_M, strict=True)]
+    detected_point_height_m: Annotated[float, Field(strict=True), Within(0, FARTHEST_M, unit="m")]
     """Height above the pipeline's points at which the detection mock-up looks for them."""
 
 
 class SetPointRevision(Strict):
     """How functions hand set-points to the autopilot."""
 
-    loss_probability: Distribution
+    loss_probability: Annotated[Distribution, Within(0.0, lt=1.0, is_floor=True)]
     """Chance that a set-point is lost, drawn once a run: a publisher made for each call may publish undiscovered."""
     node_frame_offset_x_m: OffsetDistribution
     """Steady error of one node's frame against the simulator's, east; drawn once per node and run."""
@@ -91,9 +91,9 @@ class SetPointRevision(Strict):
 
     @field_validator("loss_probability", mode="after")
     @classmethod
-    def _is_probability(cls, value: Any) -> Any:
-        if lower_bound(value) < 0 or upper_bound(value) >= 1:
-            raise wrong("is no probability", "give a number >= 0 and < 1, or a distribution with such bounds")
+    def _is_less_than_one(cls, value: Any) -> Any:
+        if support(value)[1] >= 1:
+            raise wrong("values of 1 and more can be drawn", "give a maximum that is less than 1")
         return value
 
 

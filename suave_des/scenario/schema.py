@@ -5,13 +5,12 @@ from __future__ import annotations
 import ast
 import inspect
 import textwrap
-import typing
-from collections.abc import Iterator
 from typing import Any
 
 from pydantic import BaseModel
 
 from suave_des.scenario.models import Scenario
+from suave_des.scenario.problems import models_within
 
 _PARTIAL = "Partial"
 _REFERENCE = "#/$defs/"
@@ -45,7 +44,7 @@ def scenario_schema() -> dict[str, Any]:
 
 
 def _describe(definitions: dict[str, Any]) -> None:
-    for model in models_within(Scenario):
+    for model in {model: None for _, model in models_within(Scenario)}:
         for name, text in field_docs(model).items():
             definitions[model.__name__]["properties"][name]["description"] = text
 
@@ -56,7 +55,11 @@ def _partial(schema: Any) -> Any:
         return [_partial(each) for each in schema]
     if not isinstance(schema, dict):
         return schema
-    partial = {key: _partial(value) for key, value in schema.items() if key not in ("required", "oneOf", "$ref")}
+    partial = {
+        key: _partial(value)
+        for key, value in schema.items()
+        if key not in ("required", "oneOf", "$ref", "discriminator")
+    }
     if "oneOf" in schema:  # without what is required, a mapping may fit several members
         partial["anyOf"] = _partial(schema["oneOf"])
     if "$ref" in schema:
@@ -94,20 +97,6 @@ def _allow_bases(definitions: dict[str, Any]) -> None:
         "type": "string",
         "description": "Scenario that this one differs from.",
     }
-
-
-def models_within(model: type[BaseModel]) -> Iterator[type[BaseModel]]:
-    """A model and all models within it, each once, in the order in which its keys name them."""
-    seen: dict[type[BaseModel], None] = {}
-    waiting: list[Any] = [model]
-    while waiting:
-        wanted = waiting.pop(0)
-        if not (isinstance(wanted, type) and issubclass(wanted, BaseModel)):
-            waiting[:0] = typing.get_args(wanted)
-        elif wanted not in seen:
-            seen[wanted] = None
-            waiting[:0] = [field.annotation for field in wanted.model_fields.values()]
-    yield from seen
 
 
 def field_docs(model: type[BaseModel]) -> dict[str, str]:

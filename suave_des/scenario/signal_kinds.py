@@ -9,7 +9,7 @@ import math
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, Tag, model_validator
+from pydantic import Field, model_validator
 
 from suave_des.errors import InputError, shown
 from suave_des.scenario.quantities import (
@@ -22,7 +22,6 @@ from suave_des.scenario.quantities import (
     ShiftDistribution,
     Strict,
     ValueDistribution,
-    one_of,
     ordered,
 )
 from suave_des.scenario.yamlfile import decode, read_bytes
@@ -93,73 +92,63 @@ class TableSignal(_Signal):
     """Between two rows: the earlier row's value, or a straight line."""
 
 
-Signal = Annotated[
-    Annotated[SinusoidSignal, Tag("sinusoid")]
-    | Annotated[ConstantSignal, Tag("constant")]
-    | Annotated[StepSignal, Tag("step")]
-    | Annotated[TableSignal, Tag("table")],
-    one_of("kind", "sinusoid constant step table"),
-]
+Signal = Annotated[SinusoidSignal | ConstantSignal | StepSignal | TableSignal, Field(discriminator="kind")]
 
-
-COLUMNS = ("t_s", "value")
-_LARGEST = {"t_s": LONGEST_S, "value": LARGEST}
-SIZE_LIMIT_BYTES = 20_000_000
 
 SignalTable = tuple[tuple[float, ...], tuple[float, ...]]
 """Times in s, strictly increasing, and the value at each."""
+_LARGEST = {"t_s": LONGEST_S, "value": LARGEST}
+"""Columns of a table, and the greatest magnitude of what stands in them."""
+_COLUMNS = ",".join(_LARGEST)
+_SIZE_LIMIT_BYTES = 20_000_000
 
 
 def read_table(path: Path) -> tuple[SignalTable, str]:
-    """Read a table: its times and values, and the SHA-256 of the file.
+    """Read the CSV file of a table signal: its times and values, and the SHA-256 of the file.
 
     Raises:
-        InputError: with file and line: another header, a value that is no finite number, times that do not
+        InputError: with file and line: another header, a value that is not a finite number, times that do not
             increase, no row.
     """
-    content = read_bytes(path, SIZE_LIMIT_BYTES)
+    content = read_bytes(path, _SIZE_LIMIT_BYTES)
     rows = csv.reader(io.StringIO(decode(path, content), newline=""), strict=True)
-    times: list[float] = []
-    values: list[float] = []
+    table: list[tuple[float, float]] = []
     try:
         header = [name.strip() for name in next(rows, [])]
-        if sorted(header) != sorted(COLUMNS):
-            raise _error(path, 1, f"the columns are {shown(','.join(header))}", "the first line must be t_s,value")
+        if sorted(header) != sorted(_LARGEST):
+            raise _error(path, 1, f"the columns are {shown(','.join(header))}", f"the first line must be {_COLUMNS}")
         for row in rows:
             if not any(cell.strip() for cell in row):
                 continue
-            time_s, value = _numbers(path, rows.line_num, header, row)
-            if times and time_s <= times[-1]:
+            if len(row) != len(header):
+                remedy = f"each line has two, separated by a comma: {_COLUMNS}"
+                raise _error(path, rows.line_num, f"has {len(row)} values", remedy)
+            cells = dict(zip(header, row, strict=True))
+            time_s, value = (_number(path, rows.line_num, column, cells[column]) for column in _LARGEST)
+            if table and time_s <= table[-1][0]:
                 remedy = "sort the rows, and give each time once"
-                raise _error(path, rows.line_num, f"t_s {time_s:g} does not come after {times[-1]:g}", remedy)
-            times.append(time_s)
-            values.append(value)
+                raise _error(path, rows.line_num, f"t_s {time_s:g} does not come after {table[-1][0]:g}", remedy)
+            table.append((time_s, value))
     except csv.Error as error:
-        raise _error(
-            path, rows.line_num, f"is not valid CSV: {error}", "write lines of two numbers: t_s,value"
-        ) from None
-    if not times:
-        raise _error(path, 1, "has no row under its header", "write lines of two numbers: t_s,value")
-    return (tuple(times), tuple(values)), hashlib.sha256(content).hexdigest()
+        remedy = f"write lines of two numbers: {_COLUMNS}"
+        raise _error(path, rows.line_num, f"is not valid CSV: {error}", remedy) from None
+    if not table:
+        raise _error(path, 1, "has no row under its header", f"write lines of two numbers: {_COLUMNS}")
+    times_s, values = zip(*table, strict=True)
+    return (times_s, values), hashlib.sha256(content).hexdigest()
 
 
-def _numbers(path: Path, line: int, header: list[str], row: list[str]) -> tuple[float, float]:
-    if len(row) != len(COLUMNS):
-        raise _error(path, line, f"has {len(row)} values", "each line has two, separated by a comma: t_s,value")
-    cells = dict(zip(header, row, strict=True))
-    numbers = []
-    for column in COLUMNS:
-        try:
-            number = float(cells[column])
-        except ValueError:
-            raise _error(path, line, f"{column} {shown(cells[column])} is no number", "such as 12.5") from None
-        if not math.isfinite(number):
-            raise _error(path, line, f"{column} {shown(cells[column])} is not finite", "leave that row out")
-        if abs(number) > _LARGEST[column]:
-            remedy = f"must be at least {-_LARGEST[column]:g} and at most {_LARGEST[column]:g}"
-            raise _error(path, line, f"{column} {shown(cells[column])} is out of range", remedy)
-        numbers.append(number)
-    return numbers[0], numbers[1]
+def _number(path: Path, line: int, column: str, cell: str) -> float:
+    try:
+        number = float(cell)
+    except ValueError:
+        raise _error(path, line, f"expected a number as {column}, got {shown(cell)}", "such as 12.5") from None
+    if not math.isfinite(number):
+        raise _error(path, line, f"{column} {shown(cell)} is not finite", "leave that row out")
+    if abs(number) > _LARGEST[column]:
+        remedy = f"must be at least {-_LARGEST[column]:g} and at most {_LARGEST[column]:g}"
+        raise _error(path, line, f"{column} {shown(cell)} is out of range", remedy)
+    return number
 
 
 def _error(path: Path, line: int, problem: str, remedy: str) -> InputError:

@@ -15,11 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from yaml.composer import Composer
-from yaml.parser import Parser
-from yaml.reader import Reader, ReaderError
-from yaml.resolver import BaseResolver
-from yaml.scanner import Scanner
+from yaml.reader import ReaderError
 
 from suave_des.errors import InputError, KeyPath, place_text, shown
 
@@ -68,7 +64,7 @@ def read_bytes(path: Path, limit: int = SIZE_LIMIT_BYTES) -> bytes:
     """
     try:
         if not stat.S_ISREG(path.stat().st_mode) and not path.is_dir():  # a pipe would be waited for without end
-            raise InputError("is no ordinary file", file=path, remedy="name a file on disk")
+            raise InputError("is not a regular file", file=path, remedy="name a file on disk")
         with path.open("rb") as stream:
             content = stream.read(limit + 1)
     except IsADirectoryError:
@@ -76,9 +72,8 @@ def read_bytes(path: Path, limit: int = SIZE_LIMIT_BYTES) -> bytes:
     except FileNotFoundError:
         raise InputError("no such file", file=path, remedy="check the name") from None
     except OSError as error:
-        raise InputError(
-            f"cannot be read: {error.strerror}", file=path, remedy="check the name and the rights"
-        ) from None
+        remedy = "check the name and the rights"
+        raise InputError(f"cannot be read: {error.strerror}", file=path, remedy=remedy) from None
     if len(content) > limit:
         raise InputError(f"is larger than {limit:,} bytes", file=path, remedy="split it or shorten it")
     return content
@@ -101,8 +96,8 @@ def read_yaml(path: Path | str) -> YamlDocument:
     """Read a YAML file whose top level is a mapping.
 
     Raises:
-        InputError: with the line: the file cannot be read, is no YAML, has a tag, a duplicate key or several
-            documents, holds itself, expands to more than NODE_LIMIT values, or has another top level.
+        InputError: with the line: the file cannot be read, is not YAML, has a tag, a duplicate key or several
+            documents, contains itself, expands to more than NODE_LIMIT values, or has another top level.
     """
     path = Path(path)
     content = read_bytes(path)
@@ -110,20 +105,16 @@ def read_yaml(path: Path | str) -> YamlDocument:
     try:
         root = _Composer(text).get_single_node()
     except ReaderError as error:
-        line = text.count("\n", 0, error.position) + 1
+        place = f"line {text.count(chr(10), 0, error.position) + 1}"
         problem = f"holds the character {chr(error.character)!r}, which is not allowed in YAML"
-        raise InputError(problem, file=path, place=f"line {line}", remedy="remove it") from None
+        raise InputError(problem, file=path, place=place, remedy="remove it") from None
     except yaml.MarkedYAMLError as error:
         raise _yaml_error(path, error) from None
     if root is None:
         raise InputError("is empty", file=path, place="line 1", remedy="a mapping of keys to values is needed")
     if not isinstance(root, yaml.MappingNode):
-        raise InputError(
-            "is not a mapping at its top level",
-            file=path,
-            place=f"line {_line(root)}",
-            remedy="write `key: value` lines",
-        )
+        problem = "is not a mapping at its top level"
+        raise InputError(problem, file=path, place=f"line {_line(root)}", remedy="write `key: value` lines")
     reading = _Reading(path)
     data = reading.plain(root, (), ())
     return YamlDocument(path, data, reading.lines, hashlib.sha256(content).hexdigest())
@@ -131,7 +122,7 @@ def read_yaml(path: Path | str) -> YamlDocument:
 
 def _yaml_error(path: Path, error: yaml.MarkedYAMLError) -> InputError:
     mark = error.problem_mark or error.context_mark
-    problem = error.problem or error.context or "cannot be understood"
+    problem = error.problem or error.context or "cannot be parsed"
     if isinstance(error, _TooMuchError):
         remedy = _SHORTER
     elif "but found another document" in problem:
@@ -150,18 +141,16 @@ def _line(node: yaml.Node) -> int:
 class _TooMuchError(yaml.MarkedYAMLError):
     """A file that is well-formed but nested or long beyond any honest use."""
 
+    def __init__(self, mark: Any, *, deep: bool) -> None:
+        limit = f"is nested more than {DEPTH_LIMIT} deep" if deep else f"expands to more than {NODE_LIMIT:,} values"
+        super().__init__(problem=limit, problem_mark=mark)
 
-class _Composer(Reader, Scanner, Parser, Composer, BaseResolver):
-    """PyYAML without its constructors: text to nodes, of bounded number and depth."""
 
-    def __init__(self, text: str) -> None:
-        Reader.__init__(self, text)
-        Scanner.__init__(self)
-        Parser.__init__(self)
-        Composer.__init__(self)
-        BaseResolver.__init__(self)
-        self._depth = 0
-        self._nodes = 0
+class _Composer(yaml.BaseLoader):
+    """PyYAML up to its nodes, of bounded number and depth; its constructors are not used."""
+
+    _depth = 0
+    _nodes = 0
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         """One node with all below it."""
@@ -169,15 +158,10 @@ class _Composer(Reader, Scanner, Parser, Composer, BaseResolver):
         self._nodes += 1
         if self._depth > DEPTH_LIMIT or self._nodes > NODE_LIMIT:
             mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
-            raise _too_much(mark, deep=self._depth > DEPTH_LIMIT)
+            raise _TooMuchError(mark, deep=self._depth > DEPTH_LIMIT)
         node = super().compose_node(parent, index)
         self._depth -= 1
         return node
-
-
-def _too_much(mark: Any, *, deep: bool) -> _TooMuchError:
-    limit = f"is nested more than {DEPTH_LIMIT} deep" if deep else f"expands to more than {NODE_LIMIT:,} values"
-    return _TooMuchError(problem=limit, problem_mark=mark)
 
 
 _DIGITS = set("-+0123456789.")
@@ -212,59 +196,45 @@ class _Reading:
         """Data of a node; `above` are the identities of the nodes that hold it."""
         self._count += 1
         if self._count > NODE_LIMIT or len(above) > DEPTH_LIMIT:
-            error = _too_much(node.start_mark, deep=self._count <= NODE_LIMIT)
-            raise self._error_at(self.lines[key_path[:1]], key_path[:1], str(error.problem), _SHORTER)
+            error = _TooMuchError(node.start_mark, deep=self._count <= NODE_LIMIT)
+            raise self._error(self.lines[key_path[:1]], key_path[:1], str(error.problem), _SHORTER)
+        line = _line(node)
         if id(node) in above:
-            raise self._error(node, key_path, "an alias stands for something that holds it", "write it out")
-        kind = {yaml.ScalarNode: "", yaml.SequenceNode: "seq", yaml.MappingNode: "map"}[type(node)]
-        if not (node.tag == _TAG + kind if kind else node.tag in _SCALARS):
-            tag = node.tag.replace(_TAG, "!!")
-            raise self._error(
-                node,
-                key_path,
-                f"the tag {shown(tag)} is not allowed",
-                "use plain text, numbers, lists and mappings",
-            )
+            raise self._error(line, key_path, "an alias stands for something that holds it", "write it out")
         inside = (*above, id(node))
-        if isinstance(node, yaml.MappingNode):
+        if isinstance(node, yaml.MappingNode) and node.tag == _TAG + "map":
             return self._mapping(node, key_path, inside)
-        if isinstance(node, yaml.SequenceNode):
+        if isinstance(node, yaml.SequenceNode) and node.tag == _TAG + "seq":
             for index, item in enumerate(node.value):
                 self.lines[(*key_path, index)] = _line(item)
             return [self.plain(item, (*key_path, index), inside) for index, item in enumerate(node.value)]
+        tag = node.tag.replace(_TAG, "!!")
+        if not isinstance(node, yaml.ScalarNode) or node.tag not in _SCALARS:
+            remedy = "use plain text, numbers, lists and mappings"
+            raise self._error(line, key_path, f"the tag {shown(tag)} is not allowed", remedy)
         try:
             return _SCALARS[node.tag](node.value)
         except (ValueError, KeyError):
-            wanted = node.tag.replace(_TAG, "!!")
-            raise self._error(node, key_path, f"{shown(node.value)} is no {wanted}", "remove the tag") from None
+            raise self._error(line, key_path, f"expected {tag}, got {shown(node.value)}", "remove the tag") from None
 
     def _mapping(self, node: yaml.MappingNode, key_path: KeyPath, inside: tuple[int, ...]) -> dict[str, Any]:
         data: dict[str, Any] = {}
-        first_lines: dict[str, int] = {}
         for key_node, value_node in node.value:
+            line, key = _line(key_node), str(key_node.value)
+            below = (*key_path, key)
             if not isinstance(key_node, yaml.ScalarNode):
-                raise self._error(key_node, key_path, "a key must be text", "write `key: value`")
-            key = str(key_node.value)
+                raise self._error(line, key_path, "a key must be text", "write `key: value`")
             if not key.isprintable() or len(key) > KEY_LIMIT:
-                raise self._error(
-                    key_node, key_path, f"{shown(key)} is no key", "use a short name of letters and digits"
-                )
-            if key in first_lines:
-                raise self._error(
-                    key_node,
-                    (*key_path, key),
-                    f"the key {shown(key)} stands twice, first in line {first_lines[key]}",
-                    "keep one of them",
-                )
-            first_lines[key] = _line(key_node)
+                remedy = "use a short name of letters and digits"
+                raise self._error(line, key_path, f"{shown(key)} is not a valid key", remedy)
+            if key in data:
+                problem = f"the key {shown(key)} appears twice, first in line {self.lines[below]}"
+                raise self._error(line, below, problem, "keep one of them")
             if key == "<<":
-                raise self._error(key_node, key_path, "the merge key << is not supported", "write the keys out")
-            self.lines[(*key_path, key)] = _line(key_node)
-            data[key] = self.plain(value_node, (*key_path, key), inside)
+                raise self._error(line, key_path, "the merge key << is not supported", "write the keys out")
+            self.lines[below] = line
+            data[key] = self.plain(value_node, below, inside)
         return data
 
-    def _error(self, node: yaml.Node, key_path: KeyPath, problem: str, remedy: str) -> InputError:
-        return self._error_at(_line(node), key_path, problem, remedy)
-
-    def _error_at(self, line: int, key_path: KeyPath, problem: str, remedy: str) -> InputError:
+    def _error(self, line: int, key_path: KeyPath, problem: str, remedy: str) -> InputError:
         return InputError(problem, file=self.path, place=place_text(line, key_path), remedy=remedy)

@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from suave_des.scenario.models import ConstantSignal, Signal, SinusoidSignal, StepSignal, TableSignal
 from suave_des.scenario.quantities import Distribution
-from suave_des.scenario.signal_kinds import SignalTable
+from suave_des.scenario.signal_kinds import (
+    ConstantSignal,
+    Signal,
+    SignalTable,
+    SinusoidSignal,
+    StepSignal,
+    TableSignal,
+)
 from suave_des.world import signals
 
 Draw = Callable[[str, Distribution], float]

@@ -317,7 +317,7 @@ class TestCampaign:
                 "line 17, ",
                 "num_runs",
             ),
-            ("(2,failure,60)", "(2,failure)", "line 10, suave_runner_node.thruster_events", "no thruster event"),
+            ("(2,failure,60)", "(2,failure)", "line 10, suave_runner_node.thruster_events", "not a thruster event"),
         ],
     )
     def test_that_cannot_be_right_is_refused(self, imported, old, new, place, problem) -> None:
@@ -354,12 +354,12 @@ class TestBadInput:
             (
                 MISSION_2023.replace("(1,failure,35)", "1 failure 35"),
                 "line 16, thruster_monitor.thruster_events[0]",
-                "no thruster event",
+                "not a thruster event",
             ),
             (
                 MISSION_2023.replace('["(1,failure,35)", "(3, recovery, 50.0)"]', '"(1,failure,35)"'),
                 "line 16, thruster_monitor.thruster_events",
-                "no list",
+                "expected a list",
             ),
             (
                 MISSION_2023.replace("water_visibility_min: 1.0", "water_visibility_min: 5.0"),

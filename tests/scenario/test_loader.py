@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from suave_des.resources import find, shipped_folder
 from suave_des.scenario.loader import load_scenario
-from suave_des.scenario.models import ConstantSignal, SinusoidSignal, TableSignal, ThrusterEvent
+from suave_des.scenario.models import ThrusterEvent
 from suave_des.scenario.quantities import Normal, Uniform
+from suave_des.scenario.signal_kinds import ConstantSignal, SinusoidSignal, TableSignal
 
 HEAD = "base: seams2023.yaml\n"
 SHIPPED = ("seams2023", "release15", "paper_table_values")

@@ -10,7 +10,8 @@ from jsonschema import Draft202012Validator
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import Scenario
-from suave_des.scenario.schema import field_docs, models_within, scenario_schema
+from suave_des.scenario.problems import models_within
+from suave_des.scenario.schema import field_docs, scenario_schema
 from suave_des.scenario.yamlfile import read_yaml
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -77,7 +78,7 @@ def test_the_schema_refuses_what_the_loader_refuses(validator, write, content):
 
 
 def test_every_key_has_a_meaning():
-    for model in models_within(Scenario):
+    for _, model in models_within(Scenario):
         assert set(field_docs(model)) >= set(model.model_fields), model.__name__
 
 

@@ -90,14 +90,14 @@ def test_a_folder_is_refused(tmp_path):
         ("a: [1, 2\nb: 3\n", "line 2", "is not valid YAML"),
         ("a: 1\n---\nb: 2\n", "line 2", "a second document begins here"),
         ("a: *nobody\n", "line 1", "undefined alias"),
-        ("a: 1\nb: 2\na: 3\n", "line 3, a", "'a' stands twice, first in line 1"),
-        ("a:\n  b: {c: 1, c: 2}\n", "line 2, a.b.c", "'c' stands twice"),
-        ("a: 1\n'a': 2\n", "line 2, a", "stands twice"),
+        ("a: 1\nb: 2\na: 3\n", "line 3, a", "'a' appears twice, first in line 1"),
+        ("a:\n  b: {c: 1, c: 2}\n", "line 2, a.b.c", "'c' appears twice"),
+        ("a: 1\n'a': 2\n", "line 2, a", "appears twice"),
         ("a: &x [1, *x]\n", "line 1, a[1]", "an alias stands for something that holds it"),
         ("a: &x {b: {c: *x}}\n", "line 1, a.b.c", "an alias stands for something that holds it"),
         ("[a, b]: 1\n", "line 1", "a key must be text"),
         ("a: &x {b: 1}\nc: {<<: *x}\n", "line 2, c", "the merge key << is not supported"),
-        ("a: !!float abc\n", "line 1, a", "'abc' is no !!float"),
+        ("a: !!float abc\n", "line 1, a", "expected !!float, got 'abc'"),
     ],
 )
 def test_what_is_no_plain_mapping_is_refused_with_its_line(write, content, place, problem):

@@ -19,8 +19,8 @@ from suave_des.managing.metacontrol import Metacontrol
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.measurements import Measurements
 from suave_des.scenario.loader import LoadedScenario, load_scenario, with_values
-from suave_des.scenario.models import ConstantSignal
 from suave_des.scenario.modes import Mode
+from suave_des.scenario.signal_kinds import ConstantSignal
 from suave_des.simulation.host import ManagerHost
 from suave_des.simulation.simulator import Simulator
 from tests.helpers import OUTSIDE, outside_managers
