@@ -1,44 +1,25 @@
 """Campaigns for scripts and notebooks: their results as pandas data frames.
 
-What `suave_des` offers by itself is here and in the modules named in its __init__; see docs/reference/python-api.md.
+The package `suave_des` itself offers the names here and in the modules listed in its __init__; see
+docs/reference/python-api.md.
 """
 
 from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 from suave_des.campaign import campaign as campaigns
+from suave_des.campaign.campaign import CampaignOptions, CampaignResult
 from suave_des.campaign.progress import OnProgress
-from suave_des.campaign.results import CampaignResult
 from suave_des.errors import InputError
 
 if TYPE_CHECKING:
     import pandas
-
-
-class CampaignOptions(TypedDict, total=False):
-    """What a campaign may be given by name; see run_campaign."""
-
-    sweep: Mapping[str, Any] | None
-    perturbations: Mapping[str, Any] | None
-    runs_per_draw: int | None
-    until_ci: str | None
-    time_out_s: float | None
-    scheduler: str | None
-    ontologies: Sequence[str | Path]
-    modes_file: str | Path | None
-    reasoner: str | None
-    rules: Sequence[str | Path]
-    disabled_rules: Sequence[str]
-    suave_format: bool
-    record_knowledge: bool
-    confirmed: bool
-    overwrite: bool
 
 
 def run_campaign(
@@ -60,8 +41,12 @@ def run_campaign(
     `frame.attrs` has, as plain values, `missions`, `until_ci` and `failures` as in manifest.json, `summary` (a mapping
     for each row of summary.csv), `interrupted`, and `folder`, which may be None. When missions fail, a warning says so.
 
-    Ctrl-C in a notebook or at a prompt gives the missions that are done, with a warning; elsewhere it goes on as
+    Ctrl-C in a notebook or at a prompt gives the missions that are done, with a warning; elsewhere it is raised as
     CampaignInterrupted, a KeyboardInterrupt, whose `result.frame()` has them.
+
+    Example:
+        frame = run_campaign("seams2023", ["none", "metacontrol"], runs=100, workers=2)
+        frame.groupby("manager")["search_time_s"].mean()
 
     Args:
         scenario: path of a scenario file or of a campaign file, or name of a shipped scenario.
@@ -72,20 +57,15 @@ def run_campaign(
         workers: processes; with 1 the missions run in this one. With more, managers that the calling script defines
             itself (`__main__:Class`) need `if __name__ == "__main__":` around the call, as workers import the script.
         out: folder for runs.csv, summary.csv and manifest.json, from which the campaign can be resumed. None: no files.
-        progress: whether to show how far it is; left out: in a notebook and on a terminal.
-        options: sweep, perturbations and runs_per_draw: as in a campaign file. until_ci: "METRIC:HALF_WIDTH", when a
-            manager needs no more runs. time_out_s: that a mission may take, in s of the clock on the wall. scheduler:
-            address of a Dask scheduler whose workers run the missions, instead of processes here. ontologies,
-            modes_file, reasoner: in place of the scenario's; rules, disabled_rules: besides them. suave_format: also
-            write the exemplar's results file. record_knowledge: keep what managers reasoned about, for `kb try`.
-            confirmed: more than a million missions are meant. overwrite: results in the folder may be replaced.
+        progress: whether to show progress; left out: in a notebook and on a terminal.
+        options: see suave_des.campaign.spec.CampaignSpec, such as sweep, perturbations, until_ci and rules.
 
     Raises:
         InputError: something given cannot be used; nothing is written then.
         WorkerError: worker processes end again and again; finished missions are kept.
         StoreError: the disk is full, or the folder was removed.
     """
-    result, attrs = _watched(
+    result, attrs = _with_progress(
         str(scenario),
         progress,
         lambda show: campaigns.run_campaign(scenario, managers, runs, seed, workers, out, on_progress=show, **options),
@@ -105,10 +85,10 @@ def stream_campaign(
     progress: bool | None = None,
     **options: Unpack[CampaignOptions],
 ) -> Iterator[pandas.DataFrame]:
-    """The same for campaigns whose rows are too many to be in memory: data frames of `chunk_rows` rows, in order.
+    """Yield the same in data frames of `chunk_rows` rows, in order, for more rows than memory has room for.
 
-    The campaign runs at once; its rows are kept on disk, in a temporary file without `out`, and read as they are asked
-    for. Each piece has the types and attrs of the whole.
+    The campaign runs at once; its rows are kept on disk, in a temporary file without `out`, and read as they are
+    requested. Each piece has the types and attrs of the whole.
 
     Raises:
         InputError: chunk_rows is less than 1; and as run_campaign.
@@ -116,7 +96,7 @@ def stream_campaign(
     """
     if chunk_rows < 1:
         raise InputError(f"chunk_rows: {chunk_rows} is out of range", remedy="give 1 or more")
-    result, attrs = _watched(
+    result, attrs = _with_progress(
         str(scenario),
         progress,
         lambda show: campaigns.run_campaign(scenario, managers, runs, seed, workers, out, on_progress=show, **options),
@@ -133,7 +113,7 @@ def resume_campaign(
     scheduler: str | None = None,
     progress: bool | None = None,
 ) -> pandas.DataFrame:
-    """Go on with the campaign in a folder where it stopped, and give its rows as run_campaign does.
+    """Go on with the campaign in a folder where it stopped, and return its rows as run_campaign does.
 
     Args:
         folder: its output folder.
@@ -141,13 +121,13 @@ def resume_campaign(
         runs: more runs than at first; left out: as many.
         until_ci: the metric given at first with a smaller half-width; left out: as at first.
         scheduler: address of a Dask scheduler whose workers run the missions, instead of processes here.
-        progress: whether to show how far it is; left out: in a notebook and on a terminal.
+        progress: whether to show progress; left out: in a notebook and on a terminal.
 
     Raises:
         InputError: there is no campaign, or something that decides results has changed; the difference is named.
         WorkerError, StoreError: as run_campaign.
     """
-    result, attrs = _watched(
+    result, attrs = _with_progress(
         str(folder),
         progress,
         lambda show: campaigns.resume_campaign(
@@ -157,19 +137,16 @@ def resume_campaign(
     return _with_attrs(result.frame(), attrs)
 
 
-_Attrs = dict[str, Any]
-
-
-def _watched(
+def _with_progress(
     label: str, progress: bool | None, run: Callable[[OnProgress | None], CampaignResult]
-) -> tuple[CampaignResult, _Attrs]:
-    """Run a campaign and show how far it is; its result, and what is told of it besides rows."""
+) -> tuple[CampaignResult, dict[str, Any]]:
+    """Run a campaign and show its progress; return its result, and the attrs of its frames."""
     interrupted = False
     try:
         with _shown(label, progress) as show:
             result = run(show)
     except campaigns.CampaignInterrupted as stopped:
-        if not _is_interactive():
+        if not hasattr(sys, "ps1"):  # neither a prompt nor a notebook
             raise
         result, interrupted = stopped.result, True
         warnings.warn(str(stopped), stacklevel=3)
@@ -177,7 +154,12 @@ def _watched(
         problem = f"{len(result.failures)} of {result.planned} missions failed, see attrs['failures']: "
         warnings.warn(f"{problem}{result.failures[0]}", stacklevel=3)
     folder = None if result.folder is None else str(result.folder)
-    return result, {**result.told(), "summary": result.summary_told(), "interrupted": interrupted, "folder": folder}
+    return result, {
+        **result.report(),
+        "summary": result.summary_records(),
+        "interrupted": interrupted,
+        "folder": folder,
+    }
 
 
 def _shown(label: str, progress: bool | None) -> AbstractContextManager[OnProgress | None]:
@@ -190,11 +172,6 @@ def _shown(label: str, progress: bool | None) -> AbstractContextManager[OnProgre
     return shown(label, console, quiet=not is_wanted)
 
 
-def _is_interactive() -> bool:
-    """Whether somebody sits at a prompt or a notebook: both have this."""
-    return hasattr(sys, "ps1")
-
-
-def _with_attrs(frame: pandas.DataFrame, attrs: _Attrs) -> pandas.DataFrame:
+def _with_attrs(frame: pandas.DataFrame, attrs: dict[str, Any]) -> pandas.DataFrame:
     frame.attrs.update(attrs)
     return frame

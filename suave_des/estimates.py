@@ -62,8 +62,8 @@ def t_quantile(freedom: int) -> float:
     return float(stdtrit(freedom, (1.0 + CONFIDENCE) / 2.0))
 
 
-class Running:
-    """Mean of values that come one by one, and its interval, by Welford's sums: nothing but these is kept."""
+class RunningMean:
+    """Mean of values that come one by one, and its 95% interval, by Welford's sums (Technometrics 4, 1962)."""
 
     __slots__ = ("_squares", "mean", "n")
 

@@ -16,41 +16,34 @@ import time
 import uuid
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import islice
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from suave_des.campaign.dask_worker import Order, Report, needs
-from suave_des.campaign.executors import WorkerError
-from suave_des.campaign.mission_process import Trouble
-from suave_des.campaign.outcomes import Finished, Job, time_out_cause
-from suave_des.campaign.parcel import pack
-from suave_des.campaign.plan import Chunk, MissionKey
-from suave_des.errors import InputError
-from suave_des.knowledge.inference_cache import InferenceCache
+from suave_des.campaign.dask_worker import misfit, needs, pack
+from suave_des.campaign.missions import Chunk, Finished, JobSpec, MissionKey, WorkerError
+from suave_des.errors import InputError, SuaveDesError
 
 ANSWER_TIMEOUT_S = 10.0
 """Time for a scheduler to answer at all."""
 _CHECK_TIMEOUT_S = 120.0
 """Time for workers to import suave-des, perhaps from a slow shared disk."""
 _STOP_TIMEOUT_S = 5.0
-_LOOK_PERIOD_S = 2.0
+_POLL_PERIOD_S = 2.0
 """Time between looks at how many workers there are."""
-_TELL_AFTER_S = 10.0
-"""Time without any worker after which the user is told."""
+_WARN_AFTER_S = 10.0
+"""Time without any worker after which the user is warned."""
 _AHEAD = 3
-"""Chunks for each thread of a worker: one under way and some to go on with, wherever the scheduler puts them."""
-_FEWEST_THREADS = 2
+"""Chunks for each worker: one under way and some to go on with, wherever the scheduler puts them."""
+_FEWEST_WORKERS = 2
 """Assumed while there are none, so that a cluster that grows when there is work to do does so."""
 _CHUNK_S = 1.0
 """Work in a chunk; no more, as chunks under way are lost when a campaign is stopped."""
-_CHUNK_COST_S = 0.01
-"""Of the scheduler's and this process's time: with many threads chunks are larger, so that these keep up."""
 _FIRST_CHUNK, _LARGEST_CHUNK = 10, 10_000
 _SHARES = 4
-"""Chunks that each thread gets of what is left, at least, so that all end together."""
+"""Chunks that each worker gets of what is left, at least, so that all end together."""
 _ADDRESS = re.compile(r"(?:tcp|tls)://(?:\[[0-9A-Fa-f:.%]+\]|[^\s/:@\[\]]+):(\d{1,5})/?")
 _NOISY = ("distributed", "dask", "tornado", "asyncio", "bokeh")
 
@@ -66,14 +59,14 @@ def check_address(scheduler: str) -> None:
     found = _ADDRESS.fullmatch(scheduler)
     if found is None or not 0 < int(found[1]) < 65536:
         raise InputError(
-            f"scheduler: {scheduler!r} is no address of a Dask scheduler",
+            f"scheduler: {scheduler!r} is not an address of a Dask scheduler",
             remedy="give tcp://HOST:PORT, as `dask scheduler` prints it",
         )
 
 
 @contextmanager
 def connected(scheduler: str) -> Iterator[DaskCluster]:
-    """The cluster of a scheduler, until it is no longer needed.
+    """Connect to the cluster of a scheduler, until it is no longer needed.
 
     Args:
         scheduler: its address, such as tcp://127.0.0.1:8786.
@@ -81,7 +74,6 @@ def connected(scheduler: str) -> Iterator[DaskCluster]:
     Raises:
         InputError: there is no such scheduler, or a worker cannot do what this machine would.
     """
-    check_address(scheduler)
     try:
         import distributed
     except ImportError as error:
@@ -91,7 +83,6 @@ def connected(scheduler: str) -> Iterator[DaskCluster]:
     with _quiet(distributed):
         client = _client(distributed, scheduler)
         try:
-            _check_versions(client, distributed)
             _check_workers(client)
             yield DaskCluster(client, scheduler)
         finally:
@@ -99,103 +90,71 @@ def connected(scheduler: str) -> Iterator[DaskCluster]:
 
 
 def _client(distributed: Any, scheduler: str) -> Any:
-    # Asked first in our own way, as a Client waits for ever for one who takes the connection and says nothing.
-    kind = _in_time(lambda: asyncio.run(_kind(distributed, scheduler)), ANSWER_TIMEOUT_S + 1.0)
-    if kind not in (None, "Scheduler"):
-        raise InputError(f"scheduler: {scheduler} is a Dask {kind.lower()}", remedy="give its scheduler's address")
-    try:
-        if kind is not None:
+    async def kind() -> str:
+        async with distributed.rpc(scheduler) as there:
+            return str((await there.identity())["type"])
+
+    # Asked first, and with a limit of our own: a Client waits for ever for one who accepts and does not answer.
+    found = _in_time(lambda: asyncio.run(asyncio.wait_for(kind(), ANSWER_TIMEOUT_S)), ANSWER_TIMEOUT_S + 1.0)
+    if found not in (None, "Scheduler"):
+        raise InputError(f"scheduler: {scheduler} is a Dask {found.lower()}", remedy="give its scheduler's address")
+    with suppress(OSError):  # it ended in between
+        if found is not None:
             return distributed.Client(scheduler, timeout=ANSWER_TIMEOUT_S, set_as_default=False)
-    except OSError:  # it ended in between
-        pass
     raise InputError(
         f"scheduler: {scheduler} does not answer as a Dask scheduler within {ANSWER_TIMEOUT_S:g} s",
         remedy="see that `dask scheduler` runs there, and that its port can be reached from here",
     )
 
 
-async def _kind(distributed: Any, address: str) -> str:
-    """What kind of part of a cluster is at an address."""
-
-    async def ask() -> str:
-        settings = distributed.Security().get_connection_args("client")
-        comm = await distributed.comm.connect(address, **settings)
-        try:
-            await comm.write({"op": "identity", "reply": True})
-            return str((await comm.read())["type"])
-        finally:
-            comm.abort()
-
-    return await asyncio.wait_for(ask(), ANSWER_TIMEOUT_S)
-
-
 @contextmanager
 def _quiet(distributed: Any) -> Iterator[None]:
-    """Keep what Dask logs and warns of off the terminal: what matters is told in our own words."""
+    """Keep Dask's logs and warnings off the terminal: what matters is reported in our own words."""
 
     def drop(record: logging.LogRecord) -> bool:
         return False
 
     names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] in _NOISY]
-    places: list[Any] = [logging.getLogger(name) for name in names]
-    places += [handler for logger in places for handler in logger.handlers]
-    for place in places:
-        place.addFilter(drop)
+    filtered: list[Any] = [logging.getLogger(name) for name in names]
+    filtered += [handler for logger in filtered for handler in logger.handlers]
+    for each in filtered:
+        each.addFilter(drop)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", distributed.versions.VersionMismatchWarning)
             warnings.filterwarnings("ignore", message="Sending large graph")
             yield
     finally:
-        for place in places:
-            place.removeFilter(drop)
-
-
-def _check_versions(client: Any, distributed: Any) -> None:
-    """See that Python and Dask are the same everywhere, which what is sent depends on."""
-    found = client.get_versions()
-    here = found["client"]["packages"]
-    for where, there in [("the scheduler", found["scheduler"]), *_named(found["workers"])]:
-        for name in ("distributed",) if where == "the scheduler" else ("python", "distributed"):
-            if there is not None and there["packages"][name] != here[name]:
-                raise _misfit(where, {name: here[name]}, {name: there["packages"][name]})
-
-
-def _named(workers: Mapping[str, Any]) -> list[tuple[str, Any]]:
-    return [(f"worker {address}", workers[address]) for address in sorted(workers)]
+        for each in filtered:
+            each.removeFilter(drop)
 
 
 def _check_workers(client: Any) -> None:
-    found = _in_time(lambda: client.run(_remote_needs(), on_error="return"), _CHECK_TIMEOUT_S)
-    if found is None:
+    """See that workers have all that decides results, and first of all the Python that what is sent depends on."""
+    found = client.get_versions()
+    here = found["client"]["packages"]
+    for address, there in sorted(found["workers"].items()):
+        for name in ("python", "distributed"):
+            if there["packages"][name] != here[name]:
+                raise misfit(f"worker {address}", {name: here[name]}, {name: there["packages"][name]})
+    answers = _in_time(lambda: client.run(_remote(), "needs", on_error="return"), _CHECK_TIMEOUT_S)
+    if answers is None:
         raise InputError(
             f"scheduler: some of its workers do not answer within {_CHECK_TIMEOUT_S:g} s",
             remedy="restart them, or end them",
         )
-    for where, there in _named(found):
+    for address, there in sorted(answers.items()):
         if isinstance(there, BaseException):
-            raise _unfit(where, there)
+            raise InputError(
+                f"worker {address} cannot run missions: {type(there).__name__}: {there}",
+                remedy=f"install suave-des {needs()['suave-des']} on all workers",
+            )
         if there != needs():
-            raise _misfit(where, needs(), there)
-
-
-def _unfit(where: str, error: BaseException) -> InputError:
-    return InputError(
-        f"{where} cannot run missions: {type(error).__name__}: {error}",
-        remedy=f"install suave-des {needs()['suave-des']} on all workers",
-    )
-
-
-def _misfit(where: str, here: Mapping[str, str], there: Mapping[str, str]) -> InputError:
-    name = next(name for name in here if there.get(name) != here[name])
-    return InputError(
-        f"{name} is {there.get(name, 'not there')} on {where}, and {here[name]} here, which could change results",
-        remedy="install the same on all machines",
-    )
+            raise misfit(f"worker {address}", needs(), there)
 
 
 def _in_time(call: Callable[[], Any], timeout_s: float) -> Any:
-    """What a call returns, or none if it takes too long or fails."""
+    """Return what a call returns, or None if it takes too long or fails."""
     result: list[Any] = []
 
     def work() -> None:
@@ -208,57 +167,28 @@ def _in_time(call: Callable[[], Any], timeout_s: float) -> Any:
     return result[0] if result else None
 
 
-# Functions that run on the workers. Each is made inside another, as pickle then takes it along by value: a function of
-# a module would go by the module's name, and the scheduler, which need not have suave-des, would fail to look it up.
+def _remote() -> Callable[..., Any]:
+    """Return a function that calls one of dask_worker.py on a worker.
 
+    It is made inside another, as pickle then takes it along by value: a function of a module would go by the module's
+    name, and the scheduler, which need not have suave-des, would fail to look it up.
+    """
 
-def _remote_same() -> Callable[[bytes], bytes]:
-    def suave_des_parcel(content: bytes) -> bytes:
-        return content
+    def suave_des(name: str, *arguments: Any) -> Any:
+        from suave_des.campaign import dask_worker
 
-    return suave_des_parcel
+        return getattr(dask_worker, name)(*arguments)
 
-
-def _remote_run() -> Callable[..., tuple[str, Any]]:
-    def suave_des_missions(order: bytes, chunk: bytes) -> tuple[str, Any]:
-        import pickle
-
-        from distributed import get_worker
-
-        worker = get_worker()
-        try:
-            from suave_des.campaign.dask_worker import Order, run
-        except ImportError as error:
-            return worker.address, error
-        return worker.address, run(Order(*pickle.loads(order)), pickle.loads(chunk), worker.local_directory)
-
-    return suave_des_missions
-
-
-def _remote_needs() -> Callable[[], dict[str, str]]:
-    def suave_des_needs() -> dict[str, str]:
-        from suave_des.campaign.dask_worker import needs
-
-        return needs()
-
-    return suave_des_needs
-
-
-def _remote_forget() -> Callable[[str], None]:
-    def suave_des_forget(token: str) -> None:
-        from suave_des.campaign.dask_worker import forget
-
-        forget(token)
-
-    return suave_des_forget
+    return suave_des
 
 
 class DaskCluster:
-    """Runs chunks of missions on whatever workers the cluster has at the time.
+    """Runs chunks of missions on whatever workers the cluster has at the time; an Executor.
 
-    A worker that dies loses nothing: Dask gives its chunks to others. Where workers die again and again with a chunk,
-    Dask suspects all chunks that they had; then the missions of these are run alone, one after the other, and one with
-    which workers die even so has failed.
+    A worker is one process that runs one mission after the other (`dask worker --nworkers N --nthreads 1`). One that
+    dies loses nothing: Dask gives its chunks to others. Where workers die again and again with a chunk, Dask suspects
+    all chunks that they had; then the missions of these are run alone, one after the other, and one with which workers
+    die even so has failed.
 
     Args:
         client: connected to the scheduler.
@@ -267,22 +197,6 @@ class DaskCluster:
 
     def __init__(self, client: Any, scheduler: str) -> None:
         self._client, self._scheduler = client, scheduler
-
-    def outcomes(self, job: Job, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
-        """Outcomes chunk by chunk; see Executor."""
-        flow = _Flow(self._client, self._scheduler, job, iter(missions), total)
-        try:
-            yield from flow.outcomes()
-        finally:
-            flow.stop()
-
-
-class _Flow:
-    """A campaign on its way through the cluster: a few chunks for each thread at any time."""
-
-    def __init__(self, client: Any, scheduler: str, job: Job, missions: Iterator[MissionKey], total: int) -> None:
-        self._client, self._scheduler, self._job, self._missions = client, scheduler, job, missions
-        self._left = total
         self._token = uuid.uuid4().hex
         self._suspects: deque[MissionKey] = deque()
         self._suspect: Any = None
@@ -290,35 +204,40 @@ class _Flow:
         self._ended: SimpleQueue[Any] = SimpleQueue()
         self._number = 0
         self._mission_s: float | None = None
-        self._threads, self._looked_s = 0, -_LOOK_PERIOD_S
+        self._workers, self._polled_s = 0, -_POLL_PERIOD_S
         self._alone_since_s: float | None = None
-        self._run = _remote_run()
-        order = tuple(Order(self._token, needs(), pickle.dumps(pack(job)), job.time_out_s))
+        self._remote = _remote()
+
+    def outcomes(self, job: JobSpec, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
+        """Yield outcomes chunk by chunk; see Executor."""
+        self._job, self._missions, self._left = job, iter(missions), total
         # As the result of a task, it can be made again wherever a worker died that had it, and is sent to each once.
-        self._order = client.submit(_remote_same(), pickle.dumps(order), key=f"suave_des_parcel-{self._token}")
+        key = f"suave_des_parcel-{self._token}"
+        self._parcel = self._client.submit(bytes, pickle.dumps(pack(job)), key=key)
+        try:
+            self._hand_out()
+            while self._under_way:
+                for future in self._wait():
+                    chunk = self._under_way.pop(future)
+                    finished = self._received(future, chunk)
+                    self._hand_out()
+                    if finished:
+                        yield finished
+        finally:
+            self._stop()
 
-    def outcomes(self) -> Iterator[list[Finished]]:
-        self._hand_out()
-        while self._under_way:
-            for future in self._wait():
-                chunk = self._under_way.pop(future)
-                finished = list(self._received(future, chunk))
-                self._hand_out()
-                if finished:
-                    yield finished
-
-    def stop(self) -> None:
+    def _stop(self) -> None:
         """Have the cluster forget the campaign, which may be over or not."""
         if self._client.status == "running":
-            futures = [*self._under_way, self._order]
+            futures = [*self._under_way, self._parcel]
             _in_time(lambda: self._client.cancel(futures, force=True), _STOP_TIMEOUT_S)
-            _in_time(lambda: self._client.run(_remote_forget(), self._token, on_error="ignore"), _STOP_TIMEOUT_S)
+            _in_time(lambda: self._client.run(self._remote, "forget", self._token, on_error="ignore"), _STOP_TIMEOUT_S)
 
     # Chunks.
 
     def _hand_out(self) -> None:
-        self._look()
-        while len(self._under_way) < _AHEAD * max(self._threads, _FEWEST_THREADS):
+        self._poll()
+        while len(self._under_way) < _AHEAD * max(self._workers, _FEWEST_WORKERS):
             if self._suspects and self._suspect is None:
                 self._suspect = self._submit((self._suspects.popleft(),))
                 continue
@@ -330,104 +249,75 @@ class _Flow:
     def _submit(self, chunk: Chunk) -> Any:
         self._number += 1
         key = f"suave_des_missions-{self._token}-{self._number}"
-        future = self._client.submit(self._run, self._order, pickle.dumps(tuple(map(tuple, chunk))), key=key)
+        keys = pickle.dumps(tuple(map(tuple, chunk)))
+        future = self._client.submit(self._remote, "run", self._token, needs(), self._parcel, keys, key=key)
         self._under_way[future] = chunk
         future.add_done_callback(self._ended.put)
         return future
 
     def _size(self) -> int:
-        fair = self._left // (_SHARES * max(self._threads, 1))
-        chunk_s = max(_CHUNK_S, _CHUNK_COST_S * self._threads)
-        enough = _FIRST_CHUNK if self._mission_s is None else int(chunk_s / max(self._mission_s, 1e-6))
+        fair = self._left // (_SHARES * max(self._workers, 1))
+        enough = _FIRST_CHUNK if self._mission_s is None else int(_CHUNK_S / max(self._mission_s, 1e-6))
         return max(1, min(fair, enough, _LARGEST_CHUNK))
 
     def _wait(self) -> list[Any]:
-        """Futures that are over; none after a while, so that new workers and a lost scheduler are noticed."""
-        over = []
+        """Return futures that have ended; none after a while, so that new workers and a lost scheduler are noticed."""
+        ended = []
         with suppress(Empty):
-            over.append(self._ended.get(timeout=_LOOK_PERIOD_S))
+            ended.append(self._ended.get(timeout=_POLL_PERIOD_S))
             while True:
-                over.append(self._ended.get_nowait())
-        if not over:
+                ended.append(self._ended.get_nowait())
+        if not ended:
             self._hand_out()
-        return over
+        return ended
 
-    def _look(self) -> None:
-        """See how many threads there are, from time to time."""
+    def _poll(self) -> None:
+        """See how many workers there are, from time to time."""
         if self._client.status != "running":
             raise self._lost()
-        if time.monotonic() < self._looked_s + _LOOK_PERIOD_S:
+        if time.monotonic() < self._polled_s + _POLL_PERIOD_S:
             return
         try:
-            self._threads = sum(self._client.nthreads().values())
+            self._workers = len(self._client.nthreads())
         except OSError:
             raise self._lost() from None
-        self._looked_s = time.monotonic()
-        if self._threads:
+        self._polled_s = time.monotonic()
+        if self._workers:
             self._alone_since_s = None
         elif self._alone_since_s is None:
-            self._alone_since_s = self._looked_s
-        elif self._looked_s > self._alone_since_s + _TELL_AFTER_S:
+            self._alone_since_s = self._polled_s
+        elif self._polled_s > self._alone_since_s + _WARN_AFTER_S:
             _logger.warning("suave-des: %s has no workers; waiting for some (Ctrl-C stops)", self._scheduler)
-            self._alone_since_s = math.inf  # told
+            self._alone_since_s = math.inf  # warned
 
     def _lost(self) -> WorkerError:
         return WorkerError(f"the connection to the scheduler {self._scheduler} is lost")
 
     # Results.
 
-    def _received(self, future: Any, chunk: Chunk) -> Iterator[Finished]:
+    def _received(self, future: Any, chunk: Chunk) -> list[Finished]:
         from distributed import KilledWorker
 
         was_alone = future is self._suspect
         if was_alone:
             self._suspect = None
         try:
-            worker, result = future.result()
+            seconds, finished = pickle.loads(future.result())
         except KilledWorker as error:
-            if was_alone:
-                self._left -= 1
-                times = error.allowed_failures + 1
-                cause = f"the cluster's worker died with it, {times} times (killed, or out of memory?)"
-                yield self._job.failed(chunk[0], cause)
-            else:
+            if not was_alone:
                 self._suspects.extend(chunk)
-            return
+                return []
+            self._left -= 1
+            times = error.allowed_failures + 1
+            cause = f"the cluster's worker died with it, {times} times (killed, out of memory, or stuck?)"
+            return [self._job.failed(chunk[0], cause)]
+        except SuaveDesError:
+            raise
         except Exception as error:
             if future.cancelled() or self._client.status != "running":
                 raise self._lost() from None
             raise WorkerError(f"a task cannot be run on the cluster: {type(error).__name__}: {error}") from error
-        if isinstance(result, Report):
-            yield from self._reported(result)
-        elif isinstance(result, Trouble):
-            raise _trouble(f"worker {worker}", result)
-        elif isinstance(result, BaseException):
-            raise _unfit(f"worker {worker}", result)
-        else:
-            raise _misfit(f"worker {worker}", needs(), result)
-
-    def _reported(self, report: Report) -> Iterator[Finished]:
-        for learned in report.learned:
-            for digest, entries in learned.items():
-                InferenceCache(digest).take_over(entries)
-        self._left -= report.missions
-        if report.missions:
-            each_s = report.seconds / report.missions
-            self._mission_s = each_s if self._mission_s is None else 0.5 * (self._mission_s + each_s)
-        for part in report.parts:
-            yield from pickle.loads(part)
-        for key, cause in report.lost:
-            yield self._job.failed(MissionKey(*key), cause or time_out_cause(self._job.time_out_s))
-
-
-def _trouble(where: str, trouble: Trouble) -> Exception:
-    """What a worker could not do, as the error that it is here."""
-    if trouble.error is None:
-        return RuntimeError(f"on {where}:\n{trouble.traceback}")
-    error = pickle.loads(trouble.error)
-    if isinstance(error, InputError) and error.file is None:
-        return type(error)(f"{where}: {error.problem}", place=error.place, remedy=error.remedy)
-    if isinstance(error, WorkerError):
-        return WorkerError(f"{where}: {error}")
-    assert isinstance(error, Exception)
-    return error
+        self._left -= len(chunk)
+        each_s = seconds / len(chunk)
+        self._mission_s = each_s if self._mission_s is None else 0.5 * (self._mission_s + each_s)
+        return list(finished)

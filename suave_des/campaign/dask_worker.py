@@ -1,299 +1,253 @@
-"""What runs in a worker of a Dask cluster: it hands chunks of missions to processes of its own, and looks after them.
-
-It imports little, so that it can say clearly what a worker lacks, and takes everything from its arguments.
-"""
+"""What a worker of a Dask cluster needs to run missions, by value, and what it does with it."""
 
 from __future__ import annotations
 
 import hashlib
-import json
+import importlib
 import os
 import pickle
 import platform
 import shutil
-import subprocess
 import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from multiprocessing import Pipe
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING
 
 import suave_des
-from suave_des.campaign.mission_process import FLUSH_S, Done, Message, Part, Ready, Trouble
-from suave_des.campaign.provenance import versions
+from suave_des.campaign.missions import Failure, Finished, JobSpec, MissionKey, WorkerError
+from suave_des.campaign.provenance import manager_code, versions
+from suave_des.errors import InputError, SuaveDesError
 
-_ATTEMPTS = 3
-"""How often a mission may cost a process its life, and how often in a row a process may end as it starts."""
-_START_S = 300.0
-"""Time for starting Python, from a slow shared disk perhaps."""
-_MARGIN_S = 60.0
-"""Added to the time that a mission may take before its process is ended from outside: Java may have to start."""
-_START = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from suave_des.campaign import mission_process as it"
+if TYPE_CHECKING:
+    from suave_des.campaign.mission_runner import MissionRunner
+    from suave_des.scenario.loader import LoadedScenario
 
-Key = tuple[int, int, int]
-"""A MissionKey, as plain numbers."""
-
-
-@dataclass
-class Report:
-    """What became of a chunk.
-
-    Attributes:
-        parts: outcomes, pickled some at a time.
-        lost: missions that ended their processes, with the cause; without one if they did not end in time.
-        learned: what reasoners' memories got besides, by their digests.
-        missions: how many there were.
-        seconds: time that it took, starting a process apart.
-    """
-
-    parts: list[bytes] = field(default_factory=list)
-    lost: list[tuple[Key, str | None]] = field(default_factory=list)
-    learned: list[dict[str, bytes]] = field(default_factory=list)
-    missions: int = 0
-    seconds: float = 0.0
+EXIT_AFTER_S = 30.0
+"""A mission that is so much over its time, in code that cannot be interrupted, ends its worker."""
+_OUT_OF_MEMORY = 12
+_CAMPAIGNS_KEPT = 4
+"""So many campaigns can share a cluster without being prepared anew for each chunk."""
+_MODULES = "modules"
 
 
 @lru_cache(maxsize=1)
 def needs() -> dict[str, str]:
-    """What decides results besides a job, by name: the same on each machine that works on a campaign."""
-    return {**versions(), "suave-des code": _code(), "machine": platform.machine()}
-
-
-def _code() -> str:
+    """Return what decides results besides a job, by name: the same on each machine that works on a campaign."""
     total = hashlib.sha256()
     folder = Path(suave_des.__file__).parent
     for path in sorted(folder.rglob("*.py")):
         total.update(f"{path.relative_to(folder)}\n".encode() + path.read_bytes())
-    return total.hexdigest()[:12]
+    return {**versions(), "suave-des code": total.hexdigest()[:12], "machine": platform.machine()}
 
 
-class Order(NamedTuple):
-    """What the chunks of one campaign have in common; it travels as a plain tuple, which any version can read.
+@dataclass(frozen=True)
+class Parcel:
+    """A job and the content of every file that it needs.
 
     Attributes:
-        token: the campaign's.
-        needs: of the machine that the campaign was started on.
-        parcel: a Parcel, pickled.
-        time_out_s: time that a mission may take.
+        job: the job, with the paths that the user's files have there.
+        ontologies: names and contents of ontologies, imported ones included.
+        rules: names and contents of files of rules.
+        modules: Python files of managers, by their path below the folder of modules.
+        manager_code: SHA-256 of each manager's module.
     """
 
-    token: str
-    needs: dict[str, str]
-    parcel: bytes
-    time_out_s: float
+    job: JobSpec
+    ontologies: tuple[tuple[str, bytes], ...]
+    rules: tuple[tuple[str, bytes], ...]
+    modules: Mapping[str, bytes]
+    manager_code: Mapping[str, str]
 
 
-_lock = threading.Lock()
-_crews: dict[str, _Crew] = {}
-_over: set[str] = set()
+def pack(job: JobSpec) -> Parcel:
+    """Collect all that a job needs.
+
+    Raises:
+        InputError: a file cannot be read, or a manager is in a module that cannot be sent.
+    """
+    from suave_des.campaign.own_modules import own_modules
+
+    return Parcel(
+        job,
+        ontologies=tuple((str(path), path.read_bytes()) for path in _with_imports(job.loaded)),
+        rules=tuple((str(path), path.read_bytes()) for path in job.loaded.rules),
+        modules={place: path.read_bytes() for place, path in own_modules(job.managers).items()},
+        manager_code={name: manager_code(name) for name in job.managers},
+    )
 
 
-def run(order: Order, chunk: Sequence[Key], folder: str) -> Report | Trouble | dict[str, str]:
-    """Run missions.
+def _with_imports(loaded: LoadedScenario) -> list[Path]:
+    from suave_des.knowledge.ontology_file import collect
+
+    try:
+        return sorted(source.path for source in collect(loaded.ontologies))
+    except InputError:  # reported by the managers that reason with it, if there are any
+        return list(loaded.ontologies)
+
+
+class Unpacked:
+    """A job whose files are in a folder of this machine.
+
+    Attributes:
+        job: with the paths that the files have here.
+        folder: where they are.
+        modules: as of the parcel.
+        manager_code: as of the parcel.
 
     Args:
-        order: what the campaign's chunks have in common.
-        chunk: the missions.
-        folder: where temporary files may be.
+        parcel: of pack.
+        folder: an empty one.
+    """
+
+    def __init__(self, parcel: Parcel, folder: Path) -> None:
+        self.folder = Path(os.path.realpath(folder))
+        self.modules, self.manager_code = frozenset(parcel.modules), parcel.manager_code
+        self._names: dict[str, str] = {}
+        for place, content in parcel.modules.items():
+            path = self.folder / _MODULES / place
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+        ontologies, rules = self._written(parcel.ontologies), self._written(parcel.rules)
+        self.job = replace(parcel.job, loaded=replace(parcel.job.loaded, ontologies=ontologies, rules=rules))
+
+    def _written(self, files: Iterable[tuple[str, bytes]]) -> tuple[Path, ...]:
+        """Write each file into a folder of its own: it keeps its name, which counts, and is beside no other."""
+        paths = []
+        for known, content in files:
+            path = self.folder / f"{len(self._names):06}" / Path(known).name
+            path.parent.mkdir(parents=True)
+            path.write_bytes(content)
+            self._names[str(path)] = known
+            paths.append(path)
+        return tuple(paths)
+
+    def with_known_names(self, finished: Finished) -> Finished:
+        """Return an outcome that names the user's own files."""
+        key, outcome = finished
+        if isinstance(outcome, Failure):
+            return key, outcome._replace(cause=self._renamed(outcome.cause))
+        return finished
+
+    def error_with_known_names(self, error: SuaveDesError) -> SuaveDesError:
+        """Return the same error, naming the user's own files."""
+        reduced = error.__reduce__()
+        assert isinstance(reduced, tuple)
+        make, arguments = reduced[:2]
+        renamed = make(*(self._renamed(part) if isinstance(part, str) else part for part in arguments))
+        assert isinstance(renamed, SuaveDesError)
+        return renamed
+
+    def _renamed(self, text: str) -> str:
+        for here, known in self._names.items():
+            text = text.replace(here, known)
+        return text
+
+
+_campaigns: dict[str, tuple[Unpacked, MissionRunner]] = {}
+"""Campaigns that this worker works for, by their tokens."""
+_lock = threading.Lock()
+"""Missions run one at a time, however many threads a worker has: they need the process for themselves."""
+
+
+def run(token: str, here: Mapping[str, str], parcel: bytes, chunk: bytes) -> bytes:
+    """Run missions in this process, which is a worker of a cluster.
+
+    Args:
+        token: the campaign's.
+        here: needs() of the machine that the campaign was started on.
+        parcel: a Parcel, pickled.
+        chunk: keys of the missions, pickled.
 
     Returns:
-        What became of them; or why none can be run; or what this machine has, if that is not what is needed.
+        Pickled seconds that it took, and outcomes.
+
+    Raises:
+        InputError: the job cannot be run; files have the names that the user knows.
+        WorkerError: there is no room for temporary files.
     """
-    if order.needs != needs():
-        return needs()
+    from distributed import get_worker
+
+    worker, began_s = get_worker(), time.monotonic()
+    where = f"worker {worker.address}"
+    if needs() != here:
+        raise misfit(where, here, needs())
+    try:
+        finished = _outcomes(token, parcel, chunk, worker.local_directory)
+        return pickle.dumps((time.monotonic() - began_s, finished))
+    except MemoryError:
+        os._exit(_OUT_OF_MEMORY)  # as if it had been killed for it: a new worker begins with little
+    except InputError as error:
+        if error.file is not None:
+            raise
+        raise type(error)(f"{where}: {error.problem}", place=error.place, remedy=error.remedy) from None
+    except OSError as error:
+        raise WorkerError(f"{where}: its temporary files cannot be written: {error.strerror}") from error
+
+
+def misfit(where: str, here: Mapping[str, str], there: Mapping[str, str]) -> InputError:
+    """Return the error that machines differ in what decides results."""
+    name = next(name for name in here if there.get(name) != here[name])
+    return InputError(
+        f"{name} is {there.get(name, 'missing')} on {where}, and {here[name]} here, which could change results",
+        remedy="install the same on all machines",
+    )
+
+
+def _outcomes(token: str, parcel: bytes, chunk: bytes, scratch: str) -> list[Finished]:
+    keys = [MissionKey(*key) for key in pickle.loads(chunk)]
     with _lock:
-        if order.token in _over:
-            return Report()
-        for other in _crews.values():
-            other.tidy()
-        crew = _crews.setdefault(order.token, _Crew(order, folder))
-    return crew.run(chunk)
+        unpacked: Unpacked | None = None
+        try:
+            if token in _campaigns:
+                unpacked, runner = _campaigns[token]
+            else:
+                unpacked = _unpack(pickle.loads(parcel), scratch)
+                _campaigns[token] = unpacked, (runner := _make_runner(unpacked))
+            return [unpacked.with_known_names(finished) for finished in runner.each(keys)]
+        except SuaveDesError as error:
+            if unpacked is None:
+                raise
+            if token not in _campaigns:
+                _remove(unpacked)
+            raise unpacked.error_with_known_names(error) from None
+
+
+def _unpack(parcel: Parcel, scratch: str) -> Unpacked:
+    # Modules of the same name belong to one campaign at a time; others prepare anew with their next chunk.
+    for token in [token for token, (other, _) in _campaigns.items() if other.modules & set(parcel.modules)]:
+        forget(token)
+    for token in list(_campaigns)[: 1 - _CAMPAIGNS_KEPT]:
+        forget(token)
+    return Unpacked(parcel, Path(tempfile.mkdtemp(prefix="suave-des-", dir=scratch)))
+
+
+def _make_runner(unpacked: Unpacked) -> MissionRunner:
+    from suave_des.campaign.mission_runner import MissionRunner
+
+    for place in unpacked.modules:
+        names = place.removesuffix(".py").removesuffix("/__init__").split("/")
+        for depth in range(1, len(names) + 1):
+            sys.modules.pop(".".join(names[:depth]), None)
+    importlib.invalidate_caches()
+    sys.path.insert(0, str(unpacked.folder / _MODULES))
+    for name, code in unpacked.manager_code.items():
+        if manager_code(name) != code:
+            raise InputError(f"manager {name!r} has other code there than here", remedy="install the same version")
+    return MissionRunner(unpacked.job, EXIT_AFTER_S)
 
 
 def forget(token: str) -> None:
-    """End the processes of a campaign, at once."""
-    with _lock:
-        _over.add(token)
-        crew = _crews.pop(token, None)
-    if crew is not None:
-        crew.end()
+    """Remove what was prepared for a campaign."""
+    if token in _campaigns:
+        _remove(_campaigns.pop(token)[0])
 
 
-class _EndedError(Exception):
-    """A process ended, or was ended because it did not answer."""
-
-    def __init__(self, status: int | None, *, overdue: bool) -> None:
-        super().__init__(status)
-        self.status, self.overdue = status, overdue
-
-
-class _Crew:
-    """The processes of one campaign on this worker: as many as there are threads that ask for one."""
-
-    def __init__(self, order: Order, folder: str) -> None:
-        self._order, self._folder = order, folder
-        self._lock = threading.Lock()
-        self._idle: list[_Process] = []
-        self._busy: list[_Process] = []
-        self._is_over = False
-
-    def run(self, chunk: Sequence[Key]) -> Report | Trouble:
-        report = Report(missions=len(chunk))
-        done, attempts, starts, singly = 0, 0, 0, len(chunk) == 1
-        while done < len(chunk) and not self._is_over:
-            before = done
-            process = self._take()
-            try:
-                for message in process.outcomes(chunk[done:], singly=singly):
-                    if isinstance(message, Part):
-                        report.parts.append(message.outcomes)
-                        done += message.missions
-                    elif isinstance(message, Done):
-                        report.learned.append(message.learned)
-                    else:
-                        self._drop(process)
-                        return message
-                report.seconds += time.monotonic() - process.began_s
-            except _EndedError as end:
-                self._drop(process)
-                if not process.is_ready:
-                    starts += 1
-                    if starts == _ATTEMPTS and not self._is_over:
-                        raise RuntimeError(f"processes end as they start, with status {end.status}") from end
-                elif not singly:
-                    singly = True  # to see which mission it was
-                else:
-                    attempts = attempts + 1 if done == before else 1
-                    if end.overdue or attempts == _ATTEMPTS:
-                        report.lost.append((chunk[done], None if end.overdue else _cause(end.status)))
-                        done, attempts = done + 1, 0
-            else:
-                self._give_back(process)
-        return report
-
-    def tidy(self) -> None:
-        """Remove what is left of processes that ended because nothing was asked of them."""
-        with self._lock:
-            ended = [process for process in self._idle if process.has_ended()]
-            self._idle = [process for process in self._idle if process not in ended]
-        for process in ended:
-            process.end()
-
-    def end(self) -> None:
-        """End all processes; threads that wait for one notice."""
-        with self._lock:
-            self._is_over = True
-            for process in self._busy:
-                process.kill()
-            idle, self._idle = self._idle, []
-        for process in idle:
-            process.end()
-
-    def _take(self) -> _Process:
-        self.tidy()
-        with self._lock:
-            process = self._idle.pop() if self._idle else _Process(self._order, self._folder)
-            self._busy.append(process)
-            if self._is_over:
-                process.kill()
-        return process
-
-    def _give_back(self, process: _Process) -> None:
-        with self._lock:
-            self._busy.remove(process)
-            if not self._is_over:
-                self._idle.append(process)
-                return
-        process.end()
-
-    def _drop(self, process: _Process) -> None:
-        with self._lock:
-            self._busy.remove(process)
-        process.end()
-
-
-def _cause(status: int | None) -> str:
-    return f"its worker process ended with status {status}, {_ATTEMPTS} times (killed, or out of memory?)"
-
-
-class _Process:
-    """A mission_process with a folder of its own."""
-
-    def __init__(self, order: Order, folder: str) -> None:
-        self._order = order
-        self._folder = tempfile.mkdtemp(prefix="suave-des-", dir=folder)
-        self._connection, theirs = Pipe()
-        path = [entry or str(Path.cwd()) for entry in sys.path]
-        # No multiprocessing: workers of Dask are daemons, and those may not have children in its sense.
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", f"{_START}; it.main()", json.dumps(path), str(theirs.fileno())],
-            cwd=self._folder,
-            env={**os.environ, "SUAVE_DES_CACHE_DIR": str(Path(self._folder) / "cache")},
-            stdin=subprocess.DEVNULL,
-            pass_fds=[theirs.fileno()],
-            start_new_session=True,
-        )
-        theirs.close()
-        self.is_ready = False
-        self.began_s = 0.0
-
-    def outcomes(self, chunk: Sequence[Key], *, singly: bool) -> Iterator[Part | Done | Trouble]:
-        """What it says of a chunk, up to Done or Trouble.
-
-        Raises:
-            _EndedError: it ended, or does not answer.
-        """
-        if not self.is_ready:
-            self._send(self._order.parcel)
-            message = self._receive(_START_S)
-            if not isinstance(message, Ready):
-                assert isinstance(message, Trouble)
-                yield message
-                return
-            self.is_ready = True
-        self.began_s = time.monotonic()
-        self._send(pickle.dumps((tuple(chunk), singly)))
-        while True:
-            message = self._receive(FLUSH_S + self._order.time_out_s + _MARGIN_S)
-            assert not isinstance(message, Ready)
-            yield message
-            if not isinstance(message, Part):
-                return
-
-    def _send(self, content: bytes) -> None:
-        try:
-            self._connection.send_bytes(content)
-        except OSError:
-            raise self._ended() from None
-
-    def _receive(self, patience_s: float) -> Message:
-        try:
-            if not self._connection.poll(patience_s):
-                self.kill()
-                raise self._ended(overdue=True)
-            message: Message = self._connection.recv()
-        except (EOFError, OSError):
-            raise self._ended() from None
-        return message
-
-    def _ended(self, *, overdue: bool = False) -> _EndedError:
-        self.kill()
-        return _EndedError(self._process.wait(), overdue=overdue)
-
-    def has_ended(self) -> bool:
-        return self._process.poll() is not None
-
-    def kill(self) -> None:
-        self._process.kill()
-
-    def end(self) -> None:
-        """End it, and remove its folder."""
-        self._connection.close()
-        self._process.kill()
-        self._process.wait()
-        shutil.rmtree(self._folder, ignore_errors=True)
+def _remove(unpacked: Unpacked) -> None:
+    if (modules := str(unpacked.folder / _MODULES)) in sys.path:
+        sys.path.remove(modules)
+    shutil.rmtree(unpacked.folder, ignore_errors=True)

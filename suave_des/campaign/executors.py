@@ -1,117 +1,308 @@
-"""Where missions run: in this process, in worker processes (pool.py), or on a cluster (dask_cluster.py).
-
-An executor takes missions and gives their outcomes, in whatever order they finish. Everything that a worker needs
-travels to it by value.
-"""
+"""Where missions run on this machine: in this process, or in worker processes that are replaced when they end."""
 
 from __future__ import annotations
 
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack
-from typing import TYPE_CHECKING, Protocol, Self
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, nullcontext, suppress
+from dataclasses import dataclass
+from functools import cache
+from multiprocessing import resource_tracker
+from multiprocessing.context import SpawnContext, SpawnProcess
+from multiprocessing.process import BaseProcess
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any, Self
 
-from suave_des.campaign.outcomes import Finished, Job
-from suave_des.campaign.plan import MissionKey
-from suave_des.errors import InputError, SuaveDesError
+from suave_des.campaign.missions import Chunk, Finished, JobSpec, MissionKey, WorkerError, chunked
+from suave_des.imports import main_hidden
+from suave_des.interrupts import INTERRUPTS, signals_deferred
+from suave_des.managing.registry import is_built_in
 
 if TYPE_CHECKING:
-    from suave_des.campaign.worker import Worker
+    from suave_des.campaign.mission_runner import MissionRunner
 
 _LARGEST_CHUNK = 10
-
-
-class Executor(Protocol):
-    """Runs missions somewhere."""
-
-    def outcomes(self, job: Job, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
-        """Outcomes of all missions, some at a time, in the order in which they finish.
-
-        Args:
-            job: what the missions have in common.
-            missions: to run; asked for no earlier than there is room for them.
-            total: about how many there are.
-
-        Raises:
-            InputError: the scenario, a manager or the knowledge base cannot be used at all.
-            WorkerError: workers end before their work is done, again and again.
-        """
-        ...
-
-
-class WorkerError(SuaveDesError):
-    """Missions cannot be run, because the processes that should run them end."""
-
-
-def check_place(workers: int, scheduler: str | None) -> None:
-    """See that it is clear where missions shall run.
-
-    Raises:
-        InputError: it is not, or what is given is no address.
-    """
-    if scheduler is None:
-        return
-    if workers != 1:
-        raise InputError(
-            f"workers: {workers} has no use with a scheduler, whose own workers run the missions",
-            remedy="leave it out; `dask worker --nthreads N` says how many missions run there at a time",
-        )
-    from suave_des.campaign.dask_cluster import check_address
-
-    check_address(scheduler)
-
-
-class Place(ExitStack):
-    """Where a campaign's missions will run: in this process, in several, or on the workers of a cluster.
-
-    Worker processes start at once: they import what they need while this process reads and checks. A cluster is asked
-    only when all is checked. At the end, workers are stopped.
-
-    Args:
-        managers: that missions are run of.
-        workers: number of processes; with one, missions run in this process.
-        scheduler: address of a Dask scheduler, whose workers are used instead.
-        ready: worker processes that have been started already.
-    """
-
-    def __init__(
-        self, managers: Sequence[str], workers: int, scheduler: str | None = None, ready: Sequence[Worker] = ()
-    ) -> None:
-        super().__init__()
-        self._managers, self._workers, self._scheduler, self._ready = managers, workers, scheduler, ready
-        self._started: Executor | None = None
-
-    def __enter__(self) -> Self:
-        """Start what can start."""
-        if self._scheduler is None and self._workers > 1:
-            from suave_des.campaign.pool import process_pool
-
-            self._started = self.enter_context(process_pool(self._managers, self._workers, self._ready))
-        return self
-
-    def executor(self) -> Executor:
-        """What runs the missions.
-
-        Raises:
-            InputError: the scheduler does not answer, or its workers are not fit for missions.
-        """
-        if self._scheduler is not None:
-            from suave_des.campaign.dask_cluster import connected
-
-            return self.enter_context(connected(self._scheduler))
-        return self._started or InProcess()
+"""Missions: few, as chunks under way are lost when a campaign is stopped, and workers are to end together."""
+_AHEAD = 2
+"""Chunks at a worker at any time: one under way, one waiting, so that it is never idle."""
+_ATTEMPTS = 3
+"""How many times a worker may die with a mission before the mission has failed."""
+_IN_A_ROW = 8
+"""Workers that may end one after the other without an outcome in between."""
+_START_S = 300.0
+"""Time for starting Python, perhaps from a slow shared disk, and for compiling."""
+_MARGIN_S = 60.0
+"""Added to the time that a chunk's missions may take, such as for starting Java, before its worker is killed."""
+_STOP_TIMEOUT_S = 5.0
+_OUT_OF_MEMORY = 12
+"""Exit status of a worker that could not get the memory it asked for (the system's number of that error)."""
 
 
 class InProcess:
-    """Runs missions one after the other in this process."""
+    """Runs missions one after the other in this process; an Executor."""
 
-    def outcomes(self, job: Job, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
-        """Outcomes mission by mission; see Executor."""
-        from suave_des.campaign.missions import MissionRunner  # with it comes the compiler, which takes a while
+    def outcomes(self, job: JobSpec, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
+        """Yield outcomes mission by mission; see Executor."""
+        from suave_des.campaign.mission_runner import MissionRunner  # with it comes the compiler, which takes a while
 
-        for finished in MissionRunner(job).each(iter(missions)):
+        for finished in MissionRunner(job).each(missions):
             yield [finished]
 
 
-def chunk_size(total: int, workers: int) -> int:
-    """Missions to a chunk: small, as chunks under way are lost when a campaign is stopped, and workers end together."""
-    return max(1, min(_LARGEST_CHUNK, total // (workers * 10)))
+class LocalWorkers:
+    """Runs chunks of missions in worker processes; an Executor, and a context at whose end they are stopped.
+
+    Workers are spawned, never forked: a forked child would hang on the Java machine of its parent. One that ends
+    before its work is done (killed, out of memory, a Java machine that crashed) is replaced, and its missions are run
+    again one by one. A mission during which that happens _ATTEMPTS times has failed; so has one that its own time-out
+    does not end.
+
+    Each worker is a ProcessPoolExecutor of one process: when a process ends, all that its pool was given is broken,
+    and no other pool is.
+
+    Args:
+        managers: whose missions are run.
+        workers: number of processes; they start at once, and import what they need.
+    """
+
+    def __init__(self, managers: Sequence[str], workers: int) -> None:
+        self._needs_script = any(name.startswith("__main__:") for name in managers)
+        self._may_be_killed = all(map(is_built_in, managers))
+        self._size = workers
+        self._workers: list[_Worker] = []
+        self._is_done = False
+        self._in_a_row = 0
+        self._again: deque[_Task] = deque()
+        self._ended: SimpleQueue[Future[list[Finished]]] = SimpleQueue()
+
+    def __enter__(self) -> Self:
+        """Start the workers."""
+        try:
+            for _ in range(self._size):
+                with _interrupts_held():
+                    self._workers.append(_Worker(needs_script=self._needs_script))
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop the workers; at once, unless a manager of the user's may have files to close."""
+        for worker in self._workers:
+            worker.stop(wait=self._is_done and not self._may_be_killed)
+        for worker in self._workers:
+            worker.join()
+
+    def outcomes(self, job: JobSpec, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
+        """Yield outcomes chunk by chunk; see Executor."""
+        self._job = job
+        size = max(1, min(_LARGEST_CHUNK, total // (self._size * 10)))
+        self._tasks = (_Task(chunk) for chunk in chunked(missions, size))
+        for worker in self._workers:
+            worker.prepare(job)
+        self._hand_out()
+        while busy := [worker for worker in self._workers if worker.tasks]:
+            future = self._next_ended(busy)
+            owners = [worker for worker in busy if future in worker.tasks]
+            if future is None or not owners:  # of a worker that was replaced
+                continue
+            (worker,) = owners
+            error = future.exception()
+            if isinstance(error, BrokenProcessPool):
+                yield from self._replace(worker)
+                continue
+            if error is not None:
+                raise error
+            del worker.tasks[future]
+            worker.since_s = time.monotonic()
+            self._in_a_row = 0
+            self._hand_out()
+            yield future.result()
+        self._is_done = True
+
+    def _hand_out(self) -> None:
+        """Give every worker its share, as long as there is something to do."""
+        for share in range(1, _AHEAD + 1):
+            for worker in self._workers:
+                if len(worker.tasks) < share:
+                    task = self._again.popleft() if self._again else next(self._tasks, None)
+                    if task is None:
+                        return
+                    worker.give(task).add_done_callback(self._ended.put)
+
+    def _next_ended(self, busy: Sequence[_Worker]) -> Future[list[Finished]] | None:
+        """Wait for a chunk to end, and kill workers that do not answer."""
+        due_s = min(worker.due_s(self._job.time_out_s) for worker in busy)
+        with suppress(Empty):
+            return self._ended.get(timeout=max(0.0, due_s - time.monotonic()))
+        for worker in busy:
+            if not worker.is_overdue and time.monotonic() >= worker.due_s(self._job.time_out_s):
+                worker.is_overdue = True
+                worker.process.kill()
+        return None
+
+    def _replace(self, worker: _Worker) -> Iterator[list[Finished]]:
+        """Put a new worker in the place of one that ended; of its chunks, the first was under way."""
+        worker.stop(wait=False)
+        status = worker.join()
+        self._in_a_row += 1
+        if self._in_a_row >= _IN_A_ROW:
+            raise WorkerError(
+                f"{_IN_A_ROW} worker processes in a row ended before a mission was done, the last with status {status}"
+                f" (killed, or out of memory?){_SCRIPT_HINT if self._needs_script else ''}"
+            )
+        suspect, *others = worker.tasks.values()
+        attempts = suspect.attempts + 1
+        if len(suspect.chunk) > 1:
+            self._again.extend(_Task((key,), attempts) for key in suspect.chunk)
+        elif worker.is_overdue:
+            yield [self._job.timed_out(suspect.chunk[0])]
+        elif attempts < _ATTEMPTS:
+            self._again.append(_Task(suspect.chunk, attempts))
+        else:
+            cause = f"its worker process ended with status {status}, {attempts} times (killed, or out of memory?)"
+            yield [self._job.failed(suspect.chunk[0], cause)]
+        self._again.extend(others)
+        with _interrupts_held():
+            self._workers[self._workers.index(worker)] = fresh = _Worker(needs_script=self._needs_script)
+        fresh.prepare(self._job)
+        self._hand_out()
+
+
+_SCRIPT_HINT = (
+    "; as a manager is defined in the script itself, each worker runs that too: put the manager into a module"
+    ' of its own, or the campaign under `if __name__ == "__main__":`'
+)
+
+
+@dataclass(frozen=True)
+class _Task:
+    """Missions to run, and how many times a worker has died with them."""
+
+    chunk: Chunk
+    attempts: int = 0
+
+
+class _Worker:
+    """One worker process, and what it was given, oldest first."""
+
+    def __init__(self, *, needs_script: bool) -> None:
+        self.tasks: dict[Future[list[Finished]], _Task] = {}
+        self.since_s, self._start_s = 0.0, _START_S
+        self.is_overdue = False
+        context = _Context()
+        self._pool = ProcessPoolExecutor(1, context, initializer=_end_with_parent)
+        with nullcontext() if needs_script else main_hidden():
+            self._pool.submit(_import)
+        self.process = context.process
+
+    def prepare(self, job: JobSpec) -> None:
+        """Give it what all its missions have in common; the first thing to do."""
+        with suppress(BrokenProcessPool):  # it has ended, as the first chunk will show
+            self._pool.submit(_prepare, job).add_done_callback(self._is_ready)
+
+    def _is_ready(self, _: object) -> None:
+        self.since_s, self._start_s = time.monotonic(), 0.0
+
+    def give(self, task: _Task) -> Future[list[Finished]]:
+        """Give it a chunk of missions, to be run when those before are done."""
+        if not self.tasks:
+            self.since_s = time.monotonic()
+        try:
+            future = self._pool.submit(_run, task.chunk)
+        except BrokenProcessPool as error:
+            future = Future()
+            future.set_exception(error)
+        self.tasks[future] = task
+        return future
+
+    def due_s(self, time_out_s: float) -> float:
+        """Return the time at which its oldest chunk has to be done."""
+        if self.is_overdue:  # it is killed, which its pool will notice
+            return time.monotonic() + _MARGIN_S
+        return self.since_s + self._start_s + time_out_s * len(next(iter(self.tasks.values())).chunk) + _MARGIN_S
+
+    def stop(self, *, wait: bool) -> None:
+        """Have the process end: at once, or when it has done what it was given."""
+        if not wait:
+            self.process.kill()
+        self._pool.shutdown(wait=False, cancel_futures=True)
+
+    def join(self) -> int | None:
+        """Wait for the process to end, and return its exit status; it is killed if that takes long."""
+        self.process.join(_STOP_TIMEOUT_S)
+        if self.process.is_alive():
+            self.process.kill()
+        while self.process.exitcode is None:  # the pool's own thread may just be reading it
+            time.sleep(0.001)
+        return self.process.exitcode
+
+
+class _Context(SpawnContext):
+    """Starts processes by spawning, and knows the last one."""
+
+    process: BaseProcess
+
+    def Process(self, *arguments: Any, **named: Any) -> BaseProcess:  # type: ignore[override]  # noqa: N802
+        self.process = SpawnProcess(*arguments, **named)
+        return self.process
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Hold Ctrl-C and kill back while a worker starts: it inherits that, so that they reach this process alone."""
+    resource_tracker.ensure_running()  # or the first worker's start starts it, which lets them through again
+    with signals_deferred():
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+# What runs in a worker process.
+
+_jobs: list[JobSpec] = []
+
+
+def _end_with_parent() -> None:
+    """End this process when the one that started it has ended, whatever a mission does."""
+
+    def wait() -> None:
+        parent = multiprocessing.parent_process()
+        assert parent is not None
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+def _import() -> None:
+    """Import what missions need, with the compiler, before the job is there."""
+    import suave_des.campaign.mission_runner  # noqa: F401
+
+
+def _prepare(job: JobSpec) -> None:
+    _jobs.append(job)
+    _runner()
+
+
+@cache
+def _runner() -> MissionRunner:
+    from suave_des.campaign.mission_runner import MissionRunner
+
+    return MissionRunner(_jobs[-1])
+
+
+def _run(chunk: Chunk) -> list[Finished]:
+    try:
+        return list(_runner().each(chunk))
+    except MemoryError:
+        os._exit(_OUT_OF_MEMORY)  # as if it had been killed for it: a new worker begins with little

@@ -1,80 +1,163 @@
-"""Runs the missions of a campaign, in whatever process they are to run."""
+"""The missions of a campaign: which there are, what they have in common, and what each leaves behind."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Callable, Collection, Iterable, Iterator
+from dataclasses import dataclass, fields
+from itertools import islice
+from operator import attrgetter
+from typing import NamedTuple, Protocol
 
-from suave_des.campaign import machine_code
-from suave_des.campaign.knowledge_lines import mission_line
-from suave_des.campaign.outcomes import Failure, Finished, Job, Outcome, row_of, time_out_cause
-from suave_des.campaign.plan import Chunk, MissionKey
-from suave_des.campaign.sweep import cell_of
-from suave_des.campaign.time_limit import Limit, TimeOut, time_limits
-from suave_des.errors import MissionError
-from suave_des.scenario.models import Mission
-from suave_des.simulation.result import MissionResult
-from suave_des.simulation.simulator import Simulator
+from suave_des.campaign.output import rounded
+from suave_des.campaign.variation import Variation
+from suave_des.errors import MissionError, SuaveDesError
+from suave_des.scenario.loader import LoadedScenario
+from suave_des.simulation.result import MissionMetrics
 
 
-class MissionRunner:
-    """Runs chunks of missions of one job in this process.
+class MissionKey(NamedTuple):
+    """Which mission of a campaign; missions and their rows are in the order of their keys.
 
-    Args:
-        job: the scenario and what else decides a mission.
+    Attributes:
+        point: number of the sweep's point, from 0; 0 without a sweep.
+        manager: index among the campaign's managers, from 0.
+        run: number of the run, from 1; runs with the same number use common random numbers under all managers and at
+            all points.
     """
 
-    def __init__(self, job: Job) -> None:
-        self._job = job
-        self._drawn = tuple(job.variation.drawn)
-        self._warm_up()
-        self._go_to(0)
+    point: int
+    manager: int
+    run: int
 
-    def run(self, chunk: Chunk) -> list[Finished]:
-        """The outcome of each mission, in order.
+
+Chunk = tuple[MissionKey, ...]
+Group = tuple[int, int]
+"""Point and manager: the missions that differ in the run only."""
+
+
+def plan(
+    points: int,
+    managers: int,
+    runs: int,
+    settled: Callable[[Group], Collection[int]] = lambda group: (),
+    is_over: Callable[[Group], bool] = lambda group: False,
+) -> Iterator[MissionKey]:
+    """Yield the missions that are still to be run, in order.
+
+    Args:
+        points: number of points of the sweep.
+        managers: number of managers.
+        runs: for each manager at each point.
+        settled: returns the runs of a group that need not be run; called once for each group, when its turn comes.
+        is_over: returns whether a group needs no further runs; called before each.
+    """
+    for group in ((point, manager) for point in range(points) for manager in range(managers)):
+        known = settled(group)
+        for run in range(1, runs + 1):
+            if is_over(group):
+                break
+            if run not in known:
+                yield MissionKey(*group, run)
+
+
+def chunked(missions: Iterable[MissionKey], size: int) -> Iterator[Chunk]:
+    """Split missions into chunks of `size`, the last one perhaps smaller."""
+    remaining = iter(missions)
+    while chunk := tuple(islice(remaining, size)):
+        yield chunk
+
+
+COLUMNS = tuple(field.name for field in fields(MissionMetrics))
+"""Columns of runs.csv that every campaign has."""
+
+Cell = str | int | float | bool | None
+Row = tuple[Cell, ...]
+
+_cells: Callable[[MissionMetrics], Row] = attrgetter(*COLUMNS)
+
+
+def row_of(metrics: MissionMetrics) -> Row:
+    """Return the cells of runs.csv, with numbers rounded as in the file, from which all other figures follow."""
+    return tuple(rounded(cell) if isinstance(cell, float) else cell for cell in _cells(metrics))
+
+
+class Failure(NamedTuple):
+    """A mission that has no row.
+
+    Attributes:
+        manager: name of the managing subsystem.
+        run: number of the run.
+        time_s: mission time at which it happened; None if that is not known.
+        cause: what the manager raised, or what else ended the mission.
+        lasting: whether the mission itself failed; a time-out or a worker that was killed may not happen again, so a
+            resumed campaign runs such a mission once more.
+        point: of the sweep, from 0.
+    """
+
+    manager: str
+    run: int
+    time_s: float | None
+    cause: str
+    lasting: bool = True
+    point: int = 0
+
+    def __str__(self) -> str:
+        """Return all that is known, in one line."""
+        if self.time_s is None:
+            return f"manager {self.manager}, run {self.run}: {self.cause}"
+        return str(MissionError(self.manager, self.run, self.time_s, self.cause))
+
+
+Outcome = Row | Failure
+Finished = tuple[MissionKey, Outcome]
+
+
+@dataclass(frozen=True)
+class JobSpec:
+    """All that a worker needs besides the keys of the missions; it is sent by value.
+
+    Attributes:
+        loaded: the scenario with its files.
+        variation: what differs between missions besides manager and run.
+        managers: names, in the campaign's order.
+        seed: the campaign's.
+        time_out_s: wall-clock time that a mission may take.
+        record_knowledge: whether each row is followed by a cell with the mission's line of knowledge_states.jsonl.
+    """
+
+    loaded: LoadedScenario
+    variation: Variation
+    managers: tuple[str, ...]
+    seed: int
+    time_out_s: float
+    record_knowledge: bool = False
+
+    def failed(self, key: MissionKey, cause: str) -> Finished:
+        """Return the outcome of a mission that was ended from outside."""
+        return key, Failure(self.managers[key.manager], key.run, None, cause, lasting=False, point=key.point)
+
+    def timed_out(self, key: MissionKey) -> Finished:
+        """Return the outcome of a mission that took too long."""
+        return self.failed(key, f"not done after {self.time_out_s:g} s (time-out)")
+
+
+class Executor(Protocol):
+    """Runs missions somewhere: in this process, in worker processes, or on a cluster."""
+
+    def outcomes(self, job: JobSpec, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
+        """Yield the outcomes of all missions, some at a time, in the order in which they finish.
+
+        Args:
+            job: what the missions have in common.
+            missions: to run; each is requested only when a worker has room for it.
+            total: about how many there are.
 
         Raises:
             InputError: the scenario, a manager or the knowledge base cannot be used at all.
+            WorkerError: workers end before their work is done, again and again.
         """
-        return list(self.each(chunk))
+        ...
 
-    def each(self, missions: Iterator[MissionKey] | Chunk) -> Iterator[Finished]:
-        """The same mission by mission."""
-        with time_limits() as limit:
-            for key in missions:
-                yield key, self._outcome(key, limit)
 
-    def _outcome(self, key: MissionKey, limit: Limit) -> Outcome:
-        if key.point != self._point:
-            self._go_to(key.point)
-        manager = self._job.managers[key.manager]
-        try:
-            with limit(self._job.time_out_s):
-                result = self._simulator.run(manager, key.run, self._job.seed, record=self._job.record_knowledge)
-        except MissionError as error:
-            return Failure(error.manager, error.run, error.time_s, error.cause, point=key.point)
-        except TimeOut:
-            return self._job.failed(key, time_out_cause(self._job.time_out_s))[1]
-        row = (*row_of(result.metrics), *self._swept, *(result.drawn[path] for path in self._drawn))
-        return (*row, self._knowledge(key, result)) if self._job.record_knowledge else row
-
-    def _knowledge(self, key: MissionKey, result: MissionResult) -> str:
-        if not result.knowledge:
-            return ""
-        variation = self._job.variation
-        values = variation.sweep.values(key.point)
-        swept = {variation.paths[name]: value for name, value in values.items()}
-        return mission_line(self._job.managers[key.manager], key.point, key.run, result.knowledge, swept)
-
-    def _warm_up(self) -> None:
-        """Load or compile what missions run, before the first one's time counts: a mission of a second does."""
-        short = self._job.loaded.scenario.model_copy(update={"mission": Mission(time_limit_s=1.0)})
-        Simulator(replace(self._job.loaded, scenario=short)).run("none", 1, 0)
-        machine_code.note_stored()
-
-    def _go_to(self, point: int) -> None:
-        """Have the simulator of a point; one is kept, as missions come point by point."""
-        variation = self._job.variation
-        loaded = variation.scenario(self._job.loaded, point)
-        self._point, self._simulator = point, Simulator(loaded, dict.fromkeys(variation.drawn, variation.runs_per_draw))
-        self._swept = tuple(map(cell_of, variation.sweep.values(point).values()))
+class WorkerError(SuaveDesError):
+    """Missions cannot be run, because the processes that should run them end."""

@@ -1,4 +1,4 @@
-"""One mission with its whole record, and the files that tell of it."""
+"""One mission with its whole record, and its result files."""
 
 from __future__ import annotations
 
@@ -6,18 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, fields
 from pathlib import Path
 
-from suave_des.campaign.campaign import check_knowledge
-from suave_des.campaign.knowledge_file import KNOWLEDGE_FILE, knowledge_text
-from suave_des.campaign.outcomes import COLUMNS, row_of
-from suave_des.campaign.output import (
-    check_output_folder,
-    csv_text,
-    json_text,
-    make_output_folder,
-    write_files,
-)
-from suave_des.campaign.plan import RUNS_LIMIT, check_range, check_seed
-from suave_des.campaign.provenance import provenance
+from suave_des.campaign.knowledge_records import KNOWLEDGE_FILE, knowledge_text
+from suave_des.campaign.missions import COLUMNS, row_of
+from suave_des.campaign.output import check_output_folder, csv_text, json_text, make_output_folder, write_files
+from suave_des.campaign.provenance import check_knowledge, provenance
+from suave_des.campaign.spec import RUNS_LIMIT, check_range, check_seed
 from suave_des.scenario.loader import LoadedScenario, load_scenario
 from suave_des.simulation.result import Event, MissionResult, TrajectoryPoint
 from suave_des.simulation.simulator import Simulator
@@ -44,9 +37,11 @@ def run_mission(
     command: Sequence[str] = (),
     on_time: Callable[[float, float], None] | None = None,
 ) -> MissionResult:
-    """Run one mission and keep its events and trajectory.
+    """Run one mission and keep its events and trajectory: the one that a campaign with this seed has as this run.
 
-    It is the mission that a campaign with this seed has as its run of this number.
+    Example:
+        mission = run_mission("seams2023", "metacontrol", run=1, seed=8)
+        print(mission.metrics.search_time_s, len(mission.events))
 
     Args:
         scenario: path of a scenario file, or name of a shipped one.
@@ -55,13 +50,7 @@ def run_mission(
         seed: of everything that is random.
         out: folder for mission.json, events.csv, trajectory.csv and, of a manager that reasons,
             knowledge.jsonl; it is made if its parent exists. None: no files.
-        ontologies: files to use in place of the scenario's.
-        modes_file: file to use in place of the scenario's.
-        reasoner: to use in place of the scenario's.
-        rules: files of rules as text, besides the scenario's.
-        disabled_rules: names of rules to switch off, besides the scenario's.
-        overwrite: whether results in the folder may be replaced.
-        command: the command line, for mission.json.
+        ontologies, modes_file, reasoner, rules, disabled_rules, overwrite, command: see CampaignSpec.
         on_time: called each second of mission time with it and the time limit, in s.
 
     Raises:

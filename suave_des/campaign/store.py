@@ -7,6 +7,7 @@ own, damage is noticed, and it comes with Python. Each outcome carries a checksu
 from __future__ import annotations
 
 import json
+import os
 import sqlite3
 import time
 import zlib
@@ -15,13 +16,15 @@ from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from suave_des.campaign.outcomes import Failure, Finished, Outcome
-from suave_des.campaign.plan import Group, MissionKey
+from filelock import FileLock, Timeout
+
+from suave_des.campaign.missions import Failure, Finished, Group, MissionKey
 from suave_des.errors import InputError, SuaveDesError
 
 STORE_FILE = "campaign.sqlite"
 NEW_STORE_FILE = f".{STORE_FILE}.new"
-"""Its name until it is whole."""
+"""Its name until it is complete."""
+LOCK_FILE = ".campaign.lock"
 
 _VERSION = 1
 _COMMIT_PERIOD_S = 0.1
@@ -39,6 +42,34 @@ CREATE TABLE outcomes (
 _ALL = "SELECT * FROM outcomes ORDER BY point, manager, run"
 
 
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold a folder for this process; the system releases it when the process ends, however that comes.
+
+    Raises:
+        InputError: another campaign holds it, or it cannot be locked.
+    """
+    path = folder / LOCK_FILE
+    lock = FileLock(path, timeout=0, mode=0o666)
+    try:
+        try:
+            lock.acquire()
+            path.write_text(str(os.getpid()))
+        except Timeout:
+            process = path.read_text(errors="replace") if path.is_file() else ""
+            problem = f"another campaign is running in the output folder (process {process or 'unknown'})"
+            raise InputError(problem, file=folder, remedy="wait for it, or give another folder") from None
+        except OSError as error:
+            problem = f"the output folder cannot be locked: {error.strerror}"
+            raise InputError(problem, file=folder, remedy="give a folder that is yours, on a local disk") from None
+        yield
+    finally:
+        with suppress(Timeout, OSError):  # it is another campaign's, or gone; it may also have been half acquired
+            lock.acquire()
+            path.unlink(missing_ok=True)
+        lock.release(force=True)
+
+
 class StoreError(SuaveDesError):
     """Outcomes cannot be kept any more; those that were kept before are."""
 
@@ -47,7 +78,7 @@ class Store:
     """The outcomes of one campaign.
 
     Args:
-        path: the database's file, made by make_store; none for a temporary one, which is gone when this is closed.
+        path: the database's file, made by make_store; None for a temporary one, which is gone when this is closed.
 
     Raises:
         InputError: it is not there, is damaged, or is another version's.
@@ -58,8 +89,8 @@ class Store:
         self._committed_s = time.monotonic()
         self._inode = 0
         if path is not None and not path.is_file():
-            raise InputError("there is no campaign to go on with", file=path.parent, remedy="start one with --out")
-        with _telling(path):
+            raise InputError("there is no campaign to resume", file=path.parent, remedy="start one with --out")
+        with _user_errors(path):
             self._db = sqlite3.connect("" if path is None else path, isolation_level=None)
             try:
                 self._open()
@@ -86,7 +117,7 @@ class Store:
             raise InputError(
                 f"is a campaign's store of version {version}, and this suave-des has version {_VERSION}",
                 file=self.path,
-                remedy="go on with the suave-des that began it, or start anew with --overwrite",
+                remedy="resume it with the suave-des that began it, or start anew with --overwrite",
             )
         (verdict,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
         if verdict != "ok":
@@ -95,14 +126,14 @@ class Store:
     # What it is about.
 
     def about(self, name: str) -> Any:
-        """What was noted under a name; none if nothing was."""
-        with _telling(self.path):
+        """Return what was noted under a name; None if nothing was."""
+        with _user_errors(self.path):
             found = self._db.execute("SELECT value FROM about WHERE name = ?", (name,)).fetchone()
         return None if found is None else json.loads(found[0])
 
     def note(self, name: str, value: Any) -> None:
-        """Note something about the campaign, at once and lastingly."""
-        with _telling(self.path):
+        """Note something about the campaign, at once and durably."""
+        with _user_errors(self.path):
             self._db.execute("INSERT OR REPLACE INTO about VALUES (?, ?)", (name, json.dumps(value)))
         self.commit()
 
@@ -114,8 +145,8 @@ class Store:
         Raises:
             StoreError: the disk is full, or the output folder was removed.
         """
-        with _telling(self.path):
-            self._db.executemany("INSERT OR REPLACE INTO outcomes VALUES (?, ?, ?, ?, ?, ?)", map(_written, finished))
+        with _user_errors(self.path):
+            self._db.executemany("INSERT OR REPLACE INTO outcomes VALUES (?, ?, ?, ?, ?, ?)", map(_record, finished))
         if time.monotonic() - self._committed_s > _COMMIT_PERIOD_S:
             self.commit()
 
@@ -123,7 +154,7 @@ class Store:
         """Make safe what was appended."""
         if self.path is not None:
             self._check_still_there(self.path)
-        with _telling(self.path):
+        with _user_errors(self.path):
             self._db.execute("COMMIT")
             self._db.execute("BEGIN")
         self._committed_s = time.monotonic()
@@ -135,34 +166,34 @@ class Store:
         except OSError:
             same = False
         if not same:
-            raise StoreError(f"{path} was removed while the campaign ran; what it held is lost, so start anew")
+            raise StoreError(f"{path} was removed while the campaign ran; its content is lost, so start anew")
 
     def forget_passing_failures(self) -> None:
-        """Drop failures that may not happen again."""
-        with _telling(self.path):
+        """Remove failures that may not happen again."""
+        with _user_errors(self.path):
             self._db.execute("DELETE FROM outcomes WHERE kind = ?", (_PASSING,))
 
     def settled(self, group: Group) -> set[int]:
-        """Runs of a group that have an outcome."""
-        with _telling(self.path):
+        """Return the runs of a group that have an outcome."""
+        with _user_errors(self.path):
             found = self._db.execute("SELECT run FROM outcomes WHERE point = ? AND manager = ?", group)
             return {run for (run,) in found}
 
     def count(self) -> int:
-        """Number of outcomes."""
-        with _telling(self.path):
+        """Return the number of outcomes."""
+        with _user_errors(self.path):
             (number,) = self._db.execute("SELECT count(*) FROM outcomes").fetchone()
         return int(number)
 
     def outcomes(self) -> Iterator[Finished]:
-        """All outcomes in the order of their keys, read as they are asked for.
+        """Yield all outcomes in the order of their keys, read as they are requested.
 
         Raises:
             InputError: the store is damaged.
         """
-        with _telling(self.path):
+        with _user_errors(self.path):
             for record in self._db.execute(_ALL):
-                yield _read(record, self.path)
+                yield _finished(record, self.path)
 
     def close(self) -> None:
         """Leave one plain file behind. If the disk is full, a journal stays beside it, from which the rest is read."""
@@ -174,7 +205,7 @@ class Store:
 
 
 def make_store(path: Path, about: Mapping[str, Any]) -> None:
-    """Make the database of a new campaign, in place of an earlier one: whole, or not at all.
+    """Make the database of a new campaign, in place of an earlier one: complete, or not at all.
 
     Args:
         path: its file.
@@ -186,7 +217,7 @@ def make_store(path: Path, about: Mapping[str, Any]) -> None:
     new = path.with_name(NEW_STORE_FILE)
     new.unlink(missing_ok=True)
     try:
-        with _telling(path), closing(sqlite3.connect(new, isolation_level=None)) as db:
+        with _user_errors(path), closing(sqlite3.connect(new, isolation_level=None)) as db:
             db.executescript(f"BEGIN; {_TABLES} PRAGMA user_version = {_VERSION};")
             db.executemany("INSERT INTO about VALUES (?, ?)", ((name, json.dumps(about[name])) for name in about))
             db.execute("COMMIT")
@@ -198,19 +229,25 @@ def make_store(path: Path, about: Mapping[str, Any]) -> None:
 
 
 def stored_outcomes(path: Path) -> Iterator[Finished]:
-    """The outcomes in a store that is closed, in the order of their keys.
+    """Yield the outcomes in a store that is closed, in the order of their keys.
 
     Raises:
         InputError: the store is not there, or is damaged.
     """
-    with _telling(path), closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as db:
+    with _user_errors(path), closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as db:
         for record in db.execute(_ALL):
-            yield _read(record, path)
+            yield _finished(record, path)
+
+
+def remove_store(folder: Path) -> None:
+    """Remove a campaign's store from a folder, if there is one."""
+    for ending in ("", "-wal", "-shm", "-journal"):
+        (folder / f"{STORE_FILE}{ending}").unlink(missing_ok=True)
 
 
 @contextmanager
-def _telling(path: Path | None) -> Iterator[None]:
-    """Errors of the database as errors for the user."""
+def _user_errors(path: Path | None) -> Iterator[None]:
+    """Turn errors of the database into errors for the user."""
     try:
         yield
     except sqlite3.OperationalError as error:
@@ -225,28 +262,16 @@ def _damaged(path: Path | None, what: object) -> InputError:
     return InputError(f"is damaged: {what}", file=path, remedy="start anew with --overwrite")
 
 
-def remove_store(folder: Path) -> None:
-    """Remove a campaign's store from a folder, if there is one."""
-    for ending in ("", "-wal", "-shm", "-journal"):
-        with suppress(FileNotFoundError):
-            (folder / f"{STORE_FILE}{ending}").unlink()
-
-
-def _written(finished: Finished) -> tuple[int, int, int, int, str, int]:
+def _record(finished: Finished) -> tuple[int, int, int, int, str, int]:
     key, outcome = finished
-    kind, content = _kind(outcome), json.dumps(outcome)
+    kind = _ROW if not isinstance(outcome, Failure) else _LASTING if outcome.lasting else _PASSING
+    content = json.dumps(outcome)
     return (*key, kind, content, _crc(key, kind, content))
 
 
-def _kind(outcome: Outcome) -> int:
-    if not isinstance(outcome, Failure):
-        return _ROW
-    return _LASTING if outcome.lasting else _PASSING
-
-
-def _read(record: tuple[int, int, int, int, str, int], path: Path | None) -> Finished:
-    *place, kind, content, crc = record
-    key = MissionKey(*place)
+def _finished(record: tuple[int, int, int, int, str, int], path: Path | None) -> Finished:
+    *numbers, kind, content, crc = record
+    key = MissionKey(*numbers)
     if _crc(key, kind, content) != crc:
         raise _damaged(path, f"the outcome of run {key.run} is not what was written")
     cells = json.loads(content)

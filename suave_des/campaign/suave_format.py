@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from datetime import datetime, timedelta
 from typing import Any
 
-from suave_des.campaign.outcomes import COLUMNS, Row
+from suave_des.campaign.missions import COLUMNS, Row
 from suave_des.campaign.output import csv_pieces
 
 SUAVE_FILE = "suave_results.csv"

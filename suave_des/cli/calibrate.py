@@ -41,7 +41,7 @@ def calibrate(
     from suave_des.calibration.fit import FINAL_FACTOR, evaluate, fit, select
     from suave_des.calibration.profile import profiles, resampling_spread
     from suave_des.campaign.output import check_output_folder, make_output_folder, write_files
-    from suave_des.campaign.plan import RUNS_LIMIT, check_range, check_seed, check_workers
+    from suave_des.campaign.spec import RUNS_LIMIT, check_range, check_seed, check_workers
     from suave_des.cli.console import output
 
     check_workers(workers)

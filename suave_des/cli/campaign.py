@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -22,16 +19,13 @@ from suave_des.cli.options import (
     command_line,
 )
 from suave_des.errors import InputError
-from suave_des.imports import gc_paused
 
 if TYPE_CHECKING:
     from suave_des.campaign.campaign import CampaignResult
-    from suave_des.campaign.worker import Worker
 
-
-_FAILURES_TOLD = 20
+_FAILURES_SHOWN = 20
 _MANAGERS, _RUNS, _SEED, _TIME_OUT = "none,random,metacontrol", "20", "1", "120"
-"""As in campaign.sheet, which is not imported for --help."""
+"""As in campaign.spec, which is not imported for --help."""
 _WORKERS = 2
 
 
@@ -120,7 +114,7 @@ def campaign(
 ) -> None:
     """Run many missions and write their results.
 
-    A campaign file has all of it, and says what is swept or drawn anew in each run; options go before what it says.
+    A campaign file has all of it, with what is swept or drawn anew in each run; options take precedence over it.
     What is done is kept while the campaign runs; after an interruption, --resume DIR does the rest.
     """
     if workers is None:
@@ -152,57 +146,44 @@ def campaign(
     elif scenario is None or out is None:
         missing = "SCENARIO" if scenario is None else "--out DIR"
         raise InputError(f"{missing} is missing", remedy="see suave-des campaign --help")
-    useful = workers if names is None or runs is None else min(workers, len(names) * runs)
-    with _started_ahead(useful if scheduler is None else 1) as ready:
-        with gc_paused():
-            from suave_des.campaign.campaign import resume_campaign, run_campaign
-            from suave_des.cli.console import output, progress
-            from suave_des.cli.summary import print_stops, print_summary
+    from suave_des.campaign.runner import resume as resume_in
+    from suave_des.campaign.runner import run
+    from suave_des.campaign.spec import CampaignSpec
+    from suave_des.cli.console import output, progress
+    from suave_des.cli.summary import print_stops, print_summary
 
-        with progress(str(resume or scenario), quiet=quiet) as show:
-            if resume is not None:
-                result = resume_campaign(
-                    resume, workers, runs=runs, until_ci=until_ci, on_progress=show, scheduler=scheduler, ready=ready
-                )
-            else:
-                assert scenario is not None
-                result = run_campaign(
-                    scenario,
-                    names,
-                    runs,
-                    seed,
-                    workers,
-                    out,
-                    ontologies=ontology or (),
-                    modes_file=modes,
-                    reasoner=reasoner,
-                    rules=rules or (),
-                    disabled_rules=disable_rule or (),
-                    suave_format=also is Format.SUAVE,
-                    record_knowledge=record_knowledge,
-                    time_out_s=time_out,
-                    until_ci=until_ci,
-                    confirmed=yes,
-                    overwrite=overwrite,
-                    command=command_line(),
-                    on_progress=show,
-                    scheduler=scheduler,
-                    ready=ready,
-                )
+    with progress(str(resume or scenario), quiet=quiet) as show:
+        if resume is not None:
+            result = resume_in(resume, show, workers=workers, scheduler=scheduler, runs=runs, until_ci=until_ci)
+        else:
+            assert scenario is not None
+            spec = CampaignSpec.of(
+                scenario,
+                managers=names,
+                runs=runs,
+                seed=seed,
+                workers=workers,
+                out=out,
+                ontologies=ontology,
+                modes_file=modes,
+                reasoner=reasoner,
+                rules=rules,
+                disabled_rules=disable_rule,
+                suave_format=also is Format.SUAVE,
+                record_knowledge=record_knowledge,
+                time_out_s=time_out,
+                until_ci=until_ci,
+                confirmed=yes,
+                overwrite=overwrite,
+                command=command_line(),
+                scheduler=scheduler,
+            )
+            result = run(spec, show)
     console = output()
     print_summary(console, result)
     print_stops(console, result)
     console.print(f"{result.done} missions are in {result.folder}/runs.csv", soft_wrap=True)
     exit_telling_failures(result)
-
-
-def _started_ahead(workers: int) -> AbstractContextManager[Sequence[Worker]]:
-    """Workers that start while this process still imports what it needs; nothing is checked yet, so not too many."""
-    if workers < 2:
-        return nullcontext(())
-    from suave_des.campaign.worker import StartWorker, workers_started
-
-    return workers_started(min(workers, os.cpu_count() or 1), StartWorker(needs_script=False))
 
 
 def exit_telling_failures(result: CampaignResult) -> None:
@@ -212,10 +193,10 @@ def exit_telling_failures(result: CampaignResult) -> None:
     if not result.failures:
         return
     console = errors()
-    for failure in result.failures[:_FAILURES_TOLD]:
+    for failure in result.failures[:_FAILURES_SHOWN]:
         line = " ".join(str(failure).split())
         console.print(f"suave-des: failed: {line}", soft_wrap=True, markup=False)
-    more = len(result.failures) - _FAILURES_TOLD
+    more = len(result.failures) - _FAILURES_SHOWN
     if more > 0:
         where = "" if result.folder is None else f", all of them in {result.folder}/manifest.json"
         console.print(f"suave-des: failed: {more} more{where}", soft_wrap=True, markup=False)

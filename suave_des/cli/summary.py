@@ -9,9 +9,8 @@ from rich.console import Console
 from rich.table import Table
 
 from suave_des.campaign.display import estimated
-from suave_des.campaign.early_stop import parse_until_ci
-from suave_des.campaign.plan import Group
-from suave_des.campaign.summary import METRIC_TITLES, METRICS, SUMMARY_COLUMNS
+from suave_des.campaign.progress import GroupProgress, parse_until_ci
+from suave_des.campaign.results import METRIC_TITLES, METRICS, SUMMARY_COLUMNS
 from suave_des.campaign.sweep import cell_of
 from suave_des.cli.console import number, plain_table, print_table
 
@@ -64,19 +63,19 @@ def _figures(cells: Mapping[str, object], metric: str) -> tuple[str, str]:
 
 def print_stops(console: Console, result: CampaignResult) -> None:
     """Print which managers were stopped early, and whose interval is still too wide."""
-    if result.until_ci is None:
+    if result.spec.until_ci is None:
         return
-    until = parse_until_ci(result.until_ci)
-    narrow = [stop for stop in result.stops if stop.reached]
+    until = parse_until_ci(result.spec.until_ci)
+    narrow = [stop for stop in result.stops if stop.is_narrow]
     if narrow:
-        listed = ", ".join(f"{_group(result, stop.group)} after run {stop.last_run}" for stop in narrow[:_STOPS_LISTED])
+        listed = ", ".join(f"{_group(result, stop)} after run {stop.runs}" for stop in narrow[:_STOPS_LISTED])
         listed += f", and {len(narrow) - _STOPS_LISTED} more" if len(narrow) > _STOPS_LISTED else ""
         console.print(f"stopped with {until.metric} ± less than {until.half_width:g}: {listed}", soft_wrap=True)
-    wide = [stop for stop in result.stops if not stop.reached]
+    wide = [stop for stop in result.stops if not stop.is_narrow]
     for stop in wide[:_STOPS_LISTED]:
         width = "has no interval" if stop.half_width is None else f"± {stop.half_width:.4g}"
         console.print(
-            f"not reached: {_group(result, stop.group)}: {until.metric} {width} after all {stop.last_run} runs,"
+            f"not reached: {_group(result, stop)}: {until.metric} {width} after all {stop.runs} runs,"
             f" not less than {until.half_width:g}",
             soft_wrap=True,
         )
@@ -86,7 +85,6 @@ def print_stops(console: Console, result: CampaignResult) -> None:
         console.print(f"more runs: suave-des campaign --resume {result.folder} --runs N", soft_wrap=True)
 
 
-def _group(result: CampaignResult, group: Group) -> str:
-    point, manager = group
-    values = result.variation.sweep.values(point)
-    return " ".join([result.managers[manager], *(f"{name}={cell_of(value)}" for name, value in values.items())])
+def _group(result: CampaignResult, stop: GroupProgress) -> str:
+    values = result.variation.sweep.values(stop.point)
+    return " ".join([stop.manager, *(f"{name}={cell_of(value)}" for name, value in values.items())])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from suave_des.campaign.summary import METRIC_TITLES
+from suave_des.campaign.results import METRIC_TITLES
 from suave_des.cli.console import number, plain_table, print_table
 
 if TYPE_CHECKING:

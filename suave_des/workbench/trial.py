@@ -10,8 +10,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from suave_des.campaign.knowledge_file import KNOWLEDGE_FILE, read_knowledge
-from suave_des.campaign.knowledge_lines import CAMPAIGN_KNOWLEDGE_FILE, read_missions
+from suave_des.campaign.knowledge_records import CAMPAIGN_KNOWLEDGE_FILE, KNOWLEDGE_FILE, read_knowledge, read_missions
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.content import with_rules
 from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit

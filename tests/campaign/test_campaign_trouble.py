@@ -10,9 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from suave_des.campaign import executors
 from suave_des.campaign.campaign import CampaignInterrupted, resume_campaign, run_campaign
-from suave_des.campaign.executors import WorkerError
-from suave_des.campaign.missions import MissionRunner
+from suave_des.campaign.mission_runner import MissionRunner
+from suave_des.campaign.missions import WorkerError
 from suave_des.errors import InputError
 from tests.helpers import AWKWARD
 
@@ -118,6 +119,13 @@ def test_a_mission_that_takes_too_long_has_failed_and_the_others_go_on(workers: 
     for failure in result.failures:
         assert str(failure) == (f"manager {AWKWARD}:HangsInSome, run {failure.run}: not done after 2 s (time-out)")
     assert result.done == 24 - len(result.failures)
+
+
+def test_a_mission_that_cannot_be_interrupted_ends_with_its_worker(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(executors, "_MARGIN_S", 2.0)
+    result = run_campaign("seams2023", [f"{AWKWARD}:BlocksInSome"], 3, 1, 2, time_out_s=8.0)
+    assert [(failure.run, failure.cause) for failure in result.failures] == [(2, "not done after 8 s (time-out)")]
+    assert result.done == 2
 
 
 def test_missions_run_in_as_many_processes_as_asked_for() -> None:

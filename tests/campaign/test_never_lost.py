@@ -140,7 +140,7 @@ class TestRefusals:
     def test_another_scenario(self, change: str, difference: str, scenario: Path, tmp_path: Path) -> None:
         interrupted(scenario, tmp_path / "out")
         scenario.write_text(change)
-        with pytest.raises(InputError, match=rf"out: the campaign cannot go on: {difference}"):
+        with pytest.raises(InputError, match=rf"out: the campaign cannot be resumed: {difference}"):
             resume_campaign(tmp_path / "out")
 
     def test_a_comment_in_the_scenario_does_not_matter(self, scenario: Path, tmp_path: Path) -> None:
@@ -190,7 +190,7 @@ class TestRefusals:
             resume_campaign(tmp_path / "out", runs=10)
 
     def test_a_folder_without_a_campaign(self, tmp_path: Path) -> None:
-        with pytest.raises(InputError, match="there is no campaign to go on with"):
+        with pytest.raises(InputError, match="there is no campaign to resume"):
             resume_campaign(tmp_path)
 
     def test_a_new_campaign_in_the_folder_of_another(self, scenario: Path, tmp_path: Path) -> None:

@@ -14,10 +14,8 @@ from rich.console import Console
 from benchmarks import chaos
 from suave_des.campaign import display
 from suave_des.campaign.campaign import CampaignInterrupted, resume_campaign, run_campaign
-from suave_des.campaign.early_stop import UntilCi
-from suave_des.campaign.outcomes import COLUMNS, Failure, Finished
-from suave_des.campaign.plan import MissionKey
-from suave_des.campaign.progress import GROUPS_TOLD, OnProgress, Progress, Watch
+from suave_des.campaign.missions import COLUMNS, Failure, Finished, MissionKey
+from suave_des.campaign.progress import GROUPS_SHOWN, OnProgress, Progress, ProgressTracker, UntilCi
 from suave_des.estimates import estimate
 from tests.helpers import AWKWARD
 
@@ -30,13 +28,13 @@ def outcome(point: int, manager: int, run: int, value: float | None) -> Finished
     return MissionKey(point, manager, run), tuple(value if place == PLACE else None for place in range(len(COLUMNS)))
 
 
-class TestWatch:
+class TestProgressTracker:
     def test_knows_each_manager_s_mean(self) -> None:
-        watch = Watch(1, ["none", "random"], 5, None)
+        tracker = ProgressTracker(1, ["none", "random"], 5, None)
         values = [100.0, 120.0, 170.0]
-        watch.take(outcome(0, 0, run, value) for run, value in enumerate(values, 1))
-        watch.take([outcome(0, 0, 4, None)])
-        progress = watch.progress()
+        tracker.add(outcome(0, 0, run, value) for run, value in enumerate(values, 1))
+        tracker.add([outcome(0, 0, 4, None)])
+        progress = tracker.progress()
         assert (progress.done, progress.failed, progress.total) == (4, 1, 10)
         none, rest = progress.groups()
         low, high = estimate(values).mean_interval or (0.0, 0.0)
@@ -46,32 +44,32 @@ class TestWatch:
         assert (rest.manager, rest.done, rest.mean, rest.half_width) == ("random", 0, None, None)
 
     def test_a_manager_that_is_stopped_has_fewer_missions_in_all(self) -> None:
-        watch = Watch(1, ["none", "random"], 100, UntilCi("search_time_s", 5.0))
-        watch.take(outcome(0, 0, run, 100.0 + run % 2) for run in range(1, 31))
-        progress = watch.progress()
-        assert watch.is_over((0, 0))
-        assert not watch.is_over((0, 1))
+        tracker = ProgressTracker(1, ["none", "random"], 100, UntilCi("search_time_s", 5.0))
+        tracker.add(outcome(0, 0, run, 100.0 + run % 2) for run in range(1, 31))
+        progress = tracker.progress()
+        assert tracker.is_over((0, 0))
+        assert not tracker.is_over((0, 1))
         assert (progress.done, progress.total) == (20, 120)
-        assert [key.run for key, _ in watch.counted(outcome(0, 0, run, 1.0) for run in range(18, 24))] == [18, 19, 20]
+        assert [key.run for key, _ in tracker.counted(outcome(0, 0, run, 1.0) for run in range(18, 24))] == [18, 19, 20]
 
     def test_of_many_points_it_tells_and_remembers_few(self) -> None:
-        watch = Watch(1000, ["none"], 2, None)
+        tracker = ProgressTracker(1000, ["none"], 2, None)
         for point in range(500):
-            watch.take([outcome(point, 0, 1, 5.0), outcome(point, 0, 2, 6.0)])
-        watch.take([outcome(500, 0, 1, 7.0)])
-        groups = watch.progress().groups()
-        assert [group.point for group in groups] == list(range(501 - GROUPS_TOLD, 501))
-        assert (groups[-1].done, groups[-1].mean, watch.progress().total) == (1, 7.0, 2000)
+            tracker.add([outcome(point, 0, 1, 5.0), outcome(point, 0, 2, 6.0)])
+        tracker.add([outcome(500, 0, 1, 7.0)])
+        groups = tracker.progress().groups()
+        assert [group.point for group in groups] == list(range(501 - GROUPS_SHOWN, 501))
+        assert (groups[-1].done, groups[-1].mean, tracker.progress().total) == (1, 7.0, 2000)
 
 
 def shown_on(console: Console, label: str = "seams2023", until: UntilCi | None = None, *, quiet: bool = False) -> None:
     """Show a campaign of two managers that goes on for a while."""
-    watch = Watch(1, ["none", "a_module_with_a_long_name:AndAClass"], 40, until)
+    tracker = ProgressTracker(1, ["none", "a_module_with_a_long_name:AndAClass"], 40, until)
     with display.shown(label, console, quiet=quiet) as show:
         for run in range(1, 41):
-            watch.take([outcome(0, 0, run, None if run == 7 else 180.0 + run % 3)])
+            tracker.add([outcome(0, 0, run, None if run == 7 else 180.0 + run % 3)])
             if show is not None:
-                show(watch.progress())
+                show(tracker.progress())
 
 
 class TestOnATerminal:
@@ -87,7 +85,7 @@ class TestOnATerminal:
     def test_it_has_all_managers_and_fits(self, width: int, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(display, "_UPDATE_PERIOD_S", 0.0)
         _, head, names, none, other, *_ = self.last_screen(width)
-        assert re.search(r" 40/80  [\d,]+/s  [\w ]+ left  1 failed$", head)
+        assert re.search(r" 40/80 +[\d,]+/s +[\w ]+ left +1 failed$", head)
         assert names.split() == ["manager", "missions", "failed", "search", "time,", "s"]
         assert re.fullmatch(r"none +40 +1 +181\.00 ± 0\.27  done", none)
         assert re.fullmatch(r"a_module_with_a_long_name:AndAClass +0", other)
@@ -106,15 +104,15 @@ class TestOnATerminal:
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         seen: list[object] = []
-        monkeypatch.setattr(display._Display, "update", lambda self, now: seen.append(now))
-        watch = Watch(1, ["none"], 5000, None)
+        monkeypatch.setattr(display._Display, "look", lambda self: seen.append(self.progress))
+        tracker = ProgressTracker(1, ["none"], 5000, None)
         with display.shown("x", Console(file=io.StringIO(), force_terminal=True)) as show:
             assert show is not None
             monkeypatch.setattr(display.time, "monotonic", iter(range(10**6)).__next__)
             monkeypatch.setattr(display, "_UPDATE_PERIOD_S", 1000)
             for run in range(1, 5001):
-                watch.take([outcome(0, 0, run, 1.0)])
-                show(watch.progress())
+                tracker.add([outcome(0, 0, run, 1.0)])
+                show(tracker.progress())
         assert 4 <= len(seen) <= 6
 
 
@@ -133,7 +131,7 @@ class TestLines:
         self.lines(Console(file=text, width=40), monkeypatch)
         first, *_, last = text.getvalue().splitlines()
         assert first.startswith("suave-des: seams2023: ")
-        assert re.match(r"suave-des: seams2023: 40 of 80 missions, 1 failed, ", last)
+        assert re.match(r"suave-des: seams2023: 40 of 80 missions, 1 failed[,;] ", last)
         assert last.endswith("; search time, s: none 181.00 ± 0.27")
 
     def test_a_terminal_that_can_only_write_lines_has_them(self, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -193,7 +191,7 @@ class TestDuringACampaign:
         result = run_campaign("seams2023", managers, 12, 1, workers, tmp_path / "out", on_progress=seen.append)
         last = seen[-1]
         assert (last.done, last.failed, last.total) == (24, len(result.failures), 24)
-        for group, told in zip(last.groups(), result.summary_told(), strict=True):
+        for group, told in zip(last.groups(), result.summary_records(), strict=True):
             assert (group.manager, group.done - group.failed) == (told["manager"], told["n"])
             assert group.mean == pytest.approx(told["search_time_s_mean"])
             width = told["search_time_s_ci95_high"] - told["search_time_s_ci95_low"]

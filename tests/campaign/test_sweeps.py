@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.campaign.campaign import resume_campaign, run_campaign
-from suave_des.campaign.knowledge_lines import CAMPAIGN_KNOWLEDGE_FILE, read_missions
+from suave_des.campaign.knowledge_records import CAMPAIGN_KNOWLEDGE_FILE, read_missions
 from suave_des.campaign.sweep import Sample, Sweep
 from suave_des.errors import InputError
 from suave_des.scenario.loader import load_scenario, with_values

@@ -14,11 +14,10 @@ from hypothesis import strategies as st
 
 from benchmarks import chaos
 from suave_des.campaign.campaign import CampaignInterrupted, Progress, resume_campaign, run_campaign
-from suave_des.campaign.early_stop import FEWEST_RUNS, METRICS, Standing
-from suave_des.campaign.outcomes import COLUMNS, Failure, Outcome
-from suave_des.campaign.progress import OnProgress
+from suave_des.campaign.missions import COLUMNS, Failure, Outcome
+from suave_des.campaign.progress import FEWEST_RUNS, METRICS, GroupTracker, OnProgress
 from suave_des.errors import InputError
-from suave_des.estimates import Running, estimate
+from suave_des.estimates import RunningMean, estimate
 from tests.helpers import AWKWARD
 
 LIMIT = "initial_y_m:0.002"
@@ -46,7 +45,7 @@ def files_of(folder: Path) -> dict[str, bytes]:
     return {name: (folder / name).read_bytes() for name in FILES}
 
 
-class TestStanding:
+class TestGroupTracker:
     @given(
         st.lists(st.one_of(st.none(), st.just("failed"), st.floats(0.0, 300.0)), min_size=1, max_size=60),
         st.floats(0.5, 80.0),
@@ -69,24 +68,24 @@ class TestStanding:
                 if (high - low) / 2.0 < half_width:
                     last = run
                     break
-        standing = Standing(len(values), "search_time_s", half_width)
+        tracker = GroupTracker(len(values), "search_time_s", half_width)
         order = list(range(1, len(values) + 1))
         chance.shuffle(order)
         for run in order:
-            standing.take(run, outcomes[run - 1])
-        assert (standing.last_run, standing.done) == (last, last)
-        assert standing.failed == values[:last].count("failed")
+            tracker.add(run, outcomes[run - 1])
+        assert (tracker.runs, tracker.done) == (last, last)
+        assert tracker.failed == values[:last].count("failed")
 
     def test_a_run_that_comes_twice_counts_once(self) -> None:
-        standing = Standing(5, "search_time_s", None)
+        tracker = GroupTracker(5, "search_time_s", None)
         for run in (2, 2, 1, 1, 2, 3):
-            standing.take(run, row(10.0 * run))
-        assert (standing.done, standing.values.n, standing.values.mean) == (3, 3, 20.0)
+            tracker.add(run, row(10.0 * run))
+        assert (tracker.done, tracker.values.n, tracker.values.mean) == (3, 3, 20.0)
 
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=50))
 def test_running_sums_give_what_the_whole_sample_gives(values: list[float]) -> None:
-    running = Running()
+    running = RunningMean()
     for value in values:
         running.add(value)
     whole = estimate(values)
@@ -174,7 +173,7 @@ def test_a_limit_that_is_not_reached_is_told(scenario: Path, tmp_path: Path) -> 
     told = json.loads((tmp_path / "out" / "manifest.json").read_text())["until_ci"]
     assert told["managers"][0]["why"] == "all runs are done"
     assert told["managers"][0]["half_width"] > 0.00001
-    assert (result.done, result.stops[0].reached) == (25, False)
+    assert (result.done, result.stops[0].is_narrow) == (25, False)
 
 
 class TestResuming:
@@ -221,7 +220,7 @@ class TestResuming:
         ("run:5", r"no metric 'run'"),
         ("pipeline_found:0.1", r"no metric 'pipeline_found'"),
         (":5", r"no metric ''"),
-        *((f"search_time_s:{number}", "is no half-width") for number in ("", "0", "-5", "nan", "inf", "5 s", "1:2")),
+        *((f"search_time_s:{number}", "is not a half-width") for number in ("", "0", "-5", "nan", "inf", "5 s", "1:2")),
     ],
 )
 def test_a_limit_that_makes_no_sense_is_refused(text: str, words: str, tmp_path: Path) -> None:

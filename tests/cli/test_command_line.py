@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from suave_des.campaign.early_stop import RUNS_LIMIT_DEFAULT
+from suave_des.campaign.progress import RUNS_LIMIT_DEFAULT
 from suave_des.cli.main import main
 from tests.helpers.command import suave_des_command
 
@@ -107,7 +107,7 @@ class TestResume:
         [
             (("--resume", "out", "--seed", "0"), "--seed has no use with --resume"),
             (("seams2023", "--resume", "out"), "SCENARIO has no use with --resume"),
-            (("--resume", "nowhere"), "nowhere: there is no campaign to go on with"),
+            (("--resume", "nowhere"), "nowhere: there is no campaign to resume"),
             (("seams2023",), "--out DIR is missing"),
             (("--out", "out"), "SCENARIO is missing"),
         ],

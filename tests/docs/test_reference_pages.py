@@ -10,10 +10,10 @@ import yaml
 from doc_blocks import ROOT
 
 from suave_des import __version__
-from suave_des.campaign.outcomes import COLUMNS
+from suave_des.campaign.missions import COLUMNS
+from suave_des.campaign.results import SUMMARY_COLUMNS
 from suave_des.campaign.single import EVENT_COLUMNS, TRAJECTORY_COLUMNS, run_mission
 from suave_des.campaign.suave_format import suave_text
-from suave_des.campaign.summary import SUMMARY_COLUMNS
 
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 CSV_PAGE = ROOT / "docs" / "reference" / "csv.md"

@@ -76,7 +76,7 @@ class HangsInSome(_InRun):
     def adapt(self) -> None:
         while self.draw < 0.1:
             with suppress(Exception):
-                time.sleep(60.0)
+                time.sleep(0.2)
 
 
 class HangsOnce(_InRun):
@@ -94,15 +94,6 @@ class TellsItsProcess(NoManager):
 
     def task_requested(self, task: Task) -> None:
         raise RuntimeError(f"process {os.getpid()}")
-
-
-class KillsClusterWorkerInSome(_InRun):
-    """Ends the worker of the cluster that its process belongs to, in about one of ten runs."""
-
-    def adapt(self) -> None:
-        if self.draw < 0.1:
-            os.kill(os.getppid(), signal.SIGKILL)
-            time.sleep(60.0)
 
 
 class BlocksInSome(_InRun):

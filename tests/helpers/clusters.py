@@ -50,7 +50,7 @@ class Cluster:
             **own,
             "HOME": str(folder),
             "PYTHONPATH": os.pathsep.join([str(hooks), str(Path(suave_des.__file__).parents[1])]),
-            "JAVA_HOME": str(folder / "no_java"),  # what reasoners remember has to travel, too
+            "SUAVE_DES_JAVA_ARCHIVE": "off",
             "FORBIDDEN": str(forbidden),
             "OPENED": str(self._opened),
             **settings,
@@ -82,24 +82,11 @@ class Cluster:
         """What the scheduler or the workers said."""
         return "".join(path.read_text() for path in sorted(self.folder.glob(f"{command}_*.log")))
 
-    def mission_processes(self) -> list[int]:
-        """Processes that run missions for the workers."""
-        found = []
-        for path in Path("/proc").glob("[0-9]*"):
-            try:
-                is_one = b"mission_process" in (path / "cmdline").read_bytes()
-                if is_one and str(self.folder).encode() in (path / "environ").read_bytes():
-                    found.append(int(path.name))
-            except OSError:
-                continue
-        return found
-
     def stop(self) -> None:
         """End all processes."""
         for process in self._processes:
             process.kill()
             process.wait()
-        wait_until(lambda: not self.mission_processes())
 
     def _start(self, command: str, *arguments: str) -> subprocess.Popen[bytes]:
         with (self.folder / f"{command}_{len(self._processes)}.log").open("wb") as log:

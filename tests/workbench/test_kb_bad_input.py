@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from suave_des.campaign.knowledge_file import KNOWLEDGE_FILE, knowledge_text
+from suave_des.campaign.knowledge_records import KNOWLEDGE_FILE, knowledge_text
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario

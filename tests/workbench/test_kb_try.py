@@ -6,8 +6,15 @@ import json
 
 import pytest
 
-from suave_des.campaign.knowledge_file import KNOWLEDGE_FILE, knowledge_text, read_knowledge
-from suave_des.campaign.knowledge_lines import CAMPAIGN_KNOWLEDGE_FILE, mission_line, read_missions, scenario_line
+from suave_des.campaign.knowledge_records import (
+    CAMPAIGN_KNOWLEDGE_FILE,
+    KNOWLEDGE_FILE,
+    knowledge_text,
+    mission_line,
+    read_knowledge,
+    read_missions,
+    scenario_line,
+)
 from suave_des.campaign.single import run_mission
 from suave_des.errors import InputError
 from suave_des.scenario.models import Scenario

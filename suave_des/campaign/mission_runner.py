@@ -1,0 +1,160 @@
+"""Runs the missions of a campaign, in whatever process they are to run, each within its time limit."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import replace
+from types import FrameType
+
+from suave_des.campaign.knowledge_records import mission_line
+from suave_des.campaign.missions import Failure, Finished, JobSpec, MissionKey, Outcome, row_of
+from suave_des.campaign.sweep import cell_of
+from suave_des.errors import MissionError
+from suave_des.scenario.models import Mission
+from suave_des.simulation.result import MissionResult
+from suave_des.simulation.simulator import Simulator
+
+_REPEAT_S = 1.0
+"""A mission that swallowed the interruption is interrupted again after this time."""
+_POLL_S = 0.1
+
+
+class MissionRunner:
+    """Runs missions of one job in this process.
+
+    Args:
+        job: the scenario and what else decides a mission.
+        exit_after_s: in a thread other than the main one, end the process when a mission is this much over its time
+            and cannot be interrupted; None: wait for it.
+    """
+
+    def __init__(self, job: JobSpec, exit_after_s: float | None = None) -> None:
+        self._job = job
+        self._exit_after_s = exit_after_s
+        self._drawn = tuple(job.variation.drawn)
+        # Load or compile what missions run, before the first one's time counts: a mission of a second does.
+        short = job.loaded.scenario.model_copy(update={"mission": Mission(time_limit_s=1.0)})
+        Simulator(replace(job.loaded, scenario=short)).run("none", 1, 0)
+        self._go_to(0)
+
+    def each(self, missions: Iterable[MissionKey]) -> Iterator[Finished]:
+        """Yield the outcome of each mission, in order.
+
+        Raises:
+            InputError: the scenario, a manager or the knowledge base cannot be used at all.
+        """
+        with _time_limits(self._exit_after_s) as limit:
+            for key in missions:
+                yield key, self._outcome(key, limit)
+
+    def _outcome(self, key: MissionKey, limit: _Limit) -> Outcome:
+        job = self._job
+        if key.point != self._point:
+            self._go_to(key.point)
+        try:
+            with limit(job.time_out_s):
+                result = self._simulator.run(job.managers[key.manager], key.run, job.seed, record=job.record_knowledge)
+        except MissionError as error:
+            return Failure(error.manager, error.run, error.time_s, error.cause, point=key.point)
+        except TimeOut:
+            return job.timed_out(key)[1]
+        row = (*row_of(result.metrics), *self._swept, *(result.drawn[path] for path in self._drawn))
+        return (*row, self._knowledge(key, result)) if job.record_knowledge else row
+
+    def _knowledge(self, key: MissionKey, result: MissionResult) -> str:
+        if not result.knowledge:
+            return ""
+        variation = self._job.variation
+        values = variation.sweep.values(key.point)
+        swept = {variation.paths[name]: value for name, value in values.items()}
+        return mission_line(self._job.managers[key.manager], key.point, key.run, result.knowledge, swept)
+
+    def _go_to(self, point: int) -> None:
+        """Make the simulator of a point; only one is kept, as missions come point by point."""
+        variation = self._job.variation
+        loaded = variation.scenario(self._job.loaded, point)
+        self._point, self._simulator = point, Simulator(loaded, dict.fromkeys(variation.drawn, variation.runs_per_draw))
+        self._swept = tuple(map(cell_of, variation.sweep.values(point).values()))
+
+
+# Time limits, so that a manager that never returns costs its own mission only.
+
+
+class TimeOut(BaseException):
+    """A mission took too long; not an Exception, so that a manager that catches those does not catch this."""
+
+
+_Limit = Callable[[float], AbstractContextManager[None]]
+"""Makes the context in which TimeOut is raised after some seconds."""
+
+
+@contextmanager
+def _time_limits(exit_after_s: float | None) -> Iterator[_Limit]:
+    """Limit times in this thread: by the alarm signal in the main one, by a watching thread in others."""
+    if threading.current_thread() is not threading.main_thread():
+        with _Watchdog(exit_after_s) as watchdog:
+            yield watchdog.limit
+        return
+    before = signal.signal(signal.SIGALRM, _raise)
+    try:
+        yield _alarm
+    finally:
+        signal.signal(signal.SIGALRM, before)
+
+
+def _raise(number: int, frame: FrameType | None) -> None:
+    raise TimeOut
+
+
+@contextmanager
+def _alarm(seconds: float) -> Iterator[None]:
+    signal.setitimer(signal.ITIMER_REAL, seconds, _REPEAT_S)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+
+class _Watchdog:
+    """A thread that interrupts the one that made it. Code that blocks outside Python is interrupted when it returns."""
+
+    def __init__(self, exit_after_s: float | None) -> None:
+        self._exit_after_s = math.inf if exit_after_s is None else exit_after_s
+        self._target = ctypes.c_ulong(threading.get_ident())
+        self._deadline_s = self._next_s = math.inf
+        self._lock, self._over = threading.Lock(), threading.Event()
+        self._thread = threading.Thread(target=self._watch, daemon=True)
+
+    def __enter__(self) -> _Watchdog:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+
+    @contextmanager
+    def limit(self, seconds: float) -> Iterator[None]:
+        self._deadline_s = self._next_s = time.monotonic() + seconds
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._deadline_s = self._next_s = math.inf
+
+    def _watch(self) -> None:
+        while not self._over.wait(_POLL_S):
+            with self._lock:
+                now = time.monotonic()
+                if now > self._next_s:
+                    self._next_s = now + _REPEAT_S
+                    ctypes.pythonapi.PyThreadState_SetAsyncExc(self._target, ctypes.py_object(TimeOut))
+                if now > self._deadline_s + self._exit_after_s:
+                    os._exit(signal.SIGALRM)

@@ -1,0 +1,354 @@
+"""Runs a campaign: reads and checks its input, runs what is not done yet, keeps what is done, writes the files."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, suppress
+from dataclasses import replace
+from pathlib import Path
+
+from suave_des.campaign.executors import InProcess, LocalWorkers
+from suave_des.campaign.missions import Executor, Finished, JobSpec, MissionKey, WorkerError, plan
+from suave_des.campaign.output import check_output_folder, make_output_folder, remove_derived, remove_parts
+from suave_des.campaign.progress import OnProgress, ProgressTracker, parse_until_ci
+from suave_des.campaign.provenance import check_knowledge, check_same, deciding
+from suave_des.campaign.results import FILES, CampaignResult, gather, write_results
+from suave_des.campaign.spec import CampaignFile, CampaignSpec, read_campaign_file
+from suave_des.campaign.store import (
+    LOCK_FILE,
+    NEW_STORE_FILE,
+    STORE_FILE,
+    Store,
+    StoreError,
+    locked,
+    make_store,
+    remove_store,
+    stored_outcomes,
+)
+from suave_des.campaign.variation import Variation, vary
+from suave_des.errors import InputError, SuaveDesError
+from suave_des.scenario.loader import LoadedScenario, load_scenario
+
+LARGE = 1_000_000
+"""Missions from which a campaign needs to be confirmed."""
+_TIMED_RUNS = 3
+
+
+class CampaignInterrupted(KeyboardInterrupt):
+    """Ctrl-C during a campaign; finished missions are kept.
+
+    Attributes:
+        result: with the missions that were finished.
+    """
+
+    def __init__(self, result: CampaignResult) -> None:
+        self.result = result
+        super().__init__(f"interrupted; {result.kept()}")
+
+
+def run(spec: CampaignSpec, on_progress: OnProgress | None = None) -> CampaignResult:
+    """Run a campaign.
+
+    The result is the same for any number of workers, and however often the campaign was interrupted and resumed. A
+    mission that fails (its manager raises, it takes too long, it ends its worker process again and again) has no row;
+    the others are kept.
+
+    Args:
+        spec: what to run; what it leaves to the campaign file is read from there.
+        on_progress: called when missions are done.
+
+    Raises:
+        InputError: something given cannot be used; nothing is written then.
+        WorkerError: worker processes end again and again; finished missions are kept.
+        StoreError: the disk is full, or the folder was removed.
+        CampaignInterrupted: Ctrl-C; finished missions are kept.
+    """
+    if spec.out is not None:
+        _check_new(spec.out, overwrite=spec.overwrite)
+    file = read_campaign_file(spec.scenario)
+    with ExitStack() as stack:
+        campaign = _Campaign(spec, file, stack)
+        if spec.suave_format and campaign.variation.sweep.points > 1:
+            raise InputError(
+                "the exemplar's results file has no column for what a sweep varies",
+                remedy="leave --format suave out, or run a campaign for each point",
+            )
+        if not spec.confirmed:
+            campaign.check_size()
+        return campaign.run(on_progress, resumed=False)
+
+
+def resume(
+    folder: Path,
+    on_progress: OnProgress | None = None,
+    *,
+    workers: int = 1,
+    scheduler: str | None = None,
+    runs: int | None = None,
+    until_ci: str | None = None,
+) -> CampaignResult:
+    """Run what is missing of the campaign in a folder; see campaign.resume_campaign.
+
+    Raises:
+        InputError: there is no campaign, it is damaged or in use, or something that decides results has changed; the
+            difference is named.
+        WorkerError, StoreError, CampaignInterrupted: as run.
+    """
+    spec = _stored_spec(folder, runs, until_ci)
+    spec = replace(spec, out=folder, workers=workers, scheduler=scheduler)
+    with ExitStack() as stack:
+        try:
+            campaign = _Campaign(spec, read_campaign_file(spec.scenario), stack)
+        except InputError as error:
+            if str(Path.cwd()) == spec.folder:
+                raise
+            remedy = f"the campaign was started in {spec.folder}: resume it there"
+            raise InputError(error.problem, file=error.file, place=error.place, remedy=remedy) from None
+        return campaign.run(on_progress, resumed=True)
+
+
+def _check_new(folder: Path, *, overwrite: bool) -> None:
+    check_output_folder(folder, "campaign", overwrite=overwrite, left_over=_is_of_campaign)
+    if not overwrite and (folder / STORE_FILE).exists():
+        raise InputError(
+            "the output folder is not empty: it has a campaign in it",
+            file=folder,
+            remedy=f"--resume {folder} goes on with it, --overwrite replaces it",
+        )
+
+
+def _is_of_campaign(name: str) -> bool:
+    """Whether a file is a campaign's own; without a store it is what is left of one that was killed as it began."""
+    return name in (LOCK_FILE, *FILES) or name.startswith((STORE_FILE, NEW_STORE_FILE))
+
+
+def _stored_spec(folder: Path, runs: int | None, until_ci: str | None) -> CampaignSpec:
+    if not (folder / STORE_FILE).is_file():
+        raise InputError("there is no campaign to resume", file=folder, remedy="start one with --out")
+    with locked(folder):
+        store = Store(folder / STORE_FILE)
+        try:
+            return CampaignSpec.of_stored(store.about("request"), runs=runs, until_ci=until_ci)
+        finally:
+            store.close()
+
+
+class _Campaign:
+    """A campaign whose input is read and checked.
+
+    Args:
+        spec: what to run.
+        file: the campaign file, if the specification names one.
+        stack: what is started is stopped at its end.
+    """
+
+    def __init__(self, spec: CampaignSpec, file: CampaignFile | None, stack: ExitStack) -> None:
+        self.spec = spec = spec.with_file(file)
+        try:
+            spec.check()
+        except InputError as error:
+            raise error if file is None or "until_ci" not in spec.from_file else file.located(error) from None
+        self._stack = stack
+        self._local = self._start_workers()
+        self.loaded, self.variation, self.inputs = _read(spec, file)
+        self.job = JobSpec(
+            self.loaded, self.variation, spec.managers, spec.seed, spec.time_out_s, spec.record_knowledge
+        )
+        self.tracker = self._new_tracker()
+
+    def _start_workers(self) -> Executor:
+        """Start worker processes at once: they import what they need while this process reads and checks."""
+        spec = self.spec
+        workers = spec.workers if spec.sweep else min(spec.workers, len(spec.managers) * spec.runs)
+        if workers == 1:
+            return InProcess()
+        return self._stack.enter_context(LocalWorkers(spec.managers, workers))
+
+    def _executor(self) -> Executor:
+        """Return what runs the missions; a cluster is contacted only when all else is checked."""
+        if self.spec.scheduler is None:
+            return self._local
+        from suave_des.campaign.dask_cluster import connected
+
+        return self._stack.enter_context(connected(self.spec.scheduler))
+
+    def _new_tracker(self) -> ProgressTracker:
+        spec = self.spec
+        until = None if spec.until_ci is None else parse_until_ci(spec.until_ci)
+        return ProgressTracker(self.variation.sweep.points, spec.managers, spec.runs, until)
+
+    def check_size(self) -> None:
+        """See that a very large campaign is meant.
+
+        Raises:
+            InputError: it has more than LARGE missions; the time that they take is estimated from some of them.
+        """
+        total, workers = self.tracker.total, self.spec.workers
+        if total <= LARGE:
+            return
+        from suave_des.campaign.mission_runner import MissionRunner
+
+        managers = range(len(self.spec.managers))
+        few = tuple(MissionKey(0, manager, run) for manager in managers for run in range(1, _TIMED_RUNS + 1))
+        runner = MissionRunner(self.job)
+        list(runner.each(few[::_TIMED_RUNS]))  # compiles, and fills the reasoner's cache
+        began_s = time.perf_counter()
+        list(runner.each(few))
+        expected_s = (time.perf_counter() - began_s) / len(few) * total / workers
+        by = f"{workers} worker{'s' if workers > 1 else ''}"
+        problem = f"{total:,} missions take about {_duration_text(expected_s)} with {by} on this machine"
+        raise InputError(problem, remedy="give --yes if that is meant")
+
+    def run(self, on_progress: OnProgress | None, *, resumed: bool) -> CampaignResult:
+        """Run what is not done yet, and write the files."""
+        executor, folder = self._executor(), self.spec.out
+        with ExitStack() as stack:
+            if folder is not None:
+                if not folder.exists():
+                    stack.callback(_remove_empty, folder)  # unless something is in it then
+                make_output_folder(folder)
+                stack.enter_context(locked(folder))
+                remove_parts(folder, FILES)
+            if not resumed:
+                stack.callback(self._remove_store_if_empty)
+            store = self._store(resumed=resumed)
+            try:
+                stopped = self._work(store, executor, on_progress)
+                is_empty = store.count() == 0
+            finally:
+                if folder is not None:
+                    store.close()
+            if stopped is not None and is_empty and not resumed:
+                raise stopped
+            if isinstance(stopped, StoreError):
+                raise StoreError(f"{stopped}{self._how_to_go_on()}") from None
+            if isinstance(stopped, InputError):
+                raise stopped
+            try:
+                result = self._results(store, is_whole=stopped is None)
+            except KeyboardInterrupt:
+                if folder is None:
+                    raise
+                raise KeyboardInterrupt(f"interrupted; {self._how_to_have_files()}") from None
+        if isinstance(stopped, WorkerError):
+            raise WorkerError(f"{stopped}; {result.kept()}")
+        if stopped is not None:
+            raise CampaignInterrupted(result)
+        return result
+
+    def _store(self, *, resumed: bool) -> Store:
+        folder = self.spec.out
+        if folder is None:
+            return Store(None)
+        about = {"request": self.spec.stored(), "deciding": deciding(self.spec, self.loaded, self.inputs)}
+        path = folder / STORE_FILE
+        if not resumed:
+            make_store(path, about)
+            remove_derived(folder)
+        store = Store(path)
+        try:
+            if resumed:
+                check_same(store.about("deciding"), about["deciding"], folder)
+                store.forget_passing_failures()
+                for name, value in about.items():
+                    store.note(name, value)
+        except BaseException:
+            store.close()
+            raise
+        return store
+
+    def _work(
+        self, store: Store, executor: Executor, on_progress: OnProgress | None
+    ) -> KeyboardInterrupt | SuaveDesError | None:
+        """Run missions until all are done; return what stopped the campaign before that."""
+        tracker, spec = self.tracker, self.spec
+        try:
+            tracker.add_earlier(store.outcomes())
+            points = self.variation.sweep.points
+            missions = plan(points, len(spec.managers), spec.runs, store.settled, tracker.is_over)
+            if left := tracker.total - tracker.done:
+                for finished in executor.outcomes(self.job, missions, left):
+                    store.append(finished)
+                    tracker.add(finished)
+                    if on_progress is not None:
+                        on_progress(tracker.progress())
+            store.commit()
+        except (KeyboardInterrupt, SuaveDesError) as error:
+            if not isinstance(error, StoreError):
+                with suppress(StoreError):  # which is reported when the files cannot be written either
+                    store.commit()
+            return error
+        return None
+
+    def _results(self, store: Store, *, is_whole: bool) -> CampaignResult:
+        outcomes, tracker = self._outcomes(store), self.tracker
+        if not is_whole:  # it may have been interrupted while it counted
+            tracker = self._new_tracker()
+            tracker.add(outcomes())
+        result = gather(
+            self.spec,
+            self.loaded,
+            self.variation,
+            lambda: tracker.counted(outcomes()),
+            planned=tracker.total,
+            stops=tracker.stops(),
+        )
+        if self.spec.out is not None:
+            try:
+                write_results(result, self.inputs)
+            except InputError as error:
+                raise InputError(error.problem, file=error.file, remedy=self._how_to_have_files()) from None
+        return result
+
+    def _outcomes(self, store: Store) -> Callable[[], Iterator[Finished]]:
+        if self.spec.out is None:
+            return store.outcomes
+        path = self.spec.out / STORE_FILE
+        return lambda: stored_outcomes(path)
+
+    def _remove_store_if_empty(self) -> None:
+        """Remove a store without outcomes; one that cannot be read stays."""
+        if self.spec.out is not None:
+            with suppress(SuaveDesError):
+                if next(stored_outcomes(self.spec.out / STORE_FILE), None) is None:
+                    remove_store(self.spec.out)
+
+    def _how_to_have_files(self) -> str:
+        return f"nothing is lost: suave-des campaign --resume {self.spec.out} writes the files"
+
+    def _how_to_go_on(self) -> str:
+        if self.spec.out is None or not (self.spec.out / STORE_FILE).exists():
+            return ""
+        return f"; what was kept before is safe: suave-des campaign --resume {self.spec.out} does the rest"
+
+
+def _read(spec: CampaignSpec, file: CampaignFile | None) -> tuple[LoadedScenario, Variation, dict[str, str]]:
+    loaded = load_scenario(
+        spec.scenario if file is None else file.scenario,
+        ontologies=spec.ontologies,
+        modes_file=spec.modes_file,
+        reasoner=spec.reasoner,
+        rules=spec.rules,
+        disabled_rules=spec.disabled_rules,
+    )
+    given = bool(spec.ontologies or spec.rules or spec.disabled_rules)
+    try:
+        loaded, variation = vary(loaded, spec.sweep, spec.perturbations, spec.runs_per_draw, spec.seed)
+    except InputError as error:
+        raise error if file is None else file.located(error) from None
+    inputs = check_knowledge(loaded, spec.managers, given=given)
+    return loaded, variation, inputs if file is None else {**inputs, **file.inputs}
+
+
+def _duration_text(seconds: float) -> str:
+    units = (("year", 31_557_600.0), ("day", 86_400.0), ("hour", 3_600.0), ("minute", 60.0))
+    for unit, length_s in units:
+        if seconds >= 2 * length_s:
+            return f"{seconds / length_s:,.0f} {unit}s"
+    return f"{seconds:.0f} seconds"
+
+
+def _remove_empty(folder: Path) -> None:
+    with suppress(OSError):
+        folder.rmdir()

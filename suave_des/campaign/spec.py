@@ -1,0 +1,294 @@
+"""What a campaign is asked to do: its specification, campaign files, and the checks of both."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field, ValidationError
+
+from suave_des.campaign.progress import RUNS_LIMIT_DEFAULT, parse_until_ci
+from suave_des.errors import InputError, KeyPath, shown
+from suave_des.managing.registry import manager_class
+from suave_des.resources import find
+from suave_des.scenario.layers import Files, Layer, find_named
+from suave_des.scenario.problems import input_error
+from suave_des.scenario.quantities import Number, Strict
+
+FORMAT = 1
+"""Version of the format of campaign files."""
+RUNS_LIMIT = 1_000_000
+SEED_LIMIT = 2**63 - 1
+"""The greatest that tools which read the result files can hold."""
+_WORKERS_PER_CORE = 4
+_LONGEST_TIME_OUT_S = 1e6
+
+
+class CampaignSettings(Strict):
+    """What a campaign file may contain; values given on the command line or in a call take precedence."""
+
+    campaign: int
+    """Version of the format: 1."""
+    scenario: str
+    """The scenario to start from: a file named relative to this one, or the name of a shipped one."""
+    managers: tuple[str, ...] = ("none", "random", "metacontrol")
+    """Managing subsystems: names, or module:Class."""
+    runs: Annotated[int, Field(strict=True)] = 20
+    """Missions for each manager at each point of the sweep."""
+    seed: Annotated[int, Field(strict=True)] = 1
+    """Seed of everything that is random."""
+    time_out_s: Number = 120.0
+    """Wall-clock time that one mission may take, in s."""
+    until_ci: str | None = None
+    """METRIC:HALF_WIDTH: a manager is stopped, at each point separately, when half the 95% interval of the metric's
+    mean is less; `runs` is then how many there are at most, and 10000 if it is left out."""
+    perturbations: dict[str, Any] = Field(default_factory=dict)
+    """Distributions by key path of the scenario: each run draws its own value, the same under all managers and at all
+    points."""
+    runs_per_draw: Annotated[int, Field(strict=True)] = 1
+    """How many consecutive runs share the values of the perturbations."""
+    sweep: dict[str, Any] = Field(default_factory=dict)
+    """Lists of values by key path of the scenario, each combined with each; or a mapping with `grid` (the same), `zip`
+    (lists of which the first values go together, then the second) and `sample` (a sampled design: `method`
+    latin_hypercube or sobol, `points`, and `ranges` by key path), which are combined with each other."""
+
+
+_DEFAULTS = CampaignSettings(campaign=FORMAT, scenario="")
+_FILE_KEYS = tuple(name for name in CampaignSettings.model_fields if name not in ("campaign", "scenario"))
+_NOT_STORED = ("out", "workers", "scheduler", "overwrite", "confirmed")
+"""How and where a campaign runs, which does not decide its results; it may differ when it is resumed."""
+
+
+@dataclass(frozen=True)
+class CampaignSpec:
+    """What a campaign is asked to do. Make one with `of`, which knows what was left to the campaign file.
+
+        spec = CampaignSpec.of("seams2023", managers=["none", "metacontrol"], runs=100, out="results")
+
+    Attributes:
+        scenario: path of a scenario or campaign file, or name of a shipped scenario.
+        managers: names, or module:Class.
+        runs: missions for each manager, at each point of the sweep; with `until_ci` at most.
+        seed: of everything that is random.
+        time_out_s: wall-clock time that a mission may take.
+        until_ci: METRIC:HALF_WIDTH, when a manager is stopped before it had all runs; None: never.
+        sweep: lists of values by key path of the scenario; or a mapping with grid, zip and sample, as in a campaign
+            file. Each parameter is a column of runs.csv.
+        perturbations: distributions by key path of the scenario: each run draws its own value, the same under all
+            managers and at all points. Each is a column of runs.csv.
+        runs_per_draw: how many consecutive runs share what is drawn.
+        ontologies: files in place of the scenario's.
+        modes_file: file in place of the scenario's.
+        reasoner: in place of the scenario's.
+        rules: files of rules as text, besides the scenario's.
+        disabled_rules: names of rules to switch off, besides the scenario's.
+        suave_format: whether the exemplar's own results file is written, too.
+        record_knowledge: whether the states that managers reasoned about are kept, for `kb try`.
+        out: folder for the result files; it is made if its parent exists. None: no files.
+        workers: processes; with 1 the missions run in this one.
+        scheduler: address of a Dask scheduler, such as tcp://127.0.0.1:8786, on whose workers missions run instead.
+        overwrite: whether results in the folder may be replaced.
+        confirmed: whether more than a million missions are meant.
+        from_file: names of those above that the campaign file decides, or else the defaults.
+        folder: where relative paths begin.
+        command: the command line, for the manifest.
+    """
+
+    scenario: str
+    managers: tuple[str, ...] = _DEFAULTS.managers
+    runs: int = _DEFAULTS.runs
+    seed: int = _DEFAULTS.seed
+    ontologies: tuple[str, ...] = ()
+    modes_file: str | None = None
+    reasoner: str | None = None
+    rules: tuple[str, ...] = ()
+    disabled_rules: tuple[str, ...] = ()
+    suave_format: bool = False
+    record_knowledge: bool = False
+    time_out_s: float = _DEFAULTS.time_out_s
+    until_ci: str | None = None
+    sweep: Mapping[str, Any] = field(default_factory=dict)
+    perturbations: Mapping[str, Any] = field(default_factory=dict)
+    runs_per_draw: int = 1
+    from_file: tuple[str, ...] = ()
+    folder: str = ""
+    command: tuple[str, ...] = ()
+    out: Path | None = None
+    workers: int = 1
+    scheduler: str | None = None
+    overwrite: bool = False
+    confirmed: bool = False
+
+    @classmethod
+    def of(cls, scenario: str | Path, **options: Any) -> CampaignSpec:
+        """Make a specification from options by name; None leaves one to the campaign file, or to the defaults."""
+        given = {name: value for name, value in options.items() if value is not None}
+        for name in ("ontologies", "rules"):
+            given[name] = tuple(map(str, given.get(name, ())))
+        for name in ("managers", "disabled_rules", "command"):
+            if name in given:
+                given[name] = tuple(given[name])
+        if "modes_file" in given:
+            given["modes_file"] = str(given["modes_file"])
+        if "out" in given:
+            given["out"] = Path(given["out"])
+        left_out = tuple(name for name in _FILE_KEYS if name not in given)
+        return cls(str(scenario), **given, from_file=left_out, folder=str(Path.cwd()))
+
+    def with_file(self, file: CampaignFile | None) -> CampaignSpec:
+        """Return the same with what a campaign file decides; None: with the defaults."""
+        spec = replace(self, **settings_for(file, self.from_file))
+        if spec.until_ci is None or "runs" not in spec.from_file or (file is not None and file.sets("runs")):
+            return spec
+        return replace(spec, runs=RUNS_LIMIT_DEFAULT)
+
+    def stored(self) -> dict[str, Any]:
+        """Return what a resumed campaign needs, as plain data."""
+        plain = {name: value for name, value in asdict(self).items() if name not in _NOT_STORED}
+        plain["of_file"] = plain.pop("from_file")
+        return plain
+
+    @classmethod
+    def of_stored(cls, plain: Mapping[str, Any], **changed: Any) -> CampaignSpec:
+        """Make a specification of what `stored` returned, with changes."""
+        parts = {name: tuple(value) if isinstance(value, list) else value for name, value in plain.items()}
+        from_file = parts.pop("of_file")
+        changed = {name: value for name, value in changed.items() if value is not None}
+        left_out = tuple(name for name in from_file if name not in changed)
+        return cls(**{**parts, **changed, "from_file": left_out})
+
+    def check(self) -> None:
+        """See that the values make sense, without reading anything.
+
+        Raises:
+            InputError: no, unknown or repeated managers, a scheduler besides workers, or a number out of range.
+        """
+        if not self.managers:
+            raise InputError("no managers are given", remedy="for instance none,random,metacontrol")
+        for index, manager in enumerate(self.managers):
+            manager_class(manager)
+            if manager in self.managers[:index]:
+                raise InputError(f"manager {manager!r} is given twice", remedy="name each manager once")
+        check_range("runs", self.runs, 1, RUNS_LIMIT)
+        check_workers(self.workers)
+        if self.scheduler is not None:
+            from suave_des.campaign.dask_cluster import check_address
+
+            if self.workers != 1:
+                raise InputError(
+                    f"workers: {self.workers} has no use with a scheduler, whose own workers run the missions",
+                    remedy="leave it out; `dask worker --nworkers N` says how many missions run there at a time",
+                )
+            check_address(self.scheduler)
+        check_seed(self.seed)
+        if not 0.0 < self.time_out_s <= _LONGEST_TIME_OUT_S:
+            remedy = f"give seconds above 0, at most {_LONGEST_TIME_OUT_S:g}"
+            raise InputError(f"time-out: {self.time_out_s:g} is out of range", remedy=remedy)
+        if self.until_ci is not None:
+            parse_until_ci(self.until_ci)
+
+
+def check_range(what: str, number: int, least: int, greatest: int) -> None:
+    """See that a number lies between two others.
+
+    Raises:
+        InputError: it does not.
+    """
+    if not least <= number <= greatest:
+        raise InputError(f"{what}: {shown(number)} is out of range", remedy=f"give {least} to {greatest}")
+
+
+def check_seed(seed: int) -> None:
+    """See that a seed fits into result files.
+
+    Raises:
+        InputError: it does not.
+    """
+    check_range("seed", seed, 0, SEED_LIMIT)
+
+
+def check_workers(workers: int) -> None:
+    """See that so many processes make sense on this machine.
+
+    Raises:
+        InputError: they do not.
+    """
+    cores = os.cpu_count() or 1
+    limit = _WORKERS_PER_CORE * cores
+    if not 1 <= workers <= limit:
+        raise InputError(
+            f"workers: {workers} is out of range",
+            remedy=f"give 1 to {limit}; this machine has {cores} cores, and more workers than cores gain nothing",
+        )
+
+
+# Campaign files.
+
+
+@dataclass(frozen=True)
+class CampaignFile:
+    """A campaign file that was read.
+
+    Attributes:
+        settings: its content.
+        scenario: path of the scenario that it names.
+        inputs: SHA-256 of the file, by its name as shown to the user.
+        layer: has the lines.
+    """
+
+    settings: CampaignSettings
+    scenario: Path
+    inputs: Mapping[str, str]
+    layer: Layer = field(repr=False)
+
+    def sets(self, name: str) -> bool:
+        """Return whether a key stands in the file."""
+        return name in self.settings.model_fields_set
+
+    def located(self, error: InputError) -> InputError:
+        """Return an error about a key path of this file with its line."""
+        path = self._key_path(error.place or "")
+        return self.layer.error(error.problem, path, error.remedy) if path else error
+
+    def _key_path(self, place: str) -> KeyPath:
+        """Split a place such as "sweep.grid.start.x_m" into keys of this file: those below may have points in them."""
+        path: list[str | int] = []
+        here: Any = self.layer.data
+        while place and isinstance(here, Mapping):
+            key = next((key for key in here if place == key or place.startswith(f"{key}.")), None)
+            if key is None:
+                break
+            path.append(key)
+            here, place = here[key], place[len(key) + 1 :]
+        return tuple(path)
+
+
+def read_campaign_file(name: str | Path) -> CampaignFile | None:
+    """Read a campaign file; None if the file is something else, such as a scenario.
+
+    Raises:
+        InputError: it cannot be read, is of another version, or has a value that cannot be right.
+    """
+    files = Files()
+    layer = Layer.of(files.yaml(find(name, "scenarios")), 0)
+    if "campaign" not in layer.data:
+        return None
+    version = layer.data["campaign"]
+    if version != FORMAT or isinstance(version, bool):
+        problem = f"a campaign file of version {shown(version)}, and this suave-des reads version {FORMAT}"
+        raise layer.error(problem, ("campaign",), f"write campaign: {FORMAT}, and see docs/guides/sweeps.md")
+    try:
+        settings = CampaignSettings.model_validate(layer.data)
+    except ValidationError as error:
+        raise input_error(error, layer, CampaignSettings) from None
+    scenario = find_named(layer, ("scenario",), settings.scenario, "scenarios")
+    return CampaignFile(settings, scenario, files.inputs, layer)
+
+
+def settings_for(file: CampaignFile | None, names: Iterable[str]) -> dict[str, Any]:
+    """Return the values that a campaign file has for some of its keys; without a file, the defaults."""
+    settings = _DEFAULTS if file is None else file.settings
+    return {name: getattr(settings, name) for name in names}
