@@ -46,7 +46,7 @@ def test_an_archive_is_used_and_a_damaged_one_is_removed_without_a_word(tmp_path
 def test_of_several_processes_one_makes_the_archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     started: list[object] = []
     monkeypatch.setattr(subprocess, "Popen", lambda *command, **_: started.append(command) or _Started())
-    archive = tmp_path / "java" / "1.jsa"
+    archive = tmp_path / "java" / "1.aot"
     for _ in range(3):
         java_archive.make_later(archive)
     assert len(started) == 1
@@ -67,13 +67,13 @@ class _Started:
 def test_a_folder_that_cannot_be_written_to_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: pytest.fail("a process was started"))
     (tmp_path / "file").touch()
-    java_archive.make_later(tmp_path / "file" / "java" / "1.jsa")
+    java_archive.make_later(tmp_path / "file" / "java" / "1.aot")
 
 
 def test_it_can_be_switched_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SUAVE_DES_JAVA_ARCHIVE", "off")
-    assert java_archive.archive_path((), ()) is None
-    assert java_archive.use_options(None) == ()
+    assert java_archive.archive_path([]) is None
+    assert java_archive.options_for(None) == ()
     java_archive.make_later(None)
     made = _python("-m", "suave_des.knowledge.java_archive", cache=tmp_path, switch="off")
     assert made.returncode == 0 and "switched off" in made.stdout

@@ -77,7 +77,7 @@ def full(name: str) -> str:
         ("A: B(?x -> C(?x)", "line 1, column 9", "expected , or )"),
         ("A: B(?x)) -> C(?x)", "line 1, column 9", "expected ^ or ->"),
         ("A: B(?x)\n  C(?x) -> D(?x)", "line 2, column 3", "expected ^ or -> instead of C"),
-        ("A B(?x) -> C(?x)", "line 1, column 3", "expected : after the rule's name A"),
+        ("A B(?x) -> C(?x)", "line 1, column 3", "expected : after A, instead of B"),
         ("A: B(?x) ->", "line 1, column 12", "the text ends here"),
         ("A: -> ", "line 1, column 7", "the text ends here"),
         ('A: B(?x) -> c(?x, "open)', "line 1, column 19", "no closing quote"),

@@ -1,4 +1,4 @@
-"""Read SWRL rules from text in the usual human-readable syntax.
+"""Parse SWRL rules from text in the usual human-readable syntax.
 
     # a comment, to the end of the line
     prefix my: <http://example.org/my#>
@@ -9,21 +9,26 @@
     disabled "a name with spaces": Component(?c) -> my:seen(?c, true)
 
 A rule ends where its head does. Atoms are joined by ^ or a comma. Names are bare where that is unambiguous, else
-prefixed or in angle brackets; names of rules that are no single word stand in quotes.
+prefixed or in angle brackets; names of rules that are not a single word are quoted.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+import threading
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final
+from typing import TYPE_CHECKING, Any, Final
 
 from suave_des.knowledge.rdf import Lit
 from suave_des.knowledge.rules.syntax import Atom, Named, ParsedRule, Place, RuleError, Term, Variable
 from suave_des.knowledge.vocabulary import MROS, OWL, RDF, RDFS, SUAVE, SWRL, SWRLA, SWRLB, TOMASYS, XSD, nearest
+
+if TYPE_CHECKING:
+    from lark import Lark, Token
 
 #: Prefixes that need not be declared.
 PREFIXES: Final[Mapping[str, str]] = MappingProxyType(
@@ -42,49 +47,98 @@ PREFIXES: Final[Mapping[str, str]] = MappingProxyType(
 )
 MAX_DIGITS: Final = 400
 _WORD: Final = r"[^\W\d][\w.-]*(?<![.-])"
-_SPACE: Final = re.compile(r"(?:\s|#[^\n]*)*")
-_NAME: Final = re.compile(_WORD)
-_PREFIXED: Final = re.compile(rf"({_WORD})?:((?!\d)[\w.-]*(?<![.-]))")
-_IRI: Final = re.compile(r"<([^<>\"{}|\\^`\s\x00-\x20]+)>")
-_VARIABLE: Final = re.compile(r"\?([\w-]+)")
-_NUMBER: Final = re.compile(r"[+-]?(?:[0-9]+(\.[0-9]*)?|(\.[0-9]+))([eE][+-]?[0-9]{1,4})?(?![\w.])")
-_STRING: Final = re.compile(r'"((?:[^"\\\n]|\\.)*)"')
-_LANGUAGE: Final = re.compile(r"@([A-Za-z]+(?:-[A-Za-z0-9]+)*)")
+#: Where a rule's name is expected, lark's contextual lexer reads a word alone; elsewhere "my:seen" is a prefixed name.
+_GRAMMAR: Final = rf"""
+start: (prefix | rule)*
+prefix: PREFIX NAME _COLON IRI
+rule: DISABLED? rule_name _COLON body _ARROW atoms
+rule_name: NAME | STRING
+body: atoms?
+atoms: atom ((_AND | _COMMA) atom)*
+atom: name _LPAR (term (_COMMA term)*)? _RPAR
+term: VARIABLE | NUMBER | STRING (_DATATYPE name | LANGUAGE)? | name
+name: IRI | PREFIXED | NAME
+
+PREFIX.3: /prefix(?![\w.-])(?!(\s|#[^\n]*)*:)/
+DISABLED.3: /disabled(?![\w.-])(?!(\s|#[^\n]*)*:)/
+PREFIXED.2: /({_WORD})?:(?!\d)[\w.-]*\w/
+NAME: /{_WORD}/
+IRI: /<[^<>"{{}}|\\^`\s\x00-\x20]+>/
+VARIABLE: /\?[\w-]+/
+NUMBER: /[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]{{1,4}})?(?![\w.])/
+STRING: /"([^"\\\n]|\\.)*"/
+LANGUAGE: /@[A-Za-z]+(-[A-Za-z0-9]+)*/
+_DATATYPE: "^^"
+_ARROW: /->|→/
+_AND: /\^|∧/
+_COMMA: ","
+_COLON: ":"
+_LPAR: "("
+_RPAR: ")"
+%ignore /\s+/
+%ignore /#[^\n]*/
+"""
+#: What stands for the terminals of which the first is expected, and what would be right; the first that fits counts.
+_EXPECTED: Final = (
+    ("VARIABLE", 'an argument, such as ?o, 2.5, "text", true or an individual,', None),
+    ("PREFIXED", "an atom, such as Objective(?o),", None),
+    ("DISABLED", "a rule's name", 'write name: body -> head, or "a name": body -> head'),
+    ("NAME", "a prefix", "write prefix my: <http://example.org/my#>"),
+    ("IRI", "an IRI in angle brackets", "write prefix my: <http://example.org/my#>"),
+    ("_ARROW", "^ or ->", "a rule is name: body -> head"),
+    ("_RPAR", ", or )", "parentheses must balance"),
+    ("_LPAR", "(", None),
+    ("_COLON", ":", "a rule is name: body -> head"),
+)
+_HEADER: Final = re.compile(rf'^(?:disabled\s+)?(?:{_WORD}|"[^"\n]*")\s*:(?![:/])|^prefix\s', re.MULTILINE)
 _ESCAPE: Final = re.compile(r"\\(?:u([0-9A-Fa-f]{4})|U([0-9A-Fa-f]{8})|(.))", re.DOTALL)
 _ESCAPED: Final = {"n": "\n", "t": "\t", "r": "\r", '"': '"', "\\": "\\"}
-_ARROW: Final = re.compile(r"->|→")
-_AND: Final = re.compile(r"\^|∧|,")
-_HEADER: Final = re.compile(rf'^(?:disabled\s+)?(?:{_WORD}|"[^"\n]*")\s*:(?![:/])|^prefix\s', re.MULTILINE)
 #: What no text may contain: control characters, and halves of surrogate pairs, which no file can encode.
 _FORBIDDEN: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
+_FOUND: Final = re.compile(r"[^\s\"<>(),^?]+|.", re.DOTALL)
+_BLANK: Final = re.compile(r"(?:\s|#[^\n]*)*")
+_lock: Final = threading.Lock()
 
 
 @dataclass(frozen=True)
 class ParsedRules:
-    """The rules of a text, and what is wrong with those that could not be read."""
+    """The rules of a text, and an error for each that could not be read."""
 
     rules: tuple[ParsedRule, ...]
     errors: tuple[RuleError, ...]
 
 
 def parse_rules(text: str, file: Path | str | None = None) -> ParsedRules:
-    """Read all rules of a text; after a mistake reading goes on with the next rule that begins a line."""
-    rules: list[ParsedRule] = []
+    """Parse all rules of a text; after an error parsing goes on with the next rule that begins a line.
+
+    parse_rules("Low: hasValue(?q, ?v) ^ lessThan(?v, 0.25) -> Role(?q)").rules[0].name  # "Low"
+    """
+    from lark import TextSlice, UnexpectedInput
+
     errors: list[RuleError] = []
-    parser = _Parser(text, file)
-    while not parser.at_end():
-        try:
-            rule = parser.entry()
-            if rule is not None:
-                rules.append(rule)
-        except RuleError as error:
-            errors.append(error)
-            parser.recover()
-    return ParsedRules(tuple(rules), tuple(errors))
+    with _lock:  # one parser, whose builder collects the rules
+        parser, builder = _parser()
+        builder.begin(file)
+        start: int | None = 0
+        while start is not None:
+            try:
+                parser.parse(TextSlice(text, start, len(text)))
+                break
+            except RuleError as error:
+                errors.append(error)
+                at = builder.failed_at
+            except UnexpectedInput as error:
+                at = _BLANK.match(text, error.pos_in_stream or 0).end()  # type: ignore[union-attr]
+                at = len(text) if getattr(getattr(error, "token", None), "type", "") == "$END" else at
+                errors.append(_error(text, at, _accepted(error), file))
+            line_end = text.find("\n", at)
+            header = _HEADER.search(text, line_end + 1) if line_end >= 0 else None
+            start = header.start() if header else None
+        return ParsedRules(tuple(builder.rules), tuple(errors))
 
 
 def parse_rule(text: str, file: Path | str | None = None) -> ParsedRule:
-    """Read one rule, as it is given on a command line.
+    """Parse one rule, as it is given on a command line.
 
     Raises:
         RuleError: there is none, there are several, or it cannot be read.
@@ -97,222 +151,151 @@ def parse_rule(text: str, file: Path | str | None = None) -> ParsedRule:
     return parsed.rules[0]
 
 
-class _Parser:
-    """Recursive descent over one text; the methods read what they are named after."""
+@lru_cache(maxsize=1)
+def _parser() -> tuple[Lark, _Builder]:
+    from lark import Lark
 
-    def __init__(self, text: str, file: Path | str | None) -> None:
-        self._text = text
+    builder = _Builder()
+    return Lark(_GRAMMAR, parser="lalr", lexer="contextual", transformer=builder), builder
+
+
+def _accepted(error: Any) -> set[str]:
+    """Terminals that lark would have accepted."""
+    names: set[str] = getattr(error, "expected", None) or getattr(error, "allowed", None) or set()
+    return names
+
+
+def _error(text: str, at: int, accepted: set[str], file: Path | str | None) -> RuleError:
+    """Say what was found in place of what."""
+    place = str(Place(text.count("\n", 0, at) + 1, at - text.rfind("\n", 0, at)))
+    if text.startswith('"', at) and "STRING" in accepted:
+        return RuleError("this text has no closing quote on its line", file=file, place=place)
+    expected, remedy = next((words, right) for name, words, right in _EXPECTED if name in accepted)
+    before = text[:at].split()[-1:] if len(accepted) == 1 else []
+    if before == ["^^"] or text[:at].endswith("^^"):
+        expected = "a datatype, such as xsd:decimal,"
+    elif accepted & {"_COLON", "_LPAR"} and before:
+        expected += f" after {before[0][-30:]},"
+    elif {"_AND", "DISABLED"} <= accepted:
+        expected = "^ or the next rule's name"
+    elif {"PREFIXED", "_ARROW"} <= accepted:
+        expected += " or ->"
+    found = _FOUND.match(text, at)
+    if found is None:
+        instead = "but the text ends here"
+    else:
+        shown = found.group() if len(found.group()) <= 30 else found.group()[:27] + "..."
+        instead = f"instead of {shown if shown.isprintable() else ascii(shown)}"
+    return RuleError(f"expected {expected} {instead}", file=file, place=place, remedy=remedy)
+
+
+class _Builder:
+    """Builds rules while lark parses: each method gets the parts of what it is named after in the grammar."""
+
+    def begin(self, file: Path | str | None) -> None:
+        """Forget what was collected."""
+        self.rules: list[ParsedRule] = []
+        self.failed_at = 0
         self._file = file
-        self._at = 0
-        self._line = 1
-        self._line_start = 0
-        self._counted = 0
         self._prefixes = dict(PREFIXES)
 
-    def place(self, at: int | None = None) -> Place:
-        """Line and column of an offset that is not before the last one asked for."""
-        position = self._at if at is None else at
-        if position < self._counted:
-            self._line, self._line_start, self._counted = 1, 0, 0
-        breaks = self._text.count("\n", self._counted, position)
-        if breaks:
-            self._line += breaks
-            self._line_start = self._text.rindex("\n", self._counted, position) + 1
-        self._counted = position
-        return Place(self._line, position - self._line_start + 1)
+    def start(self, _: Sequence[object]) -> None:
+        """Everything is collected already."""
 
-    def error(self, problem: str, remedy: str | None = None, at: int | None = None) -> RuleError:
-        line, column = self.place(at)
-        return RuleError(problem, file=self._file, place=f"line {line}, column {column}", remedy=remedy)
+    def prefix(self, parts: Sequence[Token]) -> None:
+        """Declare a prefix."""
+        self._prefixes[parts[1]] = self._iri(parts[2], "a prefix needs an IRI in angle brackets")
 
-    def at_end(self) -> bool:
-        self._skip()
-        return self._at >= len(self._text)
+    def rule(self, parts: Sequence[Any]) -> None:
+        """Collect a rule."""
+        (place, name), body, head = parts[-3:]
+        enabled = len(parts) == 3
+        self.rules.append(ParsedRule(name, body, head, enabled, place if enabled else self._place(parts[0])))
 
-    def recover(self) -> None:
-        """Go on with the next line that looks like the beginning of a rule."""
-        following = self._text.find("\n", self._at)
-        found = _HEADER.search(self._text, following + 1) if following >= 0 else None
-        self._at = found.start() if found else len(self._text)
+    def rule_name(self, parts: Sequence[Token]) -> tuple[Place, str]:
+        """A word, or a text that is not blank."""
+        (token,) = parts
+        name = self._text(token) if token.type == "STRING" else str(token)
+        if not name.strip():
+            raise self._wrong(token, "a rule's name is blank", 'write "a name": body -> head')
+        return self._place(token), name
 
-    def entry(self) -> ParsedRule | None:
-        """A rule, or a declaration of a prefix (which gives None)."""
-        start = self._at
-        word = _NAME.match(self._text, self._at)
-        if word is not None and word.group() in ("prefix", "disabled"):
-            self._at = word.end()
-            self._skip()
-            if not self._text.startswith(":", self._at):
-                if word.group() == "prefix":
-                    self._prefix()
-                    return None
-                return self._rule(self.place(start), enabled=False)
-            self._at = start
-        return self._rule(self.place(start), enabled=True)
+    def body(self, parts: Sequence[tuple[Atom, ...]]) -> tuple[Atom, ...]:
+        """All atoms; none for a rule that always holds."""
+        return parts[0] if parts else ()
 
-    def _prefix(self) -> None:
-        name = _NAME.match(self._text, self._at)
-        if name is None:
-            raise self.error("a prefix without a name", "write prefix my: <http://example.org/my#>")
-        self._at = name.end()
-        self._expect(":", "after the prefix")
-        self._skip()
-        iri = _IRI.match(self._text, self._at)
-        if iri is None or ":" not in iri.group(1):
-            raise self.error("a prefix needs an IRI in angle brackets", "write prefix my: <http://example.org/my#>")
-        self._at = iri.end()
-        self._prefixes[name.group()] = self._clean(iri.group(1), iri.start())
+    def atoms(self, parts: Sequence[Atom]) -> tuple[Atom, ...]:
+        """One side of a rule."""
+        return tuple(parts)
 
-    def _rule(self, place: Place, *, enabled: bool) -> ParsedRule:
-        name = self._rule_name()
-        self._expect(":", f"after the rule's name {name}")
-        self._skip()
-        body = () if _ARROW.match(self._text, self._at) else self._atoms()
-        self._skip()
-        arrow = _ARROW.match(self._text, self._at)
-        if arrow is None:
-            raise self.error(f"expected ^ or -> {self._instead()}", "a rule is name: body -> head")
-        self._at = arrow.end()
-        return ParsedRule(name, body, self._atoms(), enabled, place)
+    def atom(self, parts: Sequence[Any]) -> Atom:
+        """A predicate with its arguments."""
+        (place, predicate), *terms = parts
+        return Atom("", predicate, tuple(term for _, term in terms), (place, *(where for where, _ in terms)))
 
-    def _rule_name(self) -> str:
-        word = _NAME.match(self._text, self._at)
-        if word is not None:
-            self._at = word.end()
-            return word.group()
-        if self._text.startswith('"', self._at):
-            name = self._string()
-            if name.strip():
-                return name
-        raise self.error(
-            f"expected a rule's name {self._instead()}", 'write name: body -> head, or "a name": body -> head'
-        )
-
-    def _atoms(self) -> tuple[Atom, ...]:
-        atoms = [self._atom()]
-        while True:
-            self._skip()
-            joint = _AND.match(self._text, self._at)
-            if joint is None:
-                return tuple(atoms)
-            self._at = joint.end()
-            atoms.append(self._atom())
-
-    def _atom(self) -> Atom:
-        self._skip()
-        places = [self.place()]
-        predicate = self._name("an atom, such as Objective(?o)")
-        self._expect("(", f"after {predicate}")
-        arguments: list[Term] = []
-        self._skip()
-        if self._text.startswith(")", self._at):
-            self._at += 1
-            return Atom("", predicate, (), tuple(places))
-        while True:
-            self._skip()
-            places.append(self.place())
-            arguments.append(self._term())
-            self._skip()
-            if self._text.startswith(")", self._at):
-                self._at += 1
-                return Atom("", predicate, tuple(arguments), tuple(places))
-            if not self._text.startswith(",", self._at):
-                raise self.error(f"expected , or ) {self._instead()}", "parentheses must balance")
-            self._at += 1
-
-    def _name(self, wanted: str) -> str:
+    def name(self, parts: Sequence[Token]) -> tuple[Place, str]:
         """A bare name as it is, a prefixed name or one in angle brackets as IRI."""
-        start = self._at
-        iri = _IRI.match(self._text, start)
-        if iri is not None:
-            self._at = iri.end()
-            if ":" not in iri.group(1):
-                raise self.error(f"<{iri.group(1)}> is not an absolute IRI", at=start)
-            return self._clean(iri.group(1), start)
-        prefixed = _PREFIXED.match(self._text, start)
-        if prefixed is not None and prefixed.group(2):
-            prefix = prefixed.group(1) or ""
-            if prefix not in self._prefixes:
-                remedy = f"declare it: prefix {prefix}: <...>; known: {', '.join(sorted(self._prefixes))}"
-                raise self.error(f"unknown prefix {prefix}:", nearest(prefix, self._prefixes) or remedy)
-            self._at = prefixed.end()
-            return self._prefixes[prefix] + prefixed.group(2)
-        bare = _NAME.match(self._text, start)
-        if bare is None:
-            raise self.error(f"expected {wanted}, {self._instead()}")
-        self._at = bare.end()
-        return bare.group()
+        (token,) = parts
+        if token.type == "NAME":
+            return self._place(token), str(token)
+        if token.type == "IRI":
+            return self._place(token), self._iri(token, f"{token} is not an absolute IRI")
+        prefix, _, local = token.partition(":")
+        if prefix not in self._prefixes:
+            remedy = f"declare it: prefix {prefix}: <...>; known: {', '.join(sorted(self._prefixes))}"
+            raise self._wrong(token, f"unknown prefix {prefix}:", nearest(prefix, self._prefixes) or remedy)
+        return self._place(token), self._prefixes[prefix] + local
 
-    def _term(self) -> Term:
-        start = self._at
-        variable = _VARIABLE.match(self._text, start)
-        if variable is not None:
-            self._at = variable.end()
-            return Variable(variable.group(1))
-        number = _NUMBER.match(self._text, start)
-        if number is not None:
-            self._at = number.end()
-            if len(number.group()) > MAX_DIGITS:
-                raise self.error("a number of too many digits", f"at most {MAX_DIGITS}", at=start)
-            point, exponent = number.group(1) or number.group(2), number.group(3)
-            return Lit(number.group(), XSD + ("double" if exponent else "decimal" if point else "integer"))
-        if self._text.startswith('"', start):
-            return self._literal()
-        name = self._name('an argument, such as ?o, 2.5, "text", true or an individual')
-        return Lit(name, XSD + "boolean") if name in ("true", "false") else Named(name)
+    def term(self, parts: Sequence[Any]) -> tuple[Place, Term]:
+        """A variable, a literal, or an individual."""
+        first = parts[0]
+        if isinstance(first, tuple):
+            place, name = first
+            return place, Lit(name, XSD + "boolean") if name in ("true", "false") else Named(name)
+        return self._place(first), Variable(first[1:]) if first.type == "VARIABLE" else self._literal(first, parts[1:])
 
-    def _literal(self) -> Lit:
-        text = self._string()
-        if self._text.startswith("^^", self._at):
-            self._at += 2
-            start = self._at
-            datatype = self._name("a datatype, such as xsd:decimal")
-            if ":" not in datatype:
-                raise self.error(f"datatype {datatype} without a prefix", f"write xsd:{datatype}", at=start)
-            return Lit(text, datatype)
-        language = _LANGUAGE.match(self._text, self._at)
-        if language is not None:
-            self._at = language.end()
-            return Lit(text, f"@{language.group(1)}")
-        return Lit(text, XSD + "string")
+    def _literal(self, token: Token, more: Sequence[Any]) -> Lit:
+        if token.type == "NUMBER":
+            if len(token) > MAX_DIGITS:
+                raise self._wrong(token, "a number of too many digits", f"at most {MAX_DIGITS}")
+            kind = "double" if "e" in token.lower() else "decimal" if "." in token else "integer"
+            return Lit(str(token), XSD + kind)
+        text = self._text(token)
+        if not more:
+            return Lit(text, XSD + "string")
+        if not isinstance(more[0], tuple):
+            return Lit(text, str(more[0]))
+        datatype = more[0][1]
+        if ":" not in datatype:
+            raise self._wrong(token, f"datatype {datatype} without a prefix", f"write xsd:{datatype}")
+        return Lit(text, datatype)
 
-    def _string(self) -> str:
-        start = self._at
-        found = _STRING.match(self._text, start)
-        if found is None:
-            raise self.error("this text has no closing quote on its line")
-        self._at = found.end()
+    def _place(self, token: Token) -> Place:
+        assert token.line is not None and token.column is not None
+        return Place(token.line, token.column)
 
+    def _wrong(self, token: Token, problem: str, remedy: str | None = None) -> RuleError:
+        self.failed_at = token.start_pos or 0
+        return RuleError(problem, file=self._file, place=str(self._place(token)), remedy=remedy)
+
+    def _iri(self, token: Token, problem: str) -> str:
+        if ":" not in token:
+            raise self._wrong(token, problem)
+        return self._clean(token[1:-1], token)
+
+    def _text(self, token: Token) -> str:
         def unescape(escape: re.Match[str]) -> str:
             short, long, single = escape.groups()
             if single is None:
                 code = int(short or long, 16)
                 return chr(code) if code <= 0x10FFFF else "\ud800"
             if single not in _ESCAPED:
-                raise self.error(f"unknown escape \\{single}", r"one of \" \\ \n \t \r \uXXXX", at=start)
+                raise self._wrong(token, f"unknown escape \\{single}", r"one of \" \\ \n \t \r \uXXXX")
             return _ESCAPED[single]
 
-        return self._clean(_ESCAPE.sub(unescape, found.group(1)), start)
+        return self._clean(_ESCAPE.sub(unescape, token[1:-1]), token)
 
-    def _clean(self, text: str, at: int) -> str:
+    def _clean(self, text: str, token: Token) -> str:
         if _FORBIDDEN.search(text):
-            raise self.error("a character that no file can hold", "leave out control characters", at=at)
+            raise self._wrong(token, "a character that no file can hold", "leave out control characters")
         return text
-
-    def _expect(self, mark: str, where: str) -> None:
-        self._skip()
-        if not self._text.startswith(mark, self._at):
-            raise self.error(f"expected {mark} {where}, {self._instead()}")
-        self._at += 1
-
-    def _instead(self) -> str:
-        found = re.compile(r"[^\s\"<>(),^?]+|.", re.DOTALL).match(self._text, self._at)
-        if found is None:
-            return "but the text ends here"
-        shown = found.group() if len(found.group()) <= 30 else found.group()[:27] + "..."
-        return f"instead of {shown if shown.isprintable() else ascii(shown)}"
-
-    def _skip(self) -> None:
-        found = _SPACE.match(self._text, self._at)
-        if found is not None:
-            self._at = found.end()
