@@ -3,32 +3,35 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from suave_des.errors import InputError, KeyPath, place_text
+from suave_des.errors import InputError, KeyPath
 from suave_des.resources import find, shipped_folder
-from suave_des.scenario.exemplar_campaign import Campaign, campaign_of
+from suave_des.scenario.exemplar_campaign import campaign_text
 from suave_des.scenario.exemplar_nodes import (
-    COUNTERPARTS,
-    MARKS,
+    NODES,
     NOT_NEEDED,
     NOT_READ,
     RUNNER,
     Configuration,
-    Found,
+    Parameter,
     no_counterpart,
     read_configuration,
 )
-from suave_des.scenario.exemplar_text import Entry, campaign_text, scenario_text
+from suave_des.scenario.exemplar_text import commented, flow, heading, one_line
 from suave_des.scenario.layers import Files, Layer, Location, merge, scenario_layer
 from suave_des.scenario.loader import LoadedScenario, load_layer
-from suave_des.scenario.models import ThrusterEvent
+from suave_des.scenario.models import Scenario
 
-_EVENTS: KeyPath = ("thruster_events",)
-_MODES: KeyPath = ("modes_file",)
+_BATTERY_NOTE = (
+    "battery: on, as battery_monitor is configured; the exemplar starts it in its extended mission only"
+    " (without it: remove the scenario's part battery)"
+)
+Settings = Mapping[str, Parameter]
+"""Parameters of the files by the scenario's key path."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,7 @@ def import_config(
     campaign: Path | None = None,
     managers: Collection[str] = (),
 ) -> Imported:
-    """Put mission, campaign and System Modes files of the exemplar into our form. Nothing is written.
+    """Convert mission, campaign and System Modes files of the exemplar. Nothing is written.
 
     Args:
         files: the exemplar's files, in any order; either revision's.
@@ -80,117 +83,103 @@ def import_config(
     notes = list(configuration.notes)
     settings = _settings(configuration, str(below.data.get("revision", {}).get("name")), notes)
     if "battery_monitor" in configuration.nodes:
-        notes.append(
-            "battery: on, as battery_monitor is configured; the exemplar starts it in its extended mission only"
-            " (without it: remove the scenario's part battery)"
-        )
-    loaded = _checked(reader, below, settings, configuration, out)
-    wanted = _campaign(configuration, loaded, campaign, managers, files, notes)
-    entries = [_entry(path, found, loaded) for path, found in settings.items()]
-    if "battery_monitor" in configuration.nodes and not any(path[0] == "battery" for path in settings):
-        entries.append(Entry(("battery",), {}, "battery_monitor, all at its defaults"))
-    for modes in configuration.modes[:1]:
-        entries.append(Entry(_MODES, _relative(modes.path, out), "as it is"))
+        notes.append(_BATTERY_NOTE)
+    try:
+        loaded = load_layer(reader, merge(below, _layer(settings, configuration, out)), out)
+    except InputError as error:
+        raise _in_their_terms(error, settings) from None
     names = [path.name for path in files]
+    text = _campaign(configuration, loaded, campaign, out, managers, names, notes)
     is_shipped = base_path.is_relative_to(shipped_folder("scenarios"))
     shown_base = base_path.stem if is_shipped else _relative(base_path, out)
-    return Imported(
-        shown_base,
-        why,
-        scenario_text(names, shown_base, why, entries, notes),
-        None if wanted is None or campaign is None else campaign_text(names, _relative(out, campaign), wanted),
-        tuple(notes),
-    )
+    lines = [
+        *heading(names),
+        "# Values that are not given here are those of the base.",
+        commented(0, f"base: {flow(shown_base)}", why),
+        *_lines(configuration, settings, loaded, out),
+    ]
+    if notes:
+        lines += ["", "# Other parameters of the files:", *(f"#   {one_line(note)}" for note in notes)]
+    return Imported(shown_base, why, "\n".join(lines) + "\n", text, tuple(notes))
 
 
 def _guess(configuration: Configuration) -> tuple[str, str]:
-    """The shipped scenario of the revision that the nodes belong to."""
-    marks = [(MARKS[node], node) for node in configuration.nodes if node in MARKS]
-    later = [node for name, node in marks if name == "release15"]
-    if later:
-        return "release15", f"only revision 1.5 has {later[0]}"
-    earlier = [node for _, node in marks]
-    if earlier:
-        return "seams2023", f"only revision 2023 has {earlier[0]}"
+    """The shipped scenario of the revision that the nodes belong to, and why."""
+    for shipped, revision in (("release15", "1.5"), ("seams2023", "2023")):
+        if marks := [node for node in configuration.nodes if NODES[node].shipped == shipped]:
+            return shipped, f"only revision {revision} has {marks[0]}"
     return "seams2023", "no node of revision 1.5 alone is there"
 
 
-def _settings(configuration: Configuration, revision: str, notes: list[str]) -> dict[KeyPath, Found]:
-    """What the files say of a scenario, by key path; a note for every other key of a mission's nodes."""
-    not_read = NOT_READ.get(revision, {})
-    missions: dict[KeyPath, Found] = {}
-    runners: dict[KeyPath, Found] = {}
-    for found in configuration.parameters:
-        path = COUNTERPARTS[found.node].get(found.key)
+def _settings(configuration: Configuration, revision: str, notes: list[str]) -> Settings:
+    """The parameters that a scenario has, by its key path; a note for every other one of a mission's nodes."""
+    missions: dict[str, Parameter] = {}
+    runners: dict[str, Parameter] = {}
+    for parameter in configuration.parameters:
+        known = NODES[parameter.node].parameters
+        path = known.get(parameter.key)
         if path is None:
-            if found.node != RUNNER:
-                notes.append(no_counterpart(found, COUNTERPARTS[found.node]))
-        elif (found.node, found.key) in not_read:
-            notes.append(f"{found.place}: not taken over: {not_read[found.node, found.key]}")
+            if parameter.node != RUNNER:
+                notes.append(no_counterpart(parameter, known))
+        elif (reason := NOT_READ.get((revision, path))) is not None:
+            notes.append(f"{parameter.place}: not taken over: {reason}")
         else:
-            _add(runners if found.node == RUNNER else missions, path, found)
-    for path, found in runners.items():
-        other = missions.get(path)
-        if other is not None and _normal(path, other.value) != _normal(path, found.value):
-            notes.append(f"{other.place}: not taken over: the campaign's value counts ({found.place})")
+            settings = runners if parameter.node == RUNNER else missions
+            other = settings.setdefault(path, parameter)
+            if other is not parameter and _differ(other, parameter):
+                raise parameter.error(f"contradicts {other.place}", "make them alike, or leave one of them out")
+    for path, parameter in runners.items():
+        if path in missions and _differ(missions[path], parameter):
+            note = f"not taken over: the campaign's value counts ({parameter.place})"
+            notes.append(f"{missions[path].place}: {note}")
     return missions | runners
 
 
-def _add(settings: dict[KeyPath, Found], path: KeyPath, found: Found) -> None:
-    other = settings.setdefault(path, found)
-    if other is not found and _normal(path, other.value) != _normal(path, found.value):
-        raise found.error(f"contradicts {other.place}", "make them alike, or leave one of them out")
+def _differ(one: Parameter, other: Parameter) -> bool:
+    """Whether two values differ by more than the blanks in thruster events."""
+    values = [
+        ["".join(each.split()) if isinstance(each, str) else each for each in value]
+        if isinstance(value, list)
+        else value
+        for value in (one.value, other.value)
+    ]
+    return bool(values[0] != values[1])
 
 
-def _normal(path: KeyPath, value: Any) -> Any:
-    """A value such that equal ones are equal, however they are written."""
-    if path == _EVENTS and isinstance(value, list):
-        return ["".join(each.split()) if isinstance(each, str) else each for each in value]
-    return value
-
-
-def _checked(
-    files: Files, below: Layer, settings: dict[KeyPath, Found], configuration: Configuration, out: Path
-) -> LoadedScenario:
-    """The scenario, checked as one from a file is; what is wrong is told in terms of the user's files.
+def _layer(settings: Settings, configuration: Configuration, out: Path) -> Layer:
+    """The files' values as a scenario, each with its place there.
 
     Raises:
-        InputError: a value cannot be right, or two modes files are given.
+        InputError: two modes files are given.
     """
-    data: dict[str, Any] = {}
+    data: dict[str, Any] = {"battery": {}} if "battery_monitor" in configuration.nodes else {}
     places: dict[KeyPath, Location] = {(): Location(0, 1, out)}
-    for path, found in settings.items():
+    for name, parameter in settings.items():
+        *parents, last = path = tuple(name.split("."))
         here = data
-        for key in path[:-1]:
-            here = here.setdefault(str(key), {})
-        here[str(path[-1])] = found.value
-        places[path] = Location(0, found.line, found.document.path)
-        for index in range(len(found.value) if isinstance(found.value, list) else 0):
-            line = found.document.line((*found.key_path, index))
-            places[(*path, index)] = Location(0, line, found.document.path)
-    if "battery_monitor" in configuration.nodes:
-        data.setdefault("battery", {})
+        for key in parents:
+            here = here.setdefault(key, {})
+        here[last] = parameter.value
+        file = parameter.document.path
+        places[path] = Location(0, parameter.line, file)
+        for index in range(len(parameter.value) if isinstance(parameter.value, list) else 0):
+            places[(*path, index)] = Location(0, parameter.document.line((*parameter.key_path, index)), file)
     if configuration.modes:
         first, *others = configuration.modes
         if any(other.sha256 != first.sha256 for other in others):
-            raise InputError(
-                "there are two System Modes files", file=others[0].path, remedy=f"give one: {first.path} is the other"
-            )
+            remedy = f"give one: {first.path} is the other"
+            raise InputError("there are two System Modes files", file=others[0].path, remedy=remedy)
         data["modes_file"] = str(first.path.resolve())
-        places[_MODES] = Location(0, 1, first.path)
-    try:
-        return load_layer(files, merge(below, Layer(data, places)), out)
-    except InputError as error:
-        raise _in_their_words(error, settings) from None
+        places[("modes_file",)] = Location(0, 1, first.path)
+    return Layer(data, places)
 
 
-def _in_their_words(error: InputError, settings: dict[KeyPath, Found]) -> InputError:
+def _in_their_terms(error: InputError, settings: Settings) -> InputError:
     """The same error with node and key in place of our key path, if it is about a value from the user's files."""
     line, _, keys = (error.place or "").partition(", ")
-    for path, found in settings.items():
-        ours = place_text(0, path).removeprefix("line 0, ")
-        if error.file == str(found.document.path) and (keys == ours or keys.startswith((f"{ours}.", f"{ours}["))):
-            place = f"{line}, {found.keys}{keys.removeprefix(ours)}"
+    for path, parameter in settings.items():
+        if error.file == str(parameter.document.path) and (keys == path or keys.startswith((f"{path}.", f"{path}["))):
+            place = f"{line}, {parameter.keys}{keys.removeprefix(path)}"
             return InputError(error.problem, file=error.file, place=place, remedy=error.remedy)
     return error
 
@@ -199,39 +188,58 @@ def _campaign(
     configuration: Configuration,
     loaded: LoadedScenario,
     campaign: Path | None,
+    out: Path,
     managers: Collection[str],
-    files: Sequence[Path],
+    files: Sequence[str],
     notes: list[str],
-) -> Campaign | None:
-    """The campaign, if one is configured and wanted; else a note for each of its keys."""
+) -> str | None:
+    """Text of the campaign file, if a campaign is configured and wanted; else a note for each of its parameters."""
     runner = {each.key: each for each in configuration.parameters if each.node == RUNNER}
     if campaign is None:
-        for found in runner.values():
-            if found.key not in COUNTERPARTS[RUNNER]:
-                reason = NOT_NEEDED.get(found.key, "a scenario has none; --campaign FILE writes a campaign file")
-                notes.append(f"{found.place}: no counterpart: {reason}")
+        for key, parameter in runner.items():
+            if key not in NODES[RUNNER].parameters:
+                reason = NOT_NEEDED.get(key, "a scenario has none; --campaign FILE writes a campaign file")
+                notes.append(f"{parameter.place}: no counterpart: {reason}")
         return None
     if RUNNER not in configuration.nodes:
-        names = ", ".join(path.name for path in files)
         raise InputError(
-            f"there is no campaign to import: no node {RUNNER} in {names}",
+            f"there is no campaign to import: no node {RUNNER} in {', '.join(files)}",
             remedy="give the campaign's configuration too, or leave --campaign out",
         )
-    return campaign_of(runner, loaded, managers, [path.name for path in files], notes)
+    return campaign_text(runner, loaded, _relative(out, campaign), managers, files, notes)
 
 
-def _entry(path: KeyPath, found: Found, loaded: LoadedScenario) -> Entry:
-    value = found.value
-    if path == _EVENTS:
-        value = [_event(event) for event in loaded.scenario.thruster_events]
-    comment = f"{found.document.path.name}, line {found.line}: {found.keys}"
-    if path == ("start", "y_m") and value == 2.0:
+def _lines(configuration: Configuration, settings: Settings, loaded: LoadedScenario, out: Path) -> Iterator[str]:
+    """The values in the order of the scenario's reference, each with its source as a comment."""
+    entries = {path: _entry(path, parameter, loaded) for path, parameter in settings.items()}
+    if "battery_monitor" in configuration.nodes and not any(path.startswith("battery.") for path in settings):
+        entries["battery"] = ({}, "battery_monitor, all at its defaults")
+    for modes in configuration.modes[:1]:
+        entries["modes_file"] = (_relative(modes.path, out), "as it is")
+    order = list(Scenario.model_fields)
+    above: list[str] = []
+    for path in sorted(entries, key=lambda path: order.index(path.split(".")[0])):
+        value, comment = entries[path]
+        *parents, last = path.split(".")
+        for depth, key in enumerate(parents):
+            if above[: depth + 1] != parents[: depth + 1]:
+                yield f"{'  ' * depth}{key}:"
+        above, depth = [*parents, last], len(parents)
+        if isinstance(value, list) and any(isinstance(each, dict) for each in value):
+            yield commented(depth, f"{last}:", comment)
+            yield from (f"{'  ' * (depth + 1)}- {flow(each)}" for each in value)
+        else:
+            yield commented(depth, f"{last}: {flow(value)}", comment)
+
+
+def _entry(path: str, parameter: Parameter, loaded: LoadedScenario) -> tuple[Any, str]:
+    value = parameter.value
+    if path == "thruster_events":
+        value = [event.model_dump() for event in loaded.scenario.thruster_events]
+    comment = f"{parameter.source}: {parameter.keys}"
+    if path == "start.y_m" and value == 2.0:
         comment += "; where 2.0 was asked for, the published runs have 2.56 to 2.59"
-    return Entry(path, value, comment)
-
-
-def _event(event: ThrusterEvent) -> dict[str, Any]:
-    return {"thruster": event.thruster, "event": event.event, "time_s": event.time_s}
+    return value, comment
 
 
 def _relative(path: Path, file: Path) -> str:
