@@ -1,21 +1,30 @@
 """Settings of all tests: property tests draw the same examples on every machine, and are not timed in any way.
 
-What reasoners remember is kept in a folder of the test run, away from the user's.
+Cached inferences are kept in a folder of the test run, away from the user's, which all its processes share.
 """
 
 import os
+import shutil
 import signal
 import tempfile
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("repeatable")
 
-os.environ["SUAVE_DES_CACHE_DIR"] = tempfile.mkdtemp(prefix="suave-des-tests-")
+if "PYTEST_XDIST_WORKER" not in os.environ:  # such a process has inherited the setting
+    os.environ["SUAVE_DES_CACHE_DIR"] = tempfile.mkdtemp(prefix="suave-des-tests-")
 os.environ["SUAVE_DES_JAVA_ARCHIVE"] = "off"  # or processes that outlive the tests would make one in that folder
 
 os.environ.pop("COLUMNS", None)  # which several test processes at once are given, as if there were a terminal
 
 # A shell that runs tests in the background has them ignore Ctrl-C: those that press it, and their children, need it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Remove the folder of cached inferences when the run is over."""
+    if not hasattr(config, "workerinput"):
+        shutil.rmtree(os.environ["SUAVE_DES_CACHE_DIR"], ignore_errors=True)
