@@ -15,8 +15,7 @@ from pathlib import Path
 
 from suave_des.campaign.output import write_files
 from suave_des.errors import SuaveDesError
-from suave_des.report.comparison import compare, csv_table, markdown_table
-from suave_des.report.published import published_figures, published_runs
+from suave_des.report.paper import FILES, compare, published_estimates, published_runs
 from suave_des.report.runs import read_runs
 
 
@@ -28,14 +27,13 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="folder for paper_table.md and paper_table.csv")
     arguments = parser.parse_args()
     try:
-        comparison = compare(read_runs(arguments.runs), published_figures(arguments.published))
+        comparison = compare(read_runs(arguments.runs).frame, published_estimates(arguments.published))
         if arguments.out is not None:
-            tables = {"paper_table.md": markdown_table(comparison), "paper_table.csv": csv_table(comparison)}
-            write_files(arguments.out, tables)
+            write_files(arguments.out, dict(zip(FILES, (comparison.markdown(), comparison.csv()), strict=True)))
     except SuaveDesError as error:
         print("paper_table.py: " + " ".join(str(error).split()), file=sys.stderr)
         sys.exit(2)
-    print(markdown_table(comparison), end="")
+    print(comparison.markdown(), end="")
 
 
 if __name__ == "__main__":

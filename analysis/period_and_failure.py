@@ -2,7 +2,7 @@
 
 Writes period_and_failure.csv and period_and_failure.png.
 
-    python analysis/period_and_failure.py --out analysis/period_and_failure [--runs 300] [--workers 2]
+    python analysis/period_and_failure.py [--out DIR] [--runs N] [--workers N]
 """
 
 from __future__ import annotations
@@ -70,8 +70,8 @@ def draw(path: Path, found: dict[tuple[str, float, str], dict[str, list[float]]]
 def main() -> None:
     """Simulate every cell, write the table and the figure."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--out", type=Path, required=True)
-    options.add_argument("--runs", type=int, default=300)
+    options.add_argument("--out", type=Path, default=Path(__file__).parent / "period_and_failure")
+    options.add_argument("--runs", type=int, default=150)
     options.add_argument("--workers", type=int, default=2)
     chosen = options.parse_args()
     chosen.out.mkdir(parents=True, exist_ok=True)

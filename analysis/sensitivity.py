@@ -1,10 +1,10 @@
 """Which calibrated parameters matter: Morris screening of the two metrics, for each of the paper's managers.
 
 Elementary effects (Morris 1991; mu* after Campolongo et al. 2007; package SALib) of the mean search time and the mean
-distance inspected over the bounds of the calibration. All evaluations meet the same seas, so that differences are the
-parameters' doing. Writes sensitivity.csv and sensitivity.png.
+distance inspected over the bounds of the calibration. All evaluations use common random numbers, so that
+differences come from the parameters. Writes sensitivity.csv and sensitivity.png.
 
-    python analysis/sensitivity.py --out analysis/sensitivity [--trajectories 10] [--runs 100] [--workers 2]
+    python analysis/sensitivity.py [--out DIR] [--trajectories N] [--runs N] [--workers N]
 """
 
 from __future__ import annotations
@@ -67,9 +67,9 @@ def draw(path: Path, names: list[str], effects: dict[tuple[str, str], np.ndarray
 def main() -> None:
     """Sample, simulate, analyze, draw."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--out", type=Path, required=True)
-    options.add_argument("--trajectories", type=int, default=10)
-    options.add_argument("--runs", type=int, default=100)
+    options.add_argument("--out", type=Path, default=Path(__file__).parent / "sensitivity")
+    options.add_argument("--trajectories", type=int, default=6)
+    options.add_argument("--runs", type=int, default=50)
     options.add_argument("--workers", type=int, default=2)
     chosen = options.parse_args()
     chosen.out.mkdir(parents=True, exist_ok=True)

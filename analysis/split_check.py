@@ -2,33 +2,82 @@
 
 Writes split_check.csv beside the fits. A prediction counts as good within half a published standard deviation.
 
-    python analysis/split_check.py --out analysis/split [--runs 150] [--evaluations 200] [--missions 1000] [--workers 2]
+    python analysis/split_check.py [--out DIR] [--runs N] [--evaluations N] [--missions N] [--workers N]
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from suave_des.calibration.fit import Problem, fit
+import pandas
+
+from suave_des.calibration.fit import fit
+from suave_des.calibration.loss import Problem, published_vectors
 from suave_des.calibration.parameters import read_parameters
-from suave_des.calibration.published import as_vectors
 from suave_des.calibration.report import fitted_scenario, fitted_values
 from suave_des.campaign.campaign import run_campaign
+from suave_des.estimates import estimate
+from suave_des.report.runs import METRICS, choose_managers, read_runs
 from suave_des.resources import find
 from suave_des.scenario.loader import load_scenario
-from suave_des.validation.runs import choose_managers, read_runs
-from suave_des.validation.split import split_check
+from suave_des.validation.validation import sample
+
+WITHIN_STD = 0.5
+"""Greatest difference of a predicted mean, in published standard deviations, that counts as predicted."""
+
+
+def split_check(fitted: Mapping[str, pandas.DataFrame], published: pandas.DataFrame) -> pandas.DataFrame:
+    """Compare predicted with published figures of each manager that was left out of a fit.
+
+    Args:
+        fitted: by left-out manager, missions simulated with what was fitted without it; of each frame only the rows of
+            that manager count. Columns as of report.runs.COLUMNS, the place of detection apart.
+        published: the published missions, likewise.
+
+    Returns:
+        A row for each manager and metric: left_out, metric, published_n, published_mean, published_std, predicted_n,
+        predicted_mean, predicted_std, difference (predicted - published mean), difference_in_std (/ the published
+        standard deviation; nan if that is zero), within (whether that is at most WITHIN_STD either way).
+
+    Raises:
+        ValueError: a manager has no row in its frame, or fewer than two published ones.
+    """
+    rows = [_row(manager, metric, published, frame) for manager, frame in fitted.items() for metric in METRICS]
+    return pandas.DataFrame(rows)
+
+
+def _row(manager: str, metric: str, published: pandas.DataFrame, frame: pandas.DataFrame) -> dict[str, object]:
+    theirs = estimate(sample(published, manager, metric).tolist())
+    ours = estimate(sample(frame, manager, metric).tolist())
+    if theirs.mean is None or theirs.std is None or ours.mean is None:
+        raise ValueError(f"manager {manager}: {theirs.n} published and {ours.n} simulated missions are too few")
+    difference = ours.mean - theirs.mean
+    in_std = difference / theirs.std if theirs.std else float("nan")
+    return {
+        "left_out": manager,
+        "metric": metric,
+        "published_n": theirs.n,
+        "published_mean": theirs.mean,
+        "published_std": theirs.std,
+        "predicted_n": ours.n,
+        "predicted_mean": ours.mean,
+        "predicted_std": ours.std,
+        "difference": difference,
+        "difference_in_std": in_std,
+        "within": abs(in_std) <= WITHIN_STD,
+    }
 
 
 def main() -> None:
     """Run the three fits and their predictions."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--out", type=Path, required=True)
-    options.add_argument("--runs", type=int, default=150)
-    options.add_argument("--evaluations", type=int, default=200)
-    options.add_argument("--missions", type=int, default=1000)
+    options.add_argument("--out", type=Path, default=Path(__file__).parent / "split")
+    options.add_argument("--runs", type=int, default=60)
+    options.add_argument("--evaluations", type=int, default=77)
+    options.add_argument("--missions", type=int, default=500)
     options.add_argument("--workers", type=int, default=2)
     chosen = options.parse_args()
     chosen.out.mkdir(parents=True, exist_ok=True)
@@ -41,7 +90,7 @@ def main() -> None:
     predicted = {}
     for left_out in managers:
         others = tuple(name for name in managers if name != left_out)
-        problem = Problem(form, free, as_vectors(published.frame, others), chosen.runs, seed=1)
+        problem = Problem(form, free, published_vectors(published.frame, others), chosen.runs, seed=1)
         tried = fit(problem, chosen.evaluations, workers=chosen.workers, seed=1)
         best = min(tried, key=lambda each: each.loss)
         values = fitted_values(free, best)

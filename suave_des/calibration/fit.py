@@ -1,158 +1,39 @@
-"""Fits free parameters of a scenario to published runs, and tells how sharply each is determined."""
+"""Fit free parameters of a scenario to published missions, and determine how sharply each is known."""
 
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from suave_des.calibration.distance import SCALES, Array, energy_distance, missions_as_vectors
+from suave_des.calibration.loss import Evaluation, FreeParameter, Problem, evaluate
 from suave_des.imports import main_hidden
-from suave_des.scenario.loader import LoadedScenario, with_values
-from suave_des.simulation.simulator import Simulator
-from suave_des.validation.shares import Share, count
 
 FINALISTS, FINAL_FACTOR = 8, 4
-"""How many of the best sets of values are looked at again, and with how many times the missions."""
-METRICS_AND_PLACE = ["search_time_s", "distance_inspected_m", "detection_x_m"]
+"""How many of the best sets of values are evaluated again, and with how many times the missions."""
 FIRST_STEP = 0.1
 """Standard deviation of the first generation, as a share of each parameter's range."""
+POINTS = 9
+"""Points of a profile; the middle one is the best value."""
 
-
-@dataclass(frozen=True, slots=True)
-class FreeParameter:
-    """A parameter to fit: key path in the scenario, bounds, and where it starts."""
-
-    path: str
-    lower: float
-    upper: float
-    start: float
-
-    def value(self, unit: float) -> float:
-        """Value for a coordinate in [0, 1]; coordinates outside are reflected into it."""
-        folded = abs(unit) % 2.0
-        return self.lower + (self.upper - self.lower) * (2.0 - folded if folded > 1.0 else folded)
-
-    @property
-    def start_unit(self) -> float:
-        """Coordinate of the start value."""
-        return (self.start - self.lower) / (self.upper - self.lower)
-
-
-@dataclass(frozen=True, slots=True)
-class Evaluation:
-    """One set of values and how far its missions are from the published ones.
-
-    Attributes:
-        values: of the parameters.
-        distances: energy distance of each manager's missions.
-        share_difference: mean absolute difference of the clusters' shares; nought if none are compared.
-        loss: mean of the distances, plus the difference of the shares.
-    """
-
-    values: tuple[float, ...]
-    distances: tuple[float, ...]
-    share_difference: float
-    loss: float
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """What is fitted to what.
-
-    Attributes:
-        loaded: the scenario.
-        parameters: what is free.
-        published: missions as scaled vectors, by manager (see distance.py).
-        runs: simulated missions for each manager and evaluation.
-        seed: seed of the simulated missions; all evaluations use the same streams, so that differences between them are
-            the parameters' doing.
-    """
-
-    loaded: LoadedScenario
-    parameters: tuple[FreeParameter, ...]
-    published: Mapping[str, Array]
-    runs: int
-    seed: int
-    shares: tuple[tuple[Share, float], ...] = ()
-    """Shares of missions in clusters, each with the published one; their mean absolute difference adds to the loss."""
-
-
-def evaluate(problem: Problem, values: Sequence[float]) -> Evaluation:
-    """Simulate all managers with one set of parameter values, and measure how far they are from the published runs."""
-    named = {parameter.path: value for parameter, value in zip(problem.parameters, values, strict=True)}
-    simulator = Simulator(with_values(problem.loaded, named))
-    distances, missions = [], {}
-    for manager in sorted(problem.published):
-        published = problem.published[manager]
-        missions[manager] = simulate(simulator, manager, problem.runs, problem.seed)
-        distances.append(energy_distance(missions[manager][:, : published.shape[1]], published))
-    difference = _share_difference(problem.shares, missions)
-    return Evaluation(tuple(map(float, values)), tuple(distances), difference, float(np.mean(distances)) + difference)
-
-
-def select(problem: Problem, tried: Sequence[Evaluation], workers: int) -> Evaluation:
-    """The best of the few best evaluations, simulated anew with more missions and other streams.
-
-    The least of many noisy losses is partly luck; this looks at it again, without the luck.
-    """
-    finalists = sorted(tried, key=lambda each: each.loss)[:FINALISTS]
-    larger = replace(problem, runs=problem.runs * FINAL_FACTOR, seed=problem.seed + 1)
-    with evaluator(larger, workers) as evaluate_all:
-        return min(evaluate_all([each.values for each in finalists]), key=lambda each: each.loss)
-
-
-def _share_difference(shares: Sequence[tuple[Share, float]], missions: Mapping[str, Array]) -> float:
-    if not shares:
-        return 0.0
-    import pandas
-
-    frames = [
-        pandas.DataFrame(vectors * np.array(SCALES), columns=METRICS_AND_PLACE).assign(manager=name)
-        for name, vectors in missions.items()
-    ]
-    simulated = pandas.concat(frames, ignore_index=True)
-    differences = [abs((count(share, simulated).share or 0.0) - published) for share, published in shares]
-    return float(np.mean(differences))
-
-
-def simulate(simulator: Simulator, manager: str, runs: int, seed: int) -> Array:
-    """Missions of one manager as scaled vectors, shape (runs, 3); the detection's x is nan where there was none."""
-    metrics = [simulator.run(manager, run, seed).metrics for run in range(1, runs + 1)]
-    return missions_as_vectors(
-        np.array([each.search_time_s for each in metrics]),
-        np.array([each.distance_inspected_m for each in metrics]),
-        np.array([np.nan if each.detection_x_m is None else each.detection_x_m for each in metrics]),
-    )
-
-
-_problem: Problem | None = None
-
-
-def _set_problem(problem: Problem) -> None:
-    global _problem
-    _problem = problem
-
-
-def _evaluate_here(values: Sequence[float]) -> Evaluation:
-    assert _problem is not None  # set when the worker started
-    return evaluate(_problem, values)
+EvaluateAll = Callable[[Sequence[Sequence[float]]], list[Evaluation]]
 
 
 @contextmanager
-def evaluator(problem: Problem, workers: int) -> Iterator[Callable[[Sequence[Sequence[float]]], list[Evaluation]]]:
-    """A function that evaluates several sets of values, on worker processes if there is more than one."""
+def evaluator(problem: Problem, workers: int) -> Iterator[EvaluateAll]:
+    """Evaluate several sets of values, on worker processes if there is more than one."""
+    one = partial(evaluate, problem)
     if workers == 1:
-        yield lambda many: [evaluate(problem, values) for values in many]
+        yield lambda many: list(map(one, many))
         return
-    context = multiprocessing.get_context("spawn")
     with main_hidden():
-        pool = context.Pool(workers, initializer=_set_problem, initargs=(problem,))
+        pool = multiprocessing.get_context("spawn").Pool(workers)
     with pool:
-        yield lambda many: pool.map(_evaluate_here, many, chunksize=1)
+        yield lambda many: pool.map(one, many, chunksize=1)
 
 
 def fit(
@@ -163,7 +44,7 @@ def fit(
     seed: int = 1,
     on_generation: Callable[[int, Evaluation], None] | None = None,
 ) -> list[Evaluation]:
-    """Search for the values with the least distance, by CMA-ES (Hansen; package cma) in the box of the bounds.
+    """Search for the values with the least loss, by CMA-ES (Hansen; package cma) in the box of the bounds.
 
     Args:
         problem: what is fitted to what.
@@ -184,13 +65,95 @@ def fit(
     with evaluator(problem, workers) as evaluate_all:
         while len(tried) < evaluations:
             units = search.ask()
-            many = [
-                [parameter.value(float(unit)) for parameter, unit in zip(problem.parameters, candidate, strict=True)]
-                for candidate in units
-            ]
-            generation = evaluate_all(many)
+            generation = evaluate_all(
+                [
+                    [
+                        parameter.value(float(unit))
+                        for parameter, unit in zip(problem.parameters, candidate, strict=True)
+                    ]
+                    for candidate in units
+                ]
+            )
             search.tell(units, [each.loss for each in generation])
             tried.extend(generation)
             if on_generation is not None:
                 on_generation(len(tried), min(tried, key=lambda each: each.loss))
     return tried
+
+
+def select(problem: Problem, tried: Sequence[Evaluation], workers: int) -> Evaluation:
+    """Choose the best of the few best evaluations, simulated again with more missions and other streams.
+
+    The least of many noisy losses is partly luck; the second evaluation is not chosen for it.
+    """
+    finalists = sorted(tried, key=lambda each: each.loss)[:FINALISTS]
+    larger = replace(problem, runs=problem.runs * FINAL_FACTOR, seed=problem.seed + 1)
+    with evaluator(larger, workers) as evaluate_all:
+        return min(evaluate_all([each.values for each in finalists]), key=lambda each: each.loss)
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The loss along one parameter, the others held at the best fit.
+
+    Attributes:
+        parameter: which.
+        best: its fitted value.
+        values: where the loss was evaluated, rising.
+        losses: the loss there.
+        low: least admitted value: where the loss, interpolated, crosses the threshold; the bound if it never does.
+        high: greatest admitted value.
+    """
+
+    parameter: FreeParameter
+    best: float
+    values: tuple[float, ...]
+    losses: tuple[float, ...]
+    low: float
+    high: float
+
+
+def profiles(problem: Problem, best: Evaluation, threshold: float, workers: int) -> list[Profile]:
+    """Compute the profile of every parameter.
+
+    Args:
+        problem: what was fitted to what.
+        best: the best fit.
+        threshold: loss up to which a value is admitted.
+        workers: processes.
+    """
+    grids = [_grid(parameter, value) for parameter, value in zip(problem.parameters, best.values, strict=True)]
+    many = [
+        (*best.values[:place], value, *best.values[place + 1 :]) for place, grid in enumerate(grids) for value in grid
+    ]
+    with evaluator(problem, workers) as evaluate_all:
+        losses = iter([each.loss for each in evaluate_all(many)])
+    found = []
+    for parameter, value, grid in zip(problem.parameters, best.values, grids, strict=True):
+        along = tuple(next(losses) for _ in grid)
+        low = _crossing(value, best.loss, grid[::-1], along[::-1], threshold)
+        high = _crossing(value, best.loss, grid, along, threshold)
+        found.append(Profile(parameter, value, grid, along, low, high))
+    return found
+
+
+def _grid(parameter: FreeParameter, best: float) -> tuple[float, ...]:
+    """Values from bound to bound, denser near the best one."""
+    shares = (np.linspace(0.0, 1.0, POINTS // 2 + 1)[1:]) ** 2
+    below = best - shares * (best - parameter.lower)
+    above = best + shares * (parameter.upper - best)
+    return tuple(sorted({*below.tolist(), *above.tolist()}))
+
+
+def _crossing(best: float, loss: float, grid: tuple[float, ...], losses: tuple[float, ...], threshold: float) -> float:
+    """Going outwards from the best value along the grid's order, where the loss first exceeds the threshold."""
+    rising = grid[-1] > grid[0]
+    before, loss_before = best, loss
+    for value, here in zip(grid, losses, strict=True):
+        if (value > best) != rising or value == best:
+            continue
+        if here > threshold:
+            share = (threshold - loss_before) / (here - loss_before) if here > loss_before else 0.0
+            return before + max(0.0, share) * (value - before)
+        before, loss_before = value, here
+    return before

@@ -1,4 +1,4 @@
-"""The file that says what is free in a calibration, within which bounds, and in which form."""
+"""Read the file that names the free parameters of a calibration, their bounds, and the form of distributions."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from suave_des.calibration.fit import FreeParameter
-from suave_des.errors import InputError
+from suave_des.calibration.loss import FreeParameter
+from suave_des.errors import InputError, shown
 from suave_des.scenario.layers import Layer
 from suave_des.scenario.loader import LoadedScenario, value_at, with_values
 from suave_des.scenario.problems import input_error
@@ -26,7 +26,7 @@ class FreeEntry(Strict):
     upper: Number
     """Greatest value."""
     start: Number | None = None
-    """Where the search starts; left out: the scenario's value."""
+    """The value that the search starts from; left out: the scenario's."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -35,7 +35,7 @@ class FreeEntry(Strict):
 
 
 class CalibrationFile(Strict):
-    """What a calibration frees."""
+    """The parameters that a calibration fits."""
 
     form: dict[str, Any] = Field(default_factory=dict)
     """Values put into the scenario before anything is fitted, by key path: the form of distributions, say."""
@@ -67,9 +67,10 @@ def _parameter(layer: Layer, index: int, entry: FreeEntry, loaded: LoadedScenari
     try:
         present = value_at(loaded, entry.path)
     except InputError as error:
-        raise layer.error(error.problem, place, error.remedy or "") from None
+        raise layer.error(error.problem, place, error.remedy) from None
     if not isinstance(present, int | float) or isinstance(present, bool):
-        raise layer.error(f"{entry.path} is no number in this scenario", place, "give it a form, or another path")
+        problem = f"{entry.path}: expected a number in this scenario, got {shown(present)}"
+        raise layer.error(problem, place, "give it a form, or another path")
     start = float(present) if entry.start is None else entry.start
     if not entry.lower <= start <= entry.upper:
         raise layer.error(

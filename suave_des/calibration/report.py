@@ -1,4 +1,4 @@
-"""What a calibration writes: the fitted scenario, tables, and a figure of the profiles."""
+"""Write a calibration: the fitted scenario, tables, and a figure of the profiles."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from typing import Any
 
 import yaml
 
-from suave_des.calibration.fit import Evaluation, FreeParameter, Problem
-from suave_des.calibration.profile import Profile
-from suave_des.scenario.loader import value_at, with_values
+from suave_des.calibration.fit import Profile
+from suave_des.calibration.loss import Evaluation, FreeParameter, Problem
+from suave_des.report import style
+from suave_des.scenario.loader import LoadedScenario, value_at, with_values
 
 SCENARIO, TABLE, RECORD, FIGURE = "fitted.yaml", "parameters.csv", "calibration.json", "profiles.png"
 FILES = (SCENARIO, TABLE, RECORD, FIGURE)
@@ -43,7 +44,7 @@ def fitted_scenario(problem: Problem, base: str, values: Mapping[str, float]) ->
     return f"# Fitted by `suave-des calibrate`; the report beside this file says how.\n{text}"
 
 
-def _is_below_distribution(loaded: Any, path: str) -> bool:
+def _is_below_distribution(loaded: LoadedScenario, path: str) -> bool:
     parent, _, _ = path.rpartition(".")
     above = value_at(loaded, parent) if parent else None
     return isinstance(above, dict) and "distribution" in above
@@ -121,6 +122,4 @@ def profiles_png(found: Sequence[Profile], best: Evaluation, threshold: float) -
         panel.set_visible(False)
     for row in range(rows):
         panels[row * columns].set_ylabel("distance to the published runs", fontsize=7)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=160, metadata={"Software": None})
-    return buffer.getvalue()
+    return style.png(figure, dpi=160)

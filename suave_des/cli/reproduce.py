@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from suave_des.report.comparison import Comparison, Figure
+    from suave_des.report.paper import PaperComparison, PaperFigure
 
 SCENARIO = "seams2023"
 _TEXT_WIDTH = 95
@@ -51,10 +51,9 @@ def reproduce(
     from suave_des.campaign.campaign import run_campaign
     from suave_des.campaign.output import write_files
     from suave_des.cli.console import output, progress
-    from suave_des.report.comparison import compare, csv_table, markdown_table
-    from suave_des.report.published import published_figures
+    from suave_des.report.paper import FILES, compare, published_estimates
 
-    published = published_figures()
+    published = published_estimates()
     managers = list(dict.fromkeys(manager for manager, _ in published))
     with progress("reproduce", quiet=quiet) as show:
         result = run_campaign(
@@ -75,15 +74,15 @@ def reproduce(
     if out is None:
         console.print("\nNo files were written; --out DIR keeps each mission's figures.", soft_wrap=True)
     else:
-        write_files(out, {"paper_table.md": markdown_table(comparison), "paper_table.csv": csv_table(comparison)})
+        write_files(out, dict(zip(FILES, (comparison.markdown(), comparison.csv()), strict=True)))
         console.print(f"\nThe missions are in {out}/runs.csv, this table in {out}/paper_table.md", soft_wrap=True)
     exit_telling_failures(result)
 
 
-def print_comparison(console: Console, comparison: Comparison) -> None:
+def print_comparison(console: Console, comparison: PaperComparison) -> None:
     """Print the paper's table beside the simulated results, with remarks on their differences."""
     from suave_des.cli.console import print_table
-    from suave_des.report.published import METRICS
+    from suave_des.report.runs import METRICS
 
     for metric, title in METRICS.items():
         print_table(console, title, _table([figure for figure in comparison.figures if figure.metric == metric]))
@@ -92,9 +91,9 @@ def print_comparison(console: Console, comparison: Comparison) -> None:
         console.print(fill(line, min(console.width, _TEXT_WIDTH)))
 
 
-def _table(figures: Sequence[Figure]) -> Table:
+def _table(figures: Sequence[PaperFigure]) -> Table:
     from suave_des.cli.console import interval, number, plain_table
-    from suave_des.report.comparison import MARK
+    from suave_des.report.paper import MARK
 
     table = plain_table()
     table.add_column("manager", min_width=12)

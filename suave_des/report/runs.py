@@ -1,49 +1,230 @@
-"""Reads runs.csv."""
+"""Read missions, real or simulated, from any of the CSV files in which they come."""
 
 from __future__ import annotations
 
-from dataclasses import fields
+import csv
+import hashlib
+import io
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
 import pandas
+from numpy.typing import NDArray
 
-from suave_des.errors import InputError
-from suave_des.simulation.result import MissionMetrics
+from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.scenario.yamlfile import decode, read_bytes
 
-_KINDS = {"str": "str", "int": "int64", "float": "float64", "float | None": "float64", "bool": "bool"}
-COLUMNS = {field.name: _KINDS[str(field.type)] for field in fields(MissionMetrics)}
-"""Columns of runs.csv, with their types in a data frame."""
+METRICS = {"search_time_s": "search time (s)", "distance_inspected_m": "distance inspected (m)"}
+"""Metrics that are compared, with their titles in figures."""
+COLUMNS = ("manager", *METRICS, "detection_x_m")
+"""Columns of a frame of missions; detection_x_m is nan where it is not known or nothing was detected."""
+_SIZE_LIMIT_BYTES = 500_000_000
 
 
-def read_runs(path: Path, *, needed: tuple[str, ...] = tuple(COLUMNS)) -> pandas.DataFrame:
-    """The missions of a campaign; what is empty in the file is nan.
+class _Layout(NamedTuple):
+    """Names of the columns in one kind of file; those after the first three may be absent, or have no name there."""
+
+    manager: str
+    search_time_s: str
+    distance_inspected_m: str
+    detection_x_m: tuple[str, ...] = ()
+    time_limit_s: str = ""
+    scenario: str = ""
+    manager_is_last_word: bool = True
+
+
+_LAYOUTS = (
+    _Layout(
+        "manager",
+        "search_time_s",
+        "distance_inspected_m",
+        detection_x_m=("detection_x_m", "detection_x_m_inferred"),
+        scenario="scenario",
+        manager_is_last_word=False,
+    ),
+    # The exemplar's results files (kas-lab/suave): revision 2023, which writes -1 when nothing was found, and 1.5.
+    _Layout("mission_name", "time search (s)", "distance inspected (m)", time_limit_s="time budget (s)"),
+    _Layout("mission name", "time searching pipeline (s)", "distance inspected (m)"),
+)
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Missions read from a file.
+
+    Attributes:
+        path: the file.
+        frame: a row for each mission, in the file's order, with COLUMNS and the further columns that were asked for.
+        managers: in the order of their first missions, each with the line of that.
+        scenarios: names of scenarios that the file gives, each with its first line.
+        sha256: of the file's bytes, in hex.
+    """
+
+    path: Path
+    frame: pandas.DataFrame
+    managers: Mapping[str, int]
+    scenarios: Mapping[str, int]
+    sha256: str
+
+    def error(self, line: int, problem: str, remedy: str | None) -> InputError:
+        """Make an error about a line of the file."""
+        return InputError(problem, file=self.path, place=f"line {line}", remedy=remedy)
+
+    def check_simulated(self, managers: Sequence[str], scenario: str | None) -> None:
+        """Check that these missions are of one scenario, and that there are some of each manager.
+
+        Args:
+            managers: that are needed.
+            scenario: that is needed; none: any one.
+
+        Raises:
+            InputError: they are not, or there are none.
+        """
+        names = list(self.scenarios)
+        if len(names) > 1:
+            problem = f"has missions of several scenarios: {names[0]} and {names[1]}"
+            raise self.error(self.scenarios[names[1]], problem, "give the missions of one scenario")
+        if names and scenario not in (None, names[0]):
+            problem = f"has missions of scenario {names[0]}, not of {scenario}"
+            raise self.error(self.scenarios[names[0]], problem, f"name scenario {names[0]}, or give another file")
+        for manager in managers:
+            if manager not in self.managers:
+                remedy = f"it has {', '.join(self.managers)}; choose among them with --managers"
+                raise InputError(f"has no mission of manager {manager!r}", file=self.path, remedy=remedy)
+
+
+def read_runs(path: str | Path, *, further: Sequence[str] = ()) -> Runs:
+    """Read missions from a runs.csv, a file like the published seams2023_runs.csv, or the exemplar's own results.
+
+    Search times are taken as they stand, but for the -1 with which revision 2023 says that nothing was found: the time
+    limit stands for it, as in the published table.
 
     Args:
-        path: of a runs.csv; it may have further columns.
-        needed: columns that it must have.
+        path: of the file; it may have columns that are not read.
+        further: columns to read too, such as those of a sweep; numbers where all their values are.
 
     Raises:
-        InputError: there is no such file, it is no CSV file, it lacks a column, or one holds something else.
+        InputError: with file and line: the file cannot be read, has other columns, no mission, or an impossible value.
     """
+    path = Path(path)
+    content = read_bytes(path, _SIZE_LIMIT_BYTES)
+    reader = csv.reader(io.StringIO(decode(path, content), newline=""), strict=True)
+    rows, lines = [], []
     try:
-        frame = pandas.read_csv(path, keep_default_na=False, na_values=[""])
-    except FileNotFoundError:
-        raise InputError(
-            "no such file", file=path, remedy="give a runs.csv that suave-des campaign has written"
-        ) from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"cannot be read: {error}", file=path, remedy="give a runs.csv") from None
-    missing = [name for name in needed if name not in frame.columns]
-    if missing:
-        raise InputError(f"has no column {missing[0]}", file=path, remedy=f"a runs.csv has {', '.join(needed)}")
-    if frame["manager"].isna().any():
-        raise InputError("has a mission without manager", file=path, remedy="give a runs.csv")
-    for name, kind in COLUMNS.items():
-        words = set(frame[name].astype("str")) if kind == "bool" and name in frame.columns else set()
-        if not words <= {"True", "False"}:
-            problem = f"{name} {min(words - {'True', 'False'})!r} is neither True nor False"
-            raise InputError(problem, file=path, remedy="give a runs.csv")
-    try:
-        return frame.astype({name: kind for name, kind in COLUMNS.items() if name in frame.columns})
-    except (ValueError, TypeError, OverflowError) as error:
-        raise InputError(f"holds a value of the wrong kind: {error}", file=path, remedy="give a runs.csv") from None
+        header = [name.strip() for name in next(reader, [])]
+        layout = _layout(path, header, further)
+        wanted = (*layout[:3], *layout.detection_x_m, layout.time_limit_s, layout.scenario, *further)
+        names = [name for name in dict.fromkeys(wanted) if name in header]
+        places = [header.index(name) for name in names]
+        for cells in reader:
+            if any(map(str.strip, cells)):
+                if len(cells) != len(header):
+                    problem = f"has {len(cells)} values, but the header has {len(header)}"
+                    raise _error(path, reader.line_num, problem, "give each column a value, if only an empty one")
+                rows.append([cells[place].strip() for place in places])
+                lines.append(reader.line_num)
+    except csv.Error as error:
+        remedy = "one line for each mission, cells separated by commas"
+        raise _error(path, reader.line_num, f"is not valid CSV: {error}", remedy) from None
+    if not rows:
+        raise _error(path, 1, "has no missions under its header", "one line for each mission is needed")
+    cells_by_name = pandas.DataFrame(rows, columns=names, index=lines, dtype=str)
+    frame = _missions(_Cells(path, cells_by_name), layout)
+    managers = _first_lines(frame["manager"])
+    scenarios = _first_lines(cells_by_name[layout.scenario]) if layout.scenario in names else {}
+    frame = frame.assign(**{name: _numbers_or_words(cells_by_name[name]) for name in further})
+    return Runs(path, frame.reset_index(drop=True), managers, scenarios, hashlib.sha256(content).hexdigest())
+
+
+def choose_managers(published: Runs, wanted: str | None) -> tuple[str, ...]:
+    """Choose the managers to compare: those named, separated by commas, or all of the published file.
+
+    Raises:
+        InputError: one is named twice, or has no published mission.
+    """
+    if wanted is None:
+        return tuple(published.managers)
+    names = [name.strip() for name in wanted.split(",") if name.strip()]
+    if not names:
+        raise InputError("no managers are given", remedy=f"of {published.path}: {', '.join(published.managers)}")
+    for place, manager in enumerate(names):
+        if manager in names[:place]:
+            raise InputError(f"manager {manager!r} is given twice", remedy="name each manager once")
+        if manager not in published.managers:
+            remedy = did_you_mean(manager, published.managers, "its managers")
+            raise InputError(f"has no mission of manager {manager!r}", file=published.path, remedy=remedy)
+    return tuple(names)
+
+
+def _layout(path: Path, header: Sequence[str], further: Sequence[str]) -> _Layout:
+    for column in header:
+        if header.count(column) > 1:
+            raise _error(path, 1, f"has column {shown(column)} twice", "name each column once")
+    nearest = max(_LAYOUTS, key=lambda layout: len(set(layout[:3]) & set(header)))
+    for column in (needed := (*nearest[:3], *further)):
+        if column not in header:
+            raise _error(path, 1, f"has no column {column!r}", f"the columns {', '.join(needed)} are needed")
+    return nearest
+
+
+def _missions(cells: _Cells, layout: _Layout) -> pandas.DataFrame:
+    """Check and convert the cells; a frame with COLUMNS."""
+    words = [name.split() for name in cells.text[layout.manager]]
+    are_names = [len(each) == 1 or bool(each and layout.manager_is_last_word) for each in words]
+    cells.check(layout.manager, are_names, "a manager's name")
+    search_time_s = cells.numbers(layout.search_time_s, least=-math.inf)
+    if layout.time_limit_s in cells.text:
+        search_time_s = np.where(search_time_s == -1.0, cells.numbers(layout.time_limit_s), search_time_s)
+    cells.check(layout.search_time_s, search_time_s >= 0.0, "a finite number, at least 0")
+    detection = next((name for name in layout.detection_x_m if name in cells.text), None)
+    values = (
+        [each[-1] for each in words],
+        search_time_s,
+        cells.numbers(layout.distance_inspected_m),
+        math.nan if detection is None else cells.numbers(detection, least=-math.inf, may_be_empty=True),
+    )
+    return pandas.DataFrame(dict(zip(COLUMNS, values, strict=True)), index=cells.text.index)
+
+
+class _Cells(NamedTuple):
+    """The cells of a file as text, indexed by line."""
+
+    path: Path
+    text: pandas.DataFrame
+
+    def numbers(self, column: str, *, least: float = 0.0, may_be_empty: bool = False) -> NDArray[np.float64]:
+        """Convert a column; empty cells are nan."""
+        numbers = pandas.to_numeric(self.text[column], errors="coerce").to_numpy(float)
+        is_right = np.isfinite(numbers) & (numbers >= least)
+        if may_be_empty:
+            is_right |= (self.text[column] == "").to_numpy()
+        self.check(column, is_right, "a finite number" + (f", at least {least:g}" if least > -math.inf else ""))
+        return numbers
+
+    def check(self, column: str, is_right: Iterable[bool], wanted: str) -> None:
+        """Check a column.
+
+        Raises:
+            InputError: about the first line that is wrong.
+        """
+        for line, text, right in zip(self.text.index, self.text[column], is_right, strict=True):
+            if not right:
+                problem = f"{column}: expected {wanted}, got {shown(text)}"
+                raise _error(self.path, line, problem, "correct it, or leave the mission out")
+
+
+def _first_lines(names: pandas.Series[str]) -> dict[str, int]:
+    return {str(name): int(line) for line, name in names.drop_duplicates().items()}  # type: ignore[call-overload]
+
+
+def _numbers_or_words(text: pandas.Series[str]) -> pandas.Series[float] | pandas.Series[str]:
+    numbers = pandas.to_numeric(text, errors="coerce")
+    return text if numbers.isna().any() else numbers
+
+
+def _error(path: Path, line: int, problem: str, remedy: str) -> InputError:
+    return InputError(problem, file=path, place=f"line {line}", remedy=remedy)

@@ -1,121 +1,109 @@
-"""What a validation leaves on disk: tables as CSV, everything as JSON."""
+"""Write a validation to disk: tables as CSV, everything as JSON."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import asdict
 
-from suave_des.validation.comparison import Cell, Pair
-from suave_des.validation.shares import Counted, Position, ShareComparison
-from suave_des.validation.statistics import Interval
-from suave_des.validation.targets import Target
-from suave_des.validation.validation import Validation
+from suave_des.estimates import Interval
+from suave_des.validation.shares import Proportion
+from suave_des.validation.validation import ManagerComparison, SampleComparison, Validation
 
-CELLS_FILE, PAIRS_FILE = "validation.csv", "validation_pairs.csv"
-SHARES_FILE, POSITIONS_FILE = "validation_shares.csv", "validation_positions.csv"
-TARGETS_FILE, JSON_FILE = "validation_targets.csv", "validation.json"
-DISTRIBUTIONS_FIGURE, DETECTIONS_FIGURE = "distributions.png", "detections.png"
-FILES = (
-    CELLS_FILE,
-    PAIRS_FILE,
-    SHARES_FILE,
-    POSITIONS_FILE,
-    TARGETS_FILE,
-    JSON_FILE,
-    DISTRIBUTIONS_FIGURE,
-    DETECTIONS_FIGURE,
-)
+TABLES = {
+    "cells": "validation.csv",
+    "pairs": "validation_pairs.csv",
+    "shares": "validation_shares.csv",
+    "positions": "validation_positions.csv",
+    "targets": "validation_targets.csv",
+}
+"""Names of the tables in the JSON file, and their files."""
+JSON_FILE, DISTRIBUTIONS_FIGURE, DETECTIONS_FIGURE = "validation.json", "distributions.png", "detections.png"
+FILES = (*TABLES.values(), JSON_FILE, DISTRIBUTIONS_FIGURE, DETECTIONS_FIGURE)
 """All files of a validation."""
 
 _SIGNIFICANT_DIGITS = 8
 
-Record = dict[str, Any]
-"""A row of a table: plain values by column, numbers rounded, none for what cannot be had."""
+Record = dict[str, object]
+"""A row of a table by column; missing values are none."""
 
 
-def records(validation: Validation) -> dict[str, list[Record]]:
-    """Every table of the validation, by its name in validation.json."""
-    return {
-        "cells": [_rounded(_cell(cell)) for cell in validation.cells],
-        "pairs": [_rounded(_pair(pair)) for pair in validation.pairs],
-        "shares": [_rounded(_share(share)) for share in validation.shares],
-        "positions": [_rounded(_position(position)) for position in validation.positions],
-        "targets": [_rounded(_target(target)) for target in validation.targets],
-    }
-
-
-def texts(validation: Validation, provenance: Mapping[str, Any]) -> dict[str, str]:
-    """Content of each text file, by its name.
+def texts(validation: Validation, provenance: Mapping[str, object]) -> dict[str, str]:
+    """Write each text file, by its name.
 
     Args:
         validation: what was found.
         provenance: from what; goes into the JSON file.
     """
-    tables = records(validation)
+    import pandas
+
+    tables = {name: [_rounded(row) for row in rows] for name, rows in _tables(validation).items()}
     met = [target.met for target in validation.targets]
     summary = {"met": met.count(True), "not_met": met.count(False), "not_judged": met.count(None)}
     content = {"provenance": dict(provenance), "targets_summary": summary, **tables}
+    files = {
+        file: pandas.DataFrame(tables[name]).to_csv(index=False, lineterminator="\n") if tables[name] else ""
+        for name, file in TABLES.items()
+    }
+    return {**files, JSON_FILE: json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"}
+
+
+def _tables(validation: Validation) -> dict[str, list[Record]]:
     return {
-        CELLS_FILE: _csv(tables["cells"]),
-        PAIRS_FILE: _csv(tables["pairs"]),
-        SHARES_FILE: _csv(tables["shares"]),
-        POSITIONS_FILE: _csv(tables["positions"]),
-        TARGETS_FILE: _csv(tables["targets"]),
-        JSON_FILE: json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n",
+        "cells": [_sample(each) for each in validation.samples],
+        "pairs": [_pair(each) for each in validation.pairs],
+        "shares": [
+            {
+                "manager": each.share.manager,
+                "name": each.share.name,
+                **_proportion("published", each.published),
+                **_proportion("simulated", each.simulated),
+                **_ends("target", each.share.target, "low", "high"),
+            }
+            for each in validation.shares
+        ],
+        "positions": [
+            {
+                "manager": each.manager,
+                "detection_x_m": each.detection_x_m,
+                **_proportion("published", each.published),
+                **_proportion("simulated", each.simulated),
+            }
+            for each in validation.places
+        ],
+        "targets": [{**asdict(target), "met": target.met} for target in validation.targets],
     }
 
 
-def _csv(rows: Sequence[Record]) -> str:
-    import pandas
-
-    return pandas.DataFrame(rows).to_csv(index=False, lineterminator="\n") if rows else ""
-
-
-def _rounded(record: Record) -> Record:
-    return {column: _cell_value(value) for column, value in record.items()}
-
-
-def _cell_value(value: Any) -> Any:
-    if not isinstance(value, float):
-        return value
-    # Eight digits hide the last ones, in which machines differ; p values of 1e-12 keep theirs.
-    return float(f"{value:.{_SIGNIFICANT_DIGITS}g}") if math.isfinite(value) else None
-
-
-def _interval(name: str, interval: Interval | None) -> Record:
-    low, high = interval or (None, None)
-    return {f"{name}_ci95_low": low, f"{name}_ci95_high": high}
-
-
-def _cell(cell: Cell) -> Record:
+def _sample(compared: SampleComparison) -> Record:
+    published, simulated = compared.published, compared.simulated
     return {
-        "manager": cell.manager,
-        "metric": cell.metric,
-        "published_n": cell.published.n,
-        "published_mean": cell.published.mean,
-        **_interval("published_mean", cell.published.mean_interval),
-        "published_std": cell.published.std,
-        **_interval("published_std", cell.published.std_interval),
-        "published_median": cell.published.median,
-        "simulated_n": cell.simulated.n,
-        "simulated_mean": cell.simulated.mean,
-        **_interval("simulated_mean", cell.simulated.mean_interval),
-        "simulated_std": cell.simulated.std,
-        "simulated_median": cell.simulated.median,
-        "difference_of_means": cell.difference,
-        **_interval("difference_of_means", cell.difference_interval),
-        "std_ratio": cell.std_ratio,
-        **_interval("std_ratio", cell.std_ratio_interval),
-        "ks_distance": cell.kolmogorov_smirnov.distance,
-        "ks_p": cell.kolmogorov_smirnov.p,
-        "ad_statistic": cell.anderson_darling.statistic,
-        "ad_p": cell.anderson_darling.p,
+        "manager": compared.manager,
+        "metric": compared.metric,
+        "published_n": published.n,
+        "published_mean": published.mean,
+        **_ends("published_mean", published.mean_interval),
+        "published_std": published.std,
+        **_ends("published_std", published.std_interval),
+        "published_median": published.median,
+        "simulated_n": simulated.n,
+        "simulated_mean": simulated.mean,
+        **_ends("simulated_mean", simulated.mean_interval),
+        "simulated_std": simulated.std,
+        "simulated_median": simulated.median,
+        "difference_of_means": compared.difference,
+        **_ends("difference_of_means", compared.difference_interval),
+        "std_ratio": compared.std_ratio,
+        **_ends("std_ratio", compared.std_ratio_interval),
+        "ks_distance": compared.kolmogorov_smirnov.statistic,
+        "ks_p": compared.kolmogorov_smirnov.p,
+        "ad_statistic": None if compared.anderson_darling is None else compared.anderson_darling.statistic,
+        "ad_p": None if compared.anderson_darling is None else compared.anderson_darling.p,
     }
 
 
-def _pair(pair: Pair) -> Record:
+def _pair(pair: ManagerComparison) -> Record:
     return {
         "first": pair.first,
         "second": pair.second,
@@ -131,43 +119,21 @@ def _pair(pair: Pair) -> Record:
     }
 
 
-def _counted(side: str, counted: Counted) -> Record:
+def _proportion(side: str, found: Proportion) -> Record:
+    share = {f"{side}_count": found.count, f"{side}_n": found.n, f"{side}_share": found.share}
+    return {**share, **_ends(f"{side}_share", found.interval)}
+
+
+def _ends(name: str, interval: Interval | None, low: str = "ci95_low", high: str = "ci95_high") -> Record:
+    ends = interval or (None, None)
+    return {f"{name}_{low}": ends[0], f"{name}_{high}": ends[1]}
+
+
+def _rounded(record: Record) -> Record:
+    """Round to eight digits, which hides the last ones, in which machines differ; p values of 1e-12 keep theirs."""
     return {
-        f"{side}_count": counted.count,
-        f"{side}_n": counted.n,
-        f"{side}_share": counted.share,
-        **_interval(f"{side}_share", counted.interval),
-    }
-
-
-def _share(compared: ShareComparison) -> Record:
-    low, high = compared.share.target or (None, None)
-    return {
-        "manager": compared.share.manager,
-        "name": compared.share.name,
-        **_counted("published", compared.published),
-        **_counted("simulated", compared.simulated),
-        "target_low": low,
-        "target_high": high,
-    }
-
-
-def _position(position: Position) -> Record:
-    return {
-        "manager": position.manager,
-        "detection_x_m": position.detection_x_m,
-        **_counted("published", position.published),
-        **_counted("simulated", position.simulated),
-    }
-
-
-def _target(target: Target) -> Record:
-    return {
-        "kind": target.kind,
-        "subject": target.subject,
-        "what": target.what,
-        "value": target.value,
-        "low": target.low,
-        "high": target.high,
-        "met": target.met,
+        column: (float(f"{value:.{_SIGNIFICANT_DIGITS}g}") if math.isfinite(value) else None)
+        if isinstance(value, float)
+        else value
+        for column, value in record.items()
     }

@@ -1,19 +1,21 @@
-"""Shares of missions in regions of search time, distance and place of detection: which clusters they come in."""
+"""Count missions in regions of search time, distance and place of detection: the clusters in which they come."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
+from suave_des.estimates import Interval
 from suave_des.scenario.layers import Layer
 from suave_des.scenario.problems import input_error
 from suave_des.scenario.quantities import Number, Strict, ordered, wrong
 from suave_des.scenario.yamlfile import read_yaml
-from suave_des.validation.statistics import Interval, share_interval
+from suave_des.validation.statistics import share_interval
 
 if TYPE_CHECKING:
     import pandas
@@ -21,12 +23,12 @@ if TYPE_CHECKING:
 POSITION_STEP_M = 0.5
 """Spacing of the pipeline points on its long pieces, and so of places of detection."""
 _TOLERANCE = 1e-6
-"""Places come from sums of steps; an end of an interval must hold the value that it names."""
+"""Places come from sums of steps; an interval must contain the values that it names."""
 
 Column = Literal["search_time_s", "distance_inspected_m", "detection_x_m"]
 Bounds = tuple[Number, Number]
 Region = dict[Column, Annotated[tuple[Bounds, ...], Field(min_length=1)]]
-"""By column the intervals, ends included, one of which must hold the value; a place that is not known is in none."""
+"""By column the intervals, ends included, one of which must contain the value; an unknown place is in none."""
 
 
 class Share(Strict):
@@ -39,11 +41,11 @@ class Share(Strict):
     of: Literal["runs", "detections"] = "runs"
     """Of all runs, or of those whose place of detection is known."""
     among: Region = Field(default_factory=dict)
-    """Only runs in this region are looked at; left out: all."""
+    """Only runs in this region are counted; left out: all."""
     where: Annotated[Region, Field(min_length=1)]
     """The region whose share is taken."""
     target: tuple[Number, Number] | None = None
-    """Least and greatest share that a faithful simulation may have; left out: it is only shown."""
+    """Least and greatest share that a faithful simulation may have; left out: the share is only printed."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -62,14 +64,14 @@ class ShareList(Strict):
     """A file of shares."""
 
     shares: tuple[Share, ...]
-    """In the order in which they are shown."""
+    """In the order in which they are printed."""
 
 
 def read_shares(path: Path) -> tuple[Share, ...]:
     """Read a file of shares.
 
     Raises:
-        InputError: with file and line: it cannot be read, or has what it should not.
+        InputError: with file and line: it cannot be read, or is not valid.
     """
     layer = Layer.of(read_yaml(path), 0)
     try:
@@ -79,21 +81,26 @@ def read_shares(path: Path) -> tuple[Share, ...]:
 
 
 def shares_beside(data: Path) -> Path | None:
-    """The file of shares that belongs to a data file: NAME.targets.yaml beside NAME.csv, if it is there."""
+    """Find the file of shares of a data file: NAME.targets.yaml beside NAME.csv, if it is there."""
     path = data.with_suffix(".targets.yaml")
     return path if path.is_file() else None
 
 
 @dataclass(frozen=True, slots=True)
-class Counted:
-    """How many of some missions are in a region."""
+class Proportion:
+    """How many of some missions are in a region.
+
+    Attributes:
+        count: missions in the region.
+        n: all missions.
+    """
 
     count: int
     n: int
 
     @property
     def share(self) -> float | None:
-        """None for no missions."""
+        """count / n; none for no missions."""
         return self.count / self.n if self.n else None
 
     @property
@@ -104,17 +111,17 @@ class Counted:
 
 @dataclass(frozen=True, slots=True)
 class ShareComparison:
-    """One share on both sides."""
+    """One share, published and simulated."""
 
     share: Share
-    published: Counted
-    simulated: Counted
+    published: Proportion
+    simulated: Proportion
 
 
 def compare_shares(
     shares: Sequence[Share], published: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequence[str]
 ) -> tuple[ShareComparison, ...]:
-    """Each share of the managers compared, on both sides."""
+    """Count each share of the managers compared in published and simulated missions."""
     return tuple(
         ShareComparison(share, count(share, published), count(share, simulated))
         for share in shares
@@ -122,35 +129,32 @@ def compare_shares(
     )
 
 
-def count(share: Share, runs: pandas.DataFrame) -> Counted:
+def count(share: Share, runs: pandas.DataFrame) -> Proportion:
     """Count a share.
 
     Args:
         share: what to count.
-        runs: a row a mission, with the columns of runs.COLUMNS.
+        runs: a row for each mission, with the columns of report.runs.COLUMNS.
     """
     own = runs[runs["manager"] == share.manager]
     if share.of == "detections":
         own = own[own["detection_x_m"].notna()]
     among = own[_inside(own, share.among)]
-    return Counted(int(_inside(among, share.where).sum()), len(among))
+    return Proportion(int(_inside(among, share.where).sum()), len(among))
 
 
-def _inside(runs: pandas.DataFrame, region: Mapping[Column, Sequence[Bounds]]) -> pandas.Series[bool]:
+def _inside(runs: pandas.DataFrame, region: Region) -> pandas.Series[bool]:
     import pandas
 
     inside = pandas.Series(True, index=runs.index)
     for column, intervals in region.items():
-        values = runs[column]
-        held = pandas.Series(False, index=runs.index)
-        for low, high in intervals:
-            held |= values.between(low - _TOLERANCE, high + _TOLERANCE)
-        inside &= held
+        in_one = [runs[column].between(low - _TOLERANCE, high + _TOLERANCE) for low, high in intervals]
+        inside &= pandas.concat(in_one, axis=1).any(axis=1)
     return inside
 
 
 @dataclass(frozen=True, slots=True)
-class Position:
+class DetectionPlace:
     """How many of a manager's detections with a known place are at one place.
 
     Attributes:
@@ -162,30 +166,24 @@ class Position:
 
     manager: str
     detection_x_m: float
-    published: Counted
-    simulated: Counted
+    published: Proportion
+    simulated: Proportion
 
 
-def compare_positions(
+def compare_places(
     published: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequence[str]
-) -> tuple[Position, ...]:
-    """Distribution of the places of detection on both sides, in the order of managers and places."""
+) -> tuple[DetectionPlace, ...]:
+    """Count the detections at each place, by manager in the order given, and then by place."""
     found = []
     for manager in managers:
-        ours, theirs = _places(simulated, manager), _places(published, manager)
-        for place in sorted(set(ours) | set(theirs)):
-            sides = (Counted(side.get(place, 0), sum(side.values())) for side in (theirs, ours))
-            found.append(Position(manager, place * POSITION_STEP_M, *sides))
+        sides = [_places(runs, manager) for runs in (published, simulated)]
+        for place in sorted({*sides[0], *sides[1]}):
+            proportions = (Proportion(side.get(place, 0), sum(side.values())) for side in sides)
+            found.append(DetectionPlace(manager, place * POSITION_STEP_M, *proportions))
     return tuple(found)
 
 
-def _places(runs: pandas.DataFrame, manager: str) -> dict[int, int]:
-    """Counts by place, in steps."""
+def _places(runs: pandas.DataFrame, manager: str) -> Counter[int]:
+    """Count detections by place, in steps."""
     known = runs.loc[runs["manager"] == manager, "detection_x_m"].dropna()
-    steps = (known / POSITION_STEP_M).round().astype(int)
-    return {int(step): int(number) for step, number in zip(*_unique(steps), strict=True)}
-
-
-def _unique(steps: pandas.Series[int]) -> tuple[list[int], list[int]]:
-    counts = steps.value_counts().sort_index()
-    return counts.index.tolist(), counts.tolist()
+    return Counter((known / POSITION_STEP_M).round().astype(int).tolist())

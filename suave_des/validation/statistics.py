@@ -1,152 +1,126 @@
-"""Statistics of two samples, a published one and a simulated one: pure functions over arrays.
+"""Compare samples by scipy's intervals and tests, in the form in which a validation uses them.
 
-A sample is a float array of shape (n,). Everything that draws takes a generator and is repeatable with its seed.
+A sample is a float array of shape (n,). What draws takes a generator, and is repeatable with its seed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-Sample = NDArray[np.float64]
-Interval = tuple[float, float]
+from suave_des.estimates import CONFIDENCE, Interval
 
-CONFIDENCE = 0.95
+Sample = NDArray[np.float64]
+Statistic = Callable[..., NDArray[np.float64]]
+
 SIGNIFICANCE = 0.05
 RESAMPLES = 9_999
-PERMUTATIONS = 4_999
+PERMUTATIONS = 999
 SUBSAMPLES = 2_000
-_CHUNK_VALUES = 2_000_000
-"""Values drawn at a time, so that memory does not grow with the samples."""
+_BATCH = 500
+"""Resamples at a time, so that memory stays small."""
 
 
-@dataclass(frozen=True, slots=True)
-class Resampled:
-    """Bootstrap intervals; none where they cannot be had: a sample of one value says nothing about spread."""
+class SampleTest(NamedTuple):
+    """A two-sample test.
 
-    difference_interval: Interval | None
-    ratio_interval: Interval | None
-
-
-def bootstrap(published: Sample, simulated: Sample, rng: np.random.Generator, resamples: int = RESAMPLES) -> Resampled:
-    """95% percentile bootstrap intervals of simulated less published mean, and of simulated by published std.
-
-    Both samples are resampled, independently and with replacement (Efron and Tibshirani 1993, chapters 13 and 16).
+    Attributes:
+        statistic: of the test.
+        p: probability of a statistic at least as great if both samples come from one distribution.
     """
-    if len(published) < 2 or len(simulated) < 2:
-        return Resampled(None, None)
-    published_mean, published_std = _resampled(published, rng, resamples)
-    simulated_mean, simulated_std = _resampled(simulated, rng, resamples)
-    # Of a few values, some resamples are all the same one, and their spread is no divisor.
-    ratio = simulated_std / published_std if published_std.all() else None
-    return Resampled(_middle(simulated_mean - published_mean), None if ratio is None else _middle(ratio))
-
-
-def _resampled(sample: Sample, rng: np.random.Generator, resamples: int) -> tuple[Sample, Sample]:
-    means, stds = [], []
-    for count in _chunks(resamples, len(sample)):
-        drawn = sample[rng.integers(len(sample), size=(count, len(sample)))]
-        means.append(drawn.mean(axis=1))
-        # Means of equal values are rounded; their spread must be nought all the same.
-        stds.append(np.where(np.ptp(drawn, axis=1) > 0.0, drawn.std(axis=1, ddof=1), 0.0))
-    return np.concatenate(means), np.concatenate(stds)
-
-
-def _middle(values: Sample) -> Interval:
-    tail = (1.0 - CONFIDENCE) / 2.0
-    low, high = np.quantile(values, (tail, 1.0 - tail))
-    return float(low), float(high)
-
-
-def _chunks(total: int, values_each: int) -> Iterator[int]:
-    size = max(1, _CHUNK_VALUES // max(1, values_each))
-    for start in range(0, total, size):
-        yield min(size, total - start)
-
-
-@dataclass(frozen=True, slots=True)
-class KolmogorovSmirnov:
-    """Greatest distance between two empirical distribution functions, and the p of one at least as great."""
-
-    distance: float
-    p: float
-
-
-def kolmogorov_smirnov(published: Sample, simulated: Sample) -> KolmogorovSmirnov:
-    """Two-sample, two-sided Kolmogorov-Smirnov test (scipy.stats.ks_2samp); with ties its p is on the high side."""
-    from scipy.stats import ks_2samp
-
-    found = ks_2samp(published, simulated)
-    return KolmogorovSmirnov(float(found.statistic), float(found.pvalue))
-
-
-@dataclass(frozen=True, slots=True)
-class AndersonDarling:
-    """The k-sample Anderson-Darling statistic of two samples, and its permutation p."""
 
     statistic: float
     p: float
 
 
+def difference_interval(published: Sample, simulated: Sample, rng: np.random.Generator) -> Interval | None:
+    """95% percentile bootstrap interval of simulated - published mean; none for a sample of one value.
+
+    Both samples are resampled independently and with replacement (Efron and Tibshirani 1993, chapters 13 and 16).
+    """
+    return _bootstrap(lambda x, y, axis: y.mean(axis=axis) - x.mean(axis=axis), published, simulated, rng)
+
+
+def ratio_interval(published: Sample, simulated: Sample, rng: np.random.Generator) -> Interval | None:
+    """95% percentile bootstrap interval of simulated / published standard deviation; as difference_interval.
+
+    None, too, where a resample of the published values has no spread to divide by.
+    """
+    return _bootstrap(lambda x, y, axis: _std(y, axis) / _std(x, axis), published, simulated, rng)
+
+
+def _std(sample: Sample, axis: int) -> Sample:
+    # Means of equal values are rounded; their spread must be zero all the same.
+    return np.where(np.ptp(sample, axis=axis) > 0.0, sample.std(axis=axis, ddof=1), 0.0)
+
+
+def _bootstrap(statistic: Statistic, published: Sample, simulated: Sample, rng: np.random.Generator) -> Interval | None:
+    from scipy.stats import DegenerateDataWarning, bootstrap
+
+    if len(published) < 2 or len(simulated) < 2:
+        return None
+    with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", DegenerateDataWarning)  # checked below
+        found = bootstrap(
+            (published, simulated),
+            statistic,
+            n_resamples=RESAMPLES,
+            batch=_BATCH,
+            vectorized=True,
+            confidence_level=CONFIDENCE,
+            method="percentile",
+            rng=rng,
+        )
+    if not np.isfinite(found.bootstrap_distribution).all():
+        return None
+    return float(found.confidence_interval.low), float(found.confidence_interval.high)
+
+
+def kolmogorov_smirnov(published: Sample, simulated: Sample) -> SampleTest:
+    """Two-sample, two-sided Kolmogorov-Smirnov test; with ties its p is too high."""
+    from scipy.stats import ks_2samp
+
+    found = ks_2samp(published, simulated)
+    return SampleTest(float(found.statistic), float(found.pvalue))
+
+
 def anderson_darling(
     published: Sample, simulated: Sample, rng: np.random.Generator, permutations: int = PERMUTATIONS
-) -> AndersonDarling:
-    """Anderson-Darling test of two samples, with midranks for ties (Scholz and Stephens 1987, equation 7).
+) -> SampleTest | None:
+    """Two-sample Anderson-Darling test with midranks for ties (Scholz and Stephens 1987, equation 7).
 
-    The p is that of a permutation test, which ties do not disturb: the share of ways to deal the pooled values out, the
-    observed one among them, whose statistic is at least as great. Dealing out is drawing, for each distinct value, how
-    many of it go to the smaller sample, which is what makes thousands of permutations cheap.
+    The statistic is normalised; p is that of a permutation test, which ties do not disturb. None for a sample of one.
     """
-    small, large = sorted((published, simulated), key=len)
-    values, multiplicity = np.unique(np.concatenate([small, large]), return_counts=True)
-    if len(values) == 1:
-        return AndersonDarling(0.0, 1.0)
-    observed = float(_anderson_darling_statistics(_counts(small, values), multiplicity)[0])
-    at_least = 0
-    for count in _chunks(permutations, len(values)):
-        dealt = rng.multivariate_hypergeometric(multiplicity, len(small), size=count, method="count")
-        statistics = _anderson_darling_statistics(dealt, multiplicity)
-        # Equal statistics that were summed in another order differ in their last digits.
-        at_least += int(np.count_nonzero(statistics >= observed * (1.0 - 1e-9)))
-    return AndersonDarling(observed, (at_least + 1) / (permutations + 1))
+    from scipy.stats import PermutationMethod, anderson_ksamp
 
-
-def _counts(sample: Sample, values: Sample) -> NDArray[np.int64]:
-    """How often each distinct value comes in the sample, shape (1, number of values)."""
-    return np.bincount(np.searchsorted(values, sample), minlength=len(values))[np.newaxis, :]
-
-
-def _anderson_darling_statistics(counts: NDArray[np.int64], multiplicity: NDArray[np.int64]) -> Sample:
-    """Statistic for each row of counts of the first sample; both terms of its sum over two samples are alike."""
-    total, first = int(multiplicity.sum()), int(counts[0].sum())
-    below_pooled = multiplicity.cumsum() - multiplicity / 2.0
-    below_first = counts.cumsum(axis=1) - counts / 2.0
-    weight = below_pooled * (total - below_pooled) - total * multiplicity / 4.0
-    terms = multiplicity / total * (total * below_first - first * below_pooled) ** 2 / weight
-    factor = (total - 1) / total * (1.0 / first + 1.0 / (total - first))
-    statistics: Sample = factor * terms.sum(axis=1)
-    return statistics
+    if len(published) < 2 or len(simulated) < 2:
+        return None
+    if np.ptp(np.concatenate([published, simulated])) == 0.0:  # all values equal: no test, and no evidence
+        return SampleTest(0.0, 1.0)
+    method = PermutationMethod(n_resamples=permutations, rng=rng)
+    found = anderson_ksamp([published, simulated], variant="midrank", method=method)
+    return SampleTest(float(found.statistic), float(found.pvalue))
 
 
 def superiority(first: Sample, second: Sample, *, lower_is_better: bool) -> float:
     """Probability that a mission of the first is better than one of the second, ties counted half.
 
-    Vargha and Delaney's A (2000), the Mann-Whitney U by the product of the sizes.
+    Vargha and Delaney's A (2000): the Mann-Whitney U / the product of the sizes.
     """
-    order = np.sort(second)
-    less = np.searchsorted(order, first, side="left").sum()
-    not_greater = np.searchsorted(order, first, side="right").sum()
-    greater_share = float((less + not_greater) / 2.0 / (len(first) * len(second)))
-    return 1.0 - greater_share if lower_is_better else greater_share
+    from scipy.stats import mannwhitneyu
+
+    greater = float(mannwhitneyu(first, second, method="asymptotic").statistic) / (len(first) * len(second))
+    return 1.0 - greater if lower_is_better else greater
 
 
 @dataclass(frozen=True, slots=True)
-class Conclusion:
-    """What one-sided Mann-Whitney tests, one in each direction, say of two samples.
+class OneSidedTests:
+    """One-sided Mann-Whitney tests of two samples, one in each direction.
 
     Attributes:
         first_better_p: p of the test that the first is better.
@@ -162,10 +136,10 @@ class Conclusion:
         return int(self.first_better_p < SIGNIFICANCE) - int(self.second_better_p < SIGNIFICANCE)
 
 
-def conclude(first: Sample, second: Sample, *, lower_is_better: bool) -> Conclusion:
-    """One-sided Mann-Whitney tests of two samples (scipy.stats.mannwhitneyu, normal approximation, ties corrected)."""
+def conclude(first: Sample, second: Sample, *, lower_is_better: bool) -> OneSidedTests:
+    """Test two samples both ways (scipy.stats.mannwhitneyu, normal approximation, ties corrected)."""
     first_p, second_p = _mann_whitney(first[np.newaxis, :], second[np.newaxis, :], lower_is_better=lower_is_better)
-    return Conclusion(float(first_p[0]), float(second_p[0]))
+    return OneSidedTests(float(first_p[0]), float(second_p[0]))
 
 
 def agreement(
@@ -180,7 +154,7 @@ def agreement(
     """Share of random subsamples of two samples that lead to a given conclusion.
 
     Args:
-        sign: the conclusion, see Conclusion.sign.
+        sign: the conclusion, see OneSidedTests.sign.
         samples: all values of the first and of the second.
         sizes: of the subsamples, which are drawn without replacement.
         rng: to draw them with.
@@ -190,12 +164,13 @@ def agreement(
     Returns:
         The share; none if there are fewer values than a subsample needs.
     """
-    first, second = samples
-    if len(first) < sizes[0] or len(second) < sizes[1]:
+    if any(len(sample) < size for sample, size in zip(samples, sizes, strict=True)):
         return None
-    firsts = np.array([rng.choice(first, sizes[0], replace=False) for _ in range(subsamples)])
-    seconds = np.array([rng.choice(second, sizes[1], replace=False) for _ in range(subsamples)])
-    first_p, second_p = _mann_whitney(firsts, seconds, lower_is_better=lower_is_better)
+    drawn = (
+        np.array([rng.choice(sample, size, replace=False) for _ in range(subsamples)])
+        for sample, size in zip(samples, sizes, strict=True)
+    )
+    first_p, second_p = _mann_whitney(*drawn, lower_is_better=lower_is_better)
     signs = (first_p < SIGNIFICANCE).astype(int) - (second_p < SIGNIFICANCE).astype(int)
     return float(np.mean(signs == sign))
 
@@ -204,10 +179,11 @@ def _mann_whitney(firsts: Sample, seconds: Sample, *, lower_is_better: bool) -> 
     """For each row of two arrays (k, n) and (k, m): p that the first is better, p that the second is."""
     from scipy.stats import mannwhitneyu
 
-    def p(alternative: str) -> Any:
+    def p(alternative: str) -> Sample:
         with np.errstate(divide="ignore", invalid="ignore"):  # all values equal: no test, and no evidence
             found = mannwhitneyu(firsts, seconds, axis=1, alternative=alternative, method="asymptotic").pvalue
-        return np.nan_to_num(np.asarray(found), nan=1.0)
+        values: Sample = np.nan_to_num(np.asarray(found), nan=1.0)
+        return values
 
     less, greater = p("less"), p("greater")
     return (less, greater) if lower_is_better else (greater, less)
@@ -215,11 +191,9 @@ def _mann_whitney(firsts: Sample, seconds: Sample, *, lower_is_better: bool) -> 
 
 def share_interval(count: int, n: int) -> Interval | None:
     """95% interval of a share by Clopper and Pearson (1934); none for no trials."""
-    from scipy.special import betaincinv
+    from scipy.stats import binomtest
 
     if n == 0:
         return None
-    tail = (1.0 - CONFIDENCE) / 2.0
-    low = 0.0 if count == 0 else float(betaincinv(count, n - count + 1, tail))
-    high = 1.0 if count == n else float(betaincinv(count + 1, n - count, 1.0 - tail))
-    return low, high
+    low, high = binomtest(count, n).proportion_ci(CONFIDENCE, method="exact")
+    return float(low), float(high)

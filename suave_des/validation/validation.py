@@ -1,40 +1,149 @@
-"""Validation of simulated missions against published ones."""
+"""Compare simulated missions with published ones: samples, pairs of managers, clusters, and targets for all of them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from suave_des.estimates import Estimate, Interval, estimate
+from suave_des.report.runs import METRICS
 from suave_des.streams import Streams
-from suave_des.validation.comparison import Cell, Pair, compare_cells, compare_pairs
-from suave_des.validation.shares import Position, Share, ShareComparison, compare_positions, compare_shares
-from suave_des.validation.targets import Target, targets
+from suave_des.validation.shares import DetectionPlace, Share, ShareComparison, compare_places, compare_shares
+from suave_des.validation.statistics import (
+    SIGNIFICANCE,
+    OneSidedTests,
+    Sample,
+    SampleTest,
+    agreement,
+    anderson_darling,
+    conclude,
+    difference_interval,
+    kolmogorov_smirnov,
+    ratio_interval,
+    superiority,
+)
 
 if TYPE_CHECKING:
     import pandas
 
+LOWER_IS_BETTER = {"search_time_s": True, "distance_inspected_m": False}
+"""Which of two values of a metric is better, as the exemplar's own one-sided tests have it."""
+_LEAST_AGREEMENT = 0.5
+
+_Generators = Callable[[str], np.random.Generator]
+"""Makes the random generator of each use of chance, by a name of its own: no result depends on the others."""
+
+
+@dataclass(frozen=True, slots=True)
+class SampleComparison:
+    """A metric of one manager, published and simulated.
+
+    Attributes:
+        manager: managing subsystem.
+        metric: one of METRICS.
+        published: estimates from the published sample, with 95% intervals.
+        simulated: estimates from the simulated sample.
+        difference: simulated - published mean, in the metric's unit.
+        difference_interval: its 95% bootstrap interval; none for a sample of one.
+        std_ratio: simulated / published standard deviation; none where either is missing or the latter is zero.
+        std_ratio_interval: its 95% bootstrap interval; none likewise.
+        kolmogorov_smirnov: two-sample test.
+        anderson_darling: two-sample test, with permutation p; none for a sample of one.
+    """
+
+    manager: str
+    metric: str
+    published: Estimate
+    simulated: Estimate
+    difference: float
+    difference_interval: Interval | None
+    std_ratio: float | None
+    std_ratio_interval: Interval | None
+    kolmogorov_smirnov: SampleTest
+    anderson_darling: SampleTest | None
+
+
+@dataclass(frozen=True, slots=True)
+class ManagerComparison:
+    """Two managers compared by one metric, published and simulated.
+
+    Attributes:
+        first: the one manager.
+        second: the other.
+        metric: one of METRICS.
+        published_superiority: probability that a published mission of the first is better than one of the second.
+        simulated_superiority: the same of simulated missions.
+        published: tests of the published runs, which lead to a conclusion.
+        sizes: published missions of the two.
+        agreement: share of random subsamples of the simulation, of these sizes, that lead to the same conclusion; none
+            if the simulation has fewer missions.
+    """
+
+    first: str
+    second: str
+    metric: str
+    published_superiority: float
+    simulated_superiority: float
+    published: OneSidedTests
+    sizes: tuple[int, int]
+    agreement: float | None
+
+    @property
+    def better(self) -> str | None:
+        """The manager that the published runs show to be better; none if they show neither."""
+        return {1: self.first, -1: self.second, 0: None}[self.published.sign]
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A requirement on the simulation.
+
+    Attributes:
+        kind: mean, std, ks, conclusion or share.
+        subject: the manager, or the pair as "first, second".
+        what: metric, or name of the share.
+        value: what the simulation has; none if there are too few missions for it.
+        low: least value that is good enough; none: no limit.
+        high: greatest value that is good enough; none: no limit.
+    """
+
+    kind: str
+    subject: str
+    what: str
+    value: float | None
+    low: float | None
+    high: float | None
+
+    @property
+    def met(self) -> bool | None:
+        """Whether the value is good enough; none if there is none to judge."""
+        if self.value is None:
+            return None
+        return (self.low is None or self.value >= self.low) and (self.high is None or self.value <= self.high)
+
 
 @dataclass(frozen=True)
 class Validation:
-    """What a comparison found.
+    """The result of a comparison.
 
     Attributes:
         managers: compared, in the order given.
-        cells: every metric and manager.
+        samples: every metric and manager.
         pairs: every metric and pair of managers.
         shares: clusters and other regions.
-        positions: places of detection.
-        targets: demands, and whether they are met.
+        places: places of detection.
+        targets: requirements, and whether they are met.
     """
 
     managers: tuple[str, ...]
-    cells: tuple[Cell, ...]
-    pairs: tuple[Pair, ...]
+    samples: tuple[SampleComparison, ...]
+    pairs: tuple[ManagerComparison, ...]
     shares: tuple[ShareComparison, ...]
-    positions: tuple[Position, ...]
+    places: tuple[DetectionPlace, ...]
     targets: tuple[Target, ...]
 
     @property
@@ -51,24 +160,101 @@ def validate(
     shares: Sequence[Share] = (),
     seed: int = 1,
 ) -> Validation:
-    """Compare simulated missions with published ones.
+    """Compare simulated missions with published ones; the result depends on nothing but the arguments.
 
-    The result depends on nothing but the arguments; missions may come in any number on each side.
+    Example:
+        real = read_runs("my_real_runs.csv")
+        found = validate(real.frame, read_runs("results/runs.csv").frame, tuple(real.managers))
+        print([target for target in found.targets if not target.met])
 
     Args:
-        published: a row a mission, with the columns of runs.COLUMNS.
-        simulated: the same; further columns do no harm.
+        published: a row for each mission, with the columns of report.runs.COLUMNS.
+        simulated: the same, in any number; further columns do not matter.
         managers: those to compare; each must have missions on both sides.
         shares: regions to count.
         seed: of bootstrap, permutations and subsamples.
     """
     streams = Streams(seed, 0)
 
-    def generator(name: str) -> np.random.Generator:
+    def generators(name: str) -> np.random.Generator:
         return np.random.default_rng(streams.stream(f"validation/{name}").getrandbits(128))
 
-    cells = compare_cells(published, simulated, managers, generator)
-    pairs = compare_pairs(published, simulated, managers, generator)
+    sides = published, simulated
+    samples = tuple(_compare_samples(manager, metric, sides, generators) for metric in METRICS for manager in managers)
+    pairs = tuple(
+        _compare_managers(pair, metric, sides, generators) for metric in METRICS for pair in combinations(managers, 2)
+    )
     counted = compare_shares(shares, published, simulated, managers)
-    positions = compare_positions(published, simulated, managers)
-    return Validation(tuple(managers), cells, pairs, counted, positions, targets(cells, pairs, counted))
+    targets = (*_sample_targets(samples), *_pair_targets(pairs), *_share_targets(counted))
+    places = compare_places(published, simulated, managers)
+    return Validation(tuple(managers), samples, pairs, counted, places, targets)
+
+
+def sample(runs: pandas.DataFrame, manager: str, metric: str) -> Sample:
+    """A manager's values of a metric, shape (n,)."""
+    return runs.loc[runs["manager"] == manager, metric].to_numpy(dtype=float)
+
+
+def _compare_samples(
+    manager: str, metric: str, sides: Sequence[pandas.DataFrame], generators: _Generators
+) -> SampleComparison:
+    published, simulated = (sample(side, manager, metric) for side in sides)
+    theirs, ours = estimate(published.tolist()), estimate(simulated.tolist())
+    assert theirs.mean is not None and ours.mean is not None
+    rng = generators(f"bootstrap/{manager}/{metric}")
+    return SampleComparison(
+        manager,
+        metric,
+        theirs,
+        ours,
+        ours.mean - theirs.mean,
+        difference_interval(published, simulated, rng),
+        ours.std / theirs.std if ours.std is not None and theirs.std else None,
+        ratio_interval(published, simulated, rng),
+        kolmogorov_smirnov(published, simulated),
+        anderson_darling(published, simulated, generators(f"permutations/{manager}/{metric}")),
+    )
+
+
+def _compare_managers(
+    pair: tuple[str, str], metric: str, sides: Sequence[pandas.DataFrame], generators: _Generators
+) -> ManagerComparison:
+    lower = LOWER_IS_BETTER[metric]
+    theirs, ours = ((sample(side, pair[0], metric), sample(side, pair[1], metric)) for side in sides)
+    tests = conclude(*theirs, lower_is_better=lower)
+    sizes = len(theirs[0]), len(theirs[1])
+    rng = generators(f"subsamples/{pair[0]}/{pair[1]}/{metric}")
+    return ManagerComparison(
+        *pair,
+        metric,
+        superiority(*theirs, lower_is_better=lower),
+        superiority(*ours, lower_is_better=lower),
+        tests,
+        sizes,
+        agreement(tests.sign, ours, sizes, rng, lower_is_better=lower),
+    )
+
+
+def _sample_targets(samples: Sequence[SampleComparison]) -> Iterator[Target]:
+    """The mean in the 95% t interval of the published one, the std in its chi-square interval, and the KS p."""
+    for each in samples:
+        for kind, value, interval in (
+            ("mean", each.simulated.mean, each.published.mean_interval),
+            ("std", each.simulated.std, each.published.std_interval),
+        ):
+            low, high = interval or (None, None)
+            yield Target(kind, each.manager, each.metric, None if interval is None else value, low, high)
+        yield Target("ks", each.manager, each.metric, each.kolmogorov_smirnov.p, SIGNIFICANCE, None)
+
+
+def _pair_targets(pairs: Sequence[ManagerComparison]) -> Iterator[Target]:
+    """At least half the subsamples as large as the published samples lead to the published conclusion."""
+    for pair in pairs:
+        subject = f"{pair.first}, {pair.second}"
+        yield Target("conclusion", subject, pair.metric, pair.agreement, _LEAST_AGREEMENT, None)
+
+
+def _share_targets(shares: Sequence[ShareComparison]) -> Iterator[Target]:
+    for each in shares:
+        if each.share.target is not None:
+            yield Target("share", each.share.manager, each.share.name, each.simulated.share, *each.share.target)

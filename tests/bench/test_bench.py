@@ -17,12 +17,10 @@ import numpy as np
 import pytest
 
 import suave_des
-from suave_des.bench.bench import Bench
-from suave_des.bench.children import MeasurementError, run
-from suave_des.bench.goals import goal_rows, programs
-from suave_des.bench.machine import in_words, is_busy, machine
+from suave_des.bench.bench import Bench, CampaignTime, goal_rows, in_words, is_busy, machine, programs
+from suave_des.bench.programs import MeasurementError, run
 from suave_des.bench.ratio import MANAGER, SCENARIO, SEED, KernelCall, Replay, record
-from suave_des.bench.stock_loop import TASKS, Known, Mission, Reasoner
+from suave_des.bench.stock_reasoner import SEARCH, SEARCHING_HIGH, STATES, MissionState, StockReasoner
 from suave_des.cli.main import main
 from suave_des.cli.signals import told_by_exceptions
 from suave_des.resources import shipped_folder
@@ -56,8 +54,6 @@ SCHEMA = {
     "additionalProperties": False,
 }
 SCHEMA["required"] = list(SCHEMA["properties"])
-
-SEARCHING_HIGH = {"f_maintain_motion": "fd_all_thrusters", "f_generate_search_path": "fd_spiral_high"}
 
 
 def started(*arguments: str, cwd: Path, temporary: Path) -> subprocess.Popen[str]:
@@ -106,7 +102,7 @@ class TestCommand:
         for row in figures["rows"]:
             line = next(line for line in out.splitlines() if line.startswith(row["what"]))
             assert row["goal"] in line
-        for program in ("suave-des, metacontrol", "SimPy with stock owlready2 and Pellet"):
+        for program in ("suave-des, metacontrol", "stock owlready2 and Pellet"):
             assert program in out
         assert "extrapolated from" in out
         assert "measured in" in out
@@ -224,61 +220,38 @@ class TestRatio:
         assert replay.ns_per_substep(np.zeros(replay.shape)) > 0
 
 
-class TestStockLoop:
-    """The stand-in decides as it should: once through what thruster and visibility can do."""
+class TestStockReasoner:
+    """It decides as it should, considering the thruster and the visibility."""
 
     @pytest.mark.parametrize(
-        ("known", "designs"),
+        ("state", "designs"),
         [
-            (Known(TASKS[0], 3.5), SEARCHING_HIGH),
+            (MissionState(SEARCH, 3.5), SEARCHING_HIGH),
             (
-                Known(TASKS[0], 3.0, "FALSE", SEARCHING_HIGH),
+                MissionState(SEARCH, 3.0, "FALSE", SEARCHING_HIGH),
                 {"f_maintain_motion": "fd_recover_thrusters", "f_generate_search_path": "fd_spiral_medium"},
             ),
         ],
     )
-    def test_decisions(self, known, designs) -> None:
-        assert Reasoner(shipped_folder("ontology")).plan(known) == designs
+    def test_decisions(self, state, designs) -> None:
+        assert StockReasoner(shipped_folder("ontology")).plan(state) == designs
 
-    def test_a_mission_finds_and_inspects_the_pipeline(self) -> None:
-        class Ready(Reasoner):
-            """Decides at once, without Java."""
-
-            def plan(self, known):
-                spiral = "high" if known.visibility_m >= 3.25 else "medium" if known.visibility_m >= 2.25 else "low"
-                motion = "recover" if known.thruster == "FALSE" else "all"
-                follow = {"f_follow_pipeline": "fd_follow_pipeline"} if "f_follow_pipeline" in known.functions else {}
-                return {
-                    "f_maintain_motion": f"fd_{motion}_thrusters",
-                    "f_generate_search_path": f"fd_spiral_{spiral}",
-                    **follow,
-                }
-
-        mission = Mission(Ready(shipped_folder("ontology")))
-        mission.run(300.0)
-        assert mission.inferences == 150
-        assert mission.found_s is not None and 20 < mission.found_s < 300
-        assert mission.inspected_m > 10
+    def test_states_of_a_mission_are_different(self) -> None:
+        assert len({json.dumps(asdict(state)) for state in STATES}) == len(STATES)
 
 
 class TestGoals:
-    CAMPAIGN: ClassVar = {
-        "missions": 10_000,
-        "wall_s": 5.0,
-        "missions_a_second": 2000.0,
-        "parent_mb": 200.0,
-        "worker_mb": 200.0,
-    }
+    CAMPAIGN: ClassVar = CampaignTime(10_000, 2, 5.0, 9.0, 2000.0, 200.0, 200.0)
     RATIO: ClassVar = {"mission_over_kernel": 2.0, "kernel_ns_a_substep": 70.0, "mission_wall_us": 1000.0}
     MUCH: ClassVar = {"memory of a worker, 10,000 missions", "  the same for few and many: worker"}
     STOCK: ClassVar = {"inferences_measured": 10.0, "inferences_a_mission": 150.0, "mission_s": 150.0}
 
     def bench(self, **changed) -> Bench:
         campaigns = {
-            "cold": {**self.CAMPAIGN, "wall_s": 12.0},
+            "cold": replace(self.CAMPAIGN, wall_s=12.0),
             "warm": self.CAMPAIGN,
-            "one_worker": {**self.CAMPAIGN, "wall_s": 9.8},
-            "small": {**self.CAMPAIGN, "missions": 1000},
+            "one_worker": replace(self.CAMPAIGN, wall_s=9.8),
+            "small": replace(self.CAMPAIGN, missions=1000),
         }
         return replace(Bench({}, 10_000, 60.0, campaigns, self.RATIO, self.STOCK), **changed)
 
@@ -289,8 +262,8 @@ class TestGoals:
         ("campaign", "key", "value", "missed"),
         [
             ("warm", "missions_a_second", 1499.0, {"metacontrol missions a second, 2 workers, CSV written"}),
-            ("warm", "wall_s", 5.2, {"2 workers against 1"}),
-            ("warm", "wall_s", 8.1, {"2 workers against 1", "10,000 missions, filled memory and caches"}),
+            ("warm", "wall_s", 5.2, {"2 workers / 1 worker"}),
+            ("warm", "wall_s", 8.1, {"2 workers / 1 worker", "10,000 missions, filled memory and caches"}),
             ("cold", "wall_s", 20.1, {"10,000 missions, cold start"}),
             ("small", "parent_mb", 150.0, {"  the same for few and many: parent"}),
             ("warm", "worker_mb", 401.0, MUCH),
@@ -298,14 +271,14 @@ class TestGoals:
     )
     def test_missed(self, campaign, key, value, missed) -> None:
         campaigns = dict(self.bench().campaigns)
-        campaigns[campaign] = {**campaigns[campaign], key: value}
+        campaigns[campaign] = replace(campaigns[campaign], **{key: value})
         assert {row.what for row in goal_rows(self.bench(campaigns=campaigns)) if not row.met} == missed
 
     def test_memory_that_the_system_does_not_tell_is_left_open(self) -> None:
         unknown = {"parent_mb": None, "worker_mb": None}
-        campaigns = {name: {**found, **unknown} for name, found in self.bench().campaigns.items()}
+        campaigns = {name: replace(found, **unknown) for name, found in self.bench().campaigns.items()}
         rows = [row for row in goal_rows(self.bench(campaigns=campaigns)) if "memory of" in row.what]
-        assert rows and all(row.met is None and row.measured == "not told by this system" for row in rows)
+        assert rows and all(row.met is None and row.measured == "not reported by this system" for row in rows)
 
     def test_programs_are_compared_with_a_mission_here(self) -> None:
         assert [each.times_a_mission for each in programs(self.bench())] == [1.0, 150_000.0]

@@ -5,13 +5,23 @@ import math
 from pathlib import Path
 
 import numpy as np
+import pandas
 import pytest
 import yaml
 
-from suave_des.calibration.distance import energy_distance, missions_as_vectors
-from suave_des.calibration.fit import Evaluation, FreeParameter, Problem, evaluate, fit, simulate
+from suave_des.calibration.fit import Profile, _crossing, fit
+from suave_des.calibration.loss import (
+    Evaluation,
+    FreeParameter,
+    Problem,
+    as_vectors,
+    energy_distance,
+    evaluate,
+    published_vectors,
+    resampling_spread,
+    simulate,
+)
 from suave_des.calibration.parameters import read_parameters
-from suave_des.calibration.profile import Profile, _crossing
 from suave_des.calibration.report import fitted_scenario, fitted_values, profiles_png, table
 from suave_des.cli.main import main
 from suave_des.errors import InputError
@@ -41,8 +51,15 @@ def test_an_unknown_component_is_left_out_and_the_others_count_for_it() -> None:
 
 
 def test_missions_are_scaled_to_comparable_numbers() -> None:
-    vectors = missions_as_vectors(np.array([80.0]), np.array([24.0]), np.array([-18.0]))
-    assert vectors.tolist() == [[2.0, 2.0, -12.0]]
+    columns = {"search_time_s": [80.0], "distance_inspected_m": [24.0], "detection_x_m": [-18.0]}
+    assert as_vectors(pandas.DataFrame(columns)).tolist() == [[2.0, 2.0, -12.0]]
+
+
+def test_a_component_that_is_never_known_for_a_manager_is_left_out() -> None:
+    columns = {"search_time_s": 80.0, "distance_inspected_m": 24.0, "detection_x_m": [-18.0, math.nan, math.nan]}
+    frame = pandas.DataFrame({"manager": ["none", "none", "random"], **columns})
+    vectors = published_vectors(frame, ["none", "random"])
+    assert (vectors["none"].shape, vectors["random"].shape) == ((2, 3), (1, 2))
 
 
 @pytest.mark.parametrize(("unit", "value"), [(0.0, 1.0), (1.0, 3.0), (0.25, 1.5), (-0.25, 1.5), (1.25, 2.5)])
@@ -52,7 +69,7 @@ def test_coordinates_outside_the_bounds_are_reflected(unit: float, value: float)
 
 def planted(gain: float, runs: int = 40) -> dict:
     loaded = with_values(load_scenario("seams2023"), {GAIN: gain})
-    return {"none": simulate(Simulator(loaded), "none", runs, 99)}
+    return {"none": as_vectors(simulate(Simulator(loaded), "none", runs, 99))}
 
 
 def test_the_fit_finds_what_was_planted() -> None:
@@ -68,6 +85,12 @@ def test_the_same_fit_twice_is_the_same() -> None:
     assert fit(problem, 8, workers=1, seed=3) == fit(problem, 8, workers=1, seed=3)
 
 
+def test_the_spread_of_the_loss_repeats_with_its_seed() -> None:
+    problem = Problem(load_scenario("seams2023"), (FreeParameter(GAIN, 0.2, 1.2, 0.6),), planted(0.4, 10), 5, 1)
+    best = evaluate(problem, [0.4])
+    assert 0.0 < resampling_spread(problem, best, 1) == resampling_spread(problem, best, 1) < best.loss
+
+
 def test_shipped_parameters_are_in_the_shipped_scenario() -> None:
     form, free = read_parameters(shipped_folder("scenarios/calibration") / "seams2023.yaml", load_scenario("seams2023"))
     assert all(value_at(form, each.path) is not None for each in free)
@@ -79,7 +102,7 @@ def test_shipped_parameters_are_in_the_shipped_scenario() -> None:
     [
         ("free: []", "free"),
         ("free:\n  - {path: calibration.position_gain, lower: 0, upper: 1}", "line 2.*position_gain_per_s"),
-        ("free:\n  - {path: calibration, lower: 0, upper: 1}", "line 2.*no number"),
+        ("free:\n  - {path: calibration, lower: 0, upper: 1}", "line 2.*expected a number in this scenario"),
         (f"free:\n  - {{path: {GAIN}, lower: 1, upper: 0}}", "line 2"),
         (f"free:\n  - {{path: {GAIN}, lower: 5, upper: 9}}", "line 2.*outside"),
         (f"free:\n  - {{path: {GAIN}, lower: 0, uper: 9}}", "line 2.*upper"),

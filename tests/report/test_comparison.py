@@ -11,11 +11,8 @@ from pathlib import Path
 import pandas
 import pytest
 
-from suave_des.errors import InputError
 from suave_des.estimates import estimate
-from suave_des.report.comparison import compare, csv_table, markdown_table
-from suave_des.report.published import published_figures
-from suave_des.report.runs import read_runs
+from suave_des.report.paper import compare, published_estimates
 
 # Means and sample standard deviations as printed in the paper (SEAMS 2023, arXiv:2303.09220).
 PAPER = {
@@ -40,7 +37,7 @@ def frame(**search_times_s: list[float]) -> pandas.DataFrame:
 
 
 def test_published_runs_give_the_figures_that_the_paper_prints() -> None:
-    figures = published_figures()
+    figures = published_estimates()
     assert list(figures) == list(PAPER)
     for cell, (mean, std) in PAPER.items():
         assert figures[cell].n == 20
@@ -49,7 +46,7 @@ def test_published_runs_give_the_figures_that_the_paper_prints() -> None:
 
 
 def test_difference_is_ours_less_the_published_figure() -> None:
-    comparison = compare(frame(none=[100.0, 200.0, 300.0], random=[50.0], metacontrol=[]), published_figures())
+    comparison = compare(frame(none=[100.0, 200.0, 300.0], random=[50.0], metacontrol=[]), published_estimates())
     figures = {(figure.manager, figure.metric, figure.statistic): figure for figure in comparison.figures}
     assert len(figures) == 12
     none = figures["none", "search_time_s", "mean"]
@@ -66,7 +63,7 @@ def test_difference_is_ours_less_the_published_figure() -> None:
 )
 def test_says_whether_metacontrol_is_better_than_all_others(metacontrol: list[float], sooner: str) -> None:
     runs = frame(none=[180.0, 190.0], random=[170.0, 200.0], metacontrol=metacontrol)
-    remarks = list(compare(runs, published_figures()).remarks())
+    remarks = list(compare(runs, published_estimates()).remarks())
     assert remarks[-2].startswith(f"{sooner}, metacontrol ")
     assert "the pipeline sooner" in remarks[-2]
     assert "inspect" in remarks[-1]
@@ -74,8 +71,8 @@ def test_says_whether_metacontrol_is_better_than_all_others(metacontrol: list[fl
 
 def test_markdown_has_a_row_for_each_figure_and_marks_those_outside() -> None:
     runs = frame(none=[187.0, 188.0], random=[100.0, 260.0], metacontrol=[107.0, 106.0])
-    comparison = compare(runs, published_figures())
-    lines = markdown_table(comparison).splitlines()
+    comparison = compare(runs, published_estimates())
+    lines = comparison.markdown().splitlines()
     rows = [line for line in lines if line.startswith("| ") and "---" not in line][1:]
     assert len(rows) == 12
     assert len({line.count("|") for line in lines if line.startswith("|")}) == 1
@@ -83,21 +80,23 @@ def test_markdown_has_a_row_for_each_figure_and_marks_those_outside() -> None:
 
 
 def test_managers_without_missions_do_not_count() -> None:
-    comparison = compare(frame(none=[140.0, 232.0], random=[], metacontrol=[]), published_figures())
+    comparison = compare(frame(none=[140.0, 232.0], random=[], metacontrol=[]), published_estimates())
     remarks = list(comparison.remarks())
     assert "Here: 2 missions of none, 0 missions of random, 0 missions of metacontrol." in remarks[0]
-    assert remarks[1].startswith("3 of 4 figures lie in the 95% intervals of the paper's; those marked * do not.")
-    assert markdown_table(comparison).count("\\* |") == 1
-    alike = list(compare(frame(none=[150.0, 210.0]), published_figures()).remarks())
+    assert remarks[1].startswith("3 of 4 figures lie in the 95% intervals of the paper's; the one marked * does not.")
+    assert comparison.markdown().count("\\* |") == 1
+    alike = list(compare(frame(none=[150.0, 210.0]), published_estimates()).remarks())
     assert alike[1] == "All 4 figures lie in the 95% intervals of the paper's."
-    assert list(compare(frame(bt=[150.0]), published_figures()).remarks())[1] == (
+    far = list(compare(frame(none=[50.0, 352.0]), published_estimates()).remarks())
+    assert far[1] == "1 of 4 figures lies in the 95% intervals of the paper's; those marked * do not."
+    assert list(compare(frame(bt=[150.0]), published_estimates()).remarks())[1] == (
         "There are too few missions for any figure."
     )
 
 
 def test_csv_has_the_same_figures() -> None:
-    comparison = compare(frame(none=[150.0, 250.0], random=[], metacontrol=[]), published_figures())
-    rows = list(csv.DictReader(io.StringIO(csv_table(comparison))))
+    comparison = compare(frame(none=[150.0, 250.0], random=[], metacontrol=[]), published_estimates())
+    rows = list(csv.DictReader(io.StringIO(comparison.csv())))
     assert rows[0]["ours"] == "200.0"
     assert (rows[4]["ours"], rows[4]["difference"], rows[4]["inside_published_ci95"]) == ("", "", "")
 
@@ -120,33 +119,6 @@ class TestEstimates:
     def test_the_order_of_values_makes_no_difference(self) -> None:
         values = [0.1, 1e9, -1e9, 0.2, 0.3]
         assert estimate(values) == estimate(values[::-1])
-
-
-class TestReadingRuns:
-    def test_a_missing_file_is_named(self, tmp_path: Path) -> None:
-        with pytest.raises(InputError, match=r"runs\.csv: no such file"):
-            read_runs(tmp_path / "runs.csv")
-
-    def test_a_missing_column_is_named(self, tmp_path: Path) -> None:
-        (tmp_path / "runs.csv").write_text("scenario,manager\nseams2023,none\n")
-        with pytest.raises(InputError, match=r"runs\.csv: has no column search_time_s"):
-            read_runs(tmp_path / "runs.csv", needed=("manager", "search_time_s"))
-
-    def test_a_word_in_place_of_a_number_is_refused(self, tmp_path: Path) -> None:
-        (tmp_path / "runs.csv").write_text("manager,search_time_s\nnone,soon\n")
-        with pytest.raises(InputError, match=r"runs\.csv: holds a value of the wrong kind: .*soon"):
-            read_runs(tmp_path / "runs.csv", needed=("manager", "search_time_s"))
-
-    def test_an_empty_file_is_refused(self, tmp_path: Path) -> None:
-        (tmp_path / "runs.csv").write_text("")
-        with pytest.raises(InputError, match=r"runs\.csv: cannot be read"):
-            read_runs(tmp_path / "runs.csv")
-
-    def test_the_manager_named_none_is_no_missing_value(self, tmp_path: Path) -> None:
-        (tmp_path / "runs.csv").write_text("manager,mean_reaction_time_s\nnone,\n")
-        runs = read_runs(tmp_path / "runs.csv", needed=("manager",))
-        assert list(runs["manager"]) == ["none"]
-        assert runs["mean_reaction_time_s"].isna().all()
 
 
 def test_the_analysis_script_makes_the_table_from_a_runs_csv(tmp_path: Path) -> None:

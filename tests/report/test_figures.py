@@ -10,8 +10,8 @@ import pytest
 from suave_des.campaign.campaign import run_campaign
 from suave_des.campaign.single import run_mission
 from suave_des.errors import InputError
-from suave_des.report import distributions, mission_map, sweep
-from suave_des.report.figures import draw_folder
+from suave_des.report import mission_map
+from suave_des.report.figures import draw_distributions, draw_folder, draw_sweep, swept_parameters
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def test_the_map_shows_every_mode_and_what_happened(mission: Path) -> None:
 
 
 def test_the_distributions_have_a_curve_for_each_manager_that_reaches_1(campaign: Path) -> None:
-    figure = distributions.draw(campaign / "runs.csv")
+    figure = draw_distributions(campaign / "runs.csv")
     for axes in figure.axes:
         curves = [line for line in axes.get_lines() if len(line.get_xdata()) > 1]
         assert [line.get_label() for line in curves] == ["none (n = 3)", "random (n = 3)"]
@@ -77,15 +77,15 @@ def test_a_picture_that_cannot_be_written_is_told(mission: Path, tmp_path: Path)
 def test_a_campaign_without_missions_is_told(campaign: Path, tmp_path: Path) -> None:
     header = (campaign / "runs.csv").read_text().splitlines()[0]
     (tmp_path / "runs.csv").write_text(header + "\n")
-    with pytest.raises(InputError, match=r"runs\.csv: has no missions"):
+    with pytest.raises(InputError, match=r"runs\.csv: line 1: has no missions"):
         draw_folder(tmp_path, tmp_path / "runs.png")
 
 
 def test_a_sweep_is_drawn_with_a_mean_for_each_manager_at_each_value(tmp_path: Path) -> None:
     values = {"visibility.period_s": [40.0, 80.0], "default_modes.f_generate_search_path": ["fd_spiral_low"]}
     result = run_campaign("seams2023", ["none", "random"], 3, 1, out=tmp_path / "out", sweep=values)
-    assert sweep.swept_parameters(tmp_path / "out") == list(values)
-    figure = sweep.draw(tmp_path / "out", list(values))
+    assert swept_parameters(tmp_path / "out") == list(values)
+    figure = draw_sweep(tmp_path / "out", list(values))
     frame = result.frame()
     panel = figure.axes[0]
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["none", "random"]
@@ -100,6 +100,6 @@ def test_a_sweep_is_drawn_with_a_mean_for_each_manager_at_each_value(tmp_path: P
 def test_many_values_are_drawn_in_bins_of_equally_many_missions(tmp_path: Path) -> None:
     values = {"start.x_m": [-18.0 + 0.1 * step for step in range(24)]}
     run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out", sweep=values)
-    figure = sweep.draw(tmp_path / "out", ["start.x_m"])
+    figure = draw_sweep(tmp_path / "out", ["start.x_m"])
     xs = list(figure.axes[0].containers[0][0].get_xdata())
     assert xs == pytest.approx([-17.9 + 0.3 * number for number in range(8)])

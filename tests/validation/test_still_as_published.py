@@ -9,8 +9,8 @@ import pytest
 from scipy.stats import ks_2samp
 
 from suave_des.campaign.campaign import run_campaign
+from suave_des.report.runs import METRICS, read_runs
 from suave_des.resources import find
-from suave_des.validation.runs import METRICS, read_runs
 
 MANAGERS = ("none", "random", "metacontrol")
 

@@ -8,14 +8,13 @@ import numpy as np
 import pandas
 import pytest
 
+from analysis.split_check import split_check
+from suave_des.report.runs import read_runs
 from suave_des.resources import shipped_folder
 from suave_des.validation.figures import detections_png, distributions_png
-from suave_des.validation.files import CELLS_FILE, JSON_FILE, PAIRS_FILE, TARGETS_FILE, texts
-from suave_des.validation.runs import read_runs
+from suave_des.validation.files import JSON_FILE, TABLES, texts
 from suave_des.validation.shares import Share, read_shares, shares_beside
-from suave_des.validation.split import split_check
-from suave_des.validation.targets import Target
-from suave_des.validation.validation import validate
+from suave_des.validation.validation import Target, validate
 
 MANAGERS = ("none", "random", "metacontrol")
 DATA = shipped_folder("scenarios/published") / "seams2023_runs.csv"
@@ -60,7 +59,7 @@ def test_conclusions_are_those_of_the_papers_runs(good):
 
 
 def test_figures_of_a_cell(good):
-    cell = next(cell for cell in good.cells if (cell.manager, cell.metric) == ("none", "search_time_s"))
+    cell = next(cell for cell in good.samples if (cell.manager, cell.metric) == ("none", "search_time_s"))
     assert (cell.published.n, cell.simulated.n) == (20, 200)
     assert cell.published.mean_interval == pytest.approx((168.01, 207.69), abs=0.01)
     assert cell.published.std_interval == pytest.approx((32.24, 61.92), abs=0.01)
@@ -110,10 +109,10 @@ def test_the_result_repeats_with_its_seed_and_ignores_the_other_managers(publish
     shares = read_shares(shares_beside(DATA))
     assert validate(published, like_published, MANAGERS, shares=shares) == good
     alone = validate(published, like_published, ("none",))
-    assert alone.cells == tuple(cell for cell in good.cells if cell.manager == "none")
+    assert alone.samples == tuple(cell for cell in good.samples if cell.manager == "none")
     assert alone.pairs == ()
     other = validate(published, like_published, ("none",), seed=2)
-    assert other.cells[0].difference_interval != alone.cells[0].difference_interval
+    assert other.samples[0].difference_interval != alone.samples[0].difference_interval
 
 
 def test_what_cannot_be_judged_from_few_missions_is_not_met_and_says_so(published):
@@ -143,19 +142,19 @@ class TestFiles:
         assert content["targets_summary"] == {"met": 28, "not_met": 0, "not_judged": 0}
         assert [len(content[name]) for name in ("cells", "pairs", "targets")] == [6, 6, 28]
         assert [cell["manager"] for cell in content["cells"][:3]] == list(MANAGERS)
-        assert len(files[CELLS_FILE].splitlines()) == 7
-        assert len(files[PAIRS_FILE].splitlines()) == 7
-        assert files[TARGETS_FILE].startswith("kind,subject,what,value,low,high,met\n")
+        assert len(files[TABLES["cells"]].splitlines()) == 7
+        assert len(files[TABLES["pairs"]].splitlines()) == 7
+        assert files[TABLES["targets"]].startswith("kind,subject,what,value,low,high,met\n")
 
     def test_what_cannot_be_had_is_null_and_empty(self, published):
         few = published.groupby("manager").head(1)
         files = texts(validate(published, few, ("none", "random")), {})
         assert json.loads(files[JSON_FILE])["cells"][0]["simulated_std"] is None
-        assert ",0,nan" not in files[CELLS_FILE].lower()
+        assert ",0,nan" not in files[TABLES["cells"]].lower()
 
     def test_a_number_that_is_not_finite_is_null(self, good):
-        cell = dataclasses.replace(good.cells[0], std_ratio=math.inf)
-        files = texts(dataclasses.replace(good, cells=(cell,)), {})
+        cell = dataclasses.replace(good.samples[0], std_ratio=math.inf)
+        files = texts(dataclasses.replace(good, samples=(cell,)), {})
         assert json.loads(files[JSON_FILE])["cells"][0]["std_ratio"] is None
 
     def test_figures_are_pictures_and_repeat(self, good, published, like_published):

@@ -6,13 +6,8 @@ from pathlib import Path
 import pytest
 
 from suave_des.errors import InputError
+from suave_des.report.runs import choose_managers, read_runs
 from suave_des.resources import shipped_folder
-from suave_des.validation.runs import (
-    check_one_scenario,
-    check_same_managers,
-    choose_managers,
-    read_runs,
-)
 
 OWN = "manager,search_time_s,distance_inspected_m"
 
@@ -70,15 +65,15 @@ def test_blank_lines_and_a_byte_order_mark_do_no_harm(write):
         ("manager,search_time_s\nnone,1\n", 1, "has no column 'distance_inspected_m'"),
         (f"{OWN},manager\nnone,1,2,none\n", 1, "has column 'manager' twice"),
         (f"{OWN}\n", 1, "has no mission"),
-        (f"{OWN}\nnone,120,3\nnone,soon,3\n", 3, "search_time_s 'soon' is no number"),
-        (f"{OWN}\nnone,120,\n", 2, "distance_inspected_m '' is no number"),
-        (f"{OWN}\nnone,nan,3\n", 2, "search_time_s 'nan' is out of range"),
-        (f"{OWN}\nnone,-1,3\n", 2, "search_time_s '-1' is out of range"),
-        (f"{OWN}\nnone,120,-3\n", 2, "distance_inspected_m '-3' is out of range"),
+        (f"{OWN}\nnone,120,3\nnone,soon,3\n", 3, "search_time_s: expected a finite number, got 'soon'"),
+        (f"{OWN}\nnone,120,\n", 2, "distance_inspected_m: expected a finite number, at least 0, got ''"),
+        (f"{OWN}\nnone,nan,3\n", 2, "search_time_s: expected a finite number, got 'nan'"),
+        (f"{OWN}\nnone,-1,3\n", 2, "search_time_s: expected a finite number, at least 0, got '-1'"),
+        (f"{OWN}\nnone,120,-3\n", 2, "distance_inspected_m: expected a finite number, at least 0, got '-3'"),
         (f"{OWN}\nnone,120\n", 2, "has 2 values, but the header has 3"),
-        (f"{OWN}\n ,120,3\n", 2, "names no manager"),
-        (f"{OWN}\nmy manager,120,3\n", 2, "names no manager"),
-        (f"{OWN},detection_x_m\nnone,120,3,west\n", 2, "detection_x_m 'west' is no number"),
+        (f"{OWN}\n ,120,3\n", 2, "manager: expected a manager's name"),
+        (f"{OWN}\nmy manager,120,3\n", 2, "manager: expected a manager's name"),
+        (f"{OWN},detection_x_m\nnone,120,3,west\n", 2, "detection_x_m: expected a finite number, got 'west'"),
         (f'{OWN}\n"none,120,3\n', 2, "is not valid CSV"),
     ],
 )
@@ -108,12 +103,12 @@ def test_a_binary_file_is_refused_with_its_line(tmp_path: Path):
 def test_managers_come_in_the_order_of_the_file_unless_chosen(write):
     runs = read_runs(write("runs.csv", f"{OWN}\nrandom,1,2\nnone,1,2\nrandom,1,2\n"))
     assert choose_managers(runs, None) == ("random", "none")
-    assert choose_managers(runs, ["none"]) == ("none",)
+    assert choose_managers(runs, "none") == ("none",)
 
 
 @pytest.mark.parametrize(
     ("wanted", "problem"),
-    [(["nonw"], "no mission of manager 'nonw'"), ([], "no managers"), (["none", "none"], "twice")],
+    [("nonw", "no mission of manager 'nonw'"), (",", "no managers"), ("none, none", "twice")],
 )
 def test_managers_without_missions_or_named_twice_are_refused(write, wanted, problem):
     runs = read_runs(write("runs.csv", f"{OWN}\nnone,1,2\n"))
@@ -123,17 +118,26 @@ def test_managers_without_missions_or_named_twice_are_refused(write, wanted, pro
 
 def test_a_simulated_file_must_have_each_manager(write):
     runs = read_runs(write("runs.csv", f"{OWN}\nnone,1,2\n"))
-    check_same_managers(runs, ["none"])
+    runs.check_simulated(["none"], None)
     with pytest.raises(InputError, match="no mission of manager 'bt'"):
-        check_same_managers(runs, ["none", "bt"])
+        runs.check_simulated(["none", "bt"], None)
 
 
 def test_a_simulated_file_must_be_of_one_scenario_and_of_the_one_named(write):
     runs = read_runs(write("runs.csv", f"scenario,{OWN}\nsea,none,1,2\n"))
-    check_one_scenario(runs, "sea")
-    check_one_scenario(runs, None)
+    runs.check_simulated(["none"], "sea")
+    runs.check_simulated(["none"], None)
     with pytest.raises(InputError, match="line 2: has missions of scenario sea, not of lake"):
-        check_one_scenario(runs, "lake")
+        runs.check_simulated(["none"], "lake")
     mixed = read_runs(write("mixed.csv", f"scenario,{OWN}\nsea,none,1,2\nlake,none,1,2\n"))
     with pytest.raises(InputError, match="line 3: has missions of several scenarios: sea and lake"):
-        check_one_scenario(mixed, None)
+        mixed.check_simulated(["none"], None)
+
+
+def test_further_columns_are_numbers_where_all_their_values_are(write):
+    path = write("runs.csv", f"{OWN},period,mode\nnone,120,3,40,low\nnone,130,3,80.5,7\n")
+    frame = read_runs(path, further=["period", "mode"]).frame
+    assert frame["period"].tolist() == [40.0, 80.5]
+    assert frame["mode"].tolist() == ["low", "7"]
+    with pytest.raises(InputError, match="line 1: has no column 'speed'"):
+        read_runs(path, further=["speed"])

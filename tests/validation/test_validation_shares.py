@@ -5,12 +5,12 @@ import math
 import pytest
 
 from suave_des.errors import InputError
+from suave_des.report.runs import read_runs
 from suave_des.resources import shipped_folder
-from suave_des.validation.runs import read_runs
 from suave_des.validation.shares import (
-    Counted,
+    Proportion,
     Share,
-    compare_positions,
+    compare_places,
     compare_shares,
     count,
     read_shares,
@@ -32,12 +32,12 @@ def frame(missions):
 
 def test_runs_are_counted_with_both_ends_of_the_interval(frame):
     share = Share(manager="metacontrol", name="late", where={"search_time_s": [(120, 130)]})
-    assert count(share, frame) == Counted(4, 5)
+    assert count(share, frame) == Proportion(4, 5)
 
 
 def test_a_place_that_is_not_known_is_in_no_region_but_is_a_run(frame):
     where = {"search_time_s": [(120, 130)], "detection_x_m": [(-19.5, -18.5)]}
-    assert count(Share(manager="metacontrol", name="there", where=where), frame) == Counted(2, 5)
+    assert count(Share(manager="metacontrol", name="there", where=where), frame) == Proportion(2, 5)
 
 
 def test_of_detections_only_those_with_a_known_place_count(frame):
@@ -48,17 +48,17 @@ def test_of_detections_only_those_with_a_known_place_count(frame):
         among={"search_time_s": [(120, 130)]},
         where={"detection_x_m": [(-19.5, -18.5)]},
     )
-    assert count(share, frame) == Counted(2, 3)
+    assert count(share, frame) == Proportion(2, 3)
 
 
 def test_one_of_several_intervals_is_enough(frame):
     share = Share(manager="metacontrol", name="either", where={"detection_x_m": [(-19.5, -18.9), (-16.1, -15.9)]})
-    assert count(share, frame) == Counted(2, 5)
+    assert count(share, frame) == Proportion(2, 5)
 
 
 def test_places_that_come_from_sums_of_steps_are_at_the_interval_end(missions):
     share = Share(manager="none", name="edge", where={"detection_x_m": [(-17.5, -16.0)]})
-    assert count(share, missions({"none": [(1, 1, -17.5 - 1e-9), (1, 1, -17.51)]})) == Counted(1, 2)
+    assert count(share, missions({"none": [(1, 1, -17.5 - 1e-9), (1, 1, -17.51)]})) == Proportion(1, 2)
 
 
 def test_no_mission_has_no_share(missions):
@@ -75,11 +75,11 @@ def test_shares_of_managers_that_are_not_compared_are_left_out(frame):
 def test_places_are_counted_to_the_nearest_half_metre_on_both_sides(missions):
     published = missions({"none": [(1, 1, -19.0), (1, 1, -17.5), (1, 1, UNKNOWN)]})
     simulated = missions({"none": [(1, 1, -19.0003), (1, 1, -19.0), (1, 1, -16.0), (1, 1, -17.5)]})
-    found = compare_positions(published, simulated, ["none"])
+    found = compare_places(published, simulated, ["none"])
     assert [(each.detection_x_m, each.published, each.simulated) for each in found] == [
-        (-19.0, Counted(1, 2), Counted(2, 4)),
-        (-17.5, Counted(1, 2), Counted(1, 4)),
-        (-16.0, Counted(0, 2), Counted(1, 4)),
+        (-19.0, Proportion(1, 2), Proportion(2, 4)),
+        (-17.5, Proportion(1, 2), Proportion(1, 4)),
+        (-16.0, Proportion(0, 2), Proportion(1, 4)),
     ]
 
 

@@ -1,4 +1,4 @@
-"""Programs that are measured from outside, each in a process of its own: how long they take, and how much memory."""
+"""Run programs in processes of their own, and measure from outside how long they take and how much memory."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ class MeasurementError(SuaveDesError):
 
 
 @dataclass(frozen=True)
-class Ended:
+class Measured:
     """A program that has ended.
 
     Attributes:
         wall_s: from its start to its end.
         cpu_s: that it and its workers used.
         out: what it printed.
-        parent_mb: greatest resident memory of its first process; none where the system does not tell.
+        parent_mb: greatest resident memory of its first process; none where the system does not report it.
         worker_mb: the same of the worker process that had most; none also where there was no worker.
     """
 
@@ -47,7 +47,7 @@ class Ended:
     worker_mb: float | None
 
 
-def run(arguments: Sequence[str], folder: Path, environment: Mapping[str, str]) -> Ended:
+def run(arguments: Sequence[str], folder: Path, environment: Mapping[str, str]) -> Measured:
     """Run `python -m ARGUMENTS` to its end.
 
     Args:
@@ -66,7 +66,7 @@ def run(arguments: Sequence[str], folder: Path, environment: Mapping[str, str]) 
         begun, cpu_before_s = time.perf_counter(), _cpu_s()
         process: subprocess.Popen[str] | None = None
         try:
-            with signals_deferred():  # or it would be left to itself in the middle of its start
+            with signals_deferred():  # or it would be orphaned in the middle of its start
                 process = subprocess.Popen(
                     [sys.executable, "-m", *arguments],
                     cwd=folder,
@@ -77,16 +77,17 @@ def run(arguments: Sequence[str], folder: Path, environment: Mapping[str, str]) 
                     text=True,
                     process_group=0,  # Ctrl-C reaches this process alone, which passes it on once
                 )
-            with _memory(process.pid) as memory:
+            with _memory_peaks(process.pid) as peaks_mb:
                 out, _ = process.communicate()
                 wall_s = time.perf_counter() - begun
         finally:
             if process is not None:
                 _end(process)
     if process.returncode:
-        said = " ".join(log.read_text(errors="replace").split())[-400:]
-        raise MeasurementError(f"{' '.join(arguments)} ended with status {process.returncode}: {said}")
-    return Ended(wall_s, _cpu_s() - cpu_before_s, out, memory.parent_mb(), memory.worker_mb())
+        message = " ".join(log.read_text(errors="replace").split())[-400:]
+        raise MeasurementError(f"{' '.join(arguments)} ended with status {process.returncode}: {message}")
+    parent_mb = peaks_mb.pop(process.pid, None)
+    return Measured(wall_s, _cpu_s() - cpu_before_s, out, parent_mb, max(peaks_mb.values(), default=None))
 
 
 def _cpu_s() -> float:
@@ -96,7 +97,7 @@ def _cpu_s() -> float:
 
 
 def _end(process: subprocess.Popen[str]) -> None:
-    """End a process in which nobody is interested any more: as Ctrl-C does, so that it ends its workers."""
+    """Interrupt a process that still runs, as Ctrl-C does, so that it ends its workers."""
     with signals_deferred():
         if process.poll() is None:
             process.send_signal(signal.SIGINT)
@@ -108,59 +109,31 @@ def _end(process: subprocess.Popen[str]) -> None:
 
 
 @contextmanager
-def _memory(pid: int) -> Iterator[_Memory]:
-    """Watches the memory of a process and of its workers as long as it lives."""
-    memory = _Memory(pid)
+def _memory_peaks(pid: int) -> Iterator[dict[int, float]]:
+    """Collect the greatest resident memory of a process and of its workers, in MB by process number."""
+    peaks_mb: dict[int, float] = {}
     stop = threading.Event()
 
     def watch() -> None:
         while not stop.wait(_SAMPLE_S):
-            memory.look()
+            for each in (pid, *_workers(pid)):
+                with suppress(OSError, IndexError):  # it has ended, or there is no /proc
+                    _, _, peak = (_PROC / str(each) / "status").read_text().partition("VmHWM:")
+                    peaks_mb[each] = int(peak.split()[0]) / 1024
 
     thread = threading.Thread(target=watch, daemon=True)
     thread.start()
     try:
-        yield memory
+        yield peaks_mb
     finally:
         stop.set()
         thread.join()
 
 
-class _Memory:
-    """Greatest resident memory of a process and of each of its children, as Linux counts it (VmHWM)."""
-
-    def __init__(self, pid: int) -> None:
-        self._pid = pid
-        self._peaks_mb: dict[int, float] = {}
-
-    def look(self) -> None:
-        """Take note of what the system tells now; the system itself keeps the greatest value."""
-        for pid in (self._pid, *self._workers()):
-            peak_mb = _peak_mb(pid)
-            if peak_mb is not None:
-                self._peaks_mb[pid] = peak_mb
-
-    def parent_mb(self) -> float | None:
-        """Of the process itself."""
-        return self._peaks_mb.get(self._pid)
-
-    def worker_mb(self) -> float | None:
-        """Of the worker that had most."""
-        return max((peak for pid, peak in self._peaks_mb.items() if pid != self._pid), default=None)
-
-    def _workers(self) -> Iterator[int]:
-        for task in _PROC.glob(f"{self._pid}/task/*/children"):
-            with suppress(OSError):
-                for child in task.read_text().split():
-                    with suppress(OSError):
-                        if _WORKER in (_PROC / child / "cmdline").read_bytes():
-                            yield int(child)
-
-
-def _peak_mb(pid: int) -> float | None:
-    """Greatest resident memory of a process so far; none if it is gone, or where there is no /proc."""
-    with suppress(OSError, ValueError):
-        for line in (_PROC / str(pid) / "status").read_text().splitlines():
-            if line.startswith("VmHWM:"):
-                return int(line.split()[1]) / 1024
-    return None
+def _workers(pid: int) -> Iterator[int]:
+    for task in _PROC.glob(f"{pid}/task/*/children"):
+        with suppress(OSError):
+            for child in task.read_text().split():
+                with suppress(OSError):
+                    if _WORKER in (_PROC / child / "cmdline").read_bytes():
+                        yield int(child)

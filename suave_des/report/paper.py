@@ -1,0 +1,215 @@
+"""Compare a campaign with the table of the paper (SEAMS 2023, arXiv:2303.09220), made from the 60 runs behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from suave_des.errors import InputError
+from suave_des.estimates import Estimate, Interval, estimate
+from suave_des.report.runs import METRICS, read_runs
+from suave_des.resources import shipped_folder
+
+if TYPE_CHECKING:
+    import pandas
+
+_PAPER_ORDER = {"none": 0, "random": 1, "metacontrol": 2}
+_CLAIMS = {"search_time_s": ("find the pipeline sooner", -1.0), "distance_inspected_m": ("inspect more of it", 1.0)}
+"""What the paper says that metacontrol does on average, and the sign of what is better."""
+_DECIMALS = 6
+
+MARK = "*"
+"""Marks figures outside the paper's interval."""
+FILES = ("paper_table.md", "paper_table.csv")
+
+Estimates = Mapping[tuple[str, str], Estimate]
+"""Estimates by (manager, metric)."""
+
+
+@dataclass(frozen=True, slots=True)
+class PaperFigure:
+    """One figure of the paper's table beside ours.
+
+    Attributes:
+        manager: name of the managing subsystem.
+        metric: one of METRICS.
+        statistic: "mean" or "std" (sample standard deviation).
+        published: the paper's figure.
+        published_interval: its 95% interval.
+        ours: ours; none if there are too few missions.
+        ours_interval: its 95% interval; none likewise.
+    """
+
+    manager: str
+    metric: str
+    statistic: str
+    published: float
+    published_interval: Interval
+    ours: float | None
+    ours_interval: Interval | None
+
+    @property
+    def difference(self) -> float | None:
+        """Ours - published."""
+        return None if self.ours is None else self.ours - self.published
+
+    @property
+    def is_inside(self) -> bool | None:
+        """Whether ours lies in the 95% interval of the published one; none if there are too few missions."""
+        low, high = self.published_interval
+        return None if self.ours is None else low <= self.ours <= high
+
+
+@dataclass(frozen=True)
+class PaperComparison:
+    """The paper's table beside ours.
+
+    Attributes:
+        figures: by manager in the paper's order, then metric, then statistic.
+        published: estimates from the published runs.
+        ours: estimates from our missions.
+    """
+
+    figures: tuple[PaperFigure, ...]
+    published: Estimates
+    ours: Estimates
+
+    def remarks(self) -> Iterator[str]:
+        """Summarise the comparison in sentences."""
+        judged = [figure.is_inside for figure in self.figures if figure.is_inside is not None]
+        inside = sum(judged)
+        yield f"Paper: {_sizes(self.published)}. Here: {_sizes(self.ours)}. Difference = here - paper."
+        if not judged:
+            yield "There are too few missions for any figure."
+        elif inside == len(judged):
+            yield f"All {inside} figures lie in the 95% intervals of the paper's."
+        else:
+            outside = f"the one marked {MARK} does" if len(judged) - inside == 1 else f"those marked {MARK} do"
+            lie = "lies" if inside == 1 else "lie"
+            yield f"{inside} of {len(judged)} figures {lie} in the 95% intervals of the paper's; {outside} not."
+        yield (
+            "Intervals: Student's t for means; chi-square for standard deviations, a rough guide only, because it"
+            " assumes normally distributed values."
+        )
+        for metric, (claim, sign) in _CLAIMS.items():
+            means = {manager: found.mean for (manager, name), found in self.ours.items() if name == metric}
+            best = means.pop("metacontrol", None)
+            others = [mean for mean in means.values() if mean is not None]
+            if best is None or not others:
+                continue
+            verb, _, what = claim.partition(" ")
+            if all(sign * best > sign * mean for mean in others):
+                yield f"As in the paper, metacontrol {verb}s {what} than the others, on average."
+            else:
+                yield f"Unlike in the paper, metacontrol does not {claim} than all others, on average."
+
+    def markdown(self) -> str:
+        """Write the comparison as Markdown."""
+        lines = [
+            "| manager | metric | | paper | 95% interval | here | 95% interval | difference | |",
+            "| --- | --- | --- | ---: | ---: | ---: | ---: | ---: | --- |",
+        ]
+        for figure in self.figures:
+            cells = (
+                figure.manager,
+                METRICS[figure.metric],
+                figure.statistic,
+                f"{figure.published:.2f}",
+                _interval(figure.published_interval),
+                "" if figure.ours is None else f"{figure.ours:.2f}",
+                _interval(figure.ours_interval),
+                "" if figure.difference is None else f"{figure.difference:+.2f}",
+                f"\\{MARK}" if figure.is_inside is False else "",
+            )
+            lines.append(f"| {' | '.join(cells)} |")
+        # A paragraph for each remark, in which the mark is not emphasis.
+        return "\n".join([*lines, *(f"\n{remark.replace(MARK, chr(92) + MARK)}" for remark in self.remarks())]) + "\n"
+
+    def csv(self) -> str:
+        """Write the comparison as CSV, with six decimals; missing values are empty."""
+        import pandas
+
+        rows = [
+            {
+                "manager": figure.manager,
+                "metric": figure.metric,
+                "statistic": figure.statistic,
+                "published": figure.published,
+                **_ends("published", figure.published_interval),
+                "ours": figure.ours,
+                **_ends("ours", figure.ours_interval),
+                "difference": figure.difference,
+                "inside_published_ci95": figure.is_inside,
+            }
+            for figure in self.figures
+        ]
+        return pandas.DataFrame(rows, dtype=object).map(_rounded).to_csv(index=False, lineterminator="\n")
+
+
+def published_runs() -> Path:
+    """Locate the shipped file of published runs."""
+    return shipped_folder("scenarios") / "published" / "seams2023_runs.csv"
+
+
+def published_estimates(path: Path | None = None) -> Estimates:
+    """Estimate from published runs, managers in the order of the paper's table.
+
+    Args:
+        path: of the runs; left out, the shipped ones.
+
+    Raises:
+        InputError: the file cannot be read, or lacks a column.
+    """
+    runs = read_runs(path or published_runs())
+    names = sorted(runs.managers, key=lambda name: (_PAPER_ORDER.get(name, len(_PAPER_ORDER)), name))
+    return _estimates(runs.frame, [(name, metric) for name in names for metric in METRICS])
+
+
+def compare(runs: pandas.DataFrame, published: Estimates) -> PaperComparison:
+    """Compare the missions of a campaign with published figures.
+
+    Args:
+        runs: with the columns of runs.csv.
+        published: managers that are not in it are left out.
+
+    Raises:
+        InputError: there are fewer than two published runs of a manager.
+    """
+    ours = _estimates(runs, published)
+    figures = (figure for cell in published for figure in _figures(*cell, published[cell], ours[cell]))
+    return PaperComparison(tuple(figures), published, ours)
+
+
+def _estimates(runs: pandas.DataFrame, cells: Iterable[tuple[str, str]]) -> Estimates:
+    return {(name, metric): estimate(runs.loc[runs["manager"] == name, metric].tolist()) for name, metric in cells}
+
+
+def _figures(manager: str, metric: str, known: Estimate, ours: Estimate) -> Iterator[PaperFigure]:
+    if known.mean is None or known.std is None or known.mean_interval is None or known.std_interval is None:
+        problem = f"fewer than two published runs of {manager}"
+        raise InputError(problem, place=metric, remedy="an interval needs two or more")
+    yield PaperFigure(manager, metric, "mean", known.mean, known.mean_interval, ours.mean, ours.mean_interval)
+    yield PaperFigure(manager, metric, "std", known.std, known.std_interval, ours.std, ours.std_interval)
+
+
+def _sizes(estimates: Estimates) -> str:
+    """State how many missions there are of each manager."""
+    sizes = {manager: found.n for (manager, _), found in estimates.items()}
+    if len(set(sizes.values())) == 1:
+        return f"{next(iter(sizes.values()))} missions for each manager"
+    return ", ".join(f"{n} {'mission' if n == 1 else 'missions'} of {manager}" for manager, n in sizes.items())
+
+
+def _ends(name: str, interval: Interval | None) -> dict[str, float | None]:
+    low, high = interval or (None, None)
+    return {f"{name}_ci95_low": low, f"{name}_ci95_high": high}
+
+
+def _rounded(value: object) -> object:
+    return round(value, _DECIMALS) if isinstance(value, float) else value
+
+
+def _interval(interval: Interval | None) -> str:
+    return "" if interval is None else f"{interval[0]:.1f} to {interval[1]:.1f}"
