@@ -43,7 +43,7 @@ def rows(path: Path) -> list[dict[str, str]]:
 
 
 def test_three_missions_of_each_manager_are_simulated_and_compared(validate, tmp_path):
-    ended = validate("seams2023", "--runs", "3", "--workers", "1", "--out", "out")
+    ended = validate("seams2023", "--runs", "3", "--workers", "1", "--out", "out", "--quiet")
     assert (ended.status, ended.err) == (0, "")
     assert "targets are met" in ended.out
     assert "cannot be judged: too few missions" in ended.out
