@@ -1,15 +1,42 @@
-"""suave-des kb: the knowledge workbench. Each command is in a module of its own, suave_des/cli/kb_*.py.
+"""suave-des kb: look at the knowledge base, edit its rules, and ask what they do.
 
-Those modules import typer and the shared options only; what reads ontologies or starts Java is imported when a
-command runs, so that help appears at once.
+What reads ontologies or starts Java is imported when a command runs, so that help appears at once.
 """
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator, Sequence
+from decimal import Decimal
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
 import typer
 
-from suave_des.cli import kb_check, kb_diff, kb_explain, kb_infer, kb_policy, kb_query, kb_rules, kb_try
+from suave_des.cli import kb_rules
+from suave_des.cli.console import output, plain_table, print_table, print_trimmed
+from suave_des.cli.kb_options import (
+    AsFormat,
+    Asked,
+    Format,
+    MaxFailed,
+    Replayed,
+    StateParts,
+    grouped_options,
+    print_json,
+    state_lines,
+)
+from suave_des.errors import InputError
 
+if TYPE_CHECKING:
+    from suave_des.workbench.policy import CasePair, Policy, PolicyDifference
+    from suave_des.workbench.policy_space import ValueRange
+    from suave_des.workbench.policy_table import FunctionTable
+    from suave_des.workbench.replay import Firing, MissionReplay, ReplayedCycle
+
+_EXAMPLES = 5
+_WIDE = 300
 app = typer.Typer(
     name="kb",
     add_completion=False,
@@ -24,15 +51,379 @@ def _help(context: typer.Context) -> None:
         print(context.get_help())
 
 
-app.command("infer")(kb_infer.infer)
-app.command("explain")(kb_explain.explain)
-app.command("policy")(kb_policy.policy)
-app.command("diff")(kb_diff.diff)
-app.command("query")(kb_query.query)
-app.command("try")(kb_try.try_rule)
-app.command("check")(kb_check.check)
-app.command("rules")(kb_rules.rules)
-app.command("add-rule")(kb_rules.add_rule)
-app.command("remove-rule")(kb_rules.remove_rule)
-app.command("enable-rule")(kb_rules.enable_rule)
-app.command("disable-rule")(kb_rules.disable_rule)
+@app.command()
+@grouped_options
+def infer(knowledge: Asked, parts: StateParts, form: AsFormat = Format.TEXT) -> None:
+    """Show what the reasoner infers in a state, and what Metacontrol would do."""
+    bench = knowledge.bench()
+    conclusion = bench.infer(parts.build(bench))
+    inferred, decisions = sorted(map(str, conclusion.inference.facts)), conclusion.plan.decisions
+    state = conclusion.inference.state
+    if form is Format.JSON:
+        plan = [
+            {
+                "function": decision.function,
+                "design": decision.design,
+                "reason": decision.reason,
+                "rejected": {rejection.design: rejection.reason for rejection in decision.rejected},
+            }
+            for decision in decisions
+        ]
+        print_json({"state": state, "inferred": inferred, "plan": plan})
+        return
+    print("state")
+    for line in state_lines(state):
+        print(f"  {line}")
+    print("inferred")
+    for fact in inferred or ["nothing"]:
+        print(f"  {fact}")
+    print("plan" if decisions else "plan\n  nothing to adapt")
+    for decision in decisions:
+        print(f"  {decision.function}: {decision.design or 'no design left'}  ({decision.reason})")
+        for rejection in decision.rejected:
+            print(f"    not {rejection.design}: {rejection.reason}")
+
+
+@app.command()
+@grouped_options
+def explain(
+    knowledge: Asked,
+    parts: StateParts,
+    question: Annotated[
+        str,
+        typer.Argument(
+            metavar="QUESTION",
+            help='A fact, as a rule atom says it, or "why DESIGN?", "why not DESIGN?"; left out: all that follows.',
+        ),
+    ] = "",
+    form: AsFormat = Format.TEXT,
+) -> None:
+    """Explain why a fact follows in a state, why a design is chosen or not, or why the state contradicts itself."""
+    bench = knowledge.bench()
+    explanation = bench.explain(parts.build(bench), question)
+    if form is Format.JSON:
+        print_json(explanation)
+    else:
+        print(explanation)
+
+
+@app.command()
+@grouped_options
+def policy(
+    knowledge: Asked,
+    max_failed: MaxFailed = 2,
+    csv: Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write every row of the table.")] = None,
+    png: Annotated[
+        Path | None, typer.Option("--png", metavar="FILE", help="Draw it, over one or two measured values.")
+    ] = None,
+    form: AsFormat = Format.TEXT,
+) -> None:
+    """Tabulate what is decided in every state.
+
+    Measured values count by range: between any two numbers of the knowledge base, and on each of them.
+    """
+    from suave_des.campaign.output import csv_text, write_files
+    from suave_des.workbench.policy_table import columns_of, function_table, rows_of
+
+    if csv is not None and csv.is_dir():
+        raise InputError("is a folder", file=csv, remedy="name a file, such as policy.csv")
+    found = knowledge.bench().policy(max_failed)
+    if png is not None:
+        from suave_des.workbench.policy_figure import draw_policy
+
+        draw_policy(found, png)
+    if csv is not None:
+        write_files(csv.parent, {csv.name: csv_text(columns_of(found), rows_of(found))})
+    tables = [function_table(found, name) for name in found.functions]
+    if form is Format.JSON:
+        summary = {
+            "states": found.states,
+            "kinds": len(found.cases),
+            "attributes": found.attributes,
+            "without_effect": found.without_effect,
+            "alike": found.alike,
+            "computing_rules": found.computing,
+            "marked": found.marks,
+            "tables": tables,
+        }
+        print_json(summary)
+        return
+    for table in tables:
+        _print_function_table(table)
+    for line in _policy_summary(found):
+        print(line)
+
+
+def _print_function_table(table: FunctionTable) -> None:
+    shown = plain_table()
+    others = [name for name in table.rows[0].groundings if name != table.function]
+    with_components = any(row.components for row in table.rows)
+    # The last attribute goes across, the others down.
+    across = list(dict.fromkeys(column[-1:] for column in table.columns))
+    headings = ["now", *others, *(["components"] if with_components else []), *table.attributes[:-1]]
+    for heading in [*headings, *(str(last[0]) if last else "then" for last in across)]:
+        shown.add_column(heading, overflow="fold")
+    for row in table.rows:
+        components = [row.components] if with_components else []
+        outcomes = dict(zip(table.columns, row.outcomes, strict=True))
+        for down in dict.fromkeys(column[:-1] for column in table.columns):
+            shown.add_row(
+                row.groundings.get(table.function, "any"),
+                *(row.groundings[name] for name in others),
+                *components,
+                *map(str, down),
+                *(outcomes[(*down, *last)] for last in across),
+            )
+    what = f", by measured {', '.join(table.attributes)}" if table.attributes else ""
+    console = output()
+    if not console.is_terminal and "COLUMNS" not in os.environ:
+        console.width = _WIDE  # names stay whole where there is no window
+    print_table(console, f"{table.function}{what}", shown)
+    print()
+
+
+def _policy_summary(found: Policy) -> Iterator[str]:
+    from suave_des.knowledge.limit import in_words
+    from suave_des.workbench.policy import NONE_LEFT
+
+    kinds, most = len(found.cases), found.max_failed
+    yield f"{found.states} states of {kinds} kinds, with at most {most} components reporting"
+    for group in found.alike:
+        if len(group) > 1:
+            yield f"interchangeable, only their number counts: {', '.join(group)}"
+    for name in found.without_effect:
+        yield f"without any effect: measured {name}"
+    if found.computing:
+        yield _no_proof(found.computing)
+    for mark, states in found.marks.items():
+        yield f"{mark}: {states} states"
+        cases = () if mark == NONE_LEFT else found.marked(mark)
+        for case in cases[:_EXAMPLES]:
+            yield f"  {in_words(case.state)}" + (f": {case.problem}" if case.problem else "")
+        if len(cases) > _EXAMPLES:
+            yield f"  and {len(cases) - _EXAMPLES} more kinds: see --csv"
+
+
+def _no_proof(computing: Sequence[str]) -> str:
+    return f"not a proof, as measured values are samples for rules that compute: {', '.join(computing)}"
+
+
+@app.command()
+@grouped_options
+def diff(
+    knowledge: Asked,
+    one: Annotated[
+        Path,
+        typer.Argument(metavar="A", help="An ontology, or a .swrl file of rules besides the other ontologies."),
+    ],
+    other: Annotated[Path, typer.Argument(metavar="B", help="The same.")],
+    max_failed: MaxFailed = 2,
+    form: AsFormat = Format.TEXT,
+) -> None:
+    """Show in which states two ontologies, or two sets of rules, decide differently.
+
+    --ontology, --rules and --disable-rule count for both; an ontology given as A or B takes the place of the
+    scenario's.
+    """
+    difference = knowledge.with_file(one).bench().diff(knowledge.with_file(other).bench(), max_failed)
+    if form is Format.TEXT:
+        for line in _difference_lines(difference):
+            print(line)
+        return
+    content = {
+        "compared": difference.compared,
+        "states": difference.states,
+        "other_statuses_only": difference.states_reported,
+        "only_a": difference.only_one,
+        "only_b": difference.only_other,
+        "computing_rules": difference.computing,
+        "cells": [
+            {
+                "regions": pair.one.ranges,
+                "state": pair.one.state,
+                "states": pair.one.reports.combinations,
+                "a": {name: pair.one.outcome(name) for name in pair.one.asked},
+                "b": {name: pair.other.outcome(name) for name in pair.one.asked},
+                "marks_a": pair.one.marks,
+                "marks_b": pair.other.marks,
+            }
+            for pair in difference.differing
+        ],
+    }
+    print_json(content)
+
+
+def _difference_lines(difference: PolicyDifference) -> Iterator[str]:
+    from suave_des.knowledge.limit import in_words
+    from suave_des.workbench.policy_table import outcome_text, present
+
+    yield f"{difference.states} of {difference.compared} states are decided differently"
+    if difference.reported:
+        yield f"{difference.states_reported} more have other statuses, but the same decisions"
+    if difference.computing:
+        yield _no_proof(difference.computing)
+    for which, designs in (("A", difference.only_one), ("B", difference.only_other)):
+        if designs:
+            yield f"only {which} has {', '.join(designs)}"
+    groups: dict[str, list[CasePair]] = {}
+    for pair in difference.differing:
+        for name in pair.functions or pair.one.asked:
+            before, after = (outcome_text(case, name) for case in (pair.one, pair.other))
+            groups.setdefault(f"{name}, now {present(pair.one, name)}: A {before}, B {after}", []).append(pair)
+    for heading, pairs in groups.items():
+        yield heading
+        for ranges, states in _joined(pairs):
+            yield f"  {'; '.join(map(str, ranges))}: {states} states"
+        yield f"  for instance {in_words(pairs[0].one.state)}"
+
+
+def _joined(pairs: Sequence[CasePair]) -> list[tuple[tuple[ValueRange, ...], int]]:
+    """Ranges of measured values with the number of states; neighbouring ranges of a single attribute are joined."""
+    counts: dict[tuple[ValueRange, ...], int] = {}
+    for pair in pairs:
+        counts[pair.one.ranges] = counts.get(pair.one.ranges, 0) + pair.one.reports.combinations
+    joined: list[tuple[tuple[ValueRange, ...], int]] = []
+    for ranges, states in counts.items():
+        last = joined[-1][0] if joined else ()
+        if len(ranges) == len(last) == 1 and last[0].high == ranges[0].low is not None:
+            joined[-1] = (last[0].joined(ranges[0]),), joined[-1][1] + states
+        else:
+            joined.append((ranges, states))
+    return joined
+
+
+class TableFormat(StrEnum):
+    """How to print a table."""
+
+    TEXT = "text"
+    CSV = "csv"
+    JSON = "json"
+
+
+@app.command()
+@grouped_options
+def query(
+    knowledge: Asked,
+    parts: StateParts,
+    text: Annotated[
+        str, typer.Argument(metavar="QUERY", help="SPARQL; the prefixes suave, tomasys, mros and owl are known.")
+    ],
+    inferred: Annotated[bool, typer.Option("--inferred", help="Include what Pellet infers.")] = False,
+    form: Annotated[TableFormat, typer.Option("--format", help="A table to read, CSV or JSON.")] = TableFormat.TEXT,
+) -> None:
+    """Query the knowledge base in SPARQL.
+
+    Without any option that gives a state, the query is answered from the ontologies alone.
+    """
+    from suave_des.campaign.output import csv_text
+
+    bench = knowledge.bench()
+    found = bench.query(text, parts.build(bench) if parts.is_given else None, inferred=inferred)
+    if form is TableFormat.JSON:
+        print_json([dict(zip(found.columns, row, strict=True)) for row in found.rows])
+    elif form is TableFormat.CSV:
+        print(csv_text(found.columns, found.rows), end="")
+    else:
+        table = plain_table()
+        for column in found.columns:
+            table.add_column(column, overflow="fold")
+        for row in found.rows:
+            table.add_row(*(cell or "" for cell in row))
+        print_trimmed(output(), table)
+        if not found.rows:
+            print("no rows")
+
+
+@app.command("try")
+@grouped_options
+def try_rule(
+    knowledge: Replayed,
+    on: Annotated[
+        Path,
+        typer.Option(
+            "--on",
+            metavar="DIR",
+            help="Output folder of run, or of a campaign that recorded its knowledge, or a folder of such folders.",
+        ),
+    ],
+    rule: Annotated[str | None, typer.Argument(metavar="RULE", help='As "name: body -> head".')] = None,
+    disable: Annotated[str | None, typer.Option("--disable", metavar="NAME", help="Try to do without a rule.")] = None,
+    form: AsFormat = Format.TEXT,
+) -> None:
+    """Show when a rule would have fired in recorded missions, and which decisions would have been different.
+
+    No mission is run again: each recorded state is reasoned about with and without the rule. What another decision
+    would have led to, only a new run shows.
+    """
+    from suave_des.workbench.replay import RuleChange
+    from suave_des.workbench.replay import try_rule as replayed
+
+    change = RuleChange(
+        rule,
+        disable,
+        knowledge.ontology or (),
+        knowledge.scenario,
+        knowledge.rules or (),
+        knowledge.disable_rule or (),
+        knowledge.reasoner,
+        knowledge.time_limit,
+    )
+    missions = list(replayed(on, change))
+    if form is Format.JSON:
+        print_json(missions)
+        return
+    for mission in missions:
+        if mission.moments or len(missions) == 1:
+            for line in _replay_lines(mission):
+                print(line)
+    if len(missions) > 1:
+        moments = [mission.moments for mission in missions]
+        firing = sum(any(each.firings for each in one) for one in moments)
+        changed = [sum(len(each.decisions) for each in one) for one in moments]
+        contradictions = sum(any(each.contradiction for each in one) for one in moments)
+        print(
+            f"{len(missions)} missions: fires in {firing}, different decisions in {sum(map(bool, changed))} "
+            f"({sum(changed)} decisions), contradictions in {contradictions}"
+        )
+
+
+def _replay_lines(mission: MissionReplay) -> Iterator[str]:
+    firings: dict[str, list[ReplayedCycle]] = {}
+    decisions: dict[str, list[ReplayedCycle]] = {}
+    for cycle in mission.moments:
+        for firing in cycle.firings:
+            firings.setdefault(_firing_text(firing), []).append(cycle)
+        for each in cycle.decisions:
+            then, recorded = each.then or "no change", each.recorded or "no change"
+            decisions.setdefault(f"{each.function}: {then} instead of {recorded}", []).append(cycle)
+    which = f": {mission.mission}" if mission.mission else ""
+    firing_cycles = sum(bool(cycle.firings) for cycle in mission.moments)
+    yield f"{mission.folder}{which}: fires in {firing_cycles} of {mission.states} recorded states"
+    for text, cycles in firings.items():
+        yield f"  {_times(cycles)}: {text}"
+    yield f"  decisions that would have been different: {sum(map(len, decisions.values()))}"
+    for text, cycles in decisions.items():
+        yield f"    {_times(cycles)}: {text}"
+    contradicting = [cycle for cycle in mission.moments if cycle.contradiction]
+    if contradicting:
+        yield f"  states that would contradict themselves: {len(contradicting)} ({_times(contradicting)})"
+        yield f"    {contradicting[0].contradiction}"
+
+
+def _firing_text(firing: Firing) -> str:
+    """What is concluded with which individuals; numbers, which differ each time, are left out."""
+    bound = ", ".join(f"?{name} = {value}" for name, value in firing.bindings if not isinstance(value, Decimal))
+    known = "" if firing.is_new else " (known without it)"
+    return f"{', '.join(map(str, firing.facts))}{known} with {bound or 'nothing bound'}"
+
+
+def _times(cycles: Sequence[ReplayedCycle]) -> str:
+    first, last = cycles[0].t_s, cycles[-1].t_s
+    return f"{first:.2f} s" if first == last else f"{first:.2f} s to {last:.2f} s, {len(cycles)} states"
+
+
+for _command in (
+    *(kb_rules.check, kb_rules.rules, kb_rules.add_rule),
+    *(kb_rules.remove_rule, kb_rules.enable_rule, kb_rules.disable_rule),
+):
+    app.command()(_command)

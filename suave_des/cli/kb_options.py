@@ -1,17 +1,25 @@
-"""Options and output that the commands of the knowledge workbench share."""
+"""What the `kb` commands share: groups of options, and output as JSON or as lines of text."""
 
 from __future__ import annotations
 
+import dataclasses
+import functools
+import inspect
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from decimal import Decimal
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
+from suave_des.cli.options import DisabledRules, Ontologies, Reasoner, RuleFiles
+
 if TYPE_CHECKING:
     from suave_des.knowledge.state import KnowledgeState
+    from suave_des.scenario.loader import LoadedScenario
+    from suave_des.workbench import KnowledgeBase
 
 
 class Format(StrEnum):
@@ -21,7 +29,13 @@ class Format(StrEnum):
     JSON = "json"
 
 
-Formats = Annotated[Format, typer.Option("--format", help="Text to read, or JSON.")]
+AsFormat = Annotated[Format, typer.Option("--format", help="Text to read, or JSON.")]
+TimeLimitS = Annotated[
+    float, typer.Option("--time-limit", metavar="S", min=0.01, help="Seconds that the reasoner may take for a state.")
+]
+MaxFailed = Annotated[
+    int, typer.Option("--max-failed", min=0, metavar="N", help="At most so many components have failed or recovered.")
+]
 ScenarioOption = Annotated[
     str,
     typer.Option(
@@ -30,39 +44,176 @@ ScenarioOption = Annotated[
         help="Scenario whose ontologies, values, measured attributes and revision count.",
     ),
 ]
-TimeLimitS = Annotated[
-    float, typer.Option("--time-limit", metavar="S", min=0.01, help="Seconds that the reasoner may take for a state.")
-]
-StateFile = Annotated[
-    Path | None,
-    typer.Option("--state", metavar="FILE", help="YAML: objectives, groundings, components, measurements."),
-]
-Measured = Annotated[
-    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Measured value of a quality attribute.")
-]
-Components = Annotated[
-    list[str] | None, typer.Option("--component", metavar="NAME=STATUS", help="Reported c_status of a component.")
-]
-Groundings = Annotated[
-    list[str] | None, typer.Option("--ground", metavar="FUNCTION=DESIGN", help="Function design now in use.")
-]
-Objectives = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--objective",
-        metavar="FUNCTION[=STATUS]",
-        help="Objective that the mission has; without any: those of the groundings, else those of the search task.",
-    ),
-]
 
 
-def print_json(content: Any) -> None:
-    """Print JSON that people read too."""
-    print(json.dumps(content, indent=2, ensure_ascii=False))
+@dataclasses.dataclass(frozen=True)
+class Sources:
+    """Options that name ontologies and rules."""
+
+    ontology: Ontologies = None
+    rules: RuleFiles = None
+    disable_rule: DisabledRules = None
+    scenario: ScenarioOption = "seams2023"
+
+    def load(self, modes: Path | None = None) -> LoadedScenario:
+        """Load the scenario with these ontologies and rules."""
+        from suave_des.scenario.loader import load_scenario
+
+        return load_scenario(
+            self.scenario,
+            ontologies=self.ontology or (),
+            modes_file=modes,
+            rules=self.rules or (),
+            disabled_rules=self.disable_rule or (),
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class Asked(Sources):
+    """Options that name ontologies, rules and a reasoner to ask."""
+
+    reasoner: Reasoner = None
+    time_limit: TimeLimitS = 60.0
+
+    def bench(self) -> KnowledgeBase:
+        """Load the knowledge base and start the reasoner."""
+        from suave_des.workbench import KnowledgeBase
+
+        return KnowledgeBase.load(
+            self.ontology or (),
+            scenario=self.scenario,
+            reasoner=self.reasoner,
+            rules=self.rules or (),
+            disabled_rules=self.disable_rule or (),
+            time_limit_s=self.time_limit,
+        )
+
+    def with_file(self, file: Path) -> Asked:
+        """Add an ontology, or a .swrl file of rules."""
+        if file.suffix == ".swrl":
+            return dataclasses.replace(self, rules=[*(self.rules or ()), file])
+        return dataclasses.replace(self, ontology=[*(self.ontology or ()), file])
+
+
+@dataclasses.dataclass(frozen=True)
+class Replayed:
+    """Options that replace or add to the knowledge base of recorded missions."""
+
+    ontology: Ontologies = None
+    rules: RuleFiles = None
+    disable_rule: DisabledRules = None
+    scenario: Annotated[
+        str | None,
+        typer.Option("--scenario", metavar="SCENARIO", help="In place of the scenario that was recorded."),
+    ] = None
+    reasoner: Reasoner = None
+    time_limit: TimeLimitS = 60.0
+
+
+@dataclasses.dataclass(frozen=True)
+class StateParts:
+    """Options that describe a state."""
+
+    state: Annotated[
+        Path | None,
+        typer.Option("--state", metavar="FILE", help="YAML: objectives, groundings, components, measurements."),
+    ] = None
+    measured: Annotated[
+        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Measured value of a quality attribute.")
+    ] = None
+    component: Annotated[
+        list[str] | None, typer.Option("--component", metavar="NAME=STATUS", help="Reported c_status of a component.")
+    ] = None
+    ground: Annotated[
+        list[str] | None, typer.Option("--ground", metavar="FUNCTION=DESIGN", help="Function design now in use.")
+    ] = None
+    objective: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--objective",
+            metavar="FUNCTION[=STATUS]",
+            help="Objective that the mission has; without any: those of the groundings, else those of the search task.",
+        ),
+    ] = None
+
+    @property
+    def is_given(self) -> bool:
+        """Whether any of the options is given."""
+        return any((self.state, self.measured, self.component, self.ground, self.objective))
+
+    def build(self, bench: KnowledgeBase) -> KnowledgeState:
+        """Build the state; the other options replace what the file says."""
+        from suave_des.workbench.state_input import StateBuilder
+
+        builder = StateBuilder(bench.base, bench.settings)
+        if self.state is not None:
+            builder.add_file(self.state)
+        builder.add_words("measurements", "--set", self.measured or ())
+        builder.add_words("components", "--component", self.component or ())
+        builder.add_words("groundings", "--ground", self.ground or ())
+        builder.add_words("objectives", "--objective", self.objective or ())
+        return builder.state()
+
+
+def grouped_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Turn each parameter of a command that is a dataclass into options, one for each field.
+
+    Example:
+        @app.command()
+        @grouped_options
+        def infer(knowledge: Asked, parts: StateParts, form: AsFormat = Format.TEXT) -> None: ...
+    """
+    hints = get_type_hints(command, include_extras=True)
+    groups: dict[str, Any] = {name: hint for name, hint in hints.items() if dataclasses.is_dataclass(hint)}
+    parameters: list[inspect.Parameter] = []
+    for parameter in inspect.signature(command).parameters.values():
+        name = parameter.name
+        if name not in groups:
+            parameters.append(parameter.replace(annotation=hints[name], kind=inspect.Parameter.KEYWORD_ONLY))
+            continue
+        fields = get_type_hints(groups[name], include_extras=True)
+        parameters += [
+            inspect.Parameter(
+                each.name, inspect.Parameter.KEYWORD_ONLY, default=each.default, annotation=fields[each.name]
+            )
+            for each in dataclasses.fields(groups[name])
+        ]
+
+    @functools.wraps(command)
+    def with_groups(**given: Any) -> None:
+        for name, group in groups.items():
+            given[name] = group(**{each.name: given.pop(each.name) for each in dataclasses.fields(group)})
+        command(**given)
+
+    vars(with_groups)["__signature__"] = inspect.Signature(parameters)
+    with_groups.__annotations__ = {each.name: each.annotation for each in parameters}
+    return with_groups
+
+
+def print_json(content: object) -> None:
+    """Print JSON that people read too: dataclasses as objects, states as in state files, facts and numbers as text."""
+    print(json.dumps(_plain(content), indent=2, ensure_ascii=False))
+
+
+def _plain(value: Any) -> Any:
+    from suave_des.knowledge.state import Fact, KnowledgeState
+    from suave_des.workbench.policy_space import ValueRange
+    from suave_des.workbench.state_input import state_dict
+
+    if isinstance(value, KnowledgeState):
+        return state_dict(value)
+    if isinstance(value, Fact | ValueRange | Path | Decimal):
+        return str(value)
+    if dataclasses.is_dataclass(value):
+        value = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        bindings = {name: str(each) for name, each in value.get("bindings", ())}
+        return {key: bindings if key == "bindings" else _plain(each) for key, each in value.items()}
+    return [_plain(each) for each in value] if isinstance(value, list | tuple) else value
 
 
 def state_lines(state: KnowledgeState) -> Iterator[str]:
-    """A state, a line for each of its parts."""
+    """A state, one line for each part."""
     for objective in state.objectives:
         status = f"  {objective.status}" if objective.status else ""
         yield f"objective   {objective.function}{status}"

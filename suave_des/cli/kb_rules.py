@@ -1,48 +1,106 @@
-"""suave-des kb rules: list rules as text. kb add-rule, remove-rule, enable-rule, disable-rule: edit OWL files."""
+"""suave-des kb check, rules, add-rule, remove-rule, enable-rule, disable-rule: the rules of a knowledge base."""
 
 from __future__ import annotations
 
+from decimal import Decimal
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli.kb_options import Format, Formats, ScenarioOption, print_json
-from suave_des.cli.options import DisabledRules, Ontologies, RuleFiles
+from suave_des.cli.kb_options import AsFormat, Format, Sources, TimeLimitS, grouped_options, print_json
+from suave_des.cli.options import Modes
 
 if TYPE_CHECKING:
     from suave_des.knowledge.ontology import Ontology
 
+FOUND = 1
+"""Exit status of `check` when there are findings that --fail-on names."""
 OwlFile = Annotated[Path, typer.Argument(metavar="FILE", help="An OWL file; FILE.bak keeps what it was before.")]
 RuleName = Annotated[str, typer.Argument(metavar="NAME", help="Name of a rule of the file.")]
 
 
-def rules(
-    ontology: Ontologies = None,
-    rules: RuleFiles = None,
-    disable_rule: DisabledRules = None,
-    scenario: ScenarioOption = "seams2023",
-    form: Formats = Format.TEXT,
+class FindingsFormat(StrEnum):
+    """How to print findings."""
+
+    TEXT = "text"
+    JSON = "json"
+    MARKDOWN = "markdown"
+
+
+class FailOn(StrEnum):
+    """The least level that counts as failure."""
+
+    ERROR = "error"
+    WARN = "warn"
+
+
+@grouped_options
+def check(
+    sources: Sources,
+    modes: Modes = None,
+    shapes: Annotated[
+        list[Path] | None,
+        typer.Option("--shapes", metavar="FILE", help="SHACL shapes in Turtle, besides the shipped ones."),
+    ] = None,
+    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="The least level that makes the exit status 1.")] = (
+        FailOn.ERROR
+    ),
+    time_limit: TimeLimitS = 60.0,
+    form: Annotated[FindingsFormat, typer.Option("--format", help="How to print.")] = FindingsFormat.TEXT,
 ) -> None:
+    """Check ontologies and rules: names, arguments, variables, model, shapes, contradictions.
+
+    Exit status: 0 no findings of the level of --fail-on; 1 such findings; 2 something cannot be read.
+    """
+    from suave_des.domain import MISSION_FUNCTIONS
+    from suave_des.workbench.check import Subject
+    from suave_des.workbench.check import check as run_checks
+    from suave_des.workbench.findings import Level, has_level, summary
+
+    loaded = sources.load(modes)
+    findings = run_checks(
+        Subject(
+            ontologies=loaded.ontologies,
+            rules=loaded.rules,
+            disabled_rules=loaded.scenario.knowledge.disabled_rules,
+            values={name: Decimal(repr(value)) for name, value in loaded.scenario.knowledge.values.items()},
+            shapes=shapes or (),
+            modes={name: loaded.modes.modes(name) for name in loaded.modes.functions},
+            needed=MISSION_FUNCTIONS,
+            time_limit_s=time_limit,
+        )
+    )
+    if form is FindingsFormat.JSON:
+        print_json(findings)
+    elif form is FindingsFormat.MARKDOWN:
+        print("| level | where | what | remedy |\n| --- | --- | --- | --- |")
+        for finding in findings:
+            cells = (finding.level, finding.where, finding.message, finding.remedy or "")
+            print(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
+        print(f"\n{summary(findings)}")
+    else:
+        for line in (*findings, summary(findings)):
+            print(line)
+    if has_level(findings, Level(fail_on.upper())):
+        raise typer.Exit(FOUND)
+
+
+@grouped_options
+def rules(sources: Sources, form: AsFormat = Format.TEXT) -> None:
     """List all rules as text that --rules reads back."""
-    from suave_des.scenario.loader import load_scenario
     from suave_des.simulation.knowledge import open_base
 
-    loaded = load_scenario(scenario, ontologies=ontology or (), rules=rules or (), disabled_rules=disable_rule or ())
-    base = open_base(loaded)
+    base = open_base(sources.load())
     if form is Format.JSON:
-        print_json(
-            [
-                {"name": rule.name, "enabled": rule.enabled, "file": str(rule.file), "text": rule.text}
-                for rule in base.rules
-            ]
-        )
+        print_json([{"name": r.name, "enabled": r.enabled, "file": r.file, "text": r.text} for r in base.rules])
     else:
         print(rules_text(base), end="")
 
 
 def rules_text(base: Ontology) -> str:
-    """All rules of a knowledge base as one text, by file."""
+    """Write all rules of a knowledge base as one text, file by file."""
     from suave_des.knowledge.rules.syntax import EXPRESSION
     from suave_des.knowledge.rules.writer import naming, write_rule
 
@@ -54,8 +112,8 @@ def rules_text(base: Ontology) -> str:
             if rule.file == file:
                 text = write_rule(rule.name, rule.body, rule.head, named, enabled=rule.enabled)
                 if any(atom.predicate in ("", EXPRESSION) for atom in rule.atoms):
-                    said = "# This rule has an atom without a name, which rules as text cannot have:\n"
-                    text = said + "".join(f"# {line}\n" for line in text.splitlines())
+                    lines = "".join(f"# {line}\n" for line in text.splitlines())
+                    text = f"# This rule has an atom without a name, which rules as text cannot have:\n{lines}"
                 blocks.append(text)
     return "\n".join(blocks) or "# no rules\n"
 
@@ -64,7 +122,7 @@ def add_rule(
     file: OwlFile,
     rule: Annotated[str, typer.Argument(metavar="RULE", help='The rule: "name: body -> head".')],
 ) -> None:
-    """Add a rule to an OWL file, and leave the rest of it as it is."""
+    """Add a rule to an OWL file, and leave everything else in it as it is."""
     from suave_des.workbench.rule_editor import add_rule as add
 
     added = add(file, rule)
@@ -72,7 +130,7 @@ def add_rule(
 
 
 def remove_rule(file: OwlFile, name: RuleName) -> None:
-    """Remove a rule from an OWL file, and leave the rest of it as it is."""
+    """Remove a rule from an OWL file, and leave everything else in it as it is."""
     from suave_des.workbench.rule_editor import remove_rule as remove
 
     remove(file, name)

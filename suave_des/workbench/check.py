@@ -1,4 +1,4 @@
-"""Check a knowledge base: rules, names, model, shapes, and what Pellet says of it."""
+"""Check a knowledge base before anything runs: rules, names, model, shapes, and what Pellet reports."""
 
 from __future__ import annotations
 
@@ -14,35 +14,36 @@ from typing import Final
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.content import Content, merge, with_rules
 from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit
-from suave_des.knowledge.model import Model, build_model, check_values, expectations
+from suave_des.knowledge.model import Model, build_model, check_values
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, collect
-from suave_des.knowledge.rdf import Triple
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.regions import regions_of
 from suave_des.knowledge.rules.checks import check_rule
 from suave_des.knowledge.rules.files import RulesFile
 from suave_des.knowledge.rules.names import Vocabulary, rule_from_text
-from suave_des.knowledge.rules.syntax import Atom, Named, Rule
+from suave_des.knowledge.rules.syntax import Place, Rule
+from suave_des.knowledge.rules.writer import write_atom
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
-from suave_des.knowledge.vocabulary import LANGUAGE_NAMESPACES, PERFORMANCE, RDF_TYPE, TOMASYS, local_name, nearest
 from suave_des.resources import shipped_folder
-from suave_des.workbench.findings import Finding, Level, fails, finding_of, in_order, shown_path
-from suave_des.workbench.reachable import atom_text, dead_rules, unmeasured
-from suave_des.workbench.regions import matters, numbers_in, regions_between
-from suave_des.workbench.shapes import check_shapes
-from suave_des.workbench.undefined import undefined_names
+from suave_des.workbench.dead_rules import dead_rules, unmeasured_rules
+from suave_des.workbench.findings import Finding, Level, finding_from, has_level, ordered, relative_path
+from suave_des.workbench.model_checks import (
+    check_designs,
+    check_shapes,
+    designs_without_performance,
+    undefined_names,
+    unused_individuals,
+)
+from suave_des.workbench.policy_space import has_effect, numbers_in, ranges_between
 
-#: Modes that are no function design: the one that a cancelled task sets, and the one that a file starts with.
-_NO_DESIGNS: Final = {"fd_unground", "__DEFAULT__"}
 #: States that Pellet is asked about; `kb policy` goes through all.
 MAX_STATES: Final = 300
-_ADD_MODE: Final = "add a mode of this name to the System Modes file, or remove the design"
 
 
 @dataclass(frozen=True)
 class Subject:
-    """What is checked.
+    """What to check.
 
     Attributes:
         ontologies: files; without any, the shipped suave.owl.
@@ -66,12 +67,15 @@ class Subject:
 
 
 def check(subject: Subject) -> tuple[Finding, ...]:
-    """All that is to be said of a knowledge base, the worst first.
+    """Check a knowledge base.
 
     Pellet is asked at the end, and only if nothing before was an ERROR.
 
+    Returns:
+        all findings, the worst first.
+
     Raises:
-        InputError: something given cannot be read at all.
+        InputError: a file cannot be read at all.
     """
     given = list(subject.ontologies) or [shipped_folder("ontology") / "suave.owl"]
     sources = collect(given)
@@ -82,223 +86,137 @@ def check(subject: Subject) -> tuple[Finding, ...]:
         try:
             work()
         except KnowledgeError as error:
-            findings.append(finding_of(error))
+            findings.append(finding_from(error))
 
     content = merge(sources, subject.values)
     attempt(lambda: check_values(content, sources))
     values_are_right = not findings
-    built: list[tuple[Model, Content]] = []
-    attempt(lambda: built.append(build_model(content, sources)))
-    model = built[0][0] if built else None
+    built: list[Model] = []
+    attempt(lambda: built.append(build_model(content, sources)[0]))
+    model = built[0] if built else None
     vocabulary = Vocabulary.of(content.triples, [] if model is None else [each.iri for each in model.individuals()])
-    findings += _undefined(content, model, vocabulary, sources)
-    groups = []
-    for file in files:
-        findings += [finding_of(error) for error in file.parsed.errors]
-        rules: list[Rule] = []
-        for parsed in file.parsed.rules:
-            try:
-                rules.append(rule_from_text(parsed, vocabulary, file.path))
-            except KnowledgeError as error:
-                findings.append(replace(finding_of(error), rule=parsed.name))
-        groups.append(rules)
+    findings += undefined_names(content, model, vocabulary, sources)
+    groups = [_rules_from_text(file, vocabulary, findings) for file in files]
     whole = with_rules(content, groups, subject.disabled_rules)
-    lines = {source.path: source for source in sources}
-    findings += _replaced(content.rules, groups)
-    findings += _of_rules(whole, vocabulary, lines)
+    by_path = {source.path: source for source in sources}
+    findings += _replacing_rules(content.rules, groups)
+    findings += _check_rules(whole, vocabulary, by_path)
     if model is not None:
-        findings += _dead(whole, model, {path.resolve() for path in (*given, *subject.rules)}, lines)
-        findings += _of_model(whole, model, sources, subject)
+        findings += _dead_rules(whole, model, {path.resolve() for path in (*given, *subject.rules)}, by_path)
+        findings += check_designs(whole, model, sources, subject.modes, subject.needed)
+        findings += unused_individuals(whole, model, sources)
         if values_are_right:
-            findings += _without_performance(whole, model, sources)
+            findings += designs_without_performance(whole, model, sources)
     findings += check_shapes(sources, subject.shapes)
-    if not fails(findings, Level.ERROR):
-        attempt(lambda: findings.extend(_of_reasoner(subject)))
-    return in_order(replace(one, file=shown_path(one.file) if one.file else None) for one in findings)
+    if not has_level(findings, Level.ERROR):
+        attempt(lambda: findings.extend(_ask_pellet(subject)))
+    return ordered(replace(one, file=relative_path(one.file) if one.file else None) for one in findings)
 
 
-def _of_rules(content: Content, vocabulary: Vocabulary, sources: Mapping[Path, OntologyFile]) -> Iterator[Finding]:
+def _rules_from_text(file: RulesFile, vocabulary: Vocabulary, findings: list[Finding]) -> list[Rule]:
+    """The rules of a file whose names are all known; the others, and syntax errors, become findings."""
+    findings += map(finding_from, file.parsed.errors)
+    rules = []
+    for parsed in file.parsed.rules:
+        try:
+            rules.append(rule_from_text(parsed, vocabulary, file.path))
+        except KnowledgeError as error:
+            findings.append(replace(finding_from(error), rule=parsed.name))
+    return rules
+
+
+def _check_rules(content: Content, vocabulary: Vocabulary, sources: Mapping[Path, OntologyFile]) -> Iterator[Finding]:
     names = Counter(rule.name for rule in content.rules)
     for rule in content.rules:
+        found = _RuleFinding(rule, sources)
         if names[rule.name] > 1:
-            yield _at(rule, sources, Level.WARN, f"{names[rule.name]} rules have this name", remedy="rename one")
+            yield found(Level.WARN, f"{names[rule.name]} rules have this name", "rename one")
         for problem in check_rule(rule, vocabulary):
-            level = Level.ERROR if problem.is_fatal else Level.WARN
-            message = problem.message
-            if not rule.enabled:
-                level, message = Level.INFO, f"switched off; {message}"
-            found = _at(rule, sources, level, message, problem.remedy)
-            if problem.place is not None:
-                line = problem.place.line if rule.place else found.line
-                found = replace(found, line=line, column=problem.place.column)
-            yield found
+            if rule.enabled:
+                level, message = Level.ERROR if problem.is_fatal else Level.WARN, problem.message
+            else:
+                level, message = Level.INFO, f"switched off; {problem.message}"
+            yield found(level, message, problem.remedy, problem.place)
 
 
-def _replaced(rules: Sequence[Rule], groups: Sequence[Sequence[Rule]]) -> Iterator[Finding]:
-    """Rules as text that take the place of others of their name, and say something else."""
+def _replacing_rules(rules: Sequence[Rule], groups: Sequence[Sequence[Rule]]) -> Iterator[Finding]:
+    """Find the rules as text that replace another rule of their name, and say something else."""
     before = {rule.name: rule for rule in rules}
     for group in groups:
         for rule in group:
             old = before.get(rule.name)
             if old is not None and (old.text, old.enabled) != (rule.text, rule.enabled):
-                message = f"takes the place of the rule of this name in {shown_path(old.file)}"
-                yield _at(rule, {}, Level.INFO, message)
+                message = f"takes the place of the rule of this name in {relative_path(old.file)}"
+                yield _RuleFinding(rule, {})(Level.INFO, message)
         before |= {rule.name: rule for rule in group}
 
 
-def _dead(
+def _dead_rules(
     content: Content, model: Model, given: Collection[Path], sources: Mapping[Path, OntologyFile]
 ) -> Iterator[Finding]:
-    """Rules that cannot fire; of imported ontologies, which have rules for many models, that is no surprise."""
-    dead: list[tuple[Rule, Atom, str, str | None]] = [
-        (rule, atom, f"{atom_text(atom)} holds in no state", None)
-        for rule, atom in dead_rules(content.triples, content, model)
-    ]
+    """Find the rules that cannot fire: a note for imported ontologies, which have rules for many models."""
+    dead = [(rule, atom, f"{write_atom(atom)} holds in no state", "") for rule, atom in dead_rules(content, model)]
     known = {id(rule) for rule, *_ in dead}
-    for rule, atom, attribute in unmeasured(content.triples, content, model):
+    for rule, atom, attribute in unmeasured_rules(content, model):
         if id(rule) not in known:
             message = f"no function design has an estimate of {attribute}, so no grounding has a value of it"
             dead.append((rule, atom, message, f"add a hasQAestimation of type {attribute} to a design"))
     for rule, atom, message, remedy in dead:
         level = Level.WARN if rule.file.resolve() in given else Level.INFO
-        found = _at(rule, sources, level, f"can never fire: {message}", remedy)
-        place = atom.place()
-        if place is not None:
-            found = replace(found, column=place.column, line=place.line if rule.place else found.line)
-        yield found
+        yield _RuleFinding(rule, sources)(level, f"can never fire: {message}", remedy or None, atom.place())
 
 
-def _at(
-    rule: Rule, sources: Mapping[Path, OntologyFile], level: Level, message: str, remedy: str | None = None
-) -> Finding:
-    """A finding on a rule, with the line where the rule begins."""
-    line = _line_of_rule(rule.name, sources.get(rule.file))
-    if rule.place is not None:
-        line = int(rule.place.removeprefix("line "))
-    return Finding(level, message, str(rule.file), line, rule.name, remedy=remedy)
+@dataclass(frozen=True)
+class _RuleFinding:
+    """Makes findings about a rule, with the line where it begins, or where an atom of it is."""
+
+    rule: Rule
+    sources: Mapping[Path, OntologyFile]
+
+    def __call__(self, level: Level, message: str, remedy: str | None = None, at: Place | None = None) -> Finding:
+        rule = self.rule
+        line = int(rule.place.removeprefix("line ")) if rule.place is not None else self._line_in_ontology()
+        if at is not None and rule.place is not None:
+            line = at.line
+        return Finding(level, message, str(rule.file), line, rule.name, at.column if at else None, remedy)
+
+    def _line_in_ontology(self) -> int | None:
+        source = self.sources.get(self.rule.file)
+        if source is None:
+            return None
+        text = source.content.decode("utf-8", "replace")
+        found = re.search(rf"label[^<>]*>\s*{re.escape(self.rule.name)}\s*<", text)
+        if found is not None:
+            return text.count("\n", 0, found.start()) + 1
+        place = source.line_of(self.rule.name)
+        return int(place.removeprefix("line ")) if place else None
 
 
-def _line_of_rule(name: str, source: OntologyFile | None) -> int | None:
-    if source is None:
-        return None
-    text = source.content.decode("utf-8", "replace")
-    found = re.search(rf"label[^<>]*>\s*{re.escape(name)}\s*<", text)
-    if found is not None:
-        return text.count("\n", 0, found.start()) + 1
-    place = source.line_of(name)
-    return int(place.removeprefix("line ")) if place else None
-
-
-def _about(
-    sources: Sequence[OntologyFile], level: Level, name: str, message: str, remedy: str | None = None
-) -> Finding:
-    """A finding on an individual, with the file and line where it is described."""
-    for source in sources:
-        place = source.line_of(name)
-        if place is not None:
-            return Finding(level, message, str(source.path), int(place.removeprefix("line ")), remedy=remedy)
-    return Finding(level, message, str(sources[0].path), remedy=remedy)
-
-
-def _undefined(
-    content: Content, model: Model | None, vocabulary: Vocabulary, sources: Sequence[OntologyFile]
-) -> Iterator[Finding]:
-    """Names that are not defined; those of others' vocabularies may be defined elsewhere."""
-    for found in undefined_names(content, model, vocabulary):
-        level = Level.ERROR if found.is_ours else Level.WARN
-        yield _about(sources, level, local_name(found.subject), found.message, found.remedy)
-
-
-def _without_performance(content: Content, model: Model, sources: Sequence[OntologyFile]) -> Iterator[Finding]:
-    expected = expectations(content, model)
-    for name in sorted(model.designs):
-        if local_name(PERFORMANCE) not in expected.get(name, {}):
-            remedy = "add a hasQAestimation of type performance"
-            message = f"function design {name} has no performance, and counts 0.001"
-            yield _about(sources, Level.WARN, name, message, remedy)
-
-
-def _of_model(content: Content, model: Model, sources: Sequence[OntologyFile], subject: Subject) -> Iterator[Finding]:
-    def about(level: Level, name: str, message: str, remedy: str | None = None) -> Finding:
-        return _about(sources, level, name, message, remedy)
-
-    designs: dict[str, list[str]] = {name: [] for name in model.functions}
-    functions = {iri: name for name, iri in model.functions.items()}
-    names = {iri: name for name, iri in model.designs.items()}
-    for design, predicate, function in content.triples:
-        if predicate == TOMASYS + "solvesF" and design in names and function in functions:
-            designs[functions[str(function)]].append(names[design])
-    for name in sorted({*model.functions, *subject.needed}):
-        needed = name in subject.needed
-        if name not in model.functions:
-            yield about(Level.ERROR, name, f"there is no function {name}, which the mission needs")
-        elif not designs[name]:
-            level = Level.ERROR if needed else Level.WARN
-            remedy = f"add an individual of FunctionDesign with solvesF {name}"
-            yield about(level, name, f"function {name} has no function design", remedy)
-        if subject.modes is not None:
-            modes = subject.modes.get(name, ())
-            level = Level.ERROR if needed else Level.WARN
-            spare = set(modes) - set(designs.get(name, ())) - _NO_DESIGNS
-            for design in sorted(set(designs.get(name, ())) - set(modes)):
-                remedy = nearest(design, spare) or _ADD_MODE
-                yield about(level, design, f"function design {design} has no mode of its name for {name}", remedy)
-            for mode in sorted(spare):
-                yield about(Level.WARN, name, f"mode {mode} of {name} has no function design, so it is never chosen")
-    for name in _unused(content, model):
-        yield about(Level.INFO, name, f"nothing refers to {name}")
-
-
-def _unused(content: Content, model: Model) -> list[str]:
-    """Individuals that no fact and no rule mentions, and that are nothing by themselves."""
-    mentioned = {value for _, predicate, value in content.triples if predicate != RDF_TYPE and isinstance(value, str)}
-    mentioned |= {
-        term.iri for rule in content.rules for atom in rule.atoms for term in atom.arguments if isinstance(term, Named)
-    }
-    active = {*model.designs.values(), *(s for s, p, _ in _facts(content) if s in model.components.values())}
-    states = {each.iri for group in (model.objectives, model.groundings, model.measurements) for each in group.values()}
-    individuals = {
-        subject
-        for subject, predicate, value in content.triples
-        if predicate == RDF_TYPE and isinstance(value, str) and not value.startswith(LANGUAGE_NAMESPACES)
-    }
-    return sorted(local_name(iri) for iri in individuals - mentioned - active - states if not iri.startswith(TOMASYS))
-
-
-def _facts(content: Content) -> Iterator[Triple]:
-    return (triple for triple in content.triples if not triple[1].startswith(LANGUAGE_NAMESPACES))
-
-
-def _of_reasoner(subject: Subject) -> Iterator[Finding]:
-    """What comes to light when the knowledge base is used: contradictions, rules that Pellet drops."""
+def _ask_pellet(subject: Subject) -> Iterator[Finding]:
+    """Use the knowledge base: this brings up contradictions, and rules that Pellet drops."""
     base = Ontology.load(
         subject.ontologies, values=subject.values, rules=subject.rules, disabled_rules=subject.disabled_rules
     )
     for reason in regions_of(base).reasons:
-        yield Finding(
-            Level.INFO, f"inferences are remembered for equal measured values only, and so more slowly: {reason}"
-        )
-    limit = TimeLimit(subject.time_limit_s, "--time-limit")
+        yield Finding(Level.INFO, f"inferences are cached for equal measured values only, which is slower: {reason}")
     try:
-        pellet = make_reasoner("pellet", base, limit)
-        for state in islice(_plain_states(base), MAX_STATES):
+        pellet = make_reasoner("pellet", base, TimeLimit(subject.time_limit_s, "--time-limit"))
+        for state in islice(_simple_states(base), MAX_STATES):
             pellet.infer(state)
     except InputError as error:
-        yield finding_of(error)
+        yield finding_from(error)
 
 
-def _plain_states(base: Ontology) -> Iterator[KnowledgeState]:
-    """Each design in use, with one attribute measured in each region that makes a difference; with none at first."""
-    attributes = [name for name in base.quality_attributes if matters(base, name)]
-    regions = regions_between(numbers_in(base))
-    measured: list[tuple[str, Decimal]] = [
-        (name, value) for name in attributes for region in regions if (value := region.value()) is not None
-    ]
-    for measurements in ({}, *({name: value} for name, value in measured)):
+def _simple_states(base: Ontology) -> Iterator[KnowledgeState]:
+    """Each design in use, without a measurement and with one in each range of each attribute that has an effect."""
+    ranges = ranges_between(numbers_in(base))
+    measurements: list[dict[str, Decimal]] = [{}]
+    for name in base.quality_attributes:
+        if has_effect(base, name):
+            measurements += [{name: value} for one in ranges if (value := one.value()) is not None]
+    for measured in measurements:
         for function in base.functions:
             for design in base.designs(function):
                 yield KnowledgeState.of(
-                    [ObjectiveState(function)],
-                    groundings={function: design},
-                    measurements=measurements,
+                    [ObjectiveState(function)], groundings={function: design}, measurements=measured
                 )

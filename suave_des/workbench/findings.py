@@ -9,17 +9,19 @@ from enum import StrEnum
 from pathlib import Path
 
 from suave_des.errors import InputError
+from suave_des.knowledge.ontology_file import OntologyFile
 
 
 class Level(StrEnum):
-    """How bad it is: ERROR does not do what it says, WARN probably not, INFO is good to know."""
+    """Severity: an ERROR does not do what it says, a WARN probably does not, an INFO is good to know."""
 
     ERROR = "ERROR"
     WARN = "WARN"
     INFO = "INFO"
 
 
-_ORDER = {Level.ERROR: 0, Level.WARN: 1, Level.INFO: 2}
+_SEVERITY = {level: number for number, level in enumerate(Level)}
+_NOUNS = {Level.ERROR: "error", Level.WARN: "warning", Level.INFO: "note"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,11 +29,11 @@ class Finding:
     """One thing that was found.
 
     Attributes:
-        level: how bad it is.
+        level: its severity.
         message: what is wrong.
         file: where.
         line: in the file.
-        rule: name of the rule, if it is one.
+        rule: name of the rule, if it is about one.
         column: in the line for rules as text, in the rule's own text (as `kb rules --format json` gives it) for rules
             of ontologies.
         remedy: what would be right.
@@ -48,12 +50,8 @@ class Finding:
     @property
     def where(self) -> str:
         """File, line, rule and column, as far as they are known."""
-        parts = [
-            f"line {self.line}" if self.line else "",
-            f"rule {self.rule}" if self.rule else "",
-            f"column {self.column}" if self.column else "",
-        ]
-        place = ", ".join(filter(None, parts))
+        parts = (("line", self.line), ("rule", self.rule), ("column", self.column))
+        place = ", ".join(f"{word} {value}" for word, value in parts if value)
         return ": ".join(filter(None, (self.file, place)))
 
     def __str__(self) -> str:
@@ -62,12 +60,12 @@ class Finding:
         return f"{self.level:<5}  {line}" + (f" ({self.remedy})" if self.remedy else "")
 
 
-def finding_of(error: InputError, level: Level = Level.ERROR) -> Finding:
-    """An error as a finding, its place taken apart."""
+def finding_from(error: InputError) -> Finding:
+    """Turn an error into a finding; its place is taken apart."""
     place = error.place or ""
     line, column, rule = (re.search(pattern, place) for pattern in (r"line (\d+)", r"column (\d+)", r"^rule (.*)"))
     return Finding(
-        level,
+        Level.ERROR,
         error.problem,
         error.file,
         int(line.group(1)) if line else None,
@@ -77,36 +75,38 @@ def finding_of(error: InputError, level: Level = Level.ERROR) -> Finding:
     )
 
 
-def in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Each finding once, the worst first, then by place."""
-    return tuple(
-        sorted(
-            dict.fromkeys(findings),
-            key=lambda one: (
-                _ORDER[one.level],
-                one.file or "",
-                one.line or 0,
-                one.rule or "",
-                one.column or 0,
-                str(one),
-            ),
-        )
-    )
+def finding_about(
+    name: str, sources: Sequence[OntologyFile], level: Level, message: str, remedy: str | None = None
+) -> Finding:
+    """Make a finding about an individual, with the file and line where it is described."""
+    for source in sources:
+        place = source.line_of(name)
+        if place is not None:
+            return Finding(level, message, str(source.path), int(place.removeprefix("line ")), remedy=remedy)
+    return Finding(level, message, str(sources[0].path), remedy=remedy)
 
 
-def fails(findings: Sequence[Finding], least: Level) -> bool:
-    """Whether one of them is at least that bad."""
-    return any(_ORDER[one.level] <= _ORDER[least] for one in findings)
+def ordered(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Sort findings by severity, the worst first, then by place, and drop duplicates."""
+
+    def key(one: Finding) -> tuple[object, ...]:
+        return _SEVERITY[one.level], one.file or "", one.line or 0, one.rule or "", one.column or 0, str(one)
+
+    return tuple(sorted(dict.fromkeys(findings), key=key))
+
+
+def has_level(findings: Sequence[Finding], least: Level) -> bool:
+    """Whether one of the findings has at least that severity."""
+    return any(_SEVERITY[one.level] <= _SEVERITY[least] for one in findings)
 
 
 def summary(findings: Sequence[Finding]) -> str:
-    """How many of each level."""
-    words = {Level.ERROR: "error", Level.WARN: "warning", Level.INFO: "note"}
-    counts = {level: sum(one.level is level for one in findings) for level in Level}
-    return ", ".join(f"{count} {words[level]}{'' if count == 1 else 's'}" for level, count in counts.items())
+    """Count the findings of each level: "1 error, 0 warnings, 14 notes"."""
+    counts = {noun: sum(one.level is level for one in findings) for level, noun in _NOUNS.items()}
+    return ", ".join(f"{count} {noun}{'' if count == 1 else 's'}" for noun, count in counts.items())
 
 
-def shown_path(path: Path | str) -> str:
-    """A path relative to the current folder where it is in it."""
+def relative_path(path: Path | str) -> str:
+    """A path, relative to the current folder if it is in it."""
     whole = Path(path)
     return str(whole.relative_to(Path.cwd())) if whole.is_absolute() and whole.is_relative_to(Path.cwd()) else str(path)

@@ -1,24 +1,28 @@
-"""The policy: what is decided in every state, over regions of measured values, components and groundings."""
+"""The policy: what is decided in every state, over ranges of measured values, component reports and groundings."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from decimal import Decimal
 from functools import cached_property
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.deliberation import Conclusion
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.state import KnowledgeState
-from suave_des.workbench.regions import Region, matters, numbers_in, regions_between, rules_that_compute, values_in
-from suave_des.workbench.states import LASTING, Loop
-from suave_des.workbench.symmetry import Reports, alike, reports, statuses
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
+from suave_des.workbench.policy_space import (
+    ComponentReports,
+    PolicySpace,
+    ValueRange,
+    component_reports,
+    measured_attributes,
+    ranges_between,
+    rules_that_compute,
+    values_in,
+)
+from suave_des.workbench.state_input import LASTING, ManagingSettings
 
 #: Beyond this many inferences a policy is refused: at a millisecond and a half each it would take ten minutes.
 LARGEST: Final = 400_000
@@ -26,24 +30,24 @@ INCONSISTENT, NONE_LEFT, FLIP_FLOP = "inconsistent", "none left", "flip-flop"
 
 
 @dataclass(frozen=True)
-class Cell:
+class PolicyCase:
     """One kind of state, and what is decided in it.
 
     Attributes:
-        regions: of each attribute's measured value, in the policy's order.
+        ranges: of each attribute's measured value, in the policy's order.
         state: one state of this kind.
         reports: what the components report.
         asked: functions that have an objective.
-        statuses: what is inferred of objectives and groundings, in words, sorted.
+        statuses: what is inferred of objectives and groundings, as text, sorted.
         choices: (function, design) decided; None for the design when none is left.
         marks: any of "inconsistent", "none left", "flip-flop".
         flipping: functions whose grounding flips back and forth.
-        problem: what contradicts what, for an inconsistent one.
+        problem: what contradicts what, in an inconsistent state.
     """
 
-    regions: tuple[Region, ...]
+    ranges: tuple[ValueRange, ...]
     state: KnowledgeState
-    reports: Reports
+    reports: ComponentReports
     asked: tuple[str, ...]
     statuses: tuple[str, ...] = ()
     choices: tuple[tuple[str, str | None], ...] = ()
@@ -75,18 +79,18 @@ class Policy:
     """The whole decision table.
 
     Attributes:
-        attributes: quality attributes whose measured values make a difference.
-        regions: of each attribute, rising.
-        cells: one for each kind of state, in a fixed order.
-        alike: groups of components that are treated alike.
-        without_effect: measured attributes that no rule and no design looks at.
-        computing: rules that compute with numbers; if there are any, the regions are samples and prove nothing.
+        attributes: quality attributes whose measured values have an effect.
+        ranges: of each attribute, ascending.
+        cases: one for each kind of state, in a fixed order.
+        alike: groups of interchangeable components.
+        without_effect: measured attributes that no rule and no design refers to.
+        computing: rules that compute with numbers; if there are any, the ranges are samples and prove nothing.
         max_failed: at most so many components report anything.
     """
 
     attributes: tuple[str, ...]
-    regions: Mapping[str, tuple[Region, ...]]
-    cells: tuple[Cell, ...] = field(repr=False)
+    ranges: Mapping[str, tuple[ValueRange, ...]]
+    cases: tuple[PolicyCase, ...] = field(repr=False)
     alike: tuple[tuple[str, ...], ...]
     without_effect: tuple[str, ...]
     computing: tuple[str, ...]
@@ -94,73 +98,40 @@ class Policy:
 
     @cached_property
     def states(self) -> int:
-        """Number of states covered; alike components count one by one, each region once."""
-        return sum(cell.reports.combinations for cell in self.cells)
+        """Number of states covered; interchangeable components count one by one, each range once."""
+        return sum(case.reports.combinations for case in self.cases)
 
-    def marked(self, mark: str) -> tuple[Cell, ...]:
-        """Cells with a mark."""
-        return tuple(cell for cell in self.cells if mark in cell.marks)
+    @property
+    def marks(self) -> dict[str, int]:
+        """Number of states with each mark."""
+        marks = (INCONSISTENT, NONE_LEFT, FLIP_FLOP)
+        return {mark: sum(case.reports.combinations for case in self.marked(mark)) for mark in marks}
+
+    def marked(self, mark: str) -> tuple[PolicyCase, ...]:
+        """Cases with a mark."""
+        return tuple(case for case in self.cases if mark in case.marks)
 
     @cached_property
     def functions(self) -> tuple[str, ...]:
-        """Functions that some state asks for."""
-        return tuple(sorted({function for cell in self.cells for function in cell.asked}))
-
-
-@dataclass(frozen=True)
-class Space:
-    """What a policy distinguishes.
-
-    Attributes:
-        attributes: quality attributes whose measured values make a difference.
-        numbers: ends of the regions, rising.
-        alike: groups of components that are treated alike.
-        words: what components may report.
-    """
-
-    attributes: tuple[str, ...]
-    numbers: tuple[Decimal, ...]
-    alike: tuple[tuple[str, ...], ...]
-    words: tuple[str, ...]
-
-    @classmethod
-    def of(cls, base: Ontology, loop: Loop) -> Space:
-        """What can make a difference to these ontologies."""
-        attributes = tuple(name for name in _measured(base, loop) if matters(base, name))
-        return cls(attributes, numbers_in(base), alike(base), statuses(base))
-
-    def common(self, other: Space) -> Space:
-        """What makes a difference here or there; components are alike only if they are so in both that have them."""
-        groups: dict[tuple[int, int], list[str]] = {}
-        for number, group in enumerate(self.alike):
-            for name in group:
-                there = next((place for place, each in enumerate(other.alike) if name in each), -1)
-                groups.setdefault((number, there), []).append(name)
-        known = {name for group in self.alike for name in group}
-        only_there = (tuple(name for name in group if name not in known) for group in other.alike)
-        return Space(
-            tuple(sorted({*self.attributes, *other.attributes})),
-            tuple(sorted({*self.numbers, *other.numbers})),
-            (*map(tuple, groups.values()), *filter(None, only_there)),
-            tuple(sorted({*self.words, *other.words})),
-        )
+        """Functions that a state asks for."""
+        return tuple(sorted({function for case in self.cases for function in case.asked}))
 
 
 def make_policy(
     base: Ontology,
-    loop: Loop,
+    settings: ManagingSettings,
     infer: Callable[[KnowledgeState], Conclusion],
     max_failed: int,
-    space: Space | None = None,
+    space: PolicySpace | None = None,
 ) -> Policy:
     """Decide every kind of state.
 
     Args:
         base: the ontologies.
-        loop: which attributes are measured, and what the managing subsystem does in code.
+        settings: which attributes are measured, and what the managing subsystem does in code.
         infer: analyzes a state and plans on it.
         max_failed: at most so many components report anything.
-        space: what to distinguish; left out, what can make a difference.
+        space: what to tell apart; None: what can have an effect.
 
     Raises:
         InputError: max_failed is negative, or there would be too many states.
@@ -174,48 +145,44 @@ def make_policy(
             file=", ".join(map(str, base.files)),
             remedy="give an ontology that uses TOMASys as suave.owl does",
         )
-    space = space or Space.of(base, loop)
+    space = space or PolicySpace.of(base, settings)
     attributes = space.attributes
-    between = regions_between(space.numbers)
-    combinations = list(reports(space.alike, space.words, max_failed))
-    situations = list(_situations(base))
-    total = len(between) ** len(attributes) * len(combinations) * len(situations)
+    between = ranges_between(space.numbers)
+    combinations = list(component_reports(space.alike, space.statuses, max_failed))
+    tasks = list(_tasks(base))
+    total = len(between) ** len(attributes) * len(combinations) * len(tasks)
     if total > LARGEST:
         raise InputError(
-            f"the policy has {total:,} kinds of states, which is too much",
+            f"the policy has {total:,} kinds of states, which is too many",
             remedy=f"at most {LARGEST:,}; lower --max-failed, or give a scenario that measures less",
         )
-    cells: list[Cell] = []
-    for regions in itertools.product(between, repeat=len(attributes)):
-        for values in values_in(regions):
+    cases: list[PolicyCase] = []
+    for ranges in itertools.product(between, repeat=len(attributes)):
+        for values in values_in(ranges):
             known = {name: value for name, value in zip(attributes, values, strict=True) if value is not None}
             for each in combinations:
                 part = []
-                for asked, groundings in situations:
+                for asked, groundings in tasks:
                     state = KnowledgeState.of(
-                        [loop.objective(function, groundings.get(function)) for function in asked],
+                        [settings.objective(function, groundings.get(function)) for function in asked],
                         groundings=groundings,
                         components=dict(each.components),
                         measurements=known,
                     )
-                    part.append(_decided(Cell(regions, state, each, asked), infer))
-                cells += _with_flip_flops(part)
+                    part.append(_decide(PolicyCase(ranges, state, each, asked), infer))
+                cases += _with_flip_flops(part)
     return Policy(
         attributes=attributes,
-        regions=dict.fromkeys(attributes, between),
-        cells=tuple(cells),
+        ranges=dict.fromkeys(attributes, between),
+        cases=tuple(cases),
         alike=space.alike,
-        without_effect=tuple(name for name in _measured(base, loop) if name not in attributes),
+        without_effect=tuple(name for name in measured_attributes(base, settings) if name not in attributes),
         computing=rules_that_compute(base),
         max_failed=max_failed,
     )
 
 
-def _measured(base: Ontology, loop: Loop) -> list[str]:
-    return [name for name in loop.measured if name in base.quality_attributes]
-
-
-def _situations(base: Ontology) -> Iterator[tuple[tuple[str, ...], dict[str, str]]]:
+def _tasks(base: Ontology) -> Iterator[tuple[tuple[str, ...], dict[str, str]]]:
     """Functions asked for together, as the mission's tasks do, with each way to ground them."""
     solvable = [name for name in base.functions if base.designs(name)]
     lasting = [name for name in LASTING if name in solvable]
@@ -225,37 +192,103 @@ def _situations(base: Ontology) -> Iterator[tuple[tuple[str, ...], dict[str, str
             yield task, {name: design for name, design in zip(task, designs, strict=True) if design is not None}
 
 
-def _decided(cell: Cell, infer: Callable[[KnowledgeState], Conclusion]) -> Cell:
+def _decide(case: PolicyCase, infer: Callable[[KnowledgeState], Conclusion]) -> PolicyCase:
     try:
-        conclusion = infer(cell.state)
+        conclusion = infer(case.state)
     except KnowledgeError as error:
         if not error.problem.startswith("contradiction"):
             raise
-        return replace(cell, marks=(INCONSISTENT,), problem=error.problem)
+        return replace(case, marks=(INCONSISTENT,), problem=error.problem)
     choices = tuple((each.function, each.design) for each in conclusion.plan.decisions)
     marks = (NONE_LEFT,) if any(design is None for _, design in choices) else ()
-    return replace(cell, statuses=tuple(sorted(conclusion.statuses)), choices=choices, marks=marks)
+    return replace(case, statuses=tuple(sorted(conclusion.statuses)), choices=choices, marks=marks)
 
 
-def _with_flip_flops(cells: list[Cell]) -> list[Cell]:
-    """Mark cells whose decisions lead back to their own groundings by way of others, while nothing else changes."""
-    found = {(cell.asked, cell.state.groundings): cell for cell in cells}
+def _with_flip_flops(cases: list[PolicyCase]) -> list[PolicyCase]:
+    """Mark the cases whose decisions lead back to their own groundings by way of others, while all else is constant."""
+    found = {(case.asked, case.state.groundings): case for case in cases}
     flipping: dict[object, tuple[str, ...]] = {}
     for start in found:
         way = [start]
         while len(way) <= len(found):
-            cell = found[way[-1]]
-            following = (cell.asked, cell.after)
-            if INCONSISTENT in cell.marks or following == way[-1] or following not in found:
+            case = found[way[-1]]
+            following = (case.asked, case.after)
+            if INCONSISTENT in case.marks or following == way[-1] or following not in found:
                 break
             way.append(following)
             if following == start:
                 designs = [dict(groundings) for _, groundings in way]
-                flipping[start] = tuple(name for name in cell.asked if len({each.get(name) for each in designs}) > 1)
+                flipping[start] = tuple(name for name in case.asked if len({each.get(name) for each in designs}) > 1)
                 break
     return [
-        replace(cell, marks=(*cell.marks, FLIP_FLOP), flipping=functions)
-        if (functions := flipping.get((cell.asked, cell.state.groundings)))
-        else cell
-        for cell in cells
+        replace(case, marks=(*case.marks, FLIP_FLOP), flipping=functions)
+        if (functions := flipping.get((case.asked, case.state.groundings)))
+        else case
+        for case in cases
     ]
+
+
+@dataclass(frozen=True)
+class CasePair:
+    """One kind of state, as both knowledge bases decide it."""
+
+    one: PolicyCase
+    other: PolicyCase
+
+    @property
+    def functions(self) -> tuple[str, ...]:
+        """Functions whose grounding is decided differently."""
+        return tuple(name for name in self.one.asked if self.one.outcome(name) != self.other.outcome(name))
+
+
+@dataclass(frozen=True)
+class PolicyDifference:
+    """The difference between two policies.
+
+    Attributes:
+        compared: number of states that both have.
+        differing: kinds of states that they decide differently.
+        reported: kinds in which they decide alike, but infer different statuses.
+        only_one: function designs that only the first has; likewise only_other.
+        computing: rules that compute with numbers; if there are any, the ranges are samples and prove nothing.
+    """
+
+    compared: int
+    differing: tuple[CasePair, ...] = field(repr=False)
+    reported: tuple[CasePair, ...] = field(repr=False)
+    only_one: tuple[str, ...]
+    only_other: tuple[str, ...]
+    computing: tuple[str, ...]
+
+    @property
+    def states(self) -> int:
+        """Number of states that are decided differently."""
+        return sum(pair.one.reports.combinations for pair in self.differing)
+
+    @property
+    def states_reported(self) -> int:
+        """Number of states in which only statuses differ."""
+        return sum(pair.one.reports.combinations for pair in self.reported)
+
+
+def compare(one: Policy, other: Policy) -> PolicyDifference:
+    """Compare two policies over the same space."""
+    there = {(case.ranges, case.state, case.asked): case for case in other.cases}
+    pairs = [
+        CasePair(case, there[case.ranges, case.state, case.asked])
+        for case in one.cases
+        if (case.ranges, case.state, case.asked) in there
+    ]
+    designs = [{design for case in policy.cases for _, design in case.state.groundings} for policy in (one, other)]
+    differing: list[CasePair] = []
+    alike: list[CasePair] = []
+    for pair in pairs:
+        (differing if pair.functions or pair.one.marks != pair.other.marks else alike).append(pair)
+    return PolicyDifference(
+        compared=sum(pair.one.reports.combinations for pair in pairs),
+        differing=tuple(differing),
+        reported=tuple(pair for pair in alike if pair.one.statuses != pair.other.statuses),
+        only_one=tuple(sorted(designs[0] - designs[1])),
+        only_other=tuple(sorted(designs[1] - designs[0])),
+        computing=tuple(sorted({*one.computing, *other.computing})),
+    )

@@ -1,16 +1,17 @@
-"""The policy in tables: what a function's choice depends on, and all cells as rows of a CSV file."""
+"""The policy as tables: what each function's choice depends on, and all cases as rows of a CSV file."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
 
-from suave_des.workbench.policy import FLIP_FLOP, Cell, Policy
-from suave_des.workbench.regions import Region
-from suave_des.workbench.symmetry import Reports
+from suave_des.workbench.policy import FLIP_FLOP, Policy, PolicyCase
+from suave_des.workbench.policy_space import ComponentReports, ValueRange
 
 UNGROUNDED, NOT_ASKED = "ungrounded", "not asked for"
+_Groundings = tuple[tuple[str, str], ...]
+_Column = tuple[ValueRange, ...]
 
 
 @dataclass(frozen=True)
@@ -18,146 +19,121 @@ class TableRow:
     """One row of a function's table.
 
     Attributes:
-        components: what components report, in words; empty where that makes no difference.
-        groundings: (function, present design) where these make a difference.
+        components: what components report, as text; empty where that has no effect.
+        groundings: present design by function, where it has an effect.
         outcomes: for each column.
     """
 
     components: str
-    groundings: tuple[tuple[str, str], ...]
+    groundings: dict[str, str]
     outcomes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class FunctionTable:
-    """What happens to one function's grounding, over everything that makes a difference to it.
+    """What happens to one function's grounding, over everything that has an effect on it.
 
     Attributes:
         function: which function.
-        attributes: whose measured values make a difference.
-        columns: ranges of these attributes' values; neighbours that are alike in every row are one.
-        rows: all else.
+        attributes: whose measured values have an effect.
+        columns: ranges of these attributes' values; neighbours that are equal in every row are joined.
+        rows: one for each combination of reports and groundings.
     """
 
     function: str
     attributes: tuple[str, ...]
-    columns: tuple[tuple[Region, ...], ...]
+    columns: tuple[_Column, ...]
     rows: tuple[TableRow, ...]
 
 
 def function_table(policy: Policy, function: str) -> FunctionTable:
-    """The table of one function, without the coordinates on which it does not depend."""
-    cells = [cell for cell in policy.cells if function in cell.asked]
-    coordinates = _coordinates(policy)
-    outcome = [outcome_in_words(cell, function) for cell in cells]
-    kept = list(coordinates)
-    for name in [*coordinates]:
-        if name == f"grounding {function}":
-            continue
-        fewer = [each for each in kept if each != name]
-        if _decides([coordinates[each] for each in fewer], cells, outcome):
-            kept = fewer
-    attributes = tuple(name for name in policy.attributes if f"attribute {name}" in kept)
-    places = [policy.attributes.index(name) for name in attributes]
-    found: dict[Hashable, dict[tuple[Region, ...], str]] = {}
-    row_of: dict[Hashable, tuple[Reports | None, tuple[tuple[str, str], ...]]] = {}
-    others = [each for each in kept if not each.startswith("attribute ")]
-    for cell, result in zip(cells, outcome, strict=True):
-        key = tuple(coordinates[each](cell) for each in others)
-        groundings = tuple(
-            (each.partition(" ")[2], str(coordinates[each](cell))) for each in others if each.startswith("grounding ")
-        )
-        row_of.setdefault(key, (cell.reports if "components" in kept else None, groundings))
-        column = tuple(cell.regions[place] for place in places)
-        before = found.setdefault(key, {}).get(column, result)
-        found[key][column] = before if before == result else f"{before} or {result}, by the order of the values"
-    merged = _merged([policy.regions[name] for name in attributes], list(found.values()))
-    rows = _rows(policy, found, row_of, merged)
-    return FunctionTable(function, attributes, tuple(shown for shown, _ in merged), rows)
-
-
-def _coordinates(policy: Policy) -> dict[str, Callable[[Cell], Hashable]]:
-    """What a state consists of, by name; those that are best left out first."""
-    found: dict[str, Callable[[Cell], Hashable]] = {}
-    for function in policy.functions:
-        found[f"grounding {function}"] = lambda cell, function=function: present(cell, function)  # type: ignore[misc]
-    found["components"] = lambda cell: cell.reports
-    for place, name in enumerate(policy.attributes):
-        found[f"attribute {name}"] = lambda cell, place=place: cell.regions[place]  # type: ignore[misc]
-    return found
-
-
-def present(cell: Cell, function: str) -> str:
-    """The design that a function has in a cell, "ungrounded" or "not asked for"."""
-    if function not in cell.asked:
-        return NOT_ASKED
-    return cell.state.grounded(function) or UNGROUNDED
-
-
-def outcome_in_words(cell: Cell, function: str) -> str:
-    """What happens to a function's grounding, and whether the choice flips back and forth."""
-    flips = f" ({FLIP_FLOP})" if function in cell.flipping else ""
-    return cell.outcome(function) + flips
-
-
-def _decides(coordinates: Sequence[Callable[[Cell], Hashable]], cells: Sequence[Cell], outcome: Sequence[str]) -> bool:
-    """Whether the outcome is the same wherever these coordinates are the same."""
-    seen: dict[Hashable, str] = {}
-    return all(
-        seen.setdefault(tuple(each(cell) for each in coordinates), result) == result
-        for cell, result in zip(cells, outcome, strict=True)
-    )
-
-
-def _merged(
-    axes: Sequence[Sequence[Region]], rows: Sequence[dict[tuple[Region, ...], str]]
-) -> list[tuple[tuple[Region, ...], tuple[Region, ...]]]:
-    """(ranges shown, regions in them): of each attribute, neighbours that are alike in all else are one."""
-    groups = []
-    for place, regions in enumerate(axes):
-        others = list(itertools.product(*(each for number, each in enumerate(axes) if number != place)))
-
-        def alike(one: Region, other: Region, place: int = place, others: list[tuple[Region, ...]] = others) -> bool:
-            pairs = [((*rest[:place], one, *rest[place:]), (*rest[:place], other, *rest[place:])) for rest in others]
-            return all(row.get(first) == row.get(second) for row in rows for first, second in pairs)
-
-        merged: list[tuple[Region, Region]] = []
-        for region in regions:
-            if merged and not merged[-1][0].is_missing and alike(merged[-1][1], region):
-                merged[-1] = merged[-1][0].with_next(region), merged[-1][1]
-            else:
-                merged.append((region, region))
-        groups.append(merged)
-    return [
-        (tuple(shown for shown, _ in chosen), tuple(first for _, first in chosen))
-        for chosen in itertools.product(*groups)
-    ]
-
-
-def _rows(
-    policy: Policy,
-    found: dict[Hashable, dict[tuple[Region, ...], str]],
-    row_of: dict[Hashable, tuple[Reports | None, tuple[tuple[str, str], ...]]],
-    merged: Sequence[tuple[tuple[Region, ...], tuple[Region, ...]]],
-) -> tuple[TableRow, ...]:
-    """Rows; components that lead to the same outcomes for every grounding stand together."""
-    by_components: dict[Reports | None, dict[tuple[tuple[str, str], ...], tuple[str, ...]]] = {}
-    for key, outcomes in found.items():
-        reports, groundings = row_of[key]
-        by_components.setdefault(reports, {})[groundings] = tuple(outcomes.get(first, "") for _, first in merged)
-    groups: dict[tuple[object, ...], list[Reports | None]] = {}
-    for reports, rows in by_components.items():
+    """Tabulate one function, without the dimensions on which it does not depend."""
+    dimensions = _dimensions(policy, function)
+    attributes = tuple(name for name in policy.attributes if ("attribute", name) in dimensions)
+    grounded = [name for kind, name in dimensions if kind == "grounding"]
+    found: dict[tuple[ComponentReports | None, _Groundings], dict[_Column, str]] = {}
+    for case in policy.cases:
+        if function in case.asked:
+            reports = case.reports if ("components", "") in dimensions else None
+            row = found.setdefault((reports, tuple((name, present(case, name)) for name in grounded)), {})
+            column = tuple(case.ranges[policy.attributes.index(name)] for name in attributes)
+            result = outcome_text(case, function)
+            before = row.setdefault(column, result)
+            if before != result:
+                row[column] = f"{before} or {result}, by the order of the values"
+    joined = [_joined(policy.ranges[name], place, list(found.values())) for place, name in enumerate(attributes)]
+    columns = list(itertools.product(*joined))
+    by_reports: dict[ComponentReports | None, dict[_Groundings, tuple[str, ...]]] = {}
+    for (reports, groundings), outcomes in found.items():
+        in_columns = tuple(outcomes.get(tuple(first for _, first in column), "") for column in columns)
+        by_reports.setdefault(reports, {})[groundings] = in_columns
+    # Reports that lead to the same outcomes for every grounding are in one row.
+    groups: dict[Hashable, list[ComponentReports | None]] = {}
+    for reports, rows in by_reports.items():
         groups.setdefault(tuple(rows.items()), []).append(reports)
-    return tuple(
-        TableRow(in_words([each for each in group if each is not None], policy), groundings, outcomes)
-        for group in groups.values()
-        for groundings, outcomes in by_components[group[0]].items()
+    return FunctionTable(
+        function,
+        attributes,
+        tuple(tuple(shown for shown, _ in column) for column in columns),
+        tuple(
+            TableRow(_reports_text([each for each in group if each is not None], policy), dict(groundings), results)
+            for group in groups.values()
+            for groundings, results in by_reports[group[0]].items()
+        ),
     )
 
 
-def in_words(group: Sequence[Reports], policy: Policy) -> str:
-    """What components report: counted where they are alike, named where they are not; empty for nothing to tell."""
-    words = []
+def _dimensions(policy: Policy, function: str) -> list[tuple[str, str]]:
+    """What a function's outcome depends on: other groundings, components, attributes, and its own grounding."""
+    cases = [case for case in policy.cases if function in case.asked]
+    values: dict[tuple[str, str], list[Hashable]] = {
+        **{("grounding", name): [present(case, name) for case in cases] for name in policy.functions},
+        ("components", ""): [case.reports for case in cases],
+        **{("attribute", name): [case.ranges[place] for case in cases] for place, name in enumerate(policy.attributes)},
+    }
+    outcomes = [outcome_text(case, function) for case in cases]
+    kept = list(values)
+    for dimension in values:
+        fewer = [each for each in kept if each != dimension]
+        seen: dict[Hashable, str] = {}
+        points = zip(zip(*(values[each] for each in fewer), strict=True), outcomes, strict=True)
+        if dimension != ("grounding", function) and all(seen.setdefault(at, each) == each for at, each in points):
+            kept = fewer
+    return kept
+
+
+def _joined(
+    ranges: Sequence[ValueRange], place: int, rows: Sequence[dict[_Column, str]]
+) -> list[tuple[ValueRange, ValueRange]]:
+    """Join the neighbours that are equal in all rows and other columns: (joined range, first range in it)."""
+
+    def outcomes(one: ValueRange) -> list[dict[_Column, str]]:
+        return [{(*at[:place], *at[place + 1 :]): row[at] for at in row if at[place] == one} for row in rows]
+
+    joined: list[tuple[ValueRange, ValueRange]] = []
+    for one in ranges:
+        if joined and not joined[-1][0].is_missing and outcomes(joined[-1][1]) == outcomes(one):
+            joined[-1] = joined[-1][0].joined(one), joined[-1][1]
+        else:
+            joined.append((one, one))
+    return joined
+
+
+def present(case: PolicyCase, function: str) -> str:
+    """The design that a function has in a case, "ungrounded" or "not asked for"."""
+    if function not in case.asked:
+        return NOT_ASKED
+    return case.state.grounded(function) or UNGROUNDED
+
+
+def outcome_text(case: PolicyCase, function: str) -> str:
+    """What happens to a function's grounding, and whether the choice flips back and forth."""
+    return case.outcome(function) + (f" ({FLIP_FLOP})" if function in case.flipping else "")
+
+
+def _reports_text(group: Sequence[ComponentReports], policy: Policy) -> str:
+    """What components report: counted where they are interchangeable, else named; empty without an effect."""
+    texts = []
     for reports in group:
         counted: dict[tuple[str, str], int] = {}
         for component, status in reports.components:
@@ -168,34 +144,27 @@ def in_words(group: Sequence[Reports], policy: Policy) -> str:
             f"{label} {status}" if label and not label.startswith(" ") else f"{number} {status}{label}"
             for (label, status), number in counted.items()
         ]
-        words.append(" + ".join(parts) or "no report")
-    return ", ".join(words)
+        texts.append(" + ".join(parts) or "no report")
+    return ", ".join(texts)
 
 
 def columns_of(policy: Policy) -> tuple[str, ...]:
     """Columns of the CSV file."""
-    return (
-        *policy.attributes,
-        "components",
-        "states",
-        *(f"{function}_now" for function in policy.functions),
-        "statuses",
-        *(f"{function}_then" for function in policy.functions),
-        "marks",
-        "problem",
-    )
+    now, then = ([f"{function}_{when}" for function in policy.functions] for when in ("now", "then"))
+    return (*policy.attributes, "components", "states", *now, "statuses", *then, "marks", "problem")
 
 
 def rows_of(policy: Policy) -> Iterator[tuple[object, ...]]:
-    """Rows of the CSV file: every cell."""
-    for cell in policy.cells:
+    """Rows of the CSV file: every case."""
+    for case in policy.cases:
+        asked = [function in case.asked for function in policy.functions]
         yield (
-            *map(str, cell.regions),
-            "; ".join(f"{name}={status}" for name, status in cell.reports.components),
-            cell.reports.combinations,
-            *("" if function not in cell.asked else present(cell, function) for function in policy.functions),
-            "; ".join(cell.statuses),
-            *("" if function not in cell.asked else cell.outcome(function) for function in policy.functions),
-            "; ".join(cell.marks),
-            cell.problem or "",
+            *map(str, case.ranges),
+            "; ".join(f"{name}={status}" for name, status in case.reports.components),
+            case.reports.combinations,
+            *(present(case, name) if is_asked else "" for name, is_asked in zip(policy.functions, asked, strict=True)),
+            "; ".join(case.statuses),
+            *(case.outcome(name) if is_asked else "" for name, is_asked in zip(policy.functions, asked, strict=True)),
+            "; ".join(case.marks),
+            case.problem or "",
         )

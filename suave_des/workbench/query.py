@@ -1,4 +1,4 @@
-"""SPARQL over what the ontologies and a state assert, and what follows from them."""
+"""Query in SPARQL what the ontologies and a state assert, and what follows from them."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class QueryResult:
 
 
 def run_query(base: Ontology, text: str, state: KnowledgeState | None, *, inferred: bool) -> QueryResult:
-    """Ask a query.
+    """Answer a query.
 
     Args:
         base: the ontologies; labels and comments are there too.
@@ -55,7 +55,7 @@ def run_query(base: Ontology, text: str, state: KnowledgeState | None, *, inferr
         inferred: adds what Pellet infers.
 
     Raises:
-        InputError: it is no query, or wants to read something else than the knowledge base.
+        InputError: it is not a query, or would read something else than the knowledge base.
         KnowledgeError: the state contradicts itself.
     """
     situation = () if state is None else base.assertions(state)
@@ -72,24 +72,24 @@ def run_query(base: Ontology, text: str, state: KnowledgeState | None, *, inferr
                     graph.add((subject, predicate, value))
     for prefix, namespace in _PREFIXES.items():
         graph.bind(prefix, namespace, override=True, replace=True)
-    return _asked(graph, text)
+    return _answer(graph, text)
 
 
 def _with_fixed_names(structure: Sequence[str]) -> tuple[str, ...]:
-    """Class expressions with names for their parts that are the same each time: the parser's are drawn at random.
+    """Class expressions with the same names for their parts each time: those of the parser are random.
 
-    A query with LIMIT and without ORDER BY is then answered alike, too.
+    So a query with LIMIT and without ORDER BY has the same answer each time, too.
     """
     graph = to_canonical_graph(rdflib.Graph().parse(data="".join(structure), format="nt"))
     return tuple(sorted(f"{' '.join(term.n3() for term in triple)} .\n" for triple in graph))
 
 
-def _asked(graph: rdflib.Graph, text: str) -> QueryResult:
+def _answer(graph: rdflib.Graph, text: str) -> QueryResult:
     from rdflib.plugins.sparql import prepareQuery
 
     try:
         query = prepareQuery(text, initNs=_PREFIXES)
-    except Exception as error:  # the parser raises many kinds; each means that this is no query
+    except Exception as error:  # the parser raises many kinds; each means that this is not a query
         reason = " ".join(str(error).split()) or type(error).__name__
         remedy = "for instance SELECT ?d WHERE { ?d tomasys:solvesF ?f }"
         raise InputError(f"not a SPARQL query: {reason}", remedy=remedy) from None
@@ -108,7 +108,7 @@ def _asked(graph: rdflib.Graph, text: str) -> QueryResult:
         return QueryResult(("subject", "predicate", "object"), tuple(sorted(triples, key=_sortable)))
     except InputError:
         raise
-    except Exception as error:  # evaluation runs whatever the query says
+    except Exception as error:  # evaluation raises whatever the functions of the query raise
         raise InputError(f"the query cannot be answered: {' '.join(str(error).split())}") from None
 
 

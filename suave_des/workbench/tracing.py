@@ -1,9 +1,9 @@
-"""Derivations: how a fact follows, as a tree of rules with their bindings down to what is asserted.
+"""Trace facts: find the rules and facts that they follow from.
 
-Every step of a tree is made by Pellet: it is given the facts of one instantiated rule body, that rule and the schema,
-and nothing else, and what it then adds is what the step concludes. Where a fact follows in several ways the first one
-is told, by the rule's name and then by the bindings; Pellet's own choice (its tracing) is another one each time, and
-is asked only where no rule and no single fact does it.
+Every step of a derivation is made by Pellet: it is given the facts of one instantiated rule body, that rule and the
+schema, and nothing else, and what it adds is what the step concludes. Where a fact follows in several ways, the first
+one is shown, by the rule's name and then by the bindings. Pellet's own tracing picks another one each time, and is
+asked only where neither a rule nor a single fact suffices.
 """
 
 from __future__ import annotations
@@ -12,30 +12,29 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Final
+from typing import Any, Final
 
 from suave_des.knowledge import jvm
 from suave_des.knowledge.content import RULE_IRI, Content
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet import InProcessPellet, load_n_triples, one_at_a_time
-from suave_des.knowledge.rdf import Lit, Triple, facts_of, n_triple, value_of
-from suave_des.knowledge.rules.syntax import Atom, Rule
+from suave_des.knowledge.pellet import InProcessPellet, load_n_triples, one_at_a_time, read_term
+from suave_des.knowledge.rdf import Lit, Triple, canonical, facts_of, n_triple, value_of
+from suave_des.knowledge.rules.syntax import Atom, Kind, Rule
 from suave_des.knowledge.state import Fact, KnowledgeState, Value
-from suave_des.knowledge.vocabulary import OWL, RDF_TYPE
-from suave_des.workbench.derivation import Clash, Derivation
-from suave_des.workbench.matching import Binding, canonical_triple, is_fact, matched, matches, values_of
+from suave_des.knowledge.vocabulary import LANGUAGE_NAMESPACES, OWL, RDF_TYPE
+from suave_des.workbench.derivations import Binding, Clash, Derivation, matched, partial_matches
 
 _RULE: Final = re.compile(r"^rule\(" + re.escape(RULE_IRI) + r"(\d+)")
 _FACT: Final = re.compile(r"^(prop|type)\(([^,()]+),([^,()]+)")
 _IRI: Final = re.compile(r"[a-z]+:[^\s,()]+")
-_FUNCTIONAL: Final = OWL + "FunctionalProperty"
+_Bindings = tuple[tuple[str, Value], ...]
 
 
 @dataclass(frozen=True)
-class _Traced:
-    """What Pellet says a contradiction rests on."""
+class _Trace:
+    """What Pellet says a contradiction follows from."""
 
-    said: str
+    message: str
     rules: tuple[Rule, ...]
     triples: tuple[Triple, ...]
     axioms: tuple[str, ...]
@@ -43,11 +42,11 @@ class _Traced:
 
 @dataclass(frozen=True, eq=False)
 class Tracer:
-    """Derives facts of one state."""
+    """Derives the facts of one state."""
 
     base: Ontology
     state: KnowledgeState
-    _steps: dict[tuple[int, frozenset[Triple]], frozenset[Triple]] = field(default_factory=dict, repr=False)
+    _steps: dict[object, frozenset[Triple]] = field(default_factory=dict, repr=False)
     _found: dict[Triple, Derivation] = field(default_factory=dict, repr=False)
 
     @cached_property
@@ -68,14 +67,46 @@ class Tracer:
         """
         return InProcessPellet(self.base).infer(self.situation) | self.asserted
 
+    @cached_property
+    def known(self) -> tuple[Triple, ...]:
+        """All that follows and that rules mention, in canonical form and in a fixed order."""
+        text = self.base.content.n_triples() + "".join(map(n_triple, self.situation))
+        mentioned = [atom for rule in self.base.content.enabled_rules for atom in rule.atoms]
+        entailed = self.entailed().union(_values_of(load_n_triples(text), mentioned))
+        jvm.take_warnings()
+        return tuple(sorted({_canonical(triple) for triple in entailed if _is_fact(triple)}, key=str))
+
+    @cached_property
+    def _leaves(self) -> dict[Triple, Triple]:
+        """What is asserted, by its canonical form."""
+        return {_canonical(triple): triple for triple in sorted(filter(_is_fact, self.asserted), key=str)}
+
+    @cached_property
+    def _schema(self) -> Content:
+        """The ontologies without facts about individuals; all rules keep their numbers."""
+        content = self.base.content
+        return replace(content, triples=tuple(each for each in content.triples if not _is_fact(each)))
+
     def derive(self, triple: Triple) -> Derivation:
-        """How a triple that is entailed follows."""
+        """Derive a triple that is entailed."""
         with one_at_a_time:
-            found = self._derive(canonical_triple(triple), frozenset())
-            return found if found is not None else self._by_tracing(triple)
+            found = self._derive(_canonical(triple), frozenset())
+            if found is None:  # what Pellet says that it follows from, without the steps between
+                trace = self._trace(self.asserted, self.base.content.enabled_rules, _denial(triple))
+                premises = tuple(map(self._leaf, trace.triples))
+                found = Derivation(self._fact(triple), "axioms", premises=premises, axioms=trace.axioms)
+            return found
+
+    def firings(self, rule: Rule) -> Iterator[tuple[_Bindings, tuple[Fact, ...]]]:
+        """Find every way in which a rule fires: the bindings, and the facts that it concludes."""
+        with one_at_a_time:
+            for binding, body in _matches(rule, {}, self.known):
+                concluded = self._step(rule, frozenset(body))
+                if concluded:
+                    yield self._bindings(binding), tuple(self._fact(each) for each in sorted(concluded, key=str))
 
     def _derive(self, triple: Triple, above: frozenset[Triple]) -> Derivation | None:
-        """The first tree for a triple that does not rest on itself or on what is above it; None if there is none."""
+        """The first tree for a triple that does not depend on itself or on what is above it; None if there is none."""
         if triple in self._leaves:
             return self._leaf(self._leaves[triple])
         if triple not in self._found:
@@ -88,178 +119,134 @@ class Tracer:
 
     def _by_rules(self, triple: Triple, above: frozenset[Triple]) -> Iterator[Derivation]:
         for rule in self.base.content.enabled_rules:
-            for atom in rule.head:
-                start = matched(atom, triple, {})
-                if start is None:
-                    continue
-                for binding, body in sorted(matches(rule.body, start, (), self.known), key=str):
+            starts = (matched(atom, triple, {}) for atom in rule.head)
+            for start in (each for each in starts if each is not None):
+                for binding, body in _matches(rule, start, self.known):
                     if above.isdisjoint(body) and triple in self._step(rule, frozenset(body)):
-                        premises = [self._derive(each, above) for each in body]
-                        if None not in premises:
-                            yield self._by_rule(triple, rule, binding, [each for each in premises if each])
+                        premises = [found for each in body if (found := self._derive(each, above)) is not None]
+                        if len(premises) == len(body):
+                            yield self._by_rule(triple, rule, binding, premises)
 
     def _by_rule(self, triple: Triple, rule: Rule, binding: Binding, premises: Sequence[Derivation]) -> Derivation:
-        bound = tuple((name, value_of(binding[name], self.base.names)) for name in sorted(binding))
-        return Derivation(self._fact(triple), "rule", rule.name, bound, tuple(premises))
+        return Derivation(self._fact(triple), "rule", rule.name, self._bindings(binding), tuple(premises))
 
     def _by_schema(self, triple: Triple, above: frozenset[Triple]) -> Iterator[Derivation]:
         """What follows from one other fact about the same thing: a class by a domain, an inverse, a sub-property."""
+        kind: Kind = "class" if triple[1] == RDF_TYPE else "data" if isinstance(triple[2], Lit) else "object"
+        asked = Atom(kind, str(triple[2]) if kind == "class" else triple[1], ())
         for other in self.known:
-            about = {triple[0], triple[2]} & {other[0], other[2]}
-            if about and other not in above and triple in self._schema_adds(other, triple):
+            about_same = {triple[0], triple[2]} & {other[0], other[2]}
+            if about_same and other not in above and triple in self._concluded(frozenset({other}), [asked]):
                 premise = self._derive(other, above)
                 if premise is not None:
-                    axioms = self._traced(_denial(triple), (other,), ()).axioms
+                    axioms = self._trace((other,), (), _denial(triple)).axioms
                     yield Derivation(self._fact(triple), "axioms", premises=(premise,), axioms=axioms)
 
-    def _schema_adds(self, other: Triple, triple: Triple) -> frozenset[Triple]:
-        key = -1, frozenset({other, triple})
-        if key not in self._steps:
-            content = replace(self._schema, triples=(*self._schema.triples, other))
-            knowledge_base = load_n_triples(content.n_triples([]))
-            kind = "class" if triple[1] == RDF_TYPE else "data" if isinstance(triple[2], Lit) else "object"
-            predicate = str(triple[2]) if kind == "class" else triple[1]
-            asked: Atom = Atom(kind, predicate, ())  # type: ignore[arg-type]
-            is_possible = knowledge_base.isConsistent()
-            self._steps[key] = frozenset(values_of(knowledge_base, [asked]) if is_possible else ())
-        return self._steps[key]
-
-    def _by_tracing(self, triple: Triple) -> Derivation:
-        """What Pellet says that a triple rests on, without the steps between."""
-        traced = self._traced(_denial(triple), self.asserted, self.base.content.enabled_rules)
-        return Derivation(
-            self._fact(triple), "axioms", premises=tuple(map(self._leaf, traced.triples)), axioms=traced.axioms
-        )
-
-    @cached_property
-    def _leaves(self) -> dict[Triple, Triple]:
-        """What is asserted, by its canonical form."""
-        return {canonical_triple(triple): triple for triple in sorted(filter(is_fact, self.asserted), key=str)}
-
-    @cached_property
-    def known(self) -> tuple[Triple, ...]:
-        """All that follows and that rules ask for, in canonical form and in a fixed order."""
-        text = self.base.content.n_triples() + "".join(map(n_triple, self.situation))
-        asked = [atom for rule in self.base.content.enabled_rules for atom in rule.atoms]
-        entailed = self.entailed().union(values_of(load_n_triples(text), asked))
-        jvm.take_warnings()
-        return tuple(sorted({canonical_triple(triple) for triple in entailed if is_fact(triple)}, key=str))
-
-    def firings(self, rule: Rule) -> Iterator[tuple[tuple[tuple[str, Value], ...], tuple[Fact, ...]]]:
-        """Every way in which a rule fires: the bindings, and what it concludes."""
-        with one_at_a_time:
-            for binding, body in sorted(matches(rule.body, {}, (), self.known), key=str):
-                concluded = self._step(rule, frozenset(body))
-                if concluded:
-                    bound = tuple((name, value_of(binding[name], self.base.names)) for name in sorted(binding))
-                    yield bound, tuple(self._fact(triple) for triple in sorted(concluded, key=str))
-
     def clashes(self) -> tuple[str, tuple[Clash, ...], tuple[str, ...]]:
-        """For a state that contradicts itself: what Pellet says, who clashes, and the names of the rules involved."""
+        """Explain a state that contradicts itself.
+
+        Returns:
+            what Pellet says, the functional properties with two values, and the names of the rules involved.
+        """
         with one_at_a_time:
-            known = self._chain()
-        functional = {s for s, p, o in self.base.content.triples if p == RDF_TYPE and o == _FUNCTIONAL}
+            known = self._forward_chain()
+        triples = self.base.content.triples
+        functional = {s for s, p, o in triples if p == RDF_TYPE and o == OWL + "FunctionalProperty"}
         values: dict[tuple[str, str], dict[str | Lit, Derivation]] = {}
+        short = self.base.names.short
         for (subject, predicate, value), derivation in known.items():
             if predicate in functional:
-                values.setdefault((subject, predicate), {}).setdefault(value, derivation)
-        short = self.base.names.short
-        clashing = {
-            (short(subject), short(predicate)) for (subject, predicate), sides in values.items() if len(sides) > 1
-        }
+                values.setdefault((short(subject), short(predicate)), {}).setdefault(value, derivation)
+        clashing = {key for key, sides in values.items() if len(sides) > 1}
         clashes = tuple(
-            Clash(short(subject), short(predicate), tuple(sides[value] for value in sorted(sides, key=str)))
-            for (subject, predicate), sides in sorted(values.items())
-            # What follows from another clash is none of its own.
-            if len(sides) > 1 and not any(clashing & side.grounds() for side in sides.values())
+            Clash(*key, tuple(sides[value] for value in sorted(sides, key=str)))
+            for key, sides in sorted(values.items())
+            # What follows from another clash is not one of its own.
+            if key in clashing and not any(clashing & side.grounds() for side in sides.values())
         )
         if clashes:
             rules = {name for clash in clashes for side in clash.sides for name in side.rules()}
-            said = "; ".join(f"{each.subject} has two values of the functional {each.property}" for each in clashes)
-            return said, clashes, tuple(sorted(rules))
+            message = "; ".join(f"{each.subject} has two values of the functional {each.property}" for each in clashes)
+            return message, clashes, tuple(sorted(rules))
         with one_at_a_time:
-            traced = self._traced("", self.asserted, self.base.content.enabled_rules)
-        said = _IRI.sub(lambda iri: short(iri.group()), traced.said).strip()
-        return said, (), tuple(sorted(rule.name for rule in traced.rules))
+            trace = self._trace(self.asserted, self.base.content.enabled_rules)
+        return self._shorten(trace.message).strip(), (), tuple(sorted(rule.name for rule in trace.rules))
 
-    def _traced(self, denial: str, facts: Iterable[Triple], rules: Sequence[Rule]) -> _Traced:
-        """What Pellet says is behind a contradiction: the state's own, or that of a fact with its denial."""
+    def _forward_chain(self) -> dict[Triple, Derivation]:
+        """What all rules conclude from what is asserted, round by round, in a state in which Pellet infers nothing."""
+        known = {triple: self._leaf(asserted) for triple, asserted in self._leaves.items()}
+        while True:
+            more: dict[Triple, Derivation] = {}
+            for rule in self.base.content.enabled_rules:
+                for binding, body in _matches(rule, {}, known):
+                    for triple in sorted(self._step(rule, frozenset(body)) - known.keys(), key=str):
+                        premises = [known[each] for each in body]
+                        more.setdefault(triple, self._by_rule(triple, rule, binding, premises))
+            more = more or self._schema_round(known)
+            if not more:
+                return known
+            known |= more
+
+    def _schema_round(self, known: Mapping[Triple, Derivation]) -> dict[Triple, Derivation]:
+        """Classes and values that rules ask for and that the schema adds to what is asserted."""
+        asked = [atom for rule in self.base.content.enabled_rules for atom in rule.body]
+        more = {}
+        for triple in sorted(self._concluded(self.asserted, asked) - known.keys(), key=str):
+            fact = self._fact(triple)
+            about = tuple(each for each in known.values() if not each.premises and each.fact.subject == fact.subject)
+            more[triple] = Derivation(fact, "axioms", premises=about)
+        return more
+
+    def _step(self, rule: Rule, body: frozenset[Triple]) -> frozenset[Triple]:
+        """What Pellet concludes with one rule from the facts of one instantiated body, and the schema."""
+        return frozenset(map(_canonical, self._concluded(body, rule.head, rule))) - body
+
+    def _concluded(
+        self, facts: frozenset[Triple], asked: Sequence[Atom], rule: Rule | None = None
+    ) -> frozenset[Triple]:
+        """What Pellet says of the properties and classes of atoms, from facts, a rule and the schema alone."""
+        number = -1 if rule is None else self.base.content.rules.index(rule)
+        key = facts, tuple((atom.kind, atom.predicate) for atom in asked), number
+        if key not in self._steps:
+            knowledge_base = load_n_triples(self._text(facts, [] if rule is None else [rule]))
+            is_consistent = knowledge_base.isConsistent()
+            self._steps[key] = frozenset(_values_of(knowledge_base, asked) if is_consistent else ())
+            jvm.take_warnings()
+        return self._steps[key]
+
+    def _text(self, facts: Iterable[Triple], rules: Sequence[Rule]) -> str:
+        content = replace(self._schema, triples=(*self._schema.triples, *sorted(facts, key=str)))
+        return content.n_triples(rules)
+
+    def _trace(self, facts: Iterable[Triple], rules: Sequence[Rule], denial: str = "") -> _Trace:
+        """What Pellet says a contradiction follows from: the state's own, or that of a fact with its denial."""
         options = jvm.java_class("org.mindswap.pellet.PelletOptions")
         options.USE_TRACING = True
         try:
-            content = replace(self._schema, triples=(*self._schema.triples, *sorted(facts, key=str)))
-            text = content.n_triples(rules) + denial
-            knowledge_base = load_n_triples(text, explain=True)
+            knowledge_base = load_n_triples(self._text(facts, rules) + denial, explain=True)
             knowledge_base.isConsistent()
-            said = str(knowledge_base.getExplanation())
+            message = str(knowledge_base.getExplanation())
             axioms = sorted(str(axiom.toString()) for axiom in knowledge_base.getExplanationSet())
         finally:
             options.USE_TRACING = False
             jvm.take_warnings()
         numbers = sorted(int(found.group(1)) for axiom in axioms if (found := _RULE.match(axiom)))
         named = {found.groups() for axiom in axioms if (found := _FACT.match(axiom))}
-        used = [triple for triple in sorted(self.asserted, key=str) if _as_axiom(triple) in named]
-        # Facts and the denial are no schema; what is left are domains, subclasses and the like.
+        # Facts and the denial are not of the schema; the others are domains, subclasses and the like.
         schema = [axiom for axiom in axioms if not axiom.startswith(("rule(", "prop(", "type("))]
-        short = self.base.names.short
-        return _Traced(
-            said,
+        return _Trace(
+            message,
             tuple(self.base.content.rules[number] for number in numbers),
-            tuple(used),
-            tuple(_IRI.sub(lambda iri: short(iri.group()), axiom) for axiom in schema),
+            tuple(triple for triple in sorted(self.asserted, key=str) if _as_axiom(triple) in named),
+            tuple(map(self._shorten, schema)),
         )
 
-    def _chain(self) -> dict[Triple, Derivation]:
-        """What all rules give from what is asserted, round by round; for a state in which Pellet tells nothing."""
-        known = {triple: self._leaf(asserted) for triple, asserted in self._leaves.items()}
-        while True:
-            more = self._round(known) or self._schema_round(known)
-            if not more:
-                return known
-            known |= more
+    def _shorten(self, text: str) -> str:
+        """A text of Pellet's with names in place of IRIs."""
+        return _IRI.sub(lambda iri: self.base.names.short(iri.group()), text)
 
-    def _round(self, known: Mapping[Triple, Derivation]) -> dict[Triple, Derivation]:
-        more: dict[Triple, Derivation] = {}
-        for rule in self.base.content.enabled_rules:
-            for binding, body in sorted(matches(rule.body, {}, (), known), key=str):
-                for triple in sorted(self._step(rule, frozenset(body)) - known.keys(), key=str):
-                    if triple not in more:
-                        more[triple] = self._by_rule(triple, rule, binding, [known[each] for each in body])
-        return more
-
-    def _step(self, rule: Rule, body: frozenset[Triple]) -> frozenset[Triple]:
-        """What Pellet concludes with one rule from the facts of one instantiated body, and the schema."""
-        number = self.base.content.rules.index(rule)
-        key = number, body
-        if key not in self._steps:
-            content = replace(self._schema, triples=(*self._schema.triples, *sorted(body, key=str)))
-            knowledge_base = load_n_triples(content.n_triples([rule]))
-            concluded: frozenset[Triple] = frozenset()
-            if knowledge_base.isConsistent():
-                concluded = frozenset(map(canonical_triple, values_of(knowledge_base, rule.head))) - body
-            jvm.take_warnings()
-            self._steps[key] = concluded
-        return self._steps[key]
-
-    def _schema_round(self, known: Mapping[Triple, Derivation]) -> dict[Triple, Derivation]:
-        """Classes and values that rules ask for and that the schema adds to what is asserted."""
-        content = replace(self._schema, triples=(*self._schema.triples, *sorted(self.asserted, key=str)))
-        knowledge_base = load_n_triples(content.n_triples([]))
-        if not knowledge_base.isConsistent():
-            return {}
-        wanted = [atom for rule in self.base.content.enabled_rules for atom in rule.body]
-        more = {}
-        for triple in sorted(set(values_of(knowledge_base, wanted)) - known.keys(), key=str):
-            fact = self._fact(triple)
-            about = tuple(each for each in known.values() if not each.premises and each.fact.subject == fact.subject)
-            more[triple] = Derivation(fact, "axioms", premises=about)
-        return more
-
-    @cached_property
-    def _schema(self) -> Content:
-        """The ontologies without facts of individuals; all rules keep their numbers."""
-        content = self.base.content
-        return replace(content, triples=tuple(each for each in content.triples if not is_fact(each)))
+    def _bindings(self, binding: Binding) -> _Bindings:
+        return tuple((name, value_of(binding[name], self.base.names)) for name in sorted(binding))
 
     def _leaf(self, triple: Triple) -> Derivation:
         return Derivation(self._fact(triple), "state" if triple in self.situation else "ontology")
@@ -268,29 +255,56 @@ class Tracer:
         return next(facts_of([triple], self.base.names))
 
 
+def _matches(rule: Rule, binding: Binding, known: Iterable[Triple]) -> list[tuple[Binding, tuple[Triple, ...]]]:
+    """Ways to match a rule's body with facts, in a fixed order; comparisons are left to Pellet."""
+    ways = partial_matches(rule.body, binding, known)
+    return sorted(((bound, body) for depth, bound, body in ways if depth == len(rule.body)), key=str)
+
+
+def _is_fact(triple: Triple) -> bool:
+    """Whether a triple is about an individual, and not in the terms of the languages themselves."""
+    term = triple[2] if triple[1] == RDF_TYPE else triple[1]
+    return isinstance(term, str) and not term.startswith(LANGUAGE_NAMESPACES)
+
+
+def _canonical(triple: Triple) -> Triple:
+    """A triple with a number in its one shortest form."""
+    subject, predicate, value = triple
+    return subject, predicate, canonical(value) if isinstance(value, Lit) else value
+
+
+def _values_of(knowledge_base: Any, atoms: Iterable[Atom]) -> Iterator[Triple]:
+    """Read the values of the properties and the members of the classes that atoms name."""
+    make = jvm.java_class("org.mindswap.pellet.utils.ATermUtils").makeTermAppl
+    for kind, name in sorted({(atom.kind, atom.predicate) for atom in atoms}):
+        if kind in ("object", "data"):
+            for entry in knowledge_base.getPropertyValues(make(name)).entrySet():
+                for value in entry.getValue():
+                    yield str(entry.getKey().toString()), name, read_term(str(value.toString()))
+        elif kind == "class":
+            for member in knowledge_base.getInstances(make(name)):
+                yield str(member.toString()), RDF_TYPE, name
+
+
 def _as_axiom(triple: Triple) -> tuple[str, str, str]:
-    """The beginning of a fact as Pellet writes it: enough to tell which one it is among those asserted."""
+    """The beginning of a fact as Pellet writes it: enough to identify it among those asserted."""
     subject, predicate, value = triple
     return ("type", subject, str(value)) if predicate == RDF_TYPE else ("prop", predicate, subject)
 
 
 def _denial(triple: Triple) -> str:
-    """Says in OWL that a triple does not hold."""
+    """Say in OWL that a triple does not hold, as N-Triples."""
     subject, predicate, value = triple
-    node = "_:denied"
-    lines: list[str] = []
-
-    def add(of: str, term: str, what: str | Lit) -> None:
-        line = n_triple(("urn:x", term, what))
-        lines.append(line.replace("<urn:x>", of, 1))
-
-    if predicate == RDF_TYPE:
-        add(node, OWL + "complementOf", value)
-    else:
-        lines.append(f"{node} <{OWL}complementOf> {node}value .\n")
-        add(f"{node}value", RDF_TYPE, OWL + "Restriction")
-        add(f"{node}value", OWL + "onProperty", predicate)
-        add(f"{node}value", OWL + "hasValue", value)
-    add(node, RDF_TYPE, OWL + "Class")
-    lines.append(f"<{subject}> <{RDF_TYPE}> {node} .\n")
-    return "".join(lines)
+    denied, restriction = "urn:denied", "urn:restriction"
+    triples: list[Triple] = [
+        (denied, OWL + "complementOf", value if predicate == RDF_TYPE else restriction),
+        (denied, RDF_TYPE, OWL + "Class"),
+        (subject, RDF_TYPE, denied),
+    ]
+    if predicate != RDF_TYPE:
+        triples += [
+            (restriction, RDF_TYPE, OWL + "Restriction"),
+            (restriction, OWL + "onProperty", predicate),
+            (restriction, OWL + "hasValue", value),
+        ]
+    return re.sub("<urn:(denied|restriction)>", r"_:\1", "".join(map(n_triple, triples)))

@@ -12,7 +12,7 @@ from suave_des.cli.main import main
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.resources import shipped_folder
 from suave_des.workbench.check import Subject, check
-from suave_des.workbench.findings import Finding, Level, fails
+from suave_des.workbench.findings import Finding, Level, has_level
 
 SUAVE = "http://www.metacontrol.org/suave#"
 TOMASYS = "http://metacontrol.org/tomasys#"
@@ -37,7 +37,7 @@ def only(findings: tuple[Finding, ...], words: str) -> Finding:
 
 def test_the_shipped_ontology_passes(tmp_path: Path) -> None:
     findings = found(tmp_path)
-    assert not fails(findings, Level.WARN)
+    assert not has_level(findings, Level.WARN)
     assert only(findings, "battery_level").level is Level.INFO
 
 
@@ -127,9 +127,9 @@ def test_a_rule_on_an_attribute_that_no_grounding_has_a_value_of(tmp_path: Path)
     rule = "A: hasQAvalue(?g, ?q) ^ isQAtype(?q, {}) ^ hasValue(?q, ?v) ^ lessThan(?v, 0.3) -> Role(?g)"
     finding = only(found(tmp_path, rule.format("battery_level")), "no function design has an estimate of battery_level")
     assert (finding.level, finding.rule, finding.column) == (Level.WARN, "A", 25)
-    assert not fails(found(tmp_path, rule.format("water_visibility")), Level.WARN)
+    assert not has_level(found(tmp_path, rule.format("water_visibility")), Level.WARN)
     given = "\nB: FunctionGrounding(?g) ^ isQAtype(?q, battery_level) -> hasQAvalue(?g, ?q)"
-    assert not fails(found(tmp_path, rule.format("battery_level") + given), Level.WARN)
+    assert not has_level(found(tmp_path, rule.format("battery_level") + given), Level.WARN)
 
 
 def test_contradictions_come_from_pellet(tmp_path: Path) -> None:
@@ -239,17 +239,17 @@ def test_shapes_of_ones_own(tmp_path: Path) -> None:
     )
     findings = found(tmp_path, shapes=[shapes])
     assert len([one for one in findings if one.message == "c_thruster_1: typeC: no class"]) == 1
-    assert fails(findings, Level.WARN)
-    assert not fails(findings, Level.ERROR)
+    assert has_level(findings, Level.WARN)
+    assert not has_level(findings, Level.ERROR)
 
 
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (b"@prefix x: <urn:x> .\nfoo\n", "line 2: is no Turtle: expected directive or statement"),
+        (b"@prefix x: <urn:x> .\nfoo\n", "line 2: is not Turtle: expected directive or statement"),
         (b"<?xml version='1.0'?><rdf:RDF/>", "this is XML, not Turtle"),
         (b"<urn:a> <urn:b> \xff", "is not UTF-8 text"),
-        (b"@prefix", "is no Turtle"),
+        (b"@prefix", "is not Turtle"),
     ],
 )
 def test_shapes_that_cannot_be_read(

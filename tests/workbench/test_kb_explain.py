@@ -160,8 +160,8 @@ class TestDecisions:
         ("fg_status(fg_spiral_hi, IN_ERROR_FR)", "there is nothing named 'fg_spiral_hi' in this state (did you mean"),
         ("why fd_spiral_lo?", "there is no function design 'fd_spiral_lo' (did you mean 'fd_spiral_low'"),
         ("fg_statu(fg_spiral_high, IN_ERROR_FR)", "there is no property 'fg_statu' (did you mean 'fg_status'"),
-        ("because", "'because' is no question about a state"),
-        ("fg_status(", "is no question about a state"),
+        ("because", "'because' is not a question about a state"),
+        ("fg_status(", "is not a question about a state"),
     ],
 )
 def test_a_question_that_has_no_answer_is_told_so(bench, in_error, question, said):
@@ -204,7 +204,7 @@ def test_a_contradiction_names_the_rules_and_derives_both_sides(tmp_path):
         ("IN_ERROR_NFR", "QAWaterVisibility"),
     }
     above = bench.state(groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 2})
-    assert bench.explain(above).problem is None
+    assert bench.explain(above).contradiction is None
 
 
 def test_the_command_prints_the_tree_and_the_same_as_json(command, tmp_path):

@@ -1,4 +1,4 @@
-"""kb policy and kb diff: exhaustive over regions, right at their edges, with what is wrong marked."""
+"""kb policy and kb diff: exhaustive over ranges of values, right at their ends, with what is wrong marked."""
 
 import csv
 import io
@@ -12,14 +12,28 @@ import pytest
 from suave_des.errors import InputError
 from suave_des.knowledge.state import exact
 from suave_des.workbench import KnowledgeBase
-from suave_des.workbench.policy import Space, make_policy
+from suave_des.workbench.policy import make_policy
 from suave_des.workbench.policy_figure import draw_policy
+from suave_des.workbench.policy_space import (
+    PolicySpace,
+    ValueRange,
+    component_reports,
+    interchangeable_components,
+    ranges_between,
+    values_in,
+)
 from suave_des.workbench.policy_table import function_table
-from suave_des.workbench.regions import MISSING, Region, regions_between, values_in
-from suave_des.workbench.states import Loop
-from suave_des.workbench.symmetry import alike, reports
+from suave_des.workbench.state_input import ManagingSettings
 
 MOTION, SEARCH = "f_maintain_motion", "f_generate_search_path"
+
+
+def holds(one, value):
+    """Whether a measured value is in a range."""
+    if value is None or one.is_missing:
+        return one.is_missing and value is None
+    above = one.low is None or value > one.low or (one.low_closed and value == one.low)
+    return above and (one.high is None or value < one.high or (one.high_closed and value == one.high))
 
 
 def rules_file(tmp_path, text, name="more.swrl"):
@@ -36,65 +50,65 @@ def policy(bench):
     return bench.policy(max_failed=1)
 
 
-class TestRegions:
+class TestRanges:
     def test_cover_every_number_once(self):
-        regions = regions_between([Decimal(1), Decimal("2.5")])
+        ranges = ranges_between([Decimal(1), Decimal("2.5")])
         for value in (None, *map(Decimal, ("-3", "0.99", "1", "1.01", "2.4", "2.5", "2.51", "9"))):
-            assert sum(region.holds(value) for region in regions) == 1
-        assert list(map(str, regions)) == ["not measured", "< 1", "1", "1 < . < 2.5", "2.5", "> 2.5"]
+            assert sum(holds(one, value) for one in ranges) == 1
+        assert list(map(str, ranges)) == ["not measured", "< 1", "1", "1 < . < 2.5", "2.5", "> 2.5"]
 
     def test_have_a_value_of_their_own(self):
-        for region in regions_between([Decimal(1), Decimal("2.5")]):
-            assert region.holds(region.value())
+        for one in ranges_between([Decimal(1), Decimal("2.5")]):
+            assert holds(one, one.value())
 
     def test_two_values_in_one_open_range_come_in_every_order(self):
-        between = Region(Decimal(1), Decimal(2))
+        between = ValueRange(Decimal(1), Decimal(2))
         orders = {(one > other) - (one < other) for one, other in values_in([between, between])}
         assert orders == {-1, 0, 1}
-        assert all(between.holds(value) for values in values_in([between, between]) for value in values)
-        assert list(values_in([MISSING, MISSING])) == [(None, None)]
-        assert len(list(values_in([Region(Decimal(1), Decimal(1), True, True)] * 2))) == 1
+        assert all(holds(between, value) for values in values_in([between, between]) for value in values)
+        assert list(values_in([ValueRange(is_missing=True)] * 2)) == [(None, None)]
+        assert len(list(values_in([ValueRange(Decimal(1), Decimal(1), True, True)] * 2))) == 1
 
 
-class TestSymmetry:
+class TestInterchangeableComponents:
     def test_thrusters_are_alike(self, bench):
-        assert alike(bench.base) == (tuple(f"c_thruster_{n}" for n in range(1, 7)),)
+        assert interchangeable_components(bench.base) == (tuple(f"c_thruster_{n}" for n in range(1, 7)),)
 
     def test_a_rule_that_names_one_sets_it_apart(self, tmp_path):
         file = rules_file(tmp_path, 'one: c_status(c_thruster_3, "FALSE") -> fd_realisability(fd_spiral_high, false)\n')
-        groups = alike(KnowledgeBase.load(rules=[file]).base)
+        groups = interchangeable_components(KnowledgeBase.load(rules=[file]).base)
         assert ("c_thruster_3",) in groups
         assert len(groups) == 2
 
     def test_combinations_count_what_they_stand_for(self):
-        found = list(reports([["a", "b", "c"], ["d"]], ["FALSE", "RECOVERED"], 2))
+        found = list(component_reports([["a", "b", "c"], ["d"]], ["FALSE", "RECOVERED"], 2))
         # of 4 components none, one or two report one of two words
         assert sum(each.combinations for each in found) == 1 + 4 * 2 + 6 * 4
 
 
 class TestPolicy:
     def test_says_how_many_states_it_covers(self, policy):
-        # 16 regions, 13 reports, 4 search and 3 motion groundings, or 2 follow groundings in its place
+        # 16 ranges, 13 reports, 4 search and 3 motion groundings, or 2 follow groundings in its place
         assert policy.states == 16 * 13 * (3 * 4 + 3 * 2)
-        assert len(policy.cells) == 16 * 3 * 18
+        assert len(policy.cases) == 16 * 3 * 18
 
-    def test_any_state_is_decided_as_its_cell_says(self, bench, policy):
+    def test_any_state_is_decided_as_its_case_says(self, bench, policy):
         chance = random.Random(5)
-        for cell in chance.sample(policy.cells, 60):
-            (region,) = cell.regions
-            value = None if region.is_missing else region.value(chance.randrange(7), 7)
-            assert region.holds(value)
+        for case in chance.sample(policy.cases, 60):
+            (one,) = case.ranges
+            value = None if one.is_missing else one.value(chance.randrange(7), 7)
+            assert holds(one, value)
             others = [f"c_thruster_{n}" for n in range(1, 7)]
             chance.shuffle(others)
             state = bench.state(
-                objectives=cell.asked,
-                groundings=dict(cell.state.groundings),
-                components={name: status for name, (_, status) in zip(others, cell.reports.components, strict=False)},
+                objectives=case.asked,
+                groundings=dict(case.state.groundings),
+                components={name: status for name, (_, status) in zip(others, case.reports.components, strict=False)},
                 measurements={} if value is None else {"water_visibility": exact(value)},
             )
             conclusion = bench.infer(state)
-            assert tuple((each.function, each.design) for each in conclusion.plan.decisions) == cell.choices
-            assert tuple(sorted(conclusion.statuses)) == cell.statuses
+            assert tuple((each.function, each.design) for each in conclusion.plan.decisions) == case.choices
+            assert tuple(sorted(conclusion.statuses)) == case.statuses
 
     def test_the_search_table_has_the_deployed_thresholds(self, policy):
         table = function_table(policy, SEARCH)
@@ -113,9 +127,7 @@ class TestPolicy:
         table = function_table(policy, MOTION)
         assert table.attributes == ()
         failed = next(
-            row
-            for row in table.rows
-            if row.components == "1 FALSE" and row.groundings == ((MOTION, "fd_all_thrusters"),)
+            row for row in table.rows if row.components == "1 FALSE" and row.groundings == {MOTION: "fd_all_thrusters"}
         )
         assert failed.outcomes == ("fd_recover_thrusters",)
 
@@ -123,14 +135,14 @@ class TestPolicy:
         file = rules_file(tmp_path, f'clash: {VISIBLE} ^ lessThan(?v, 1.5) -> fg_status(?fg, "IN_ERROR_FR")\n')
         found = KnowledgeBase.load(rules=[file]).policy(max_failed=0)
         marked = found.marked("inconsistent")
-        assert {cell.state.grounded(SEARCH) for cell in marked} == {
+        assert {case.state.grounded(SEARCH) for case in marked} == {
             "fd_spiral_low", "fd_spiral_medium", "fd_spiral_high"
         }  # fmt: skip
-        low = {str(cell.regions[0]) for cell in marked if cell.state.grounded(SEARCH) == "fd_spiral_low"}
-        high = {str(cell.regions[0]) for cell in marked if cell.state.grounded(SEARCH) == "fd_spiral_high"}
+        low = {str(case.ranges[0]) for case in marked if case.state.grounded(SEARCH) == "fd_spiral_low"}
+        high = {str(case.ranges[0]) for case in marked if case.state.grounded(SEARCH) == "fd_spiral_high"}
         assert "1.25 < . < 1.5" in high - low
         assert "1.5" not in high
-        assert all("by the rules QAWaterVisibility, clash" in cell.problem for cell in marked)
+        assert all("by the rules QAWaterVisibility, clash" in case.problem for case in marked)
 
     def test_a_choice_that_alternates_is_marked(self, tmp_path):
         # Each motion design is unrealisable while it is in use.
@@ -143,9 +155,9 @@ class TestPolicy:
         )
         found = KnowledgeBase.load(rules=[file], disabled_rules=["S9"]).policy(max_failed=0)
         flipping = found.marked("flip-flop")
-        assert {cell.state.grounded(MOTION) for cell in flipping} == {"fd_all_thrusters", "fd_recover_thrusters"}
+        assert {case.state.grounded(MOTION) for case in flipping} == {"fd_all_thrusters", "fd_recover_thrusters"}
         assert any("(flip-flop)" in outcome for row in function_table(found, MOTION).rows for outcome in row.outcomes)
-        assert {cell.flipping for cell in flipping} == {(MOTION,)}
+        assert {case.flipping for case in flipping} == {(MOTION,)}
         others = [outcome for row in function_table(found, SEARCH).rows for outcome in row.outcomes]
         assert not any("flip-flop" in outcome for outcome in others)
 
@@ -154,19 +166,19 @@ class TestPolicy:
         assert KnowledgeBase.load(rules=[file]).policy(max_failed=0).computing == ("sum",)
 
     def test_an_attribute_that_nothing_looks_at_is_left_out(self, bench, tmp_path):
-        loop = Loop(measured=("battery_level", "water_visibility"))
-        assert Space.of(bench.base, loop).attributes == ("water_visibility",)
+        settings = ManagingSettings(measured=("battery_level", "water_visibility"))
+        assert PolicySpace.of(bench.base, settings).attributes == ("water_visibility",)
         file = rules_file(
             tmp_path,
             "flat: isQAtype(?q, battery_level) ^ hasValue(?q, ?v) ^ lessThan(?v, 0.2) -> "
             "fd_realisability(fd_spiral_high, false)\n",
         )
-        assert Space.of(KnowledgeBase.load(rules=[file]).base, loop).attributes == loop.measured
+        assert PolicySpace.of(KnowledgeBase.load(rules=[file]).base, settings).attributes == settings.measured
 
     def test_too_many_states_are_refused(self, bench):
-        many = Space(("battery_level", "energy", "water_visibility"), tuple(map(Decimal, range(40))), (), ())
-        with pytest.raises(InputError, match="kinds of states, which is too much"):
-            make_policy(bench.base, Loop(), bench.infer, 9, many)
+        many = PolicySpace(("battery_level", "energy", "water_visibility"), tuple(map(Decimal, range(40))), (), ())
+        with pytest.raises(InputError, match="kinds of states, which is too many"):
+            make_policy(bench.base, ManagingSettings(), bench.infer, 9, many)
 
 
 class TestFiles:
@@ -192,7 +204,7 @@ class TestFiles:
         )
         assert row[f"{SEARCH}_then"] == "fd_spiral_medium"
         assert picture.read_bytes().startswith(b"\x89PNG")
-        assert f"{policy.states} states, reasoned in {len(policy.cells)} kinds" in text
+        assert f"{policy.states} states of {len(policy.cases)} kinds" in text
         assert not list(tmp_path.glob(".*"))
 
     def test_a_picture_over_two_attributes(self, tmp_path):
@@ -202,9 +214,9 @@ class TestFiles:
             "fd_realisability(fd_spiral_high, false)\n",
         )
         two = KnowledgeBase.load(rules=[file])
-        loop = Loop(measured=("battery_level", "water_visibility"))
-        space = Space(loop.measured, (Decimal(1), Decimal("2.25")), (), ())
-        found = make_policy(two.base, loop, two.infer, 0, space)
+        settings = ManagingSettings(measured=("battery_level", "water_visibility"))
+        space = PolicySpace(settings.measured, (Decimal(1), Decimal("2.25")), (), ())
+        found = make_policy(two.base, settings, two.infer, 0, space)
         draw_policy(found, tmp_path / "two.svg")
         assert "battery level" in (tmp_path / "two.svg").read_text()
         table = function_table(found, SEARCH)
@@ -225,7 +237,7 @@ class TestDiff:
         )
         difference = bench.diff(KnowledgeBase.load(rules=[file]), max_failed=0)
         high = [pair for pair in difference.differing if pair.one.state.grounded(SEARCH) == "fd_spiral_high"]
-        assert {str(pair.one.regions[0]) for pair in high} == {"3", "3 < . < 3.25"}
+        assert {str(pair.one.ranges[0]) for pair in high} == {"3", "3 < . < 3.25"}
         assert {(pair.one.outcome(SEARCH), pair.other.outcome(SEARCH)) for pair in high} == {
             ("fd_spiral_medium", "stays")
         }
@@ -251,7 +263,7 @@ class TestDiff:
         assert "none left, none left" not in text
 
     def test_components_that_only_one_side_has_are_still_alike(self, bench):
-        mine = Space.of(bench.base, bench.loop)
+        mine = PolicySpace.of(bench.base, bench.settings)
         none = replace(mine, alike=())
         assert mine.common(none).alike == none.common(mine).alike == mine.alike
 

@@ -18,7 +18,7 @@ from suave_des.campaign.knowledge_records import (
 from suave_des.campaign.single import run_mission
 from suave_des.errors import InputError
 from suave_des.scenario.models import Scenario
-from suave_des.workbench.trial import Change, try_rule
+from suave_des.workbench.replay import RuleChange, try_rule
 
 SEARCH = "f_generate_search_path"
 NEAR = (
@@ -60,7 +60,7 @@ def test_adaptations_tell_why_the_other_designs_were_left_out(mission):
 
 def test_a_rule_fires_exactly_where_its_body_holds(mission):
     folder, result = mission
-    (trial,) = try_rule(folder, Change(NEAR))
+    (trial,) = try_rule(folder, RuleChange(NEAR))
     expected = [
         record.t_s
         for record in result.knowledge
@@ -71,13 +71,13 @@ def test_a_rule_fires_exactly_where_its_body_holds(mission):
     (firing,) = trial.moments[0].firings
     assert dict(firing.bindings)["q"] == "obs_water_visibility"
     assert firing.is_new
-    assert trial.cycles == len(result.knowledge)
+    assert trial.states == len(result.knowledge)
 
 
 def test_doing_without_a_rule_undoes_the_decisions_that_it_called_for(mission):
     folder, result = mission
-    (trial,) = try_rule(folder, Change(disabled="QAWaterVisibility"))
-    lost = [each for moment in trial.moments for each in moment.otherwise]
+    (trial,) = try_rule(folder, RuleChange(disabled="QAWaterVisibility"))
+    lost = [each for moment in trial.moments for each in moment.decisions]
     adapted = [event for event in result.events if event.event == "adaptation" and "IN_ERROR_NFR" in event.detail]
     assert len(lost) == len(adapted) > 0
     assert {each.then for each in lost} == {None}
@@ -87,10 +87,10 @@ def test_doing_without_a_rule_undoes_the_decisions_that_it_called_for(mission):
 def test_a_rule_that_contradicts_others_is_told_with_its_time(mission, command):
     folder, _ = mission
     clash = NEAR.replace("near:", "clash:").replace("IN_ERROR_NFR", "IN_ERROR_FR").replace("2.5", "4")
-    (trial,) = try_rule(folder, Change(clash))
-    problems = [moment for moment in trial.moments if moment.problem]
+    (trial,) = try_rule(folder, RuleChange(clash))
+    problems = [moment for moment in trial.moments if moment.contradiction]
     assert problems
-    assert all("by the rules QAWaterVisibility, clash" in moment.problem for moment in problems)
+    assert all("by the rules QAWaterVisibility, clash" in moment.contradiction for moment in problems)
     status, text, _ = command("try", clash, "--on", folder)
     assert status == 0
     assert f"states that would contradict themselves: {len(problems)}" in text
@@ -129,8 +129,8 @@ def test_a_campaign_keeps_the_same_states_in_less_room(mission, campaign):
 
 
 def test_a_campaign_is_tried_mission_by_mission_each_with_what_was_swept(mission, campaign, command):
-    alone = next(try_rule(mission[0], Change(disabled="QAWaterVisibility")))
-    first, second = try_rule(campaign, Change(disabled="QAWaterVisibility"))
+    alone = next(try_rule(mission[0], RuleChange(disabled="QAWaterVisibility")))
+    first, second = try_rule(campaign, RuleChange(disabled="QAWaterVisibility"))
     assert (first.mission, second.mission) == ("metacontrol, run 1", "metacontrol, run 1, point 1")
     assert first.moments == alone.moments
     assert second.moments != first.moments
@@ -146,7 +146,7 @@ def test_the_options_change_what_is_tried_against(mission, tmp_path, command):
     rules.write_text(NEAR)
     status, text, _ = command("try", NEAR, "--on", folder, "--rules", rules)
     assert status == 0
-    assert "(known without it)" in text and "others: 0" in text
+    assert "(known without it)" in text and "different: 0" in text
     status, text, _ = command("try", NEAR, "--on", folder, "--scenario", "paper_table_values", "--disable-rule", "S1a")
     assert status == 0
     status, _, error = command("try", NEAR, "--on", folder, "--disable-rule", "S1x")
@@ -188,10 +188,10 @@ def test_what_cannot_be_tried_is_told(mission, command, words, said):
 
 def test_folders_and_files_that_are_no_record_are_told(mission, tmp_path):
     with pytest.raises(InputError, match=r"has no knowledge\.jsonl or knowledge_states\.jsonl.*--record-knowledge"):
-        list(try_rule(tmp_path, Change(NEAR)))
+        list(try_rule(tmp_path, RuleChange(NEAR)))
     (tmp_path / KNOWLEDGE_FILE).write_text('{"t_s": 1}\n')
     with pytest.raises(InputError, match=r"mission\.json: cannot be read"):
-        list(try_rule(tmp_path, Change(NEAR)))
+        list(try_rule(tmp_path, RuleChange(NEAR)))
     (tmp_path / "mission.json").write_bytes((mission[0] / "mission.json").read_bytes())
     with pytest.raises(InputError, match=r"knowledge\.jsonl: line 1: is damaged"):
-        list(try_rule(tmp_path, Change(NEAR)))
+        list(try_rule(tmp_path, RuleChange(NEAR)))

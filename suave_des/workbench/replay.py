@@ -1,4 +1,4 @@
-"""A dry run: what one rule more, or one less, would have inferred and decided in recorded missions."""
+"""Replay recorded missions with one rule more, or one less: what would have been inferred and decided."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rules.files import RulesFile, hash_with_rules
 from suave_des.knowledge.rules.parser import parse_rule, parse_rules
-from suave_des.knowledge.rules.syntax import Rule
 from suave_des.knowledge.state import Fact, KnowledgeState, Value
 from suave_des.resources import find
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import Scenario
 from suave_des.simulation.result import KnowledgeRecord
-from suave_des.workbench.bench import KnowledgeBase
-from suave_des.workbench.states import Loop
+from suave_des.workbench.knowledge_base import KnowledgeBase
+from suave_des.workbench.state_input import ManagingSettings
 from suave_des.workbench.tracing import Tracer
 
 _MISSION_FILE = "mission.json"
+_GIVEN = Path("the rule to try")
 
 
 @dataclass(frozen=True)
@@ -46,11 +46,11 @@ class Firing:
 
 
 @dataclass(frozen=True)
-class Otherwise:
-    """A decision that would have been another.
+class ChangedDecision:
+    """A decision that would have been different.
 
     Attributes:
-        function: whose grounding.
+        function: whose grounding is decided.
         recorded: design decided without the change; None: no adaptation, or no design left.
         then: design decided with it.
     """
@@ -61,48 +61,48 @@ class Otherwise:
 
 
 @dataclass(frozen=True)
-class Moment:
-    """One recorded reasoning cycle at which the rule fires or changes something.
+class ReplayedCycle:
+    """One recorded reasoning cycle in which the rule fires or changes something.
 
     Attributes:
         t_s: mission time.
         state: what was reasoned about.
         firings: of the rule.
-        otherwise: decisions that would have been others.
-        problem: for a state that would contradict itself: what contradicts what.
+        decisions: those that would have been different.
+        contradiction: for a state that would contradict itself, what contradicts what.
     """
 
     t_s: float
     state: KnowledgeState
     firings: tuple[Firing, ...]
-    otherwise: tuple[Otherwise, ...]
-    problem: str | None = None
+    decisions: tuple[ChangedDecision, ...]
+    contradiction: str | None = None
 
 
 @dataclass(frozen=True)
-class MissionTrial:
-    """A rule's dry run on one mission.
+class MissionReplay:
+    """A replay of one mission.
 
     Attributes:
         folder: the mission's output folder, or its campaign's.
         mission: which of the campaign's; empty for a mission with a folder of its own.
-        cycles: recorded states.
-        moments: those at which the rule fires or changes something, in order of time.
+        states: number of recorded states.
+        moments: the cycles in which the rule fires or changes something, in order of time.
     """
 
     folder: Path
     mission: str
-    cycles: int
-    moments: tuple[Moment, ...]
+    states: int
+    moments: tuple[ReplayedCycle, ...]
 
 
 @dataclass(frozen=True)
-class Change:
-    """What to try, and what it is tried on.
+class RuleChange:
+    """The rule to try, and the knowledge base to try it on.
 
     Attributes:
-        text: the rule, as "name: body -> head"; it takes the place of those of its name. None: without a rule.
-        disabled: in its place the name of a rule to do without.
+        text: the rule, as "name: body -> head"; it takes the place of those of its name. None: no rule is added.
+        disabled: in its place, the name of a rule to switch off.
         ontologies: in place of those of the missions' scenario.
         scenario: file or name of a scenario in place of that of the missions.
         rules: files of rules as text, besides the scenario's.
@@ -122,14 +122,14 @@ class Change:
 
 
 @dataclass(frozen=True)
-class _Recorded:
+class _RecordedMission:
     folder: Path
     mission: str
     scenario: Scenario
     records: tuple[KnowledgeRecord, ...]
 
 
-def try_rule(folder: Path, change: Change) -> Iterator[MissionTrial]:
+def try_rule(folder: Path, change: RuleChange) -> Iterator[MissionReplay]:
     """Try a rule, or the lack of one, on recorded missions, one after the other.
 
     Only the recorded states are reasoned about: what would have followed from another decision is not simulated.
@@ -144,30 +144,29 @@ def try_rule(folder: Path, change: Change) -> Iterator[MissionTrial]:
     """
     if (change.text is None) == (change.disabled is None):
         raise InputError("give a rule, or --disable NAME", remedy="one of the two")
-    pair: _Pair | None = None
-    for recorded in _recorded(folder):
-        if pair is None or pair.scenario != recorded.scenario:
-            pair = _Pair(recorded.scenario, change)
-        moments = [pair.moment(record) for record in recorded.records]
-        found = tuple(each for each in moments if each is not None)
-        yield MissionTrial(recorded.folder, recorded.mission, len(recorded.records), found)
+    comparison: _Comparison | None = None
+    for mission in _recorded_missions(folder):
+        if comparison is None or comparison.scenario != mission.scenario:
+            comparison = _Comparison(mission.scenario, change)
+        cycles = (comparison.replay(record) for record in mission.records)
+        moments = tuple(each for each in cycles if each is not None)
+        yield MissionReplay(mission.folder, mission.mission, len(mission.records), moments)
 
 
-def _recorded(folder: Path) -> Iterator[_Recorded]:
+def _recorded_missions(folder: Path) -> Iterator[_RecordedMission]:
     if not folder.is_dir():
         raise InputError("no such folder", file=folder, remedy="give the folder that suave-des run --out wrote")
-    folders = [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]
-    any_found = False
-    for each in folders:
+    is_any_found = False
+    for each in [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]:
         if (each / KNOWLEDGE_FILE).is_file():
-            any_found = True
-            yield _Recorded(each, "", _scenario(each / _MISSION_FILE), read_knowledge(each / KNOWLEDGE_FILE))
+            is_any_found = True
+            yield _RecordedMission(each, "", _scenario(each / _MISSION_FILE), read_knowledge(each / KNOWLEDGE_FILE))
         if (each / CAMPAIGN_KNOWLEDGE_FILE).is_file():
-            any_found = True
+            is_any_found = True
             for one in read_missions(each / CAMPAIGN_KNOWLEDGE_FILE):
                 point = f", point {one.point}" if one.point else ""
-                yield _Recorded(each, f"{one.manager}, run {one.run}{point}", one.scenario, one.records)
-    if not any_found:
+                yield _RecordedMission(each, f"{one.manager}, run {one.run}{point}", one.scenario, one.records)
+    if not is_any_found:
         raise InputError(
             f"has no {KNOWLEDGE_FILE} or {CAMPAIGN_KNOWLEDGE_FILE}, nor has a folder in it",
             file=folder,
@@ -184,28 +183,10 @@ def _scenario(path: Path) -> Scenario:
         raise InputError("is not a mission's record", file=path, remedy="run the mission again") from None
 
 
-def _with(base: Ontology, text: str) -> Ontology:
-    file = RulesFile(Path("the rule to try"), text, parse_rules(text, "the rule to try"))
-    content = with_rules(base.content, [file.rules(base.vocabulary)], ())
-    return replace(
-        base, content=content, rules=content.rules, content_hash=hash_with_rules(base.content_hash, [file], ())
-    )
-
-
-def _without(base: Ontology, name: str) -> Ontology:
-    try:
-        content = with_rules(base.content, [], [name])
-    except KnowledgeError as error:
-        raise KnowledgeError(error.problem, place="--disable", remedy=error.remedy) from None
-    return replace(
-        base, content=content, rules=content.rules, content_hash=hash_with_rules(base.content_hash, [], [name])
-    )
-
-
-class _Pair:
+class _Comparison:
     """The knowledge base of a scenario, without the change and with it."""
 
-    def __init__(self, scenario: Scenario, change: Change) -> None:
+    def __init__(self, scenario: Scenario, change: RuleChange) -> None:
         self.scenario = scenario
         if change.scenario is not None:
             loaded = load_scenario(change.scenario)
@@ -221,48 +202,52 @@ class _Pair:
             rules=[*rules, *change.rules],
             disabled_rules=[*used.knowledge.disabled_rules, *change.disabled_rules],
         )
-        if change.text is not None:
-            self.rule = parse_rule(change.text, "the rule to try").name
-            other = _with(base, change.text)
-        else:
-            self.rule = str(change.disabled)
-            other = _without(base, self.rule)
-        loop, limit = Loop.of(used), TimeLimit(change.limit_s, "--time-limit")
+        name = parse_rule(change.text, _GIVEN).name if change.text is not None else change.disabled
+        settings, limit = ManagingSettings.of(used), TimeLimit(change.limit_s, "--time-limit")
         reasoner = change.reasoner or used.knowledge.reasoner
-        self.before = KnowledgeBase.of(base, loop, reasoner, limit)
-        self.after = KnowledgeBase.of(other, loop, reasoner, limit)
-        self.has_rule, self.lacks_it = self.after, self.before
+        self.before = KnowledgeBase.of(base, settings, reasoner, limit)
+        self.after = KnowledgeBase.of(_changed(base, change), settings, reasoner, limit)
+        self.with_rule, self.without_rule = self.after, self.before
         if change.text is None:
-            self.has_rule, self.lacks_it = self.before, self.after
-        self.rules = [rule for rule in self.has_rule.base.content.enabled_rules if rule.name == self.rule]
+            self.with_rule, self.without_rule = self.before, self.after
+        self.rules = [rule for rule in self.with_rule.base.content.enabled_rules if rule.name == name]
 
-    def moment(self, record: KnowledgeRecord) -> Moment | None:
-        """What the change does at a recorded reasoning cycle; None: nothing."""
-        state: KnowledgeState = record.state
+    def replay(self, record: KnowledgeRecord) -> ReplayedCycle | None:
+        """What the change does in a recorded reasoning cycle; None: nothing."""
+        state = record.state
         recorded, _ = _decisions(self.before, state)
-        then, problem = _decisions(self.after, state)
-        firings: tuple[Firing, ...] = ()
-        if problem is None:
-            without = self.lacks_it.infer(state).inference
-            firings = tuple(_firings(Tracer(self.has_rule.base, state), self.rules, without.facts | without.asserted))
-        otherwise = tuple(
-            Otherwise(function, recorded.get(function), then.get(function))
-            for function in sorted(recorded.keys() | then.keys())
-            if problem is None and recorded.get(function) != then.get(function)
+        then, contradiction = _decisions(self.after, state)
+        if contradiction is not None:
+            return ReplayedCycle(record.t_s, state, (), (), contradiction)
+        without = self.without_rule.infer(state).inference
+        tracer = Tracer(self.with_rule.base, state)
+        firings = tuple(
+            Firing(facts, bindings, is_new=not (without.facts | without.asserted).issuperset(facts))
+            for rule in self.rules
+            for bindings, facts in tracer.firings(rule)
         )
-        if not firings and not otherwise and problem is None:
-            return None
-        return Moment(record.t_s, state, firings, otherwise, problem)
+        decisions = tuple(
+            ChangedDecision(function, recorded.get(function), then.get(function))
+            for function in sorted(recorded.keys() | then.keys())
+            if recorded.get(function) != then.get(function)
+        )
+        return ReplayedCycle(record.t_s, state, firings, decisions) if firings or decisions else None
 
 
-def _firings(tracer: Tracer, rules: Sequence[Rule], known: frozenset[Fact]) -> Iterator[Firing]:
-    for rule in rules:
-        for bindings, facts in tracer.firings(rule):
-            yield Firing(facts, bindings, is_new=not known.issuperset(facts))
+def _changed(base: Ontology, change: RuleChange) -> Ontology:
+    files = [] if change.text is None else [RulesFile(_GIVEN, change.text, parse_rules(change.text, _GIVEN))]
+    disabled = [] if change.disabled is None else [change.disabled]
+    groups = [file.rules(base.vocabulary) for file in files]
+    try:
+        content = with_rules(base.content, groups, disabled)
+    except KnowledgeError as error:
+        raise KnowledgeError(error.problem, place="--disable", remedy=error.remedy) from None
+    digest = hash_with_rules(base.content_hash, files, disabled)
+    return replace(base, content=content, rules=content.rules, content_hash=digest)
 
 
 def _decisions(bench: KnowledgeBase, state: KnowledgeState) -> tuple[dict[str, str | None], str | None]:
-    """Groundings that would be changed, by function; and the problem of a state that contradicts itself."""
+    """Groundings that would be changed, by function; and the contradiction in a state that has one."""
     try:
         decisions = bench.infer(state).plan.decisions
     except KnowledgeError as error:

@@ -1,19 +1,17 @@
-"""Which rules can never fire: a bound on what can hold in any state, from above.
+"""Find the rules that can never fire, by an upper bound on what can hold in any state.
 
-What no ontology asserts, no state brings and no rule that can fire concludes, cannot hold. Properties are taken one by
-one and individuals not told apart, so a rule that is said to be dead is dead, but not each dead rule is found.
+What no ontology asserts, no state adds and no rule that can fire concludes, cannot hold. Each property is considered
+by itself, and individuals are not told apart. So a rule that is reported is dead, but not every dead rule is reported.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Final
 
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.model import Model
-from suave_des.knowledge.rdf import Lit, Triple, canonical
+from suave_des.knowledge.rdf import Lit, canonical
 from suave_des.knowledge.rules.syntax import EXPRESSION, Atom, Named, Rule
-from suave_des.knowledge.rules.writer import write_atom
 from suave_des.knowledge.vocabulary import LANGUAGE_NAMESPACES, OWL, RDF_TYPE, RDFS, TOMASYS, XSD
 
 _ANY: Final = "any value"
@@ -23,14 +21,14 @@ _SPREADS: Final = (RDFS + "subPropertyOf", OWL + "inverseOf", OWL + "equivalentP
 
 
 class _Possible:
-    """Classes that can have members, and values that properties can have."""
+    """The classes that can have members, and the values that properties can have."""
 
-    def __init__(self, triples: Iterable[Triple], content: Content, model: Model) -> None:
+    def __init__(self, content: Content, model: Model) -> None:
         self.structure = "".join(content.structure)
         self.classes: set[str] = {OWL + "Thing", *(TOMASYS + name for name in ("Objective", "FunctionGrounding"))}
         self.values: dict[str, set[object]] = {}
-        self.axioms = [triple for triple in triples if triple[1].startswith(LANGUAGE_NAMESPACES)]
-        for _, predicate, value in triples:
+        self.axioms = [triple for triple in content.triples if triple[1].startswith(LANGUAGE_NAMESPACES)]
+        for _, predicate, value in content.triples:
             if predicate == RDF_TYPE and isinstance(value, str) and not value.startswith(LANGUAGE_NAMESPACES):
                 self.classes.add(value)
             elif not predicate.startswith(LANGUAGE_NAMESPACES):
@@ -82,11 +80,11 @@ class _Possible:
         return canonical(wanted) in values or (_ANY_TEXT in values and wanted.datatype == XSD + "string")
 
     def _is_defined(self, iri: str) -> bool:
-        """Whether a class expression or property chain speaks of it, which is not followed here."""
+        """Whether a class expression or a property chain mentions it; these are not followed here."""
         return f"<{iri}>" in self.structure
 
     def conclude(self, atom: Atom) -> None:
-        """Add what an atom of a head makes true."""
+        """Add what an atom of a head asserts."""
         if atom.kind == "class":
             self.classes.add(atom.predicate)
         elif atom.kind in ("object", "data") and len(atom.arguments) == 2:
@@ -95,15 +93,9 @@ class _Possible:
             known.add(canonical(value) if isinstance(value, Lit) else _ANY)
 
 
-def dead_rules(triples: Iterable[Triple], content: Content, model: Model) -> list[tuple[Rule, Atom]]:
-    """Enabled rules that no state can make fire, each with an atom that can never hold.
-
-    Args:
-        triples: all that the ontologies say outside of rules.
-        content: the ontologies and the rules.
-        model: what states are made of.
-    """
-    possible = _Possible(list(triples), content, model)
+def dead_rules(content: Content, model: Model) -> list[tuple[Rule, Atom]]:
+    """Find the enabled rules that fire in no state, each with an atom of its body that can never hold."""
+    possible = _Possible(content, model)
     waiting = list(content.enabled_rules)
     while True:
         firing = [rule for rule in waiting if all(map(possible.allows, rule.body))]
@@ -117,34 +109,25 @@ def dead_rules(triples: Iterable[Triple], content: Content, model: Model) -> lis
     return [(rule, next(atom for atom in rule.body if not possible.allows(atom))) for rule in waiting]
 
 
-def unmeasured(triples: Iterable[Triple], content: Content, model: Model) -> list[tuple[Rule, Atom, str]]:
-    """Enabled rules that want a grounding's value (hasQAvalue) of an attribute that no grounding gets a value of.
+def unmeasured_rules(content: Content, model: Model) -> list[tuple[Rule, Atom, str]]:
+    """Find the enabled rules that need a grounding's value (hasQAvalue) of an attribute of which no grounding has one.
 
-    A grounding gets the measured values of those attributes that its function design has an estimate of.
+    A grounding has the measured values of those attributes that its function design has an estimate of.
 
     Returns:
-        each with the atom that names the attribute, and the attribute's name.
+        each rule with the atom that names the attribute, and the attribute's name.
     """
     has_value, is_type = TOMASYS + "hasQAvalue", TOMASYS + "isQAtype"
     estimated = frozenset().union(*model.estimated.values())
     never = {iri: name for name, iri in model.attributes.items() if name not in estimated}
-    if content.head_properties() & {has_value, is_type} or any(triple[1] == has_value for triple in triples):
-        return []  # values come from elsewhere, too
+    if content.head_properties() & {has_value, is_type} or any(triple[1] == has_value for triple in content.triples):
+        return []  # groundings have values from elsewhere, too
     found = []
     for rule in content.enabled_rules:
         held = {atom.arguments[-1] for atom in rule.body if atom.predicate == has_value}
         for atom in rule.body:
-            term = atom.arguments[-1] if atom.arguments else None
-            if (
-                atom.predicate == is_type
-                and atom.arguments[0] in held
-                and isinstance(term, Named)
-                and term.iri in never
-            ):
-                found.append((rule, atom, never[term.iri]))
+            if atom.predicate == is_type and len(atom.arguments) == 2 and atom.arguments[0] in held:
+                term = atom.arguments[1]
+                if isinstance(term, Named) and term.iri in never:
+                    found.append((rule, atom, never[term.iri]))
     return found
-
-
-def atom_text(atom: Atom) -> str:
-    """An atom as its rule writes it."""
-    return write_atom(atom)

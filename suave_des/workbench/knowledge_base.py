@@ -1,4 +1,4 @@
-"""The knowledge workbench as one object: a knowledge base that can be asked."""
+"""The knowledge base: ontologies, rules and a reasoner that answer questions."""
 
 from __future__ import annotations
 
@@ -13,32 +13,38 @@ from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import KnowledgeState, Number
 from suave_des.scenario.loader import load_scenario
 from suave_des.simulation.knowledge import open_base
-from suave_des.workbench.difference import PolicyDifference, compare
 from suave_des.workbench.explain import Explanation, explain
-from suave_des.workbench.policy import Policy, Space, make_policy
+from suave_des.workbench.policy import Policy, PolicyDifference, compare, make_policy
+from suave_des.workbench.policy_space import PolicySpace
 from suave_des.workbench.query import QueryResult, run_query
-from suave_des.workbench.states import Loop, state_from
+from suave_des.workbench.state_input import ManagingSettings, StateBuilder
 
 DEFAULT_SCENARIO = "seams2023"
 
 
-def _several(files: str | Path | Sequence[str | Path]) -> Sequence[str | Path]:
-    return [files] if isinstance(files, str | Path) else files
+def _several(given: str | Path | Sequence[str | Path]) -> Sequence[str | Path]:
+    return [given] if isinstance(given, str | Path) else given
 
 
 @dataclass(frozen=True, eq=False)
 class KnowledgeBase:
-    """An ontology with a reasoner, and the loop that they are used in.
+    """Ontologies and rules with a reasoner, and the settings of the managing subsystem that uses them.
 
     Attributes:
-        base: the ontologies.
-        loop: what the managing subsystem does besides what the rules say.
+        base: the ontologies and rules.
+        settings: what the managing subsystem does besides what the rules say.
         reasoner: name of the reasoner.
         limit: of the reasoner's time for one state.
+
+    Example:
+        >>> knowledge = KnowledgeBase.load(rules="spare.swrl")
+        >>> state = knowledge.state(measurements={"water_visibility": 1.8})
+        >>> for decision in knowledge.infer(state).plan.decisions:
+        ...     print(decision.function, decision.design)
     """
 
     base: Ontology
-    loop: Loop
+    settings: ManagingSettings
     reasoner: str
     limit: TimeLimit = field(repr=False)
     _deliberation: Deliberation = field(repr=False)
@@ -78,12 +84,12 @@ class KnowledgeBase:
         )
         reasoner = loaded.scenario.knowledge.reasoner
         limit = TimeLimit(time_limit_s, "--time-limit")
-        return cls.of(open_base(loaded), Loop.of(loaded.scenario), reasoner, limit)
+        return cls.of(open_base(loaded), ManagingSettings.of(loaded.scenario), reasoner, limit)
 
     @classmethod
-    def of(cls, base: Ontology, loop: Loop, reasoner: str, limit: TimeLimit) -> KnowledgeBase:
-        """A workbench on ontologies that are loaded already."""
-        return cls(base, loop, reasoner, limit, Deliberation(base, make_reasoner(reasoner, base, limit)))
+    def of(cls, base: Ontology, settings: ManagingSettings, reasoner: str, limit: TimeLimit) -> KnowledgeBase:
+        """Start a reasoner on ontologies that are loaded already."""
+        return cls(base, settings, reasoner, limit, Deliberation(base, make_reasoner(reasoner, base, limit)))
 
     def state(
         self,
@@ -94,46 +100,46 @@ class KnowledgeBase:
         groundings: Mapping[str, str] | None = None,
         objectives: str | Iterable[str] | Mapping[str, str | None] = (),
     ) -> KnowledgeState:
-        """A state with names checked; without objectives, those of the groundings, else those of the search task.
+        """Build a state, with its names checked.
 
         Args:
-            file: YAML with any of objectives, groundings, components, measurements; what is given besides wins.
+            file: YAML with any of objectives, groundings, components, measurements; the other arguments replace what
+                it says.
             measurements: measured value by quality attribute type.
             components: c_status by component.
             groundings: function design by function.
-            objectives: functions, or o_status by function; none: UNGROUNDED without a grounding, else nothing.
+            objectives: functions, or o_status by function; None: UNGROUNDED without a grounding, else no status.
+                Without objectives, the state has those of the groundings, else those of the search task.
 
         Raises:
-            InputError: a name is unknown, or a value cannot be meant.
+            InputError: a name is unknown, or a value makes no sense.
         """
-
-        def words(parts: Mapping[str, object] | None) -> list[str]:
-            return [f"{name}={value}" for name, value in (parts or {}).items()]
-
-        def statuses(parts: Mapping[str, object]) -> list[str]:
-            return [name if status is None else f"{name}={status}" for name, status in parts.items()]
-
-        asked = [objectives] if isinstance(objectives, str) else objectives
-        return state_from(
-            self.base,
-            self.loop,
-            None if file is None else Path(file),
-            measured=words(measurements),
-            components=words(components),
-            groundings=words(groundings),
-            objectives=statuses(objectives) if isinstance(objectives, Mapping) else asked,
-        )
+        if not isinstance(objectives, Mapping):
+            objectives = dict.fromkeys([objectives] if isinstance(objectives, str) else objectives)
+        builder = StateBuilder(self.base, self.settings)
+        if file is not None:
+            builder.add_file(Path(file))
+        parts = {
+            "measurements": measurements,
+            "components": components,
+            "groundings": groundings,
+            "objectives": objectives,
+        }
+        for kind, given in parts.items():
+            for name, value in (given or {}).items():
+                builder.add(kind, name, value)
+        return builder.state()
 
     def infer(self, state: KnowledgeState) -> Conclusion:
-        """What the reasoner adds to a state, and the plan that follows.
+        """Infer what follows in a state, and plan on it.
 
         Raises:
             KnowledgeError: the state contradicts the ontologies, or the reasoner takes too long.
         """
-        return self._deliberation.analyze_and_plan(state, improve_exceeded=self.loop.improves_exceeded)
+        return self._deliberation.analyze_and_plan(state, improve_exceeded=self.settings.improves_exceeded)
 
     def explain(self, state: KnowledgeState, question: str = "") -> Explanation:
-        """Why a fact or a decision follows in a state, or why the state contradicts itself.
+        """Explain why a fact or a decision follows in a state, or why the state contradicts itself.
 
         Args:
             state: the state.
@@ -145,39 +151,32 @@ class KnowledgeBase:
             KnowledgeError: the reasoner takes too long.
         """
         doing = f"explaining the state {in_words(state)}"
-        return self.limit.run(lambda: explain(self.base, state, question, self.loop.improves_exceeded), doing)
+        return self.limit.run(lambda: explain(self.base, state, question, self.settings.improves_exceeded), doing)
 
     def policy(self, max_failed: int = 2) -> Policy:
-        """What is decided in every state.
-
-        Args:
-            max_failed: at most so many components report anything.
+        """Decide every state, with at most so many components that report anything.
 
         Raises:
             InputError: there would be too many states.
             KnowledgeError: the reasoner takes too long for one of them.
         """
-        return make_policy(self.base, self.loop, self.infer, max_failed)
+        return make_policy(self.base, self.settings, self.infer, max_failed)
 
     def diff(self, other: KnowledgeBase, max_failed: int = 2) -> PolicyDifference:
-        """Where another knowledge base decides differently, over everything that either of them distinguishes.
-
-        Args:
-            other: the other one.
-            max_failed: at most so many components report anything.
+        """Find the states that another knowledge base decides differently, over all that either of them tells apart.
 
         Raises:
             InputError: there would be too many states.
             KnowledgeError: the reasoner takes too long for one of them.
         """
-        space = Space.of(self.base, self.loop).common(Space.of(other.base, other.loop))
+        space = PolicySpace.of(self.base, self.settings).common(PolicySpace.of(other.base, other.settings))
         return compare(
-            make_policy(self.base, self.loop, self.infer, max_failed, space),
-            make_policy(other.base, other.loop, other.infer, max_failed, space),
+            make_policy(self.base, self.settings, self.infer, max_failed, space),
+            make_policy(other.base, other.settings, other.infer, max_failed, space),
         )
 
     def query(self, text: str, state: KnowledgeState | None = None, *, inferred: bool = False) -> QueryResult:
-        """Ask in SPARQL.
+        """Answer a query in SPARQL.
 
         Args:
             text: the query; see suave_des.workbench.query.run_query.
@@ -185,7 +184,7 @@ class KnowledgeBase:
             inferred: adds what Pellet infers.
 
         Raises:
-            InputError: it is no query.
+            InputError: it is not a query.
             KnowledgeError: the state contradicts itself, or it takes too long.
         """
         return self.limit.run(lambda: run_query(self.base, text, state, inferred=inferred), "answering the query")

@@ -1,0 +1,208 @@
+"""Check the model in the ontologies: its names, functions, designs and modes, and its shape (SHACL)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+from rdflib import Graph, Namespace, URIRef
+from rdflib.plugins.parsers.notation3 import BadSyntax
+from rdflib.term import Node
+
+from suave_des.errors import InputError
+from suave_des.knowledge.content import Content
+from suave_des.knowledge.model import Model, expectations
+from suave_des.knowledge.ontology_file import OntologyFile, without_log
+from suave_des.knowledge.rules.names import Vocabulary
+from suave_des.knowledge.rules.syntax import Named
+from suave_des.knowledge.vocabulary import (
+    LANGUAGE_NAMESPACES,
+    PERFORMANCE,
+    RDF_TYPE,
+    TOMASYS,
+    local_name,
+    namespace,
+    nearest,
+)
+from suave_des.resources import shipped_folder
+from suave_des.workbench.findings import Finding, Level, finding_about
+
+#: Modes that are no function design: the one that a cancelled task sets, and the one that a file starts with.
+_NO_DESIGNS: Final = {"fd_unground", "__DEFAULT__"}
+_PROPERTIES: Final = ("object property", "data property", "annotation property")
+_SH: Final = Namespace("http://www.w3.org/ns/shacl#")
+_REASON: Final = re.compile(r"Bad syntax \((.*?)\) at \^ in:", re.DOTALL)
+_LEVELS: Final = {_SH.Violation: Level.ERROR, _SH.Warning: Level.WARN, _SH.Info: Level.INFO}
+_TURTLE: Final = "give SHACL shapes in Turtle"
+
+
+def undefined_names(
+    content: Content, model: Model | None, vocabulary: Vocabulary, sources: Sequence[OntologyFile]
+) -> Iterator[Finding]:
+    """Find the classes, properties and individuals that are used and defined nowhere: most are misspelt.
+
+    Names of other vocabularies than those of the ontologies may be defined elsewhere, and are a warning.
+    """
+    groups = (model.objectives, model.groundings, model.measurements) if model is not None else ()
+    described = {subject for subject, _, _ in content.triples}
+    described |= {individual.iri for group in groups for individual in group.values()}
+    namespaces = {namespace(iri) for iri in described}
+
+    def undefined(subject: str, what: str, name: str, *kinds: str) -> Finding:
+        bare = local_name(name)
+        known = [iri for iri in described if vocabulary.kinds.get(iri, frozenset()) & {*kinds}]
+        same = sorted(iri for iri in known if local_name(iri) == bare)
+        remedy = f"did you mean {' or '.join(same)}?" if same else nearest(bare, set(map(local_name, known)))
+        level = Level.ERROR if namespace(name) in namespaces else Level.WARN
+        message = f"{local_name(subject)}: {what} is not defined"
+        return finding_about(local_name(subject), sources, level, message, remedy)
+
+    for subject, predicate, value in content.triples:
+        own_value = isinstance(value, str) and not value.startswith(LANGUAGE_NAMESPACES)
+        if predicate == RDF_TYPE:
+            if own_value and "class" not in vocabulary.kinds.get(str(value), ()):
+                yield undefined(subject, f"class {local_name(str(value))}", str(value), "class")
+        elif not predicate.startswith(LANGUAGE_NAMESPACES):
+            if predicate not in described:
+                yield undefined(subject, f"property {local_name(predicate)}", predicate, *_PROPERTIES)
+            elif own_value and value not in described and "object property" in vocabulary.kinds.get(predicate, ()):
+                what = f"{local_name(predicate)} {local_name(str(value))}"
+                yield undefined(subject, what, str(value), "individual")
+
+
+def check_designs(
+    content: Content,
+    model: Model,
+    sources: Sequence[OntologyFile],
+    modes: Mapping[str, Collection[str]] | None,
+    required: Collection[str],
+) -> Iterator[Finding]:
+    """Check that functions have designs, and designs have modes.
+
+    Args:
+        content: the ontologies.
+        model: the functions and designs in them.
+        sources: the files that they come from.
+        modes: names of the modes by function; None: modes are not checked.
+        required: functions that the mission cannot do without.
+    """
+    designs: dict[str, set[str]] = {name: set() for name in model.functions}
+    functions = {iri: name for name, iri in model.functions.items()}
+    names = {iri: name for name, iri in model.designs.items()}
+    for design, predicate, function in content.triples:
+        if predicate == TOMASYS + "solvesF" and design in names and function in functions:
+            designs[functions[str(function)]].add(names[design])
+    for name in sorted({*model.functions, *required}):
+        level = Level.ERROR if name in required else Level.WARN
+        if name not in model.functions:
+            message = f"there is no function {name}, which the mission needs"
+            yield finding_about(name, sources, Level.ERROR, message)
+        elif not designs[name]:
+            remedy = f"add an individual of FunctionDesign with solvesF {name}"
+            yield finding_about(name, sources, level, f"function {name} has no function design", remedy)
+        if modes is not None:
+            named, solving = set(modes.get(name, ())), designs.get(name, set())
+            spare = named - solving - _NO_DESIGNS
+            for design in sorted(solving - named):
+                remedy = nearest(design, spare) or (
+                    "add a mode of this name to the System Modes file, or remove the design"
+                )
+                message = f"function design {design} has no mode of its name for {name}"
+                yield finding_about(design, sources, level, message, remedy)
+            for mode in sorted(spare):
+                message = f"mode {mode} of {name} has no function design, so it is never chosen"
+                yield finding_about(name, sources, Level.WARN, message)
+
+
+def designs_without_performance(content: Content, model: Model, sources: Sequence[OntologyFile]) -> Iterator[Finding]:
+    """Find the function designs without an expected performance."""
+    expected = expectations(content, model)
+    for name in sorted(model.designs):
+        if local_name(PERFORMANCE) not in expected.get(name, {}):
+            remedy = "add a hasQAestimation of type performance"
+            message = f"function design {name} has no performance, and counts 0.001"
+            yield finding_about(name, sources, Level.WARN, message, remedy)
+
+
+def unused_individuals(content: Content, model: Model, sources: Sequence[OntologyFile]) -> Iterator[Finding]:
+    """Find the individuals that no fact and no rule mentions, and that have no meaning by themselves."""
+    mentioned = {value for _, predicate, value in content.triples if predicate != RDF_TYPE and isinstance(value, str)}
+    mentioned |= {
+        term.iri for rule in content.rules for atom in rule.atoms for term in atom.arguments if isinstance(term, Named)
+    }
+    components = {*model.components.values()}
+    mentioned |= {
+        subject for subject, name, _ in content.triples if not name.startswith(LANGUAGE_NAMESPACES)
+    } & components
+    mentioned |= {*model.designs.values()}
+    mentioned |= {
+        one.iri for group in (model.objectives, model.groundings, model.measurements) for one in group.values()
+    }
+    individuals = {
+        subject
+        for subject, predicate, value in content.triples
+        if predicate == RDF_TYPE and isinstance(value, str) and not value.startswith(LANGUAGE_NAMESPACES)
+    }
+    for name in sorted(local_name(iri) for iri in individuals - mentioned if not iri.startswith(TOMASYS)):
+        yield finding_about(name, sources, Level.INFO, f"nothing refers to {name}")
+
+
+def check_shapes(sources: Sequence[OntologyFile], more: Sequence[Path]) -> Iterator[Finding]:
+    """Check the model against SHACL shapes, the shipped ones and more.
+
+    Raises:
+        InputError: a file of shapes cannot be read.
+    """
+    from pyshacl import validate
+
+    shapes = Graph()
+    for path in (shipped_folder("ontology") / "tomasys-shapes.ttl", *more):
+        shapes += _read_shapes(path)
+    data = Graph()
+    for source in sources:
+        data += source.graph
+    try:
+        _, report, _ = validate(data, shacl_graph=shapes, do_owl_imports=False, meta_shacl=False, inplace=False)
+    except Exception as error:  # each kind of malformed shape raises another error
+        reason = " ".join(str(error).split())
+        raise InputError(f"the shapes cannot be used: {reason}", file=", ".join(map(str, more)) or None) from error
+    assert isinstance(report, Graph)
+    for result in report.subjects(_SH.resultSeverity, None):
+        yield _shape_finding(report, result, sources)
+
+
+def _read_shapes(path: Path) -> Graph:
+    graph = Graph()
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", file=path, remedy=_TURTLE) from error
+    if content.lstrip().startswith((b"<?xml", b"<rdf:RDF")):
+        raise InputError("this is XML, not Turtle", file=path, remedy=_TURTLE)
+    place = None
+    try:
+        with without_log():
+            return graph.parse(data=content, format="turtle")
+    except UnicodeDecodeError as error:
+        raise InputError("is not UTF-8 text", file=path, remedy="save it as UTF-8") from error
+    except BadSyntax as error:
+        found = _REASON.search(str(error))
+        reason, place = found.group(1) if found else "bad syntax", f"line {error.lines + 1}"
+    except Exception as error:  # the parser meets the end of a truncated file in many ways
+        reason = "it ends too early" if isinstance(error, IndexError) else " ".join(str(error).split())[:200]
+    raise InputError(f"is not Turtle: {reason}", file=path, place=place, remedy=_TURTLE)
+
+
+def _shape_finding(report: Graph, result: Node, sources: Sequence[OntologyFile]) -> Finding:
+    def value(name: str) -> str:
+        return str(report.value(result, _SH[name]) or "")
+
+    name, path = local_name(value("focusNode")), local_name(value("resultPath") or "")
+    level = _LEVELS.get(URIRef(value("resultSeverity")), Level.ERROR)
+    focus = report.value(result, _SH.focusNode)
+    described = [source for source in sources if source.line_of(name)]
+    mentioning = [source for source in sources if focus in source.graph.all_nodes()]
+    message = ": ".join(filter(None, (name, path, value("resultMessage"))))
+    return finding_about(name, described or mentioning or sources, level, message)

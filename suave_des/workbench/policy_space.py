@@ -1,0 +1,324 @@
+"""The states that a policy tells apart: ranges of measured values, and reports of interchangeable components.
+
+A rule that only compares numbers cannot tell two values apart that compare alike with every number in the knowledge
+base. So one value stands for each range between two numbers; equality with a number is a range of its own. Likewise
+only the number of components with a status counts where ontologies and rules treat components alike.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from math import comb
+from typing import Final
+
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rdf import Lit, Triple
+from suave_des.knowledge.regions import regions_of
+from suave_des.knowledge.rules.syntax import Atom, Named, Rule, Variable
+from suave_des.knowledge.state import exact
+from suave_des.knowledge.vocabulary import OWL, RDFS, SWRLB, TOMASYS, XSD
+from suave_des.workbench.state_input import ManagingSettings
+
+COMPARISONS: Final = frozenset(
+    SWRLB + name for name in ("equal", "notEqual", "lessThan", "lessThanOrEqual", "greaterThan", "greaterThanOrEqual")
+)
+_IS_QA_TYPE: Final = TOMASYS + "isQAtype"
+_HAS_VALUE: Final = TOMASYS + "hasValue"
+_OF_VALUES: Final = frozenset({_IS_QA_TYPE, _HAS_VALUE})
+_C_STATUS: Final = TOMASYS + "c_status"
+
+
+@dataclass(frozen=True, slots=True)
+class ValueRange:
+    """A range of measured values, or no measurement.
+
+    Attributes:
+        low, high: its ends; None: it has none there.
+        low_closed, high_closed: whether the end belongs to it.
+        is_missing: whether there is no measurement.
+
+    Example:
+        >>> str(ValueRange(Decimal("1.25"), Decimal("2.25"), low_closed=True))
+        '1.25 <= . < 2.25'
+    """
+
+    low: Decimal | None = None
+    high: Decimal | None = None
+    low_closed: bool = False
+    high_closed: bool = False
+    is_missing: bool = False
+
+    def __str__(self) -> str:
+        """In words: "not measured", "1.25", "< 1.25", ">= 1.25", "1.25 <= . < 2.25"."""
+        if self.is_missing:
+            return "not measured"
+        if self.is_number:
+            return str(self.low)
+        below = "" if self.high is None else f"{'<=' if self.high_closed else '<'} {self.high}"
+        if self.low is None:
+            return below or "any"
+        if self.high is None:
+            return f"{'>=' if self.low_closed else '>'} {self.low}"
+        return f"{self.low} {'<=' if self.low_closed else '<'} . {below}"
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it is one number."""
+        return self.low is not None and self.low == self.high
+
+    def value(self, step: int = 0, steps: int = 1) -> Decimal | None:
+        """A value in it; in an open range the `step`-th of `steps` ascending ones."""
+        if self.is_missing or self.is_number:
+            return self.low
+        low = self.low if self.low is not None else (self.high or Decimal(0)) - 1
+        high = self.high if self.high is not None else low + 1
+        return exact(low + (high - low) * (step + 1) / Decimal(2 ** steps.bit_length()))
+
+    def joined(self, following: ValueRange) -> ValueRange:
+        """The range of this one and the one that follows it."""
+        return ValueRange(self.low, following.high, self.low_closed, following.high_closed)
+
+
+def numbers_in(base: Ontology) -> tuple[Decimal, ...]:
+    """Every number in the ontologies and enabled rules, ascending."""
+    return tuple(map(exact, regions_of(base).thresholds))
+
+
+def ranges_between(numbers: Sequence[Decimal]) -> tuple[ValueRange, ...]:
+    """No measurement, then each open range and each number, ascending."""
+    ends: list[Decimal | None] = [None, *numbers, None]
+    found = [ValueRange(is_missing=True)]
+    for low, high in itertools.pairwise(ends):
+        found.append(ValueRange(low, high))
+        if high is not None:
+            found.append(ValueRange(high, high, True, True))
+    return tuple(found)
+
+
+def values_in(ranges: Sequence[ValueRange]) -> Iterator[tuple[Decimal | None, ...]]:
+    """Values of several attributes, one in each given range, for every order that the values can have.
+
+    Values in different ranges are ordered by these; those in the same open range can be in any order, and equal.
+    """
+    places: dict[ValueRange, list[int]] = {}
+    for place, one in enumerate(ranges):
+        if not one.is_missing and not one.is_number:
+            places.setdefault(one, []).append(place)
+    shared = [(one, group) for one, group in places.items() if len(group) > 1]
+    for ranks in itertools.product(*(_weak_orders(len(group)) for _, group in shared)):
+        values = [one.value() for one in ranges]
+        for (one, group), order in zip(shared, ranks, strict=True):
+            for place, rank in zip(group, order, strict=True):
+                values[place] = one.value(rank, len(group))
+        yield tuple(values)
+
+
+def _weak_orders(size: int) -> Iterator[tuple[int, ...]]:
+    """All ways to rank things, ties allowed: ranks from 0 without gaps."""
+    ranks = itertools.product(range(size), repeat=size)
+    return (each for each in ranks if set(each) == set(range(max(each) + 1)))
+
+
+def rules_that_compute(base: Ontology) -> tuple[str, ...]:
+    """Names of enabled rules that do more with numbers than compare them: for these, ranges prove nothing."""
+    return tuple(sorted({rule.name for rule in base.content.enabled_rules if _computes(rule)}))
+
+
+def _computes(rule: Rule) -> bool:
+    return any(
+        atom.kind == "range" or (atom.kind == "builtin" and atom.predicate not in COMPARISONS) for atom in rule.body
+    ) or any(atom.kind == "data" and isinstance(atom.arguments[-1], Variable) for atom in rule.head)
+
+
+def has_effect(base: Ontology, attribute: str) -> bool:
+    """Whether a measured value of a quality attribute can have any effect.
+
+    It has none if no design expects one, and no rule can match the individual that carries it: what is known of that
+    is its class, isQAtype and hasValue. Where the schema has more to say (class expressions, properties related to
+    these), the attribute counts as one with an effect.
+    """
+    iri = base.model.attributes[attribute]
+    measured = base.model.measurements[attribute]
+    triples = base.content.triples
+    expressions = any(f"<{OWL}{kind}>" in line for kind in ("Class", "Restriction") for line in base.content.structure)
+    if measured.own or expressions or any(attribute in kinds for kinds in base.model.estimated.values()):
+        return True
+    related = ("subPropertyOf", "inverseOf", "equivalentProperty")
+    if any(
+        (predicate == _IS_QA_TYPE and value == iri)
+        or (predicate.endswith(related) and (subject in _OF_VALUES or value in _OF_VALUES))
+        for subject, predicate, value in triples
+    ):
+        return True
+    # The classes of the individual: QAvalue, what the domains of its properties say, and all above.
+    classes = {TOMASYS + "QAvalue", OWL + "Thing"}
+    while True:
+        more = {
+            value
+            for subject, predicate, value in triples
+            if isinstance(value, str)
+            and (
+                (predicate == RDFS + "domain" and subject in _OF_VALUES)
+                or (predicate in (RDFS + "subClassOf", OWL + "equivalentClass") and subject in classes)
+            )
+        }
+        if more <= classes:
+            return any(_can_match(rule, iri, measured.iri, classes) for rule in base.content.enabled_rules)
+        classes |= more
+
+
+def _can_match(rule: Rule, attribute: str, measured: str, classes: set[str]) -> bool:
+    """Whether a variable of a rule, or a name in it, can stand for the individual of a measured value."""
+
+    def could_hold(atom: Atom, term: Variable) -> bool:
+        if atom.arguments[0] != term:
+            return False
+        if atom.predicate == _IS_QA_TYPE:
+            return isinstance(atom.arguments[-1], Variable) or atom.arguments[-1] == Named(attribute)
+        return atom.predicate in classes if atom.kind == "class" else atom.predicate == _HAS_VALUE
+
+    terms = {term for atom in rule.atoms for term in atom.arguments}
+    if Named(measured) in terms or any(atom.kind in ("same", "different") for atom in rule.atoms):
+        return True
+    subjects = {atom.arguments[0] for atom in rule.body if atom.kind in ("class", "object", "data")}
+    return any(
+        all(could_hold(atom, term) for atom in rule.body if term in atom.arguments)
+        for term in subjects
+        if isinstance(term, Variable)
+    )
+
+
+def interchangeable_components(base: Ontology) -> tuple[tuple[str, ...], ...]:
+    """Group the components that can be exchanged: doing so maps ontologies and rules onto themselves."""
+    groups: list[list[str]] = []
+    for name in base.components:
+        group = next((each for each in groups if _exchangeable(base, each[0], name)), None)
+        if group is None:
+            groups.append([name])
+        else:
+            group.append(name)
+    return tuple(map(tuple, groups))
+
+
+def _exchangeable(base: Ontology, one: str, other: str) -> bool:
+    model, content = base.model, base.content
+    a, b = model.components[one], model.components[other]
+    if any(f"<{iri}>" in line for iri in (a, b) for line in content.structure):
+        return False
+    if any(Named(iri) in atom.arguments for iri in (a, b) for rule in content.enabled_rules for atom in rule.atoms):
+        return False
+    swap: dict[str | Lit, str] = {a: b, b: a}
+
+    def swapped(triple: Triple) -> Triple:
+        subject, predicate, value = triple
+        return swap.get(subject, subject), predicate, swap.get(value, value)
+
+    own = {
+        triple
+        for triple in (*content.triples, *model.initial.get(one, ()), *model.initial.get(other, ()))
+        if triple[0] in swap or triple[2] in swap
+    }
+    return {swapped(triple) for triple in own} == own
+
+
+def component_statuses(base: Ontology) -> tuple[str, ...]:
+    """Values of c_status to look at: what the thruster monitor reports, and what enabled rules ask for."""
+    asked = {
+        term.text
+        for rule in base.content.enabled_rules
+        for atom in rule.body
+        if atom.predicate == _C_STATUS
+        for term in atom.arguments
+        if isinstance(term, Lit) and term.datatype == XSD + "string"
+    }
+    return tuple(sorted({*asked, "FALSE", "RECOVERED"}))
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentReports:
+    """What components report; stands for all reports that differ by an exchange of interchangeable components.
+
+    Attributes:
+        components: (component, c_status), the first ones of each group of interchangeable components.
+        combinations: how many combinations it stands for.
+    """
+
+    components: tuple[tuple[str, str], ...]
+    combinations: int
+
+
+def component_reports(
+    groups: Sequence[Sequence[str]], statuses: Sequence[str], most: int
+) -> Iterator[ComponentReports]:
+    """All that components can report, up to an exchange of interchangeable ones, fewest reports first.
+
+    Args:
+        groups: of interchangeable components.
+        statuses: that a component can report.
+        most: at most so many components report at all.
+    """
+    counts = [list(_counts(len(statuses), min(most, len(group)))) for group in groups]
+    for chosen in itertools.product(*counts):
+        if sum(map(sum, chosen)) > most:
+            continue
+        components: list[tuple[str, str]] = []
+        combinations = 1
+        for group, numbers in zip(groups, chosen, strict=True):
+            left = list(group)
+            for status, number in zip(statuses, numbers, strict=True):
+                combinations *= comb(len(left), number)
+                components += [(left.pop(0), status) for _ in range(number)]
+        yield ComponentReports(tuple(components), combinations)
+
+
+def _counts(kinds: int, most: int) -> list[tuple[int, ...]]:
+    """How many components report each status."""
+    found = [numbers for numbers in itertools.product(range(most + 1), repeat=kinds) if sum(numbers) <= most]
+    return sorted(found, key=lambda numbers: (sum(numbers), [-number for number in numbers]))
+
+
+@dataclass(frozen=True)
+class PolicySpace:
+    """What a policy tells apart.
+
+    Attributes:
+        attributes: quality attributes whose measured values have an effect.
+        numbers: ends of the ranges, ascending.
+        alike: groups of interchangeable components.
+        statuses: that components can report.
+    """
+
+    attributes: tuple[str, ...]
+    numbers: tuple[Decimal, ...]
+    alike: tuple[tuple[str, ...], ...]
+    statuses: tuple[str, ...]
+
+    @classmethod
+    def of(cls, base: Ontology, settings: ManagingSettings) -> PolicySpace:
+        """What can have an effect in these ontologies."""
+        attributes = tuple(name for name in measured_attributes(base, settings) if has_effect(base, name))
+        return cls(attributes, numbers_in(base), interchangeable_components(base), component_statuses(base))
+
+    def common(self, other: PolicySpace) -> PolicySpace:
+        """What has an effect in either; components are alike only if they are so in both that have them."""
+        groups: dict[tuple[int, int], list[str]] = {}
+        for number, group in enumerate(self.alike):
+            for name in group:
+                there = next((place for place, each in enumerate(other.alike) if name in each), -1)
+                groups.setdefault((number, there), []).append(name)
+        known = {name for group in self.alike for name in group}
+        only_there = (tuple(name for name in group if name not in known) for group in other.alike)
+        return PolicySpace(
+            tuple(sorted({*self.attributes, *other.attributes})),
+            tuple(sorted({*self.numbers, *other.numbers})),
+            (*map(tuple, groups.values()), *filter(None, only_there)),
+            tuple(sorted({*self.statuses, *other.statuses})),
+        )
+
+
+def measured_attributes(base: Ontology, settings: ManagingSettings) -> list[str]:
+    """Quality attributes of the ontologies that the scenario measures."""
+    return [name for name in settings.measured if name in base.quality_attributes]

@@ -1,0 +1,188 @@
+"""States as people write them: mappings in Python, a YAML file, or NAME=VALUE on the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from decimal import Decimal
+from pathlib import Path
+from typing import Any, Final
+
+from suave_des.domain import GENERATE_SEARCH_PATH, MAINTAIN_MOTION
+from suave_des.errors import InputError, KeyPath, KnowledgeError, did_you_mean, shown
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.planning import calls
+from suave_des.knowledge.rdf import Lit
+from suave_des.knowledge.state import KnowledgeState, ObjectiveState
+from suave_des.knowledge.vocabulary import TOMASYS, XSD, nearest
+from suave_des.scenario.models import Scenario
+from suave_des.scenario.yamlfile import read_yaml
+
+UNGROUNDED: Final = "UNGROUNDED"
+#: Functions that every task of the mission asks for.
+LASTING: Final = (MAINTAIN_MOTION,)
+_STATUSES: Final = {"components": "c_status", "objectives": "o_status"}
+_KEYS: Final = ("objectives", "groundings", "components", "measurements")
+
+
+@dataclass(frozen=True)
+class ManagingSettings:
+    """What the managing subsystem does in code, besides what the rules say.
+
+    Attributes:
+        improves_exceeded: whether an objective is also adapted when a measured value exceeds what its present design
+            expects (revision 2023).
+        always_improved: functions whose objective carries o_always_improve (revision 1.5).
+        measured: quality attribute types that the scenario measures.
+    """
+
+    improves_exceeded: bool = False
+    always_improved: frozenset[str] = frozenset()
+    measured: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> ManagingSettings:
+        """Read the settings of a scenario's revision."""
+        revision = scenario.revision.metacontrol
+        battery = ("battery_level",) if scenario.battery is not None else ()
+        return cls(
+            improves_exceeded=revision.search_improves_when_exceeded,
+            always_improved=frozenset({GENERATE_SEARCH_PATH} if revision.search_always_improves else ()),
+            measured=tuple(sorted({*scenario.signals, *battery})),
+        )
+
+    def objective(self, function: str, design: str | None, status: str | None = None) -> ObjectiveState:
+        """Make a function's objective; without a grounding it is UNGROUNDED."""
+        known = status if status is not None or design is not None else UNGROUNDED
+        return ObjectiveState(function, known, function in self.always_improved)
+
+
+@dataclass
+class StateBuilder:
+    """Builds a state from parts whose names it checks. Later parts replace earlier ones.
+
+    Example:
+        >>> builder = StateBuilder(Ontology.load(), ManagingSettings())
+        >>> builder.add_words("measurements", "--set", ["water_visibility=1.8"])
+        >>> builder.state().measurements
+        (('water_visibility', Decimal('1.8')),)
+    """
+
+    base: Ontology
+    settings: ManagingSettings
+    objectives: dict[str, str | None] = field(default_factory=dict)
+    groundings: dict[str, str] = field(default_factory=dict)
+    components: dict[str, str] = field(default_factory=dict)
+    measurements: dict[str, Any] = field(default_factory=dict)
+
+    def add(self, kind: str, name: str, value: Any) -> None:
+        """Add one part: one of the objectives, groundings, components or measurements.
+
+        Raises:
+            InputError: the knowledge base has no such name, or the value makes no sense.
+        """
+        what, known = {
+            "components": ("component", self.base.components),
+            "measurements": ("quality attribute", self.base.quality_attributes),
+        }.get(kind, ("function", self.base.functions))
+        if name not in known:
+            raise InputError(f"there is no {what} {shown(name)}", remedy=did_you_mean(name, known))
+        if kind == "measurements":
+            if isinstance(value, bool) or not isinstance(value, int | float | str | Decimal):
+                raise InputError(f"{name}: {shown(value)} is not a number", remedy=f"for instance {name}: 1.8")
+            KnowledgeState.of(measurements={name: value})  # raises if it is not a number
+        else:
+            if isinstance(value, bool):  # YAML reads a bare FALSE as one
+                value = str(value).upper()
+            if not isinstance(value, str) and not (kind == "objectives" and value is None):
+                raise InputError(f"{name}: {shown(value)} is not a word", remedy="put it in quotes")
+        if isinstance(value, str) and kind in _STATUSES:
+            self._check_status(_STATUSES[kind], value)
+        if kind == "groundings" and value not in self.base.designs(name):
+            remedy = did_you_mean(value, self.base.designs(name))
+            raise InputError(f"{name} has no function design {shown(value)}", remedy=remedy)
+        getattr(self, kind)[name] = value
+
+    def _check_status(self, property_name: str, value: str) -> None:
+        """Refuse a status that is nearly one that a rule mentions: nothing would follow from it."""
+        known = {
+            term.text
+            for rule in self.base.rules
+            for atom in rule.atoms
+            if atom.predicate == TOMASYS + property_name
+            for term in atom.arguments
+            if isinstance(term, Lit) and term.datatype == XSD + "string"
+        }
+        if property_name == "o_status":
+            known.add(UNGROUNDED)
+        if value not in known and not calls(value) and nearest(value.upper(), known) is not None:
+            remedy = did_you_mean(value.upper(), sorted(known))
+            raise InputError(f"no rule mentions the {property_name} {shown(value)}", remedy=remedy)
+
+    def add_words(self, kind: str, option: str, words: Iterable[str]) -> None:
+        """Add parts as NAME=VALUE, such as water_visibility=1.8; an objective may be a name alone.
+
+        Raises:
+            InputError: as add does, with the option as its place.
+        """
+        for word in words:
+            name, equals, value = word.partition("=")
+            if not equals and kind != "objectives":
+                raise InputError(f"{shown(word)} has no value", place=option, remedy=f"{option} NAME=VALUE")
+            try:
+                self.add(kind, name.strip(), value.strip() if equals else None)
+            except InputError as error:
+                raise InputError(error.problem, place=option, remedy=error.remedy) from None
+
+    def add_file(self, path: Path) -> None:
+        """Add the parts in a YAML file with any of the mappings objectives, groundings, components, measurements.
+
+        Raises:
+            InputError: the file cannot be read, or as add does, with line and key.
+        """
+        document = read_yaml(path)
+        for key, content in document.data.items():
+            if key not in _KEYS:
+                raise document.error(f"{shown(key)} is not part of a state", (key,), did_you_mean(key, _KEYS))
+            if isinstance(content, list) and key == "objectives":
+                entries: list[tuple[Any, Any, KeyPath]] = [(name, None, (key, at)) for at, name in enumerate(content)]
+            elif isinstance(content, Mapping):
+                entries = [(name, value, (key, name)) for name, value in content.items()]
+            else:
+                raise document.error(f"{shown(content)} is not a mapping", (key,), "write `name: value` lines under it")
+            for name, value, key_path in entries:
+                try:
+                    self.add(key, str(name), value)
+                except InputError as error:
+                    raise document.error(error.problem, key_path, error.remedy) from None
+
+    def state(self) -> KnowledgeState:
+        """Build the state. Without objectives, it has those of the groundings, else those of the search task.
+
+        Raises:
+            KnowledgeError: the ontologies have no function that an objective could ask for.
+        """
+        if not self.base.functions:
+            raise KnowledgeError(
+                "there is no function, so there is nothing to decide",
+                file=", ".join(map(str, self.base.files)),
+                remedy="give an ontology that uses TOMASys as suave.owl does",
+            )
+        search = [name for name in (*LASTING, GENERATE_SEARCH_PATH) if name in self.base.functions]
+        asked = self.objectives or dict.fromkeys(self.groundings or search)
+        return KnowledgeState.of(
+            [self.settings.objective(name, self.groundings.get(name), status) for name, status in asked.items()],
+            groundings=self.groundings,
+            components=self.components,
+            measurements=self.measurements,
+        )
+
+
+def state_dict(state: KnowledgeState) -> dict[str, Any]:
+    """The content of a YAML or JSON file for a state; numbers are text, so that they stay exact."""
+    return {
+        "objectives": {each.function: each.status for each in state.objectives},
+        "groundings": dict(state.groundings),
+        "components": dict(state.components),
+        "measurements": {name: format(value, "f") for name, value in state.measurements},
+    }
