@@ -26,16 +26,16 @@ class Derivation:
         source: "state" or "ontology" where it is asserted, "rule", or "axioms" where it follows from the schema.
         rule: the rule's name.
         bindings: value of each of the rule's variables, by variable.
-        premises: the facts of the rule's body, instantiated.
         axioms: the axioms of the schema that were used.
+        premises: the facts of the rule's body, instantiated.
     """
 
     fact: Fact
     source: str
     rule: str | None = None
     bindings: tuple[tuple[str, Value], ...] = ()
-    premises: tuple[Derivation, ...] = ()
     axioms: tuple[str, ...] = ()
+    premises: tuple[Derivation, ...] = ()
 
     def __str__(self) -> str:
         """As a tree of lines."""

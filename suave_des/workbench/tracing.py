@@ -128,7 +128,7 @@ class Tracer:
                             yield self._by_rule(triple, rule, binding, premises)
 
     def _by_rule(self, triple: Triple, rule: Rule, binding: Binding, premises: Sequence[Derivation]) -> Derivation:
-        return Derivation(self._fact(triple), "rule", rule.name, self._bindings(binding), tuple(premises))
+        return Derivation(self._fact(triple), "rule", rule.name, self._bindings(binding), premises=tuple(premises))
 
     def _by_schema(self, triple: Triple, above: frozenset[Triple]) -> Iterator[Derivation]:
         """What follows from one other fact about the same thing: a class by a domain, an inverse, a sub-property."""
