@@ -6,9 +6,14 @@ import functools
 import inspect
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any, TypedDict
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from suave_des.scenario.loader import Replacements as Replacements
+else:
+    Replacements = dict  # the loader is not imported for --help
 
 Scenario = Annotated[str, typer.Argument(metavar="SCENARIO", help="A scenario file, or the name of a shipped one.")]
 Ontologies = Annotated[
@@ -39,16 +44,6 @@ Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress.")]
 Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="Replace results of the same kind that are in the output folder already.")
 ]
-
-
-class Replacements(TypedDict):
-    """What the options of replaces_files give, as keywords of load_scenario and whatever passes them on to it."""
-
-    ontologies: Sequence[Path]
-    rules: Sequence[Path]
-    disabled_rules: Sequence[str]
-    modes_file: Path | None
-    reasoner: str | None
 
 
 def replaces_files(command: Callable[..., None]) -> Callable[..., None]:

@@ -14,14 +14,14 @@ from suave_des.scenario.revision import Revision
 from suave_des.scenario.yamlfile import YamlDocument, read_bytes, read_yaml
 
 _KIND_KEYS = ("kind", "distribution")
-"""Keys that say what a mapping is: one of another kind replaces the base's, whose keys would not fit."""
+"""Keys for the kind of a mapping: one of another kind replaces the base's, whose keys would not fit."""
 
 _REMOVABLE_IN: tuple[KeyPath, ...] = (("signals",), ("knowledge", "values"))
 """Mappings of freely named entries, in which a null removes the base's entry."""
 
 
 class Location(NamedTuple):
-    """Where a value stands; depth 0 is the file that the user named, its base is 1, and so on."""
+    """File and line of a value; depth 0 is the file that the user named, its base is 1, and so on."""
 
     depth: int
     line: int
@@ -63,15 +63,15 @@ class Layer:
         return Layer(data, {path: place for path, place in self.places.items() if path[:1] != (key,)})
 
     def below(self, key: str) -> Layer:
-        """What stands under a key whose value is a mapping."""
+        """The mapping under a key."""
         places = {path[1:]: place for path, place in self.places.items() if path[:1] == (key,)}
         return Layer(self.data[key], places)
 
     def replaced(self, key: str, value: Layer) -> Layer:
         """The same with another mapping under a key."""
-        rest = self.without(key)
+        others = self.without(key)
         places = {(key, *path): place for path, place in value.places.items()}
-        return Layer({**rest.data, key: value.data}, {**rest.places, **places})
+        return Layer({**others.data, key: value.data}, {**others.places, **places})
 
 
 def merge(base: Layer, over: Layer) -> Layer:
@@ -119,7 +119,6 @@ class Files:
     """
 
     def __init__(self) -> None:
-        """Nothing read yet."""
         self.inputs: dict[str, str] = {}
 
     def yaml(self, path: Path) -> YamlDocument:
@@ -129,7 +128,7 @@ class Files:
         return document
 
     def ontology(self, path: Path) -> None:
-        """An ontology, which is only hashed here."""
+        """An ontology or a file of rules, which is only hashed here."""
         self.note(path, hashlib.sha256(read_bytes(path, _ONTOLOGY_LIMIT_BYTES)).hexdigest())
 
     def note(self, path: Path, sha256: str) -> None:
@@ -177,7 +176,7 @@ def find_named(layer: Layer, key_path: KeyPath, name: object, kind: str, remedy:
         InputError: there is none, with the line that names it.
     """
     if not isinstance(name, str) or not name:
-        raise layer.error(f"{shown(name)} is no file name", key_path, "a path, or the name of a shipped file")
+        raise layer.error(f"{shown(name)} is not a file name", key_path, "a path, or the name of a shipped file")
     try:
         return find(name, kind, beside=layer.place(key_path).file.parent)
     except InputError as error:
@@ -193,45 +192,39 @@ def _check_chain(layer: Layer, key_path: KeyPath, chain: tuple[Path, ...]) -> No
 
 def _with_whole_revision(files: Files, layer: Layer, depth: int, *, inherited: bool) -> Layer:
     """The layer with its revision written out; parts of an inherited one are left as they are."""
-    value = layer.data.get("revision")
-    if isinstance(value, dict) and "base" in value:
-        own = layer.below("revision").without("base")
-        whole = merge(_revision_layer(files, layer, ("revision", "base"), value["base"], depth + 1), own)
-    elif isinstance(value, dict):
-        missing = [key for key in Revision.model_fields if key not in value]
-        if missing and not inherited:
-            remedy = 'name the revision to start from, such as base: "2023", beside what differs from it'
-            raise layer.error(f"has no {missing[0]}", ("revision",), remedy)
+    if "revision" not in layer.data:
         return layer
-    elif "revision" in layer.data:
-        whole = _revision_layer(files, layer, ("revision",), value, depth + 1)
-    else:
-        return layer
-    return layer.replaced("revision", whole)
+    value = layer.data["revision"]
+    if not isinstance(value, dict):
+        return layer.replaced("revision", _revision_layer(files, layer, ("revision",), value, depth + 1))
+    if "base" in value:
+        below = _revision_layer(files, layer, ("revision", "base"), value["base"], depth + 1)
+        return layer.replaced("revision", merge(below, layer.below("revision").without("base")))
+    missing = [key for key in Revision.model_fields if key not in value]
+    if missing and not inherited:
+        remedy = 'name the revision to start from, such as base: "2023", beside what differs from it'
+        raise layer.error(f"has no {missing[0]}", ("revision",), remedy)
+    return layer
 
 
 def _revision_layer(
     files: Files, named: Layer, key_path: KeyPath, name: object, depth: int, above: tuple[Path, ...] = ()
 ) -> Layer:
     """A revision by its name or path, merged over its own base."""
-    path = _revision_path(named, key_path, name)
+    if isinstance(name, int | float) and not isinstance(name, bool):
+        name = f"{name:g}"  # 2023 and 1.5 need no quotes
+    shipped = sorted(path.stem for path in shipped_folder(_REVISIONS).glob("*.yaml"))
+    if not isinstance(name, str) or not name:
+        remedy = f"one of {', '.join(shipped)}, the path of a revision file, or a mapping with base"
+        raise named.error(f"{shown(name)} is not a revision", key_path, remedy)
+    try:
+        path = find(name, _REVISIONS, beside=named.place(key_path).file.parent)
+    except InputError:
+        remedy = f"{did_you_mean(name, shipped, 'shipped')}; or the path of a revision file"
+        raise named.error(f"there is no revision {shown(name)}", key_path, remedy) from None
     _check_chain(named, key_path, (*above, path))
     layer = Layer.of(files.yaml(path), depth)
     if "base" not in layer.data:
         return layer
     below = _revision_layer(files, layer, ("base",), layer.data["base"], depth + 1, (*above, path))
     return merge(below, layer.without("base"))
-
-
-def _revision_path(named: Layer, key_path: KeyPath, name: object) -> Path:
-    if isinstance(name, int | float) and not isinstance(name, bool):
-        name = f"{name:g}"  # 2023 and 1.5 need no quotes
-    shipped = sorted(path.stem for path in shipped_folder(_REVISIONS).glob("*.yaml"))
-    if not isinstance(name, str) or not name:
-        remedy = f"one of {', '.join(shipped)}, the path of a revision file, or a mapping with base"
-        raise named.error(f"{shown(name)} is no revision", key_path, remedy)
-    try:
-        return find(name, _REVISIONS, beside=named.place(key_path).file.parent)
-    except InputError:
-        remedy = f"{did_you_mean(name, shipped, 'shipped')}; or the path of a revision file"
-        raise named.error(f"there is no revision {shown(name)}", key_path, remedy) from None

@@ -5,10 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 from pydantic import ValidationError
 
@@ -71,131 +70,119 @@ class LoadedScenario:
         return self.layer.error(error.problem, key_path, error.remedy)
 
 
-def load_scenario(
-    name: str | Path,
-    *,
-    ontologies: Sequence[str | Path] = (),
-    modes_file: str | Path | None = None,
-    reasoner: str | None = None,
-    rules: Sequence[str | Path] = (),
-    disabled_rules: Sequence[str] = (),
-) -> LoadedScenario:
-    """Read and check a scenario and the files that it names.
+class Replacements(TypedDict, total=False):
+    """What stands in place of a scenario's own files and settings, or is added to them.
 
-    Files named inside a file are looked for beside it, then among the shipped ones.
-
-    Args:
-        name: path of a scenario file, or name of a shipped one with or without ".yaml".
+    Attributes:
         ontologies: files to use in place of the scenario's.
         modes_file: file to use in place of the scenario's.
         reasoner: to use in place of the scenario's.
         rules: files of rules as text, besides the scenario's.
         disabled_rules: names of rules to switch off, besides the scenario's.
+    """
+
+    ontologies: Sequence[str | Path]
+    modes_file: str | Path | None
+    reasoner: str | None
+    rules: Sequence[str | Path]
+    disabled_rules: Sequence[str]
+
+
+def load_scenario(name: str | Path, **replacements: Unpack[Replacements]) -> LoadedScenario:
+    """Read and check a scenario and the files that it names.
+
+    Files named inside a file are looked for beside it, then among the shipped ones.
+
+        loaded = load_scenario("seams2023", reasoner="pellet")
+
+    Args:
+        name: path of a scenario file, or name of a shipped one with or without ".yaml".
+        replacements: ontologies, modes_file and reasoner to use in place of the scenario's; rules (files of rules as
+            text) and disabled_rules (names of rules to switch off) besides the scenario's.
 
     Raises:
         InputError: a file that cannot be read, or a value that cannot be right, with file and line.
     """
+    reasoner = replacements.get("reasoner")
     if reasoner is not None and reasoner not in REASONERS:
         remedy = did_you_mean(reasoner, REASONERS)
         raise InputError(f"there is no reasoner {shown(reasoner)}", place="--reasoner", remedy=remedy)
     files = Files()
     path = find(name, "scenarios")
-    return load_layer(
-        files,
-        scenario_layer(files, path),
-        path,
-        ontologies=ontologies,
-        modes_file=modes_file,
-        reasoner=reasoner,
-        rules=rules,
-        disabled_rules=disabled_rules,
-    )
+    return load_layer(files, scenario_layer(files, path), path, **replacements)
 
 
-def load_layer(
-    files: Files,
-    layer: Layer,
-    path: Path,
-    *,
-    ontologies: Sequence[str | Path] = (),
-    modes_file: str | Path | None = None,
-    reasoner: str | None = None,
-    rules: Sequence[str | Path] = (),
-    disabled_rules: Sequence[str] = (),
-) -> LoadedScenario:
+def load_layer(files: Files, layer: Layer, path: Path, **replacements: Unpack[Replacements]) -> LoadedScenario:
     """Check a scenario that is merged over its base already, and read the other files that it names.
 
     Args:
         files: reader of the files.
         layer: the scenario.
         path: the scenario's file.
-        ontologies: as of load_scenario, likewise modes_file, reasoner, rules and disabled_rules.
+        replacements: as of load_scenario.
 
     Raises:
         InputError: as load_scenario does.
     """
     layer = Layer({**layer.data, "name": _name(layer, path)}, layer.places)
-    try:
-        scenario = Scenario.model_validate(layer.data)
-    except ValidationError as error:
-        raise input_error(error, layer, Scenario) from None
+    scenario = _validated(layer)
+    knowledge = scenario.knowledge
 
+    def named(key_path: KeyPath, name: str, kind: str, remedy: str | None = None) -> Path:
+        if layer.stands(key_path):
+            return find_named(layer, key_path, name, kind, remedy)
+        return find(name, kind, beside=path.parent)  # a default
+
+    modes_file = replacements.get("modes_file")
     if modes_file is None:
-        modes_path = _named(layer, path, ("modes_file",), scenario.modes_file, "scenarios")
+        modes_path = named(("modes_file",), scenario.modes_file, "scenarios")
     else:
         modes_path = find(modes_file, "scenarios")
     modes = modes_of(files.yaml(modes_path))
-    check_modes(layer, scenario, modes)
+    _check_modes(layer, scenario, modes)
     _check_managers(layer, scenario)
 
-    ontology_paths = tuple(find(each, "ontology") for each in ontologies) or tuple(
-        _named(layer, path, ("knowledge", "ontologies", index), each, "ontology")
-        for index, each in enumerate(scenario.knowledge.ontologies)
+    ontologies = tuple(find(each, "ontology") for each in replacements.get("ontologies", ())) or tuple(
+        named(("knowledge", "ontologies", index), each, "ontology") for index, each in enumerate(knowledge.ontologies)
     )
-    for each in ontology_paths:
-        files.ontology(each)
-
-    rules_paths = tuple(
-        find_named(
-            layer, ("knowledge", "rules", index), each, "ontology", "a file of rules as text, named relative to this"
-        )
-        for index, each in enumerate(scenario.knowledge.rules)
-    ) + tuple(map(Path, rules))
-    for each in rules_paths:
+    remedy = "a file of rules as text, named relative to this"
+    rules = (
+        *(named(("knowledge", "rules", index), each, "ontology", remedy) for index, each in enumerate(knowledge.rules)),
+        *map(Path, replacements.get("rules", ())),
+    )
+    for each in (*ontologies, *rules):
         files.ontology(each)
 
     tables = {}
     for signal_name, signal in scenario.signals.items():
         if isinstance(signal, TableSignal):
             remedy = "a CSV file with columns t_s,value, named relative to the file that names it"
-            table_path = _named(layer, path, ("signals", signal_name, "file"), signal.file, "scenarios", remedy)
+            table_path = named(("signals", signal_name, "file"), signal.file, "scenarios", remedy)
             tables[signal_name], digest = read_table(table_path)
             files.note(table_path, digest)
 
-    scenario = _overridden(scenario, ontologies, modes_file, reasoner, rules, disabled_rules)
-    return LoadedScenario(scenario, path, ontology_paths, modes, modes_path, tables, files.inputs, layer, rules_paths)
+    scenario = _replaced(scenario, replacements)
+    return LoadedScenario(scenario, path, ontologies, modes, modes_path, tables, files.inputs, layer, rules)
 
 
-def _overridden(
-    scenario: Scenario,
-    ontologies: Sequence[str | Path],
-    modes_file: str | Path | None,
-    reasoner: str | None,
-    rules: Sequence[str | Path],
-    disabled_rules: Sequence[str],
-) -> Scenario:
-    """The scenario as if it had named what was given in its place."""
+def _validated(layer: Layer) -> Scenario:
+    try:
+        return Scenario.model_validate(layer.data)
+    except ValidationError as error:
+        raise input_error(error, layer, Scenario) from None
+
+
+def _replaced(scenario: Scenario, replacements: Replacements) -> Scenario:
+    """The scenario as if it had given the replacements itself."""
     knowledge: dict[str, object] = {}
-    if ontologies:
+    if ontologies := replacements.get("ontologies"):
         knowledge["ontologies"] = tuple(map(str, ontologies))
-    if rules:
-        knowledge["rules"] = (*scenario.knowledge.rules, *map(str, rules))
-    if disabled_rules:
-        knowledge["disabled_rules"] = (*scenario.knowledge.disabled_rules, *disabled_rules)
-    if reasoner is not None:
+    if reasoner := replacements.get("reasoner"):
         knowledge["reasoner"] = reasoner
+    knowledge["rules"] = (*scenario.knowledge.rules, *map(str, replacements.get("rules", ())))
+    knowledge["disabled_rules"] = (*scenario.knowledge.disabled_rules, *replacements.get("disabled_rules", ()))
     update: dict[str, object] = {"knowledge": scenario.knowledge.model_copy(update=knowledge)}
-    if modes_file is not None:
+    if modes_file := replacements.get("modes_file"):
         update["modes_file"] = str(modes_file)
     return scenario.model_copy(update=update)
 
@@ -208,47 +195,37 @@ def _name(layer: Layer, path: Path) -> object:
     return stem if re.match(r"[A-Za-z_]", stem) else f"_{stem}"
 
 
-def _named(layer: Layer, path: Path, key_path: KeyPath, name: str, kind: str, remedy: str | None = None) -> Path:
-    """A file that the scenario names, or leaves at its default: then it is looked for beside the scenario."""
-    if layer.stands(key_path):
-        return find_named(layer, key_path, name, kind, remedy)
-    return find(name, kind, beside=path.parent)
-
-
-def check_modes(layer: Layer, scenario: Scenario, modes: ModeTable) -> None:
-    """See that the modes file has what the mission and the scenario's default modes ask for."""
+def _check_modes(layer: Layer, scenario: Scenario, modes: ModeTable) -> None:
+    """Check that the modes file has the functions and modes that the mission and the scenario use."""
     for function in MISSION_FUNCTIONS:
         if function not in modes.functions:
-            raise InputError(
-                f"defines no function {function}, which the mission needs",
-                file=modes.source,
-                remedy=did_you_mean(function, modes.functions, "its functions"),
-            )
+            remedy = did_you_mean(function, modes.functions, "its functions")
+            problem = f"defines no function {function}, which the mission needs"
+            raise InputError(problem, file=modes.source, remedy=remedy)
         if UNGROUND_MODE not in modes.modes(function):
-            raise InputError(
-                f"function {function} has no mode {UNGROUND_MODE}",
-                file=modes.source,
-                remedy=f"add {UNGROUND_MODE}: {{NODE: inactive}}, which a cancelled task sets",
-            )
+            remedy = f"add {UNGROUND_MODE}: {{NODE: inactive}}, which a cancelled task sets"
+            raise InputError(f"function {function} has no mode {UNGROUND_MODE}", file=modes.source, remedy=remedy)
+
+    def check(function: str, mode: str, key_path: KeyPath) -> None:
+        known = modes.modes(function)
+        if mode not in known:
+            remedy = did_you_mean(mode, known, f"its modes in {modes.source}")
+            raise layer.error(f"function {function} has no mode {shown(mode)}", key_path, remedy)
+
     for function, mode in scenario.default_modes.items():
-        key_path = ("default_modes", function)
         if function not in modes.functions:
             remedy = did_you_mean(function, modes.functions, f"functions in {modes.source}")
-            raise layer.error(f"there is no function {shown(function)}", key_path, remedy)
-        if mode not in modes.modes(function):
-            remedy = did_you_mean(mode, modes.modes(function), f"its modes in {modes.source}")
-            raise layer.error(f"function {function} has no mode {shown(mode)}", key_path, remedy)
+            raise layer.error(f"there is no function {shown(function)}", ("default_modes", function), remedy)
+        check(function, mode, ("default_modes", function))
     for index, mode in enumerate(scenario.managers.bt.search_modes):
-        listed: KeyPath = ("managers", "bt", "search_modes", index)
-        known = modes.modes(GENERATE_SEARCH_PATH)
+        key_path: KeyPath = ("managers", "bt", "search_modes", index)
         # The default names the shipped modes, which another modes file need not have: it matters only to bt.
-        if layer.stands(listed) and mode not in known:
-            remedy = did_you_mean(mode, known, f"modes in {modes.source}")
-            raise layer.error(f"{GENERATE_SEARCH_PATH} has no mode {shown(mode)}", listed, remedy)
+        if layer.stands(key_path):
+            check(GENERATE_SEARCH_PATH, mode, key_path)
 
 
 def _check_managers(layer: Layer, scenario: Scenario) -> None:
-    """See that settings are for a manager that can exist: built in, registered, or given as module:Class."""
+    """Check that settings are for a manager that can exist: built in, registered, or given as module:Class."""
     others = scenario.managers.model_extra or {}
     registered = [point.name for point in entry_points(group=MANAGER_GROUP)] if others else []
     for name, settings in others.items():
@@ -263,6 +240,8 @@ def _check_managers(layer: Layer, scenario: Scenario) -> None:
 def with_values(loaded: LoadedScenario, values: Mapping[str, Any]) -> LoadedScenario:
     """A scenario in which the values at some key paths are others.
 
+        slower = with_values(loaded, {"signals.water_visibility.period_s": 120})
+
     Args:
         loaded: the scenario to start from; it is left as it is.
         values: new values by key path, such as "signals.water_visibility.period_s" or "thruster_events.0.time_s"; the
@@ -276,14 +255,11 @@ def with_values(loaded: LoadedScenario, values: Mapping[str, Any]) -> LoadedScen
     for path, value in values.items():
         set_value(data, path, value)
     layer = Layer(data, {(): Location(0, 1, loaded.path)})
-    try:
-        scenario = Scenario.model_validate(data)
-    except ValidationError as error:
-        raise input_error(error, layer, Scenario) from None
+    scenario = _validated(layer)
     if _named_files(scenario) != _named_files(loaded.scenario):
         remedy = "write a scenario for each, with `base` and the files that differ"
         raise InputError("files were read with the scenario and stay as they are", remedy=remedy)
-    check_modes(layer, scenario, loaded.modes)
+    _check_modes(layer, scenario, loaded.modes)
     return replace(loaded, scenario=scenario)
 
 
@@ -298,12 +274,8 @@ def value_at(loaded: LoadedScenario, path: str) -> Any:
     Raises:
         InputError: the path leads nowhere.
     """
-    here: Any = loaded.scenario.model_dump(mode="json")
-    for part in path.split("."):
-        if not isinstance(here, dict | list):
-            raise InputError(f"{path}: {part} is below a plain value", remedy="leave the rest out")
-        here = _step(here, part, path)
-    return here
+    holder, key = _holder(loaded.scenario.model_dump(mode="json"), path)
+    return holder[key]
 
 
 def set_value(data: dict[str, Any], path: str, value: Any) -> None:
@@ -312,28 +284,21 @@ def set_value(data: dict[str, Any], path: str, value: Any) -> None:
     Raises:
         InputError: the path leads nowhere.
     """
-    *parents, last = path.split(".")
-    here: Any = data
-    for depth, part in enumerate(parents):
-        here = _step(here, part, ".".join(parents[: depth + 1]))
-        if not isinstance(here, dict | list):
-            raise InputError(f"{path}: {'.'.join(parents[: depth + 1])} is a plain value", remedy="leave the rest out")
-    _step(here, last, path)
-    here[_key(here, last)] = value
+    holder, key = _holder(data, path)
+    holder[key] = value
 
 
-def _step(here: Any, part: str, path: str) -> Any:
-    key = _key(here, part)
-    if isinstance(here, list):
-        if isinstance(key, int) and 0 <= key < len(here):
-            return here[key]
-        raise InputError(f"{path}: there is no entry {part}", remedy=f"entries are 0 to {len(here) - 1}")
-    if key not in here:
-        close = get_close_matches(part, [str(each) for each in here], n=1)
-        known = ", ".join(sorted(str(each) for each in here))
-        raise InputError(f"{path}: unknown key", remedy=f"did you mean {close[0]}?" if close else f"known: {known}")
-    return here[key]
-
-
-def _key(here: Any, part: str) -> str | int:
-    return int(part) if isinstance(here, list) and part.isdigit() else part
+def _holder(data: dict[str, Any], path: str) -> tuple[Any, Any]:
+    """The mapping or list that holds the value at a key path, and its key there."""
+    here, parts = data, path.split(".")
+    for depth, part in enumerate(parts):
+        if isinstance(here, list):
+            if not part.isdigit() or int(part) >= len(here):
+                raise InputError(f"{path}: there is no entry {part}", remedy=f"entries are 0 to {len(here) - 1}")
+        elif not isinstance(here, dict):
+            raise InputError(f"{path}: {'.'.join(parts[:depth])} is a plain value", remedy="leave the rest out")
+        elif part not in here:
+            raise InputError(f"{path}: unknown key", remedy=did_you_mean(part, sorted(map(str, here))))
+        holder, key = here, int(part) if isinstance(here, list) else part
+        here = here[key]
+    return holder, key

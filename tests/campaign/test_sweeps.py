@@ -159,7 +159,7 @@ def test_a_changed_sweep_cannot_be_resumed(tmp_path: Path) -> None:
         ("campaign: 1\n", "scenario: is missing"),
         ("campaign: 1\nscenario: nowhere.yaml\n", "line 2, scenario: no such file"),
         (HEAD + "sweeps: {}\n", "line 6, sweeps: unknown key 'sweeps' (did you mean 'sweep'?"),
-        (HEAD + "sweep: [1]\n", "line 6, sweep: [1] is not a mapping"),
+        (HEAD + "sweep: [1]\n", "line 6, sweep: expected a mapping of keys to values, got [1]"),
         (HEAD + "sweep:\n  visibility.perod_s: [40]\n", "line 7, sweep.visibility.perod_s: "),
         (HEAD + "sweep:\n  visibility.period_s: []\n", "line 7, sweep.visibility.period_s: is empty"),
         (HEAD + "sweep:\n  visibility.period_s: 40\n", "is no list (write it in brackets: [40])"),
@@ -177,7 +177,7 @@ def test_a_changed_sweep_cannot_be_resumed(tmp_path: Path) -> None:
         (HEAD + "sweep:\n  sample: {method: sobol, points: 8, ranges: {start.x_m: [2, 1]}}\n", "[2, 1] is no range"),
         (HEAD + "runs_per_draw: 0\n", "line 6, runs_per_draw: 0 is out of range"),
         (HEAD + "perturbations:\n  start.x_m: 3\n", "line 7, perturbations.start.x_m: 3 is no distribution"),
-        (HEAD + f"perturbations:\n  start.q_m: {UNIFORM % (1, 2)}\n", "did you mean z_m?"),
+        (HEAD + f"perturbations:\n  start.q_m: {UNIFORM % (1, 2)}\n", "did you mean 'z_m'?"),
         (HEAD + f"perturbations:\n  latencies.mode_change_s: {UNIFORM % (1, 2)}\n", "is not drawn once in a run"),
         (HEAD + f"perturbations:\n  mission.time_limit_s: {UNIFORM % (1, 2)}\n", "takes no such distribution"),
         (

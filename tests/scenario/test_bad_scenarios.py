@@ -254,8 +254,8 @@ def refused(write, content: str, **options: object) -> InputError:
         # revisions
         (HEAD + "revision: 2024\n", "line 2, revision", "no revision '2024'", "shipped: 1.5, 2023"),
         (HEAD + "revision: {base: '1.6'}\n", "line 2, revision.base", "no revision '1.6'", "did you mean '1.5'?"),
-        (HEAD + "revision: [2023]\n", "line 2, revision", "[2023] is no revision", "one of 1.5, 2023"),
-        (HEAD + "revision: true\n", "line 2, revision", "true is no revision", "one of 1.5, 2023"),
+        (HEAD + "revision: [2023]\n", "line 2, revision", "[2023] is not a revision", "one of 1.5, 2023"),
+        (HEAD + "revision: true\n", "line 2, revision", "true is not a revision", "one of 1.5, 2023"),
         ("revision: {follow: {acceptance_m: 1}}\n", "line 1, revision", "has no name", 'base: "2023"'),
         (
             HEAD + "revision: {follow: {acceptance: 1}}\n",
@@ -273,7 +273,7 @@ def refused(write, content: str, **options: object) -> InputError:
         (HEAD + "revision: {spiral: {restarts_on_activation: maybe}}\n", "line 2, ", "'maybe'", "true or false"),
         # other files
         ("base: nowhere.yaml\n", "line 1, base", "no such file: 'nowhere.yaml'", "seams2023.yaml"),
-        ("base: [a]\n", "line 1, base", "['a'] is no file name", "a path"),
+        ("base: [a]\n", "line 1, base", "['a'] is not a file name", "a path"),
         ("base: .\n", "line 1, base", "is a folder", "a file in it"),
         ("base: mine.yaml\n", "line 1, base", "mine.yaml -> mine.yaml", "its own base"),
         (HEAD + "modes_file: nowhere.yaml\n", "line 2, modes_file", "no such file: 'nowhere.yaml'", "suave_modes.yaml"),
