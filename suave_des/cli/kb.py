@@ -183,7 +183,6 @@ def _print_function_table(table: FunctionTable) -> None:
 
 
 def _policy_summary(found: Policy) -> Iterator[str]:
-    from suave_des.knowledge.limit import in_words
     from suave_des.workbench.policy import NONE_LEFT
 
     kinds, most = len(found.cases), found.max_failed
@@ -199,7 +198,7 @@ def _policy_summary(found: Policy) -> Iterator[str]:
         yield f"{mark}: {states} states"
         cases = () if mark == NONE_LEFT else found.marked(mark)
         for case in cases[:_EXAMPLES]:
-            yield f"  {in_words(case.state)}" + (f": {case.problem}" if case.problem else "")
+            yield f"  {case.state}" + (f": {case.problem}" if case.problem else "")
         if len(cases) > _EXAMPLES:
             yield f"  and {len(cases) - _EXAMPLES} more kinds: see --csv"
 
@@ -254,7 +253,6 @@ def diff(
 
 
 def _difference_lines(difference: PolicyDifference) -> Iterator[str]:
-    from suave_des.knowledge.limit import in_words
     from suave_des.workbench.policy_table import outcome_text, present
 
     yield f"{difference.states} of {difference.compared} states are decided differently"
@@ -274,7 +272,7 @@ def _difference_lines(difference: PolicyDifference) -> Iterator[str]:
         yield heading
         for ranges, states in _joined(pairs):
             yield f"  {'; '.join(map(str, ranges))}: {states} states"
-        yield f"  for instance {in_words(pairs[0].one.state)}"
+        yield f"  for instance {pairs[0].one.state}"
 
 
 def _joined(pairs: Sequence[CasePair]) -> list[tuple[tuple[ValueRange, ...], int]]:

@@ -33,22 +33,6 @@ MAX_BYTES: Final = 16 * 2**20
 MAX_FILES: Final = 64
 
 
-def new_cache_entries(sizes: dict[str, int]) -> dict[str, bytes]:
-    """Return what was appended to the files in the user's cache folder, by digest.
-
-    Args:
-        sizes: how much of each file is known already, by digest; brought up to date.
-    """
-    added = {}
-    for path in sorted((cache_folder() / _FOLDER).glob(f"*{_SUFFIX}")):
-        content = path.read_bytes()
-        start = sizes.get(path.stem, 0)
-        if len(content) > start:
-            added[path.stem] = content[start:]
-        sizes[path.stem] = len(content)
-    return added
-
-
 class InferenceCache:
     """Inferred facts by key, in a file of the user's cache folder; nothing where that cannot be written to.
 
@@ -86,18 +70,22 @@ class InferenceCache:
 
     def add(self, key: Key, facts: frozenset[Fact]) -> None:
         """Append an entry."""
-        self._append(self._line(key, facts))
-
-    def content(self) -> bytes:
-        """Return all entries in the form that take_over reads."""
-        return b"".join(self._line(*entry) for entry in self.load().items())
-
-    def take_over(self, content: bytes) -> None:
-        """Append the entries of another cache of the same digest that this one does not have."""
-        known = self.load()
-        new = [self._line(key, facts) for key, facts in self._entries(content)[0].items() if key not in known]
-        if new:
-            self._append(b"".join(new))
+        if self._path is None:
+            return
+        line = self._line(key, facts)
+        with suppress(OSError):  # without its file the cache is slower, not wrong
+            self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            handle = os.open(self._path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
+            try:
+                size = os.fstat(handle).st_size
+                if size < MAX_BYTES:
+                    os.write(handle, line if size else self._first + line)
+            finally:
+                os.close(handle)
+            if size == 0:
+                files = self._path.parent.glob(f"*{_SUFFIX}")
+                for path in sorted(files, key=lambda path: path.stat().st_mtime)[:-MAX_FILES]:
+                    path.unlink(missing_ok=True)
 
     def _entries(self, content: bytes) -> tuple[dict[Key, frozenset[Fact]], bool]:
         """Entries with a right checksum, and whether there are others."""
@@ -111,23 +99,6 @@ class InferenceCache:
             elif line not in (b"", self._first):
                 damaged = True
         return found, damaged
-
-    def _append(self, lines: bytes) -> None:
-        if self._path is None:
-            return
-        with suppress(OSError):  # without its file the cache is slower, not wrong
-            self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            handle = os.open(self._path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
-            try:
-                size = os.fstat(handle).st_size
-                if size < MAX_BYTES:
-                    os.write(handle, lines if size else self._first + lines)
-            finally:
-                os.close(handle)
-            if size == 0:
-                files = self._path.parent.glob(f"*{_SUFFIX}")
-                for path in sorted(files, key=lambda path: path.stat().st_mtime)[:-MAX_FILES]:
-                    path.unlink(missing_ok=True)
 
     def _rewrite(self, entries: dict[Key, frozenset[Fact]]) -> None:
         assert self._path is not None

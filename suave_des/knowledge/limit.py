@@ -1,4 +1,4 @@
-"""A limit to the time that a reasoner may take, so that a rule that explodes ends in a message."""
+"""A time limit for reasoners, so that a rule that matches too many combinations ends in an error message."""
 
 from __future__ import annotations
 
@@ -6,53 +6,32 @@ import os
 import queue
 import threading
 from collections.abc import Callable
-from typing import Final, Generic, TypeVar
+from concurrent.futures import Future
+from typing import Any, Final, TypeVar
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.state import KnowledgeState
 
-#: What a reasoner may take for one state, where nothing else is said.
+#: What a reasoner may take for one state by default, in s.
 TIME_LIMIT_S: Final = 60.0
 #: What a reasoner does at first, for the message.
 LOADING: Final = "loading the ontologies"
 _Result = TypeVar("_Result")
+_Jobs = queue.SimpleQueue[tuple["Future[Any]", Callable[[], Any]]]
 _abandoned: Final[list[str]] = []
 
 
 def times_abandoned() -> int:
-    """How often work was given up on in this process: it may still run, and then the process cannot end as usual."""
+    """How often work was abandoned in this process: it may still run, and then the process cannot end as usual."""
     return len(_abandoned)
 
 
-class _Job(Generic[_Result]):
-    """Work with its outcome, once it has one."""
-
-    def __init__(self, work: Callable[[], _Result]) -> None:
-        self._work = work
-        self._done = threading.Event()
-        self._result: list[_Result] = []
-        self._error: BaseException | None = None
-
-    def do(self) -> None:
-        try:
-            self._result.append(self._work())
-        except BaseException as error:  # travels to the thread that waits
-            self._error = error
-        self._done.set()
-
-    def wait(self, limit_s: float) -> bool:
-        return self._done.wait(limit_s)
-
-    def result(self) -> _Result:
-        if self._error is not None:
-            raise self._error
-        return self._result[0]
-
-
 class TimeLimit:
-    """Does work in one thread of its own, and gives up waiting for it after a time.
+    """Does work in a thread of its own, and stops waiting for it after a time.
 
-    Java code cannot be stopped from outside. So the thread is left to itself then; it ends with the process.
+    Java code cannot be stopped from outside: the thread goes on until the process ends.
+
+        TimeLimit(10.0).run(lambda: reasoner.infer(state), "reasoning on a state")
 
     Args:
         seconds: the limit of each piece of work.
@@ -62,12 +41,12 @@ class TimeLimit:
     def __init__(self, seconds: float = TIME_LIMIT_S, option: str | None = None) -> None:
         self.seconds = seconds
         self._option = option
-        self._jobs: queue.SimpleQueue[_Job[object]] | None = None
+        self._jobs: _Jobs | None = None
         self._process = 0
         self._stuck: str | None = None
 
     def run(self, work: Callable[[], _Result], doing: str) -> _Result:
-        """Do a piece of work and give its result.
+        """Do a piece of work and return its result.
 
         Args:
             work: what to do.
@@ -81,18 +60,18 @@ class TimeLimit:
         if self._jobs is None or self._process != os.getpid():  # a process that was forked has none of the threads
             self._jobs, self._process = queue.SimpleQueue(), os.getpid()
             threading.Thread(target=_do_all, args=(self._jobs,), daemon=True, name="reasoner").start()
-        job = _Job(work)
-        self._jobs.put(job)  # type: ignore[arg-type]
+        future: Future[_Result] = Future()
+        self._jobs.put((future, work))
         try:
-            in_time = job.wait(self.seconds)
-        except BaseException:  # Ctrl-C: the thread may be in Java, which crashes if the process ends as usual
+            return future.result(self.seconds)
+        except BaseException as error:
+            if future.done():
+                raise
             _abandoned.append(doing)
-            raise
-        if not in_time:
+            if not isinstance(error, TimeoutError):  # Ctrl-C: Java crashes if the process ends as usual meanwhile
+                raise
             self._stuck = doing
-            _abandoned.append(doing)
-            raise self.exceeded(doing)
-        return job.result()
+            raise self.exceeded(doing) from None
 
     def exceeded(self, doing: str) -> KnowledgeError:
         """The error for work that took too long."""
@@ -103,25 +82,16 @@ class TimeLimit:
         )
 
 
-def _do_all(jobs: queue.SimpleQueue[_Job[object]]) -> None:
+def _do_all(jobs: _Jobs) -> None:
     while True:
-        jobs.get().do()
+        future, work = jobs.get()
+        try:
+            future.set_result(work())
+        except BaseException as error:  # raised again by the thread that waits
+            future.set_exception(error)
+        del future, work  # or the last result would be kept until the next piece of work
 
 
 def reasoning_on(state: KnowledgeState) -> str:
     """What a reasoner does with a state, for the message."""
-    return f"reasoning on the state {in_words(state)}"
-
-
-def in_words(state: KnowledgeState) -> str:
-    """A state in one line."""
-    objectives = [
-        f"{each.function} asked for" + (f" ({each.status})" if each.status else "") for each in state.objectives
-    ]
-    parts = [
-        *objectives,
-        *(f"{function} = {design}" for function, design in state.groundings),
-        *(f"{component} = {status}" for component, status in state.components),
-        *(f"{name} = {value}" for name, value in state.measurements),
-    ]
-    return ", ".join(parts) or "with nothing in it"
+    return f"reasoning on the state {state}"

@@ -1,7 +1,7 @@
 """Pellet, kept running inside this process.
 
-The ontologies are loaded once. Each inference works on a copy of that knowledge base, to which the facts of
-the state are added: nothing inferred is ever carried over, so an inference depends on its state alone.
+The ontologies are loaded once. Each inference works on a copy of that knowledge base, to which the assertions of
+the state are added: nothing inferred is kept, so an inference depends on its state alone.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ one_at_a_time: Final = threading.RLock()
 
 
 def load_n_triples(text: str, *, explain: bool = False) -> Any:
-    """A Pellet knowledge base with that content; call it with the lock held."""
+    """Load a Pellet knowledge base; to be called with the lock held."""
     model = jvm.java_class("com.hp.hpl.jena.rdf.model.ModelFactory").createDefaultModel()
     model.read(jvm.java_class("java.io.StringReader")(text), None, "N-TRIPLES")
     knowledge_base = jvm.java_class(_PELLET + "KnowledgeBase")()
@@ -40,61 +40,66 @@ def load_n_triples(text: str, *, explain: bool = False) -> Any:
 
 
 @contextmanager
-def _java_errors(kb: Ontology) -> Iterator[None]:
-    """What Java throws, as an error for the user: Pellet meets something that it cannot use at all."""
+def _java_errors(ontology: Ontology) -> Iterator[None]:
+    """Convert what Java throws, where Pellet cannot use the ontologies at all, to an error for the user."""
     try:
         yield
     except jvm.JavaError as error:
         said = " ".join(str(error).split()).rpartition("Exception: ")[2]
         raise KnowledgeError(
-            f"Pellet cannot use the ontologies: {said}", file=_files(kb), remedy="suave-des kb check may say where"
+            f"Pellet cannot use the ontologies: {said}",
+            file=_files(ontology),
+            remedy="suave-des kb check may say where",
         ) from error
 
 
 class InProcessPellet:
-    """Pellet with one knowledge base loaded.
+    """Pellet with one ontology loaded.
+
+        pellet = InProcessPellet(ontology)
+        pellet.infer(ontology.assertions(state))  # values and members, as triples
 
     Raises:
         KnowledgeError: the ontologies are inconsistent by themselves, or Pellet drops one of the rules.
     """
 
-    def __init__(self, kb: Ontology) -> None:
-        self._kb = kb
-        with one_at_a_time, _java_errors(kb):
+    def __init__(self, ontology: Ontology) -> None:
+        self._ontology = ontology
+        with one_at_a_time, _java_errors(ontology):
             jvm.start()
             self._make_term = jvm.java_class(_PELLET + "utils.ATermUtils").makeTermAppl
             self._make_literal = jvm.java_class(_PELLET + "utils.ATermUtils").makeTypedLiteral
             self._make_plain = jvm.java_class(_PELLET + "utils.ATermUtils").makePlainLiteral
-            self._base = load_n_triples(kb.content.n_triples())
+            self._base = load_n_triples(ontology.content.n_triples())
             self._terms: dict[str, Any] = {}
-            self._properties = [(name, self._term(name)) for name in kb.content.properties_to_read()]
-            self._classes = [(name, self._term(name)) for name in sorted(kb.content.head_classes())]
+            self._properties = [(name, self._term(name)) for name in ontology.content.properties_to_read()]
+            self._classes = [(name, self._term(name)) for name in sorted(ontology.content.head_classes())]
             if not self._base.isConsistent():
-                raise contradiction(kb, ())
+                raise contradiction(ontology, ())
             # A copy, because Pellet compiles the rules of a knowledge base when it first reasons on it.
             self._base.copy().isConsistent()
-            # What follows from the ontologies alone follows in every state: entailment is monotonic.
+            # Entailment is monotonic: what the ontologies entail, every state entails.
             self._known = self._collections(self._base)
             self._always = frozenset(self._read(self._base))
             self._refuse_dropped_rules()
         jvm.make_archive_later()
 
-    def infer(self, situation: Sequence[Triple]) -> frozenset[Triple]:
-        """All values of the properties to read, and members of the classes to read, in a situation.
+    def infer(self, assertions: Sequence[Triple]) -> frozenset[Triple]:
+        """Return all values of the properties to read, and members of the classes to read.
 
         Args:
-            situation: triples added to the ontologies.
+            assertions: triples added to the ontologies.
 
         Raises:
-            KnowledgeError: the situation contradicts itself.
+            KnowledgeError: they contradict one another, or the ontologies.
         """
-        jvm.start()  # it runs; but not in a process that was forked since
-        with one_at_a_time, _java_errors(self._kb):
+        jvm.start()  # an error in a process that was forked since
+        with one_at_a_time, _java_errors(self._ontology):
             copy = self._base.copy()
-            for subject, predicate, value in situation:
+            for subject, predicate, value in assertions:
                 self._add(copy, subject, predicate, value)
             if not copy.isConsistent():
-                raise contradiction(self._kb, situation)
+                raise contradiction(self._ontology, assertions)
             found = self._always.union(self._read(copy, self._known))
             self._refuse_dropped_rules()
             return found
@@ -122,12 +127,12 @@ class InProcessPellet:
             knowledge_base.addPropertyValue(self._term(predicate), individual, self._term(value))
 
     def _read(self, knowledge_base: Any, known: Sequence[Any] | None = None) -> Iterator[Triple]:
-        """Values and members, without those in known: the collections of a knowledge base that has less in it."""
+        """Read values and members, without those in the collections of a smaller knowledge base."""
         for number, (collection, (name, _)) in enumerate(
             zip(self._collections(knowledge_base), [*self._properties, *self._classes], strict=True)
         ):
             if known is not None:
-                collection.removeAll(known[number])  # in Java: most is as in the ontologies, and is not carried over
+                collection.removeAll(known[number])  # in Java, so that few cross to Python
             for item in collection:
                 if number >= len(self._properties):
                     yield str(item.toString()), RDF_TYPE, name
@@ -137,32 +142,32 @@ class InProcessPellet:
                         yield subject, name, read_term(str(value.toString()))
 
     def _collections(self, knowledge_base: Any) -> list[Any]:
-        """For each property to read the (subject, values) entries, for each class its members."""
+        """The (subject, values) entries of each property to read, and the members of each class to read."""
         return [
             *(knowledge_base.getPropertyValues(term).entrySet() for _, term in self._properties),
             *(jvm.java_class("java.util.HashSet")(knowledge_base.getInstances(term)) for _, term in self._classes),
         ]
 
     def _refuse_dropped_rules(self) -> None:
-        """Raise if Pellet said that it leaves out a rule; warnings that name the rule come first."""
+        """Raise if Pellet logged that it leaves out a rule; warnings that name the rule come first."""
         warnings = sorted(jvm.take_warnings(), key=lambda warning: _RULE.search(warning) is None)
         for warning in warnings:
             named = _RULE.search(warning)
             if named is not None:
-                raise _dropped(self._kb.content.rules[int(named.group(1))], warning)
+                raise _dropped(self._ontology.content.rules[int(named.group(1))], warning)
             if "SWRL" in warning or "rule" in warning.lower():
-                raise KnowledgeError(f"Pellet does not use part of a rule: {warning}", file=_files(self._kb))
+                raise KnowledgeError(f"Pellet does not use part of a rule: {warning}", file=_files(self._ontology))
 
 
-def contradiction(kb: Ontology, situation: Sequence[Triple]) -> KnowledgeError:
-    """The error for a state that contradicts itself: on what, by which rules, and what in the state they need.
+def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> KnowledgeError:
+    """Explain a contradiction: on what, by which rules, and from which assertions of the state.
 
-    Loads everything once more, with Pellet's tracing switched on: it is off otherwise, for it costs time.
+    Loads everything again with Pellet's tracing, which is off otherwise, because it takes time.
     """
     options = jvm.java_class(_PELLET + "PelletOptions")
     options.USE_TRACING = True
     try:
-        text = kb.content.n_triples() + "".join(map(n_triple, situation))
+        text = ontology.content.n_triples() + "".join(map(n_triple, assertions))
         knowledge_base = load_n_triples(text, explain=True)
         knowledge_base.isConsistent()
         said = str(knowledge_base.getExplanation())
@@ -170,27 +175,27 @@ def contradiction(kb: Ontology, situation: Sequence[Triple]) -> KnowledgeError:
     finally:
         options.USE_TRACING = False
         jvm.take_warnings()
-    rules = sorted({kb.content.rules[int(n)].name for axiom in axioms for n in _RULE.findall(axiom)[:1]})
+    rules = sorted({ontology.content.rules[int(n)].name for axiom in axioms for n in _RULE.findall(axiom)[:1]})
     facts = [
         str(fact)
-        for triple in situation
+        for triple in assertions
         if any(axiom.startswith(f"prop({triple[1]},{triple[0]},") for axiom in axioms)
-        for fact in facts_of([triple], kb.names)
+        for fact in facts_of([triple], ontology.names)
     ]
-    problem = re.sub(r"https?://[^\s,()]+", lambda iri: kb.names.short(iri.group()), said)
+    problem = re.sub(r"https?://[^\s,()]+", lambda iri: ontology.names.short(iri.group()), said)
     if rules:
         problem += f", by the rules {', '.join(rules)}"
     if facts:
         problem += f", in the state {', '.join(facts)}"
     return KnowledgeError(
         f"contradiction: {problem[0].lower()}{problem[1:]}",
-        file=_files(kb),
+        file=_files(ontology),
         remedy="change a rule, so that no two of these hold at once" if rules else "correct the ontology",
     )
 
 
 def _dropped(rule: Rule, warning: str) -> KnowledgeError:
-    """The error for a rule that Pellet would leave out with nothing but a line in its log."""
+    """The error for a rule that Pellet leaves out with nothing but a line in its log."""
     reason = warning.rpartition("): ")[2] if "): " in warning else warning
     return KnowledgeError(
         f"Pellet does not use rule {rule.name}: {_RULE.sub(rule.name, reason)}",
@@ -200,8 +205,8 @@ def _dropped(rule: Rule, warning: str) -> KnowledgeError:
     )
 
 
-def _files(kb: Ontology) -> str:
-    return ", ".join(map(str, kb.files))
+def _files(ontology: Ontology) -> str:
+    return ", ".join(map(str, ontology.files))
 
 
 def read_term(text: str) -> str | Lit:

@@ -15,25 +15,25 @@ from typing import Final
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.state import Decision, Inference, KnowledgeState, ObjectiveState, Plan, Rejection
+from suave_des.knowledge.state import UNGROUNDED, Decision, Inference, KnowledgeState, ObjectiveState, Plan, Rejection
 from suave_des.knowledge.vocabulary import PERFORMANCE, objective_name
 
 #: What a design without a performance counts.
 DEFAULT_PERFORMANCE: Final = Decimal("0.001")
 #: Statuses that call for adaptation, besides all that start with IN_ERROR_; the last three are of older files.
-_CALLING: Final = frozenset({"UNGROUNDED", "INTERNAL_ERROR", "EXTERNAL_ERROR", "UPDATABLE"})
+_CALLING: Final = frozenset({UNGROUNDED, "INTERNAL_ERROR", "EXTERNAL_ERROR", "UPDATABLE"})
 _COMPARE: Final[Mapping[str, Callable[[Decimal, Decimal], bool]]] = MappingProxyType(
     {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
 )
 
 
 def plan(
-    kb: Ontology, state: KnowledgeState, inference: Inference, *, to_adapt: Mapping[str, str] | None = None
+    ontology: Ontology, state: KnowledgeState, inference: Inference, *, to_adapt: Mapping[str, str] | None = None
 ) -> Plan:
     """Decide on every objective that is ungrounded, in error, updatable or always to be improved.
 
     Args:
-        kb: the knowledge base.
+        ontology: the knowledge base.
         state: the state that was reasoned about.
         inference: what the reasoner added to it.
         to_adapt: functions whose objectives are adapted whatever their status, each with the reason.
@@ -45,7 +45,7 @@ def plan(
     for objective in state.objectives:
         call = _call(objective, inference) or (to_adapt or {}).get(objective.function)
         if call is not None:
-            decisions.append(_decide(kb, inference, objective.function, call))
+            decisions.append(_decide(ontology, inference, objective.function, call))
     return Plan(tuple(decisions))
 
 
@@ -65,8 +65,8 @@ def _call(objective: ObjectiveState, inference: Inference) -> str | None:
     return "always to be improved" if True in inference.values(name, "o_always_improve") else None
 
 
-def _decide(kb: Ontology, inference: Inference, function: str, call: str) -> Decision:
-    designs = [name for name in inference.subjects("solvesF", function) if name in kb.model.designs]
+def _decide(ontology: Ontology, inference: Inference, function: str, call: str) -> Decision:
+    designs = [name for name in inference.subjects("solvesF", function) if name in ontology.model.designs]
     rejected = []
     left = []
     for design in designs:
@@ -79,8 +79,8 @@ def _decide(kb: Ontology, inference: Inference, function: str, call: str) -> Dec
         present = inference.state.grounded(function)
         kept = f"{present} is kept" if present else "it stays ungrounded"
         return Decision(function, None, f"{call}: no function design is left, {kept}", tuple(rejected))
-    best = min(left, key=lambda design: (-performance(kb, inference, design), design))
-    shown = _show(performance(kb, inference, best))
+    best = min(left, key=lambda design: (-performance(ontology, inference, design), design))
+    shown = _show(performance(ontology, inference, best))
     reason = f"{call}: highest performance, {shown}, of {len(left)} left among {len(designs)}"
     return Decision(function, best, reason, tuple(rejected))
 
@@ -132,9 +132,9 @@ def _operator(inference: Inference, attribute: str, objective: str) -> tuple[Cal
     )
 
 
-def performance(kb: Ontology, inference: Inference, design: str) -> Decimal:
+def performance(ontology: Ontology, inference: Inference, design: str) -> Decimal:
     """What the planner maximises: the design's expected performance."""
-    name = kb.names.short(PERFORMANCE)
+    name = ontology.names.short(PERFORMANCE)
     return max(
         (value for kind, value in _values(inference, design, "hasQAestimation") if kind == name),
         default=DEFAULT_PERFORMANCE,

@@ -1,12 +1,12 @@
-"""Reasoners: what a state of the knowledge base entails. Ways to run the same Pellet, or to run it seldom.
+"""Reasoners: what a state of the knowledge base entails. All of them run Pellet, and infer the same.
 
-An inference is a pure function of knowledge base and state; so it may be remembered.
+An inference is a pure function of ontology and state, so it is cached.
 """
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Final, Protocol
 
@@ -16,17 +16,24 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import Triple, facts_of
 from suave_des.knowledge.state import Inference, KnowledgeState
 
-#: Inferences that a reasoner remembers; about 20 kB each.
-REMEMBERED: Final = 4096
+#: Inferences that a reasoner caches in this process; about 20 kB each.
+CACHED_STATES: Final = 4096
 
 
 class Reasoner(Protocol):
-    """Tells what a state entails."""
+    """Infers what a state entails.
+
+    state = KnowledgeState.of(
+        groundings={"f_generate_search_path": "fd_spiral_high"}, measurements={"water_visibility": 1.0}
+    )
+    reasoner = make_reasoner("pellet", Ontology.load())
+    reasoner.infer(state).grounding_status("f_generate_search_path")  # "IN_ERROR_NFR"
+    """
 
     name: str
 
     def infer(self, state: KnowledgeState) -> Inference:
-        """What the reasoner adds to the state.
+        """Return what the reasoner adds to the state.
 
         Raises:
             KnowledgeError: state and ontologies contradict one another, or Pellet does not use one of the
@@ -36,71 +43,65 @@ class Reasoner(Protocol):
         ...
 
 
-class _Remembering:
-    """A backend with a bounded memory of exact states."""
+Entailed = Callable[[KnowledgeState, tuple[Triple, ...]], Iterable[Triple]]
 
-    def __init__(
-        self, name: str, kb: Ontology, entailed: Callable[[KnowledgeState, tuple[Triple, ...]], Iterable[Triple]]
-    ) -> None:
+
+class _StateCache:
+    """A backend that caches the inferences of equal states."""
+
+    def __init__(self, name: str, ontology: Ontology, entailed: Entailed) -> None:
         self.name = name
-        self._kb = kb
+        self._ontology = ontology
         self._entailed = entailed
-        self._memory: OrderedDict[KnowledgeState, Inference] = OrderedDict()
+        self._cached = lru_cache(maxsize=CACHED_STATES)(self._infer)
 
     def infer(self, state: KnowledgeState) -> Inference:
-        """What the reasoner adds to the state."""
-        known = self._memory.get(state)
-        if known is None:
-            known = self._memory[state] = self._infer(state)
-            if len(self._memory) > REMEMBERED:
-                self._memory.popitem(last=False)
-        else:
-            self._memory.move_to_end(state)
-        return known
+        """Return what the reasoner adds to the state."""
+        return self._cached(state)
 
     def _infer(self, state: KnowledgeState) -> Inference:
-        situation = self._kb.assertions(state)
-        asserted = self._kb.facts.union(facts_of(situation, self._kb.names))
-        entailed = facts_of(self._entailed(state, situation), self._kb.names)
+        assertions = self._ontology.assertions(state)
+        asserted = self._ontology.facts.union(facts_of(assertions, self._ontology.names))
+        entailed = facts_of(self._entailed(state, assertions), self._ontology.names)
         return Inference(state, asserted, frozenset(entailed) - asserted)
 
 
-def _pellet(kb: Ontology, limit: TimeLimit) -> Reasoner:
+def _pellet(ontology: Ontology, limit: TimeLimit) -> Reasoner:
     from suave_des.knowledge.pellet import InProcessPellet
 
-    pellet = limit.run(lambda: InProcessPellet(kb), LOADING)
+    pellet = limit.run(lambda: InProcessPellet(ontology), LOADING)
 
-    def entailed(state: KnowledgeState, situation: tuple[Triple, ...]) -> Iterable[Triple]:
-        return limit.run(lambda: pellet.infer(situation), reasoning_on(state))
+    def entailed(state: KnowledgeState, assertions: tuple[Triple, ...]) -> Iterable[Triple]:
+        return limit.run(lambda: pellet.infer(assertions), reasoning_on(state))
 
-    return _Remembering("pellet", kb, entailed)
+    return _StateCache("pellet", ontology, entailed)
 
 
-def _owlready2(kb: Ontology, limit: TimeLimit) -> Reasoner:
+def _owlready2(ontology: Ontology, limit: TimeLimit) -> Reasoner:
     from suave_des.knowledge.pellet import InProcessPellet
     from suave_des.knowledge.stock import StockPellet
 
-    stock = StockPellet(kb)
+    stock = StockPellet(ontology)
     checker: list[InProcessPellet] = []
 
-    def entailed(state: KnowledgeState, situation: tuple[Triple, ...]) -> Iterable[Triple]:
-        # owlready2 throws Pellet's log away, and with it the only word on a rule that was dropped, or on
-        # what contradicts what. The Pellet in this process tells: once at the start, and for contradictions.
+    def entailed(state: KnowledgeState, assertions: tuple[Triple, ...]) -> Iterable[Triple]:
+        # owlready2 discards Pellet's log, which alone reports dropped rules and explains contradictions. The Pellet
+        # in this process does so: once at the start, and for contradictions.
         if not checker:
-            checker.append(limit.run(lambda: InProcessPellet(kb), reasoning_on(state)))
+            checker.append(limit.run(lambda: InProcessPellet(ontology), reasoning_on(state)))
         try:
-            found = stock.infer(situation, limit.seconds)
+            found = stock.infer(assertions, limit.seconds)
         except TimeoutError:
             raise limit.exceeded(reasoning_on(state)) from None
-        return limit.run(lambda: checker[0].infer(situation), reasoning_on(state)) if found is None else found
+        return limit.run(lambda: checker[0].infer(assertions), reasoning_on(state)) if found is None else found
 
-    return _Remembering("owlready2", kb, entailed)
+    return _StateCache("owlready2", ontology, entailed)
 
 
-def _remembered(kb: Ontology, limit: TimeLimit) -> Reasoner:
+def _remembered(ontology: Ontology, limit: TimeLimit) -> Reasoner:
     from suave_des.knowledge.cached_pellet import CachedPellet
 
-    return CachedPellet(kb, limit=limit)
+    return CachedPellet(ontology, limit=limit)
 
 
 BACKENDS: Final[Mapping[str, Callable[[Ontology, TimeLimit], Reasoner]]] = MappingProxyType(
@@ -108,13 +109,13 @@ BACKENDS: Final[Mapping[str, Callable[[Ontology, TimeLimit], Reasoner]]] = Mappi
 )
 
 
-def make_reasoner(name: str, kb: Ontology, limit: TimeLimit | None = None) -> Reasoner:
-    """A reasoner by name.
+def make_reasoner(name: str, ontology: Ontology, limit: TimeLimit | None = None) -> Reasoner:
+    """Make a reasoner by name.
 
     Args:
-        name: "remembered" (asks Pellet once for each situation that the rules can tell apart), "pellet" (kept running
-            in this process) or "owlready2" (stock, the reference).
-        kb: the knowledge base.
+        name: "remembered" (caches Pellet's inferences, on disk too, one for all states that the rules cannot tell
+            apart), "pellet" (kept running in this process) or "owlready2" (stock, the reference).
+        ontology: the ontology.
         limit: of the time that Pellet may take for one state, or to load the ontologies; None: a minute.
 
     Raises:
@@ -124,4 +125,4 @@ def make_reasoner(name: str, kb: Ontology, limit: TimeLimit | None = None) -> Re
     make = BACKENDS.get(name)
     if make is None:
         raise InputError(f"there is no reasoner {name!r}", remedy=f"one of {', '.join(sorted(BACKENDS))}")
-    return make(kb, limit or TimeLimit())
+    return make(ontology, limit or TimeLimit())

@@ -1,8 +1,8 @@
-"""Which states are the same to the rules: those whose measured values lie in the same regions.
+"""Regions of measured values that the rules cannot tell apart.
 
-Where rules only compare numbers, what they infer depends on the order of the measured values relative to one another
-and to the numbers in the knowledge base alone. The numbers cut the line into regions: each number is one of its own,
-and so is each gap between two. Numbers are compared exactly, as decimals.
+Where rules only compare numbers, what they infer depends only on the order of the measured values relative to one
+another and to the numbers in the knowledge base. These numbers are thresholds: each is a region of its own, and so is
+each gap between two. Numbers are compared exactly, as decimals.
 """
 
 from __future__ import annotations
@@ -95,20 +95,20 @@ def _ranked(state: KnowledgeState, where: list[tuple[str, int]]) -> tuple[tuple[
     )
 
 
-def regions_of(kb: Ontology) -> Regions:
+def regions_of(ontology: Ontology) -> Regions:
     """The regions of a knowledge base, or why it has none."""
-    carriers = _carriers(kb)
-    reasons = [*_of_rules(kb, carriers), *_of_ontologies(kb, carriers)]
-    return Regions(tuple(sorted(set(_numbers(kb)))), tuple(dict.fromkeys(reasons)))
+    carriers = _carriers(ontology)
+    reasons = [*_of_rules(ontology, carriers), *_of_ontologies(ontology, carriers)]
+    return Regions(tuple(sorted(set(_numbers(ontology)))), tuple(dict.fromkeys(reasons)))
 
 
-def _carriers(kb: Ontology) -> frozenset[str]:
+def _carriers(ontology: Ontology) -> frozenset[str]:
     """Properties that can have a measured value: hasValue, and what holds wherever it does."""
     found = {HAS_VALUE}
     while True:
         more = {
             one
-            for subject, predicate, value in kb.content.triples
+            for subject, predicate, value in ontology.content.triples
             if predicate in _SAME_VALUES and isinstance(value, str) and {subject, value} & found
             for one in (value, subject)
         }
@@ -117,8 +117,8 @@ def _carriers(kb: Ontology) -> frozenset[str]:
         found |= more
 
 
-def _of_rules(kb: Ontology, carriers: frozenset[str]) -> Iterator[str]:
-    for rule in kb.content.enabled_rules:
+def _of_rules(ontology: Ontology, carriers: frozenset[str]) -> Iterator[str]:
+    for rule in ontology.content.enabled_rules:
         for atom in rule.atoms:
             if atom.kind == "builtin" and atom.predicate not in _COMPARING:
                 yield f"rule {rule.name} computes with {local_name(atom.predicate)}"
@@ -140,17 +140,17 @@ def _measured_variables(rule: Rule, carriers: frozenset[str]) -> set[str]:
     return {term.name for term in values if isinstance(term, Variable)}
 
 
-def _of_ontologies(kb: Ontology, carriers: frozenset[str]) -> Iterator[str]:
+def _of_ontologies(ontology: Ontology, carriers: frozenset[str]) -> Iterator[str]:
     for name in sorted(carriers - {HAS_VALUE}):
         yield f"{local_name(name)} has the values of hasValue"
-    for subject, predicate, value in kb.content.triples:
+    for subject, predicate, value in ontology.content.triples:
         if isinstance(value, Lit) and value.datatype in _BINARY:
             yield f"{local_name(subject)} has a binary number, which is compared inexactly"
         if predicate == RDFS + "range" and subject in carriers and value != XSD + "decimal":
             yield f"{local_name(subject)} has a range other than decimal"
         if predicate == RDF_TYPE and value == RDFS + "Datatype":
             yield f"the ontology defines a datatype, {local_name(subject)}"
-    for line in kb.content.structure:
+    for line in ontology.content.structure:
         for term in _XSD_TERM.findall(line):
             if term not in _SIZELESS | _SIZES:
                 yield f"a class expression speaks of {local_name(term)}"
@@ -158,19 +158,19 @@ def _of_ontologies(kb: Ontology, carriers: frozenset[str]) -> Iterator[str]:
             yield "a class expression has a binary number, which is compared inexactly"
 
 
-def _numbers(kb: Ontology) -> Iterator[Decimal]:
+def _numbers(ontology: Ontology) -> Iterator[Decimal]:
     """Every number in the knowledge base, whatever its datatype, and texts that look like one."""
-    model = kb.model
+    model = ontology.model
     groups = (model.objectives, model.groundings, model.measurements)
     for triples in (
-        kb.content.triples,
+        ontology.content.triples,
         *(individual.own for group in groups for individual in group.values()),
         *model.initial.values(),
     ):
         yield from _in_texts(value.text for _, _, value in triples if isinstance(value, Lit))
-    for line in kb.content.structure:
+    for line in ontology.content.structure:
         yield from _in_texts(text for text, _ in _LITERAL.findall(line))
-    for rule in kb.content.enabled_rules:
+    for rule in ontology.content.enabled_rules:
         for atom in rule.atoms:
             yield from _in_texts(term.text for term in atom.arguments if isinstance(term, Lit))
 

@@ -1,4 +1,4 @@
-"""What passes through the loop: the state that is known, what is inferred from it, and the plan.
+"""The data of the MAPE-K loop: the knowledge state, what is inferred from it, and the plan.
 
 Nothing here imports a reasoner, so that the rest of the simulation may use these types at no cost.
 """
@@ -17,17 +17,19 @@ from suave_des.knowledge.vocabulary import grounding_name, objective_name
 
 Value = str | bool | Decimal
 Number = Decimal | float | int | str
+#: Status of an objective whose function has no function design in use.
+UNGROUNDED: Final = "UNGROUNDED"
 #: Beyond this power of ten (floats end at 308) a number is a mistake, and its text would fill the memory.
 MAX_EXPONENT: Final = 400
 
 
 def exact(number: Number) -> Decimal:
-    """The decimal number that the shortest text of a float denotes: 0.1 gives 0.1, not 0.1000000000000000055.
+    """Convert a number to the decimal that the shortest text of a float denotes: 0.1, not 0.1000000000000000055.
 
     Trailing zeros are dropped, so that equal numbers are written alike.
 
     Raises:
-        KnowledgeError: it is no finite number.
+        KnowledgeError: it is not a finite number.
     """
     try:
         value = Decimal(repr(float(number)) if isinstance(number, float) else number)
@@ -40,7 +42,7 @@ def exact(number: Number) -> Decimal:
 
 
 class ObjectiveState(NamedTuple):
-    """An objective that the mission has now: the function it asks for and what the loop has noted of it."""
+    """An objective that the mission has now: the function that it needs, and its status as the loop recorded it."""
 
     function: str
     status: str | None = None
@@ -49,7 +51,13 @@ class ObjectiveState(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class KnowledgeState:
-    """All that changes in the knowledge base: hashable, sorted by name, and nothing inferred in it.
+    """All that changes in the knowledge base: hashable, sorted by name, and without anything inferred.
+
+        KnowledgeState.of(
+            [ObjectiveState("f_generate_search_path", UNGROUNDED)],
+            components={"c_thruster_1": "FALSE"},
+            measurements={"water_visibility": 2.4},
+        )
 
     Attributes:
         objectives: one for each function that the current task needs.
@@ -72,10 +80,10 @@ class KnowledgeState:
         components: Mapping[str, str] | None = None,
         measurements: Mapping[str, Number] | None = None,
     ) -> KnowledgeState:
-        """A state from unsorted parts; floats become exact short decimals.
+        """Make a state from unsorted parts; floats become exact short decimals.
 
         Raises:
-            KnowledgeError: a measured value is no finite number, or a function has two objectives.
+            KnowledgeError: a measured value is not a finite number, or a function has two objectives.
         """
         known = sorted(objectives, key=lambda objective: objective.function)
         for one, other in itertools.pairwise(known):
@@ -87,6 +95,14 @@ class KnowledgeState:
             components=tuple(sorted((components or {}).items())),
             measurements=tuple(sorted((name, exact(value)) for name, value in (measurements or {}).items())),
         )
+
+    def __str__(self) -> str:
+        """As messages show it, on one line."""
+        parts = [
+            *(f"{each.function} asked for" + (f" ({each.status})" if each.status else "") for each in self.objectives),
+            *(f"{name} = {value}" for name, value in (*self.groundings, *self.components, *self.measurements)),
+        ]
+        return ", ".join(parts) or "with nothing in it"
 
     def grounded(self, function: str) -> str | None:
         """The function design now in use for a function."""
@@ -106,7 +122,7 @@ class Fact:
     value: Value
 
     def __str__(self) -> str:
-        """As a rule atom would say it: fg_status(fg_spiral_high, IN_ERROR_NFR), Component(c_thruster_1)."""
+        """As a rule atom: fg_status(fg_spiral_high, IN_ERROR_NFR), Component(c_thruster_1)."""
         if self.property == "type":
             return f"{self.value}({self.subject})"
         value = str(self.value).lower() if isinstance(self.value, bool) else self.value
@@ -114,10 +130,11 @@ class Fact:
 
 
 class Inference:
-    """What the reasoner adds to a state; not to be changed.
+    """The facts that the reasoner adds to a state; not to be changed.
 
-    Attributes:
-        state: the state that was reasoned about.
+    Args:
+        state: the state that was analyzed.
+        asserted: the facts of the ontologies and of the state, or a function that finds them when they are needed.
         facts: the inferred facts, none of which is asserted.
     """
 
@@ -127,13 +144,6 @@ class Inference:
         asserted: frozenset[Fact] | Callable[[KnowledgeState], frozenset[Fact]],
         facts: frozenset[Fact],
     ) -> None:
-        """An inference.
-
-        Args:
-            state: the state that was reasoned about.
-            asserted: the facts of the knowledge base and of the state, or what gives them when they are needed.
-            facts: the inferred facts.
-        """
         self.state = state
         self.facts = facts
         self._asserted = asserted
@@ -144,7 +154,7 @@ class Inference:
         return self._asserted(self.state) if callable(self._asserted) else self._asserted
 
     def __eq__(self, other: object) -> bool:
-        """Whether both say the same of the same state."""
+        """Whether both have the same facts about the same state."""
         return (
             isinstance(other, Inference)
             and self.state == other.state
@@ -187,14 +197,6 @@ class Inference:
     def is_updatable(self, function: str) -> bool:
         """Whether a better function design may have become available."""
         return True in self.values(objective_name(function), "o_updatable")
-
-    def is_realisable(self, design: str) -> bool:
-        """Whether a function design can be grounded: true unless inferred otherwise."""
-        return False not in self.values(design, "fd_realisability")
-
-    def error_log(self, design: str) -> tuple[str, ...]:
-        """Objectives that a function design has failed."""
-        return tuple(str(value) for value in self.values(design, "fd_error_log"))
 
     def _one(self, subject: str, property_name: str) -> str | None:
         values = self.values(subject, property_name)

@@ -1,21 +1,20 @@
 """Stock owlready2: sync_reasoner_pellet, in a fresh world and a new Java process for each inference.
 
-Slow (about a second each) and simple: the reference that the in-process backend is compared with.
+Slow (about a second each) and simple: the reference for the reasoner in this process.
 """
 
 from __future__ import annotations
 
 import io
 import subprocess
+import tempfile
 from collections.abc import Iterator, Sequence
 from decimal import Decimal
-from pathlib import Path
-from types import TracebackType
 from typing import Any, Final
 
 import owlready2
 import owlready2.reasoning
-from rdflib import Literal, URIRef
+from rdflib import URIRef
 from rdflib.namespace import OWL, RDF, RDFS
 from rdflib.term import Node
 
@@ -23,7 +22,7 @@ from suave_des.errors import KnowledgeError
 from suave_des.knowledge.java import java_executable
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import unescape
-from suave_des.knowledge.rdf import Lit, Triple, literal, n_triple
+from suave_des.knowledge.rdf import Lit, Triple, n_triple, term_of
 from suave_des.knowledge.vocabulary import RDF as RDF_IRI
 from suave_des.knowledge.vocabulary import RDF_TYPE, XSD
 
@@ -32,26 +31,26 @@ _STATE_IRI: Final = "urn:suave-des:state"
 
 
 class StockPellet:
-    """owlready2 with its own way to run Pellet."""
+    """owlready2, which starts Pellet in a Java process of its own."""
 
-    def __init__(self, kb: Ontology) -> None:
-        self._text = kb.content.n_triples()
-        self._properties = kb.content.properties_to_read()
-        self._classes = sorted(kb.content.head_classes())
+    def __init__(self, ontology: Ontology) -> None:
+        self._text = ontology.content.n_triples()
+        self._properties = ontology.content.properties_to_read()
+        self._classes = sorted(ontology.content.head_classes())
 
-    def infer(self, situation: Sequence[Triple], limit_s: float | None = None) -> frozenset[Triple] | None:
-        """What holds of the properties and classes to read; None when the situation contradicts itself.
+    def infer(self, assertions: Sequence[Triple], limit_s: float | None = None) -> frozenset[Triple] | None:
+        """Return the values and members of the properties and classes to read; None for a contradiction.
 
         Raises:
             TimeoutError: it took longer than the limit; its Java process is ended.
         """
-        # What owlready2 hands on to subprocess.run, which has no other way to be told.
+        # owlready2 passes these on to subprocess.run, and has no other parameter for it.
         owlready2.reasoning._subprocess_kargs["timeout"] = limit_s
         owlready2.JAVA_EXE = str(java_executable())
         world = owlready2.World()
         try:
-            lossy = [triple for triple in situation if _is_lossy(triple[2])]
-            text = self._text + "".join(n_triple(triple) for triple in situation if triple not in lossy)
+            lossy = [triple for triple in assertions if _is_lossy(triple[2])]
+            text = self._text + "".join(n_triple(triple) for triple in assertions if triple not in lossy)
             ontology = world.get_ontology(_STATE_IRI).load(fileobj=io.BytesIO(text.encode()), only_local=True)
             for triple in lossy:
                 _add_exactly(world, ontology, triple)
@@ -74,14 +73,12 @@ class StockPellet:
 
 def _value(term: Node) -> str | Lit:
     """An IRI or a literal; text that Pellet returns is PlainLiteral, with its escapes left in by owlready2."""
-    if not isinstance(term, Literal):
-        return str(term)
-    found = literal(term)
-    return Lit(unescape(found.text), XSD + "string") if found.datatype == _PLAIN else found
+    found = term_of(term)
+    return Lit(unescape(found.text), XSD + "string") if isinstance(found, Lit) and found.datatype == _PLAIN else found
 
 
 def _below(graph: Any, name: str) -> set[Node]:
-    """A class with all its subclasses: the reasoner tells only the nearest classes of an individual."""
+    """A class with all its subclasses: the reasoner returns only the nearest classes of an individual."""
     found: set[Node] = {URIRef(name)}
     waiting = list(found)
     while waiting:
@@ -95,34 +92,25 @@ def _below(graph: Any, name: str) -> set[Node]:
 
 def _reason(world: owlready2.World) -> bool:
     """Let owlready2 run Pellet; false when the ontology is inconsistent."""
-    try:
-        owlready2.sync_reasoner_pellet(world, infer_property_values=True, infer_data_property_values=True, debug=0)
-    except BaseException as error:
-        _remove_left_behind(error.__traceback__)
-        if isinstance(error, owlready2.OwlReadyInconsistentOntologyError):
+    before = tempfile.tempdir
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        tempfile.tempdir = folder  # where owlready2 leaves a file behind when its reasoner fails or is interrupted
+        try:
+            owlready2.sync_reasoner_pellet(world, infer_property_values=True, infer_data_property_values=True, debug=0)
+        except owlready2.OwlReadyInconsistentOntologyError:
             return False
-        if isinstance(error, subprocess.TimeoutExpired):
+        except subprocess.TimeoutExpired as error:
             raise TimeoutError from error
-        if isinstance(error, owlready2.OwlReadyJavaError):
+        except owlready2.OwlReadyJavaError as error:
             reason = " ".join(str(error).split())[:400]
             raise KnowledgeError(f"Pellet, run by owlready2, failed: {reason}") from error
-        raise
+        finally:
+            tempfile.tempdir = before
     return True
 
 
-def _remove_left_behind(trace: TracebackType | None) -> None:
-    """Remove the temporary file that owlready2 leaves behind when its reasoner fails or is interrupted."""
-    while trace is not None:
-        if trace.tb_frame.f_code.co_name == "sync_reasoner_pellet":
-            file = trace.tb_frame.f_locals.get("tmp")
-            if file is not None:
-                file.close()
-                Path(file.name).unlink(missing_ok=True)
-        trace = trace.tb_next
-
-
 def _add_exactly(world: owlready2.World, ontology: owlready2.Ontology, triple: Triple) -> None:
-    """Assert a decimal as it was written: the loader would make a float of it, written as 1e-05, no decimal."""
+    """Assert a decimal as it was written: the loader would make a float of it, and write 1e-05, not a decimal."""
     subject, predicate, value = triple
     assert isinstance(value, Lit)
     subject_id, predicate_id, datatype_id = map(world._abbreviate, (subject, predicate, value.datatype))
@@ -130,7 +118,7 @@ def _add_exactly(world: owlready2.World, ontology: owlready2.Ontology, triple: T
 
 
 def _as_float(triple: Triple) -> Triple:
-    """What owlready2 makes of such a decimal when Pellet returns it: no second value, only a rounded echo."""
+    """The triple that owlready2 makes of such a decimal when Pellet returns it, rounded: it is no second value."""
     subject, predicate, value = triple
     assert isinstance(value, Lit)
     return subject, predicate, Lit(str(float(value.text)), value.datatype)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from suave_des.knowledge.deliberation import Conclusion, Deliberation
-from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit, in_words
+from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import KnowledgeState, Number
@@ -150,7 +150,7 @@ class KnowledgeBase:
             InputError: the question is none of these, or names what the knowledge base does not have.
             KnowledgeError: the reasoner takes too long.
         """
-        doing = f"explaining the state {in_words(state)}"
+        doing = f"explaining the state {state}"
         return self.limit.run(lambda: explain(self.base, state, question, self.settings.improves_exceeded), doing)
 
     def policy(self, max_failed: int = 2) -> Policy:

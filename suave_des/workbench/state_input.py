@@ -13,12 +13,11 @@ from suave_des.errors import InputError, KeyPath, KnowledgeError, did_you_mean, 
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.planning import calls
 from suave_des.knowledge.rdf import Lit
-from suave_des.knowledge.state import KnowledgeState, ObjectiveState
+from suave_des.knowledge.state import UNGROUNDED, KnowledgeState, ObjectiveState
 from suave_des.knowledge.vocabulary import TOMASYS, XSD, nearest
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.yamlfile import read_yaml
 
-UNGROUNDED: Final = "UNGROUNDED"
 #: Functions that every task of the mission asks for.
 LASTING: Final = (MAINTAIN_MOTION,)
 _STATUSES: Final = {"components": "c_status", "objectives": "o_status"}

@@ -15,7 +15,7 @@ import suave_des
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge import java
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.reasoners import BACKENDS, REMEMBERED, Reasoner, make_reasoner
+from suave_des.knowledge.reasoners import BACKENDS, CACHED_STATES, Reasoner, make_reasoner
 from tests.helpers.knowledge_states import SEARCH, searching
 
 
@@ -30,7 +30,7 @@ def test_the_same_state_is_reasoned_on_once(pellet: Reasoner) -> None:
 
 
 def test_the_memory_of_states_is_bounded(kb: Ontology, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("suave_des.knowledge.reasoners.REMEMBERED", 2)
+    monkeypatch.setattr("suave_des.knowledge.reasoners.CACHED_STATES", 2)
     reasoner = make_reasoner("pellet", kb)
     first = reasoner.infer(searching("fd_spiral_low", 1))
     for visibility in (2, 3):
@@ -38,7 +38,7 @@ def test_the_memory_of_states_is_bounded(kb: Ontology, monkeypatch: pytest.Monke
     again = reasoner.infer(searching("fd_spiral_low", 1))
     assert again == first
     assert again is not first
-    assert REMEMBERED >= 1000
+    assert CACHED_STATES >= 1000
 
 
 def fake_java(folder: Path, says: str) -> Path:

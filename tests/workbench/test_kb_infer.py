@@ -202,7 +202,7 @@ main(["run", "seams2023", "--reasoner", {reasoner!r}, "--rules", {str(rules)!r}]
             raise KeyboardInterrupt
 
         monkeypatch.setattr("suave_des.knowledge.limit._abandoned", [])
-        monkeypatch.setattr("suave_des.knowledge.limit._Job.wait", interrupted)
+        monkeypatch.setattr("suave_des.knowledge.limit.Future.result", interrupted)
         with pytest.raises(KeyboardInterrupt):
             TimeLimit().run(lambda: None, "reasoning")
         assert times_abandoned() == 1
