@@ -31,7 +31,7 @@ MAX_FILES: Final = 4
 #: Another attempt to make an archive is made after this time.
 AGAIN_AFTER_S: Final = 86400.0
 _MAKING_S: Final = 600.0
-_started: Final[list[subprocess.Popen[bytes]]] = []  # kept, since nobody waits for them
+_started: Final[list[subprocess.Popen[bytes]]] = []  # so that Python does not wait for them
 
 #: The training run: the shipped ontology and one inference.
 _TRAINING: Final = """
@@ -133,8 +133,8 @@ def main() -> int:
     try:
         print(make() or f"switched off by {_SWITCH}")
     except (OSError, subprocess.SubprocessError) as error:
-        said = (getattr(error, "stderr", None) or b"").decode(errors="replace").strip().splitlines()
-        print(f"suave-des: Java could not make its archive: {said[-1] if said else error}", file=sys.stderr)
+        lines = (getattr(error, "stderr", None) or b"").decode(errors="replace").strip().splitlines()
+        print(f"suave-des: Java could not make its archive: {lines[-1] if lines else error}", file=sys.stderr)
         return 2
     return 0
 

@@ -133,13 +133,13 @@ def _parse_xml(path: Path, content: bytes) -> etree._Element:
     except etree.XMLSyntaxError as error:
         line, column = error.position
         place = f"line {line}, column {column}"
-        said = re.sub(r", line \d+, column \d+$", "", error.msg or "")
+        reason = re.sub(r", line \d+, column \d+$", "", error.msg or "")
         external = re.search(rb"<!ENTITY\s+(?:%\s*)?\S+\s+(?:SYSTEM|PUBLIC)\b", content)
-        if "amplification" in said:
+        if "amplification" in reason:
             problem = "the entities in this file expand to far more than its size"
             raise KnowledgeError(problem, file=path, remedy="write their values out") from error
         if external is None:
-            raise KnowledgeError(f"not well-formed XML: {said}", file=path, place=place, remedy=_SAVE_AS) from error
+            raise KnowledgeError(f"not well-formed XML: {reason}", file=path, place=place, remedy=_SAVE_AS) from error
         raise _external_entity(path, external.group().split()[-2].decode(errors="replace"), content) from error
     document: Any = root.getroottree().docinfo
     if document.system_url or document.public_id:

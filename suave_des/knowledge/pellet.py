@@ -10,6 +10,7 @@ import re
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from typing import Any, Final
 
 from suave_des.errors import KnowledgeError
@@ -45,9 +46,9 @@ def _java_errors(ontology: Ontology) -> Iterator[None]:
     try:
         yield
     except jvm.JavaError as error:
-        said = " ".join(str(error).split()).rpartition("Exception: ")[2]
+        reason = " ".join(str(error).split()).rpartition("Exception: ")[2]
         raise KnowledgeError(
-            f"Pellet cannot use the ontologies: {said}",
+            f"Pellet cannot use the ontologies: {reason}",
             file=_files(ontology),
             remedy="suave-des kb check may say where",
         ) from error
@@ -67,11 +68,9 @@ class InProcessPellet:
         self._ontology = ontology
         with one_at_a_time, _java_errors(ontology):
             jvm.start()
-            self._make_term = jvm.java_class(_PELLET + "utils.ATermUtils").makeTermAppl
-            self._make_literal = jvm.java_class(_PELLET + "utils.ATermUtils").makeTypedLiteral
-            self._make_plain = jvm.java_class(_PELLET + "utils.ATermUtils").makePlainLiteral
+            self._terms = jvm.java_class(_PELLET + "utils.ATermUtils")
+            self._term = cache(self._terms.makeTermAppl)
             self._base = load_n_triples(ontology.content.n_triples())
-            self._terms: dict[str, Any] = {}
             self._properties = [(name, self._term(name)) for name in ontology.content.properties_to_read()]
             self._classes = [(name, self._term(name)) for name in sorted(ontology.content.head_classes())]
             if not self._base.isConsistent():
@@ -104,21 +103,15 @@ class InProcessPellet:
             self._refuse_dropped_rules()
             return found
 
-    def _term(self, iri: str) -> Any:
-        term = self._terms.get(iri)
-        if term is None:
-            term = self._terms[iri] = self._make_term(iri)
-        return term
-
     def _add(self, knowledge_base: Any, subject: str, predicate: str, value: str | Lit) -> None:
         individual = self._term(subject)
         knowledge_base.addIndividual(individual)
         if isinstance(value, Lit):
             value = canonical(value)
             if value.datatype.startswith("@"):
-                data = self._make_plain(value.text, value.datatype[1:])
+                data = self._terms.makePlainLiteral(value.text, value.datatype[1:])
             else:
-                data = self._make_literal(value.text, value.datatype)
+                data = self._terms.makeTypedLiteral(value.text, value.datatype)
             knowledge_base.addPropertyValue(self._term(predicate), individual, data)
         elif predicate == RDF_TYPE:
             knowledge_base.addType(individual, self._term(value))
@@ -170,7 +163,7 @@ def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> Knowledge
         text = ontology.content.n_triples() + "".join(map(n_triple, assertions))
         knowledge_base = load_n_triples(text, explain=True)
         knowledge_base.isConsistent()
-        said = str(knowledge_base.getExplanation())
+        reason = str(knowledge_base.getExplanation())
         axioms = sorted(str(axiom.toString()) for axiom in knowledge_base.getExplanationSet())
     finally:
         options.USE_TRACING = False
@@ -182,7 +175,7 @@ def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> Knowledge
         if any(axiom.startswith(f"prop({triple[1]},{triple[0]},") for axiom in axioms)
         for fact in facts_of([triple], ontology.names)
     ]
-    problem = re.sub(r"https?://[^\s,()]+", lambda iri: ontology.names.short(iri.group()), said)
+    problem = re.sub(r"https?://[^\s,()]+", lambda iri: ontology.names.short(iri.group()), reason)
     if rules:
         problem += f", by the rules {', '.join(rules)}"
     if facts:
@@ -210,7 +203,7 @@ def _files(ontology: Ontology) -> str:
 
 
 def read_term(text: str) -> str | Lit:
-    """A term as Pellet prints it: an IRI, or literal(text,language,datatype)."""
+    """Read a term as Pellet prints it: an IRI, or literal(text,language,datatype)."""
     found = _LITERAL.fullmatch(text)
     if found is None:
         return text

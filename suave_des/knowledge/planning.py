@@ -1,8 +1,7 @@
-"""Plan: choose a function design for each objective that needs one (the loop's third step).
+"""Plan: choose a function design for each objective that needs one (the third step of the MAPE-K loop).
 
-The planner reads facts, asserted and inferred; what the rules say is left to the reasoner. Source: the
-exemplar's Metacontrol (paper, section on Metacontrol; repository kas-lab/suave). Unlike there, the filter by
-required values counts.
+The planner reads facts, asserted and inferred; the rules are the reasoner's. Source: the exemplar's Metacontrol (paper,
+section on Metacontrol; repository kas-lab/suave). Unlike there, the filter by required values is in force.
 """
 
 from __future__ import annotations
@@ -18,9 +17,9 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.state import UNGROUNDED, Decision, Inference, KnowledgeState, ObjectiveState, Plan, Rejection
 from suave_des.knowledge.vocabulary import PERFORMANCE, objective_name
 
-#: What a design without a performance counts.
+#: Performance of a design for which none is given.
 DEFAULT_PERFORMANCE: Final = Decimal("0.001")
-#: Statuses that call for adaptation, besides all that start with IN_ERROR_; the last three are of older files.
+#: Statuses that call for adaptation, besides all that start with IN_ERROR_; the last three occur in older files.
 _CALLING: Final = frozenset({UNGROUNDED, "INTERNAL_ERROR", "EXTERNAL_ERROR", "UPDATABLE"})
 _COMPARE: Final[Mapping[str, Callable[[Decimal, Decimal], bool]]] = MappingProxyType(
     {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
@@ -33,8 +32,8 @@ def plan(
     """Decide on every objective that is ungrounded, in error, updatable or always to be improved.
 
     Args:
-        ontology: the knowledge base.
-        state: the state that was reasoned about.
+        ontology: the ontology.
+        state: the state that was analyzed.
         inference: what the reasoner added to it.
         to_adapt: functions whose objectives are adapted whatever their status, each with the reason.
 
@@ -67,22 +66,16 @@ def _call(objective: ObjectiveState, inference: Inference) -> str | None:
 
 def _decide(ontology: Ontology, inference: Inference, function: str, call: str) -> Decision:
     designs = [name for name in inference.subjects("solvesF", function) if name in ontology.model.designs]
-    rejected = []
-    left = []
-    for design in designs:
-        reason = next(_objections(inference, design, function), None)
-        if reason is None:
-            left.append(design)
-        else:
-            rejected.append(Rejection(design, reason))
+    objections = {design: next(_objections(inference, design, function), None) for design in designs}
+    rejected = tuple(Rejection(design, reason) for design, reason in objections.items() if reason is not None)
+    left = {design: performance(ontology, inference, design) for design, reason in objections.items() if reason is None}
     if not left:
         present = inference.state.grounded(function)
         kept = f"{present} is kept" if present else "it stays ungrounded"
-        return Decision(function, None, f"{call}: no function design is left, {kept}", tuple(rejected))
-    best = min(left, key=lambda design: (-performance(ontology, inference, design), design))
-    shown = _show(performance(ontology, inference, best))
-    reason = f"{call}: highest performance, {shown}, of {len(left)} left among {len(designs)}"
-    return Decision(function, best, reason, tuple(rejected))
+        return Decision(function, None, f"{call}: no function design is left, {kept}", rejected)
+    best = min(left, key=lambda design: (-left[design], design))
+    reason = f"{call}: highest performance, {_show(left[best])}, of {len(left)} left among {len(designs)}"
+    return Decision(function, best, reason, rejected)
 
 
 def _objections(inference: Inference, design: str, function: str) -> Iterator[str]:
@@ -93,16 +86,21 @@ def _objections(inference: Inference, design: str, function: str) -> Iterator[st
     if objective in inference.values(design, "fd_error_log"):
         yield f"{objective} is in its error log"
     for attribute, required in _values(inference, objective, "hasNFR"):
-        compare, sign = _operator(inference, attribute, objective)
+        signs = _operators(inference, attribute)
+        if not signs:
+            raise KnowledgeError(
+                f"{objective} requires a value of {attribute}, which has no qa_comparison_operator",
+                remedy=f"give {attribute} one of {' '.join(_COMPARE)}: "
+                "the way in which a value is worse than the required one",
+            )
         for expected in _expected(inference, design, attribute):
-            if compare(expected, required):
+            if _COMPARE[signs[0]](expected, required):
                 left, right = _show_pair(expected, required)
-                yield f"{attribute} {left} expected {sign} {right} required"
+                yield f"{attribute} {left} expected {signs[0]} {right} required"
     for attribute, expected in _values(inference, design, "hasQAestimation"):
         for measured in inference.state.measured(attribute):
-            signs = [str(sign) for sign in inference.values(attribute, "qa_comparison_operator")]
-            for sign in signs:
-                if sign in _COMPARE and _COMPARE[sign](measured, expected):
+            for sign in _operators(inference, attribute):
+                if _COMPARE[sign](measured, expected):
                     left, right = _show_pair(measured, expected)
                     yield f"{attribute} {left} measured {sign} {right} expected"
 
@@ -117,40 +115,30 @@ def _values(inference: Inference, subject: str, property_name: str) -> Iterator[
 
 
 def _expected(inference: Inference, design: str, attribute: str) -> list[Decimal]:
-    """Expected values of one quality attribute; a missing performance counts as in the choice."""
+    """Expected values of one quality attribute; a missing performance is the default, as in the choice."""
     found = [value for name, value in _values(inference, design, "hasQAestimation") if name == attribute]
     return found or ([DEFAULT_PERFORMANCE] if attribute == "performance" else [])
 
 
-def _operator(inference: Inference, attribute: str, objective: str) -> tuple[Callable[[Decimal, Decimal], bool], str]:
-    for sign in map(str, inference.values(attribute, "qa_comparison_operator")):
-        if sign in _COMPARE:
-            return _COMPARE[sign], sign
-    raise KnowledgeError(
-        f"{objective} requires a value of {attribute}, which has no qa_comparison_operator",
-        remedy=f"give {attribute} one of {' '.join(_COMPARE)}: the way in which a value is worse than the required one",
-    )
+def _operators(inference: Inference, attribute: str) -> list[str]:
+    """How a value of a quality attribute is worse than an expected one; usually one operator."""
+    return [sign for sign in map(str, inference.values(attribute, "qa_comparison_operator")) if sign in _COMPARE]
 
 
 def performance(ontology: Ontology, inference: Inference, design: str) -> Decimal:
-    """What the planner maximises: the design's expected performance."""
+    """The design's expected performance, which the planner maximises."""
     name = ontology.names.short(PERFORMANCE)
-    return max(
-        (value for kind, value in _values(inference, design, "hasQAestimation") if kind == name),
-        default=DEFAULT_PERFORMANCE,
-    )
+    found = (value for kind, value in _values(inference, design, "hasQAestimation") if kind == name)
+    return max(found, default=DEFAULT_PERFORMANCE)
 
 
 def _show(value: Decimal, digits: int = 2) -> str:
-    """A number with that many digits, of which those after the second are left out where they are zero."""
+    """Write a number with two digits, or up to `digits` of them that are not zero at the end."""
     whole, _, part = f"{value:.{digits}f}".partition(".")
     return f"{whole}.{part[:2]}{part[2:].rstrip('0')}"
 
 
 def _show_pair(one: Decimal, other: Decimal) -> tuple[str, str]:
-    """Two numbers with two digits, or with as many as it takes to tell them apart."""
-    for digits in range(2, 17):
-        shown = _show(one, digits), _show(other, digits)
-        if shown[0] != shown[1] or one == other:
-            return shown
-    return str(one), str(other)
+    """Write two numbers with as many digits as it takes to distinguish them."""
+    shown = ((_show(one, digits), _show(other, digits)) for digits in range(2, 17))
+    return next((pair for pair in shown if pair[0] != pair[1] or one == other), (str(one), str(other)))

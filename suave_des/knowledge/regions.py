@@ -42,7 +42,8 @@ class Regions:
 
     Attributes:
         thresholds: every number in the knowledge base, ascending.
-        reasons: why regions do not tell enough, so that only equal values count as the same; empty where they do.
+        reasons: why the rules may distinguish values of one region, so that only equal values are equivalent; empty
+            where they cannot.
     """
 
     thresholds: tuple[Decimal, ...]
@@ -50,7 +51,7 @@ class Regions:
 
     @property
     def is_sound(self) -> bool:
-        """Whether all values of a region are the same to the rules."""
+        """Whether the rules cannot distinguish values of one region."""
         return not self.reasons
 
     def region(self, value: Decimal) -> int:
@@ -58,9 +59,9 @@ class Regions:
         return bisect_left(self.thresholds, value) + bisect_right(self.thresholds, value)
 
     def around(self, value: float) -> tuple[float, float]:
-        """Bounds of a value: all numbers between them are in its region. Equal bounds: only an equal number surely is.
+        """Return bounds of a value: all numbers between them are in its region; equal bounds: only an equal number is.
 
-        Numbers are exact, and floats are not; but what is less as a float is less as the decimal that it stands for.
+        Floats keep the order of the decimals that they denote, though not always their difference.
         """
         floats = self._floats
         place = bisect_left(floats, value, 1)
@@ -73,7 +74,7 @@ class Regions:
         return (-inf, *map(float, self.thresholds), inf)
 
     def key(self, state: KnowledgeState) -> Key:
-        """What a state is to the rules: equal keys entail the same."""
+        """Return what the rules can distinguish of a state: states with equal keys entail the same."""
         measured = state.measurements
         if self.reasons:
             return state.objectives, state.groundings, state.components, measured
@@ -85,7 +86,7 @@ class Regions:
 
 
 def _ranked(state: KnowledgeState, where: list[tuple[str, int]]) -> tuple[tuple[str, int | tuple[int, int]], ...]:
-    """Regions, with the place of each value among those that share its gap; equal values share a place."""
+    """Regions, with the rank of each value among those in the same gap; equal values have the same rank."""
     in_gap: dict[int, set[Decimal]] = {}
     for (_, value), (_, number) in zip(state.measurements, where, strict=True):
         in_gap.setdefault(number, set()).add(value)
@@ -96,7 +97,7 @@ def _ranked(state: KnowledgeState, where: list[tuple[str, int]]) -> tuple[tuple[
 
 
 def regions_of(ontology: Ontology) -> Regions:
-    """The regions of a knowledge base, or why it has none."""
+    """Find the regions of an ontology, or why its rules may distinguish values within them."""
     carriers = _carriers(ontology)
     reasons = [*_of_rules(ontology, carriers), *_of_ontologies(ontology, carriers)]
     return Regions(tuple(sorted(set(_numbers(ontology)))), tuple(dict.fromkeys(reasons)))
@@ -105,16 +106,10 @@ def regions_of(ontology: Ontology) -> Regions:
 def _carriers(ontology: Ontology) -> frozenset[str]:
     """Properties that can have a measured value: hasValue, and what holds wherever it does."""
     found = {HAS_VALUE}
-    while True:
-        more = {
-            one
-            for subject, predicate, value in ontology.content.triples
-            if predicate in _SAME_VALUES and isinstance(value, str) and {subject, value} & found
-            for one in (value, subject)
-        }
-        if more <= found:
-            return frozenset(found)
+    pairs = [{s, o} for s, p, o in ontology.content.triples if p in _SAME_VALUES and isinstance(o, str)]
+    while more := set[str]().union(*(pair for pair in pairs if pair & found)) - found:
         found |= more
+    return frozenset(found)
 
 
 def _of_rules(ontology: Ontology, carriers: frozenset[str]) -> Iterator[str]:
@@ -161,12 +156,8 @@ def _of_ontologies(ontology: Ontology, carriers: frozenset[str]) -> Iterator[str
 def _numbers(ontology: Ontology) -> Iterator[Decimal]:
     """Every number in the knowledge base, whatever its datatype, and texts that look like one."""
     model = ontology.model
-    groups = (model.objectives, model.groundings, model.measurements)
-    for triples in (
-        ontology.content.triples,
-        *(individual.own for group in groups for individual in group.values()),
-        *model.initial.values(),
-    ):
+    own = (individual.own for individual in model.individuals())
+    for triples in (ontology.content.triples, *own, *model.initial.values()):
         yield from _in_texts(value.text for _, _, value in triples if isinstance(value, Lit))
     for line in ontology.content.structure:
         yield from _in_texts(text for text, _ in _LITERAL.findall(line))

@@ -22,7 +22,7 @@ SWRL: Final = "http://www.w3.org/2003/11/swrl#"
 SWRLB: Final = "http://www.w3.org/2003/11/swrlb#"
 SWRLA: Final = "http://swrl.stanford.edu/ontologies/3.3/swrla.owl#"
 
-#: Namespaces of the languages themselves: what is said in them is no fact about the system.
+#: Namespaces of OWL, RDF and SWRL: their terms describe no fact of the system.
 LANGUAGE_NAMESPACES: Final = (RDF, RDFS, OWL, XSD, SWRL, SWRLB, SWRLA)
 
 RDF_TYPE: Final = RDF + "type"
@@ -67,7 +67,7 @@ def local_name(iri: str) -> str:
 
 
 def namespace(iri: str) -> str:
-    """What stands before the local name, with its separator."""
+    """The part of an IRI before the local name, with the separator."""
     return iri[: len(iri) - len(local_name(iri))]
 
 
@@ -91,6 +91,6 @@ def measurement_name(attribute: str) -> str:
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
-    """A question after the known name that is most like a word; None when none is."""
+    """Suggest the known name most similar to a word, as a question; None when none is similar."""
     found = difflib.get_close_matches(word, sorted(known), n=1, cutoff=0.6)
     return f"did you mean {found[0]}?" if found else None

@@ -62,7 +62,7 @@ SILENT = {
     ),
     "literal of an object property": ('A: typeFD(?q, "fd") -> Role(?q)', 15, None),
     "head literal outside the range": ("A: Role(?q) -> fg_status(?q, 1)", 30, "a value of string"),
-    "individual of a data property": ("A: fg_status(?q, energy) -> Role(?q)", 18, 'a text stands in quotes: "energy"'),
+    "individual of a data property": ("A: fg_status(?q, energy) -> Role(?q)", 18, 'a text needs quotes: "energy"'),
     "class as property": ("A: Role(?q, ?r) -> Role(?q)", 4, "write Role(?x)"),
     "differentFrom": (
         "A: Role(?q) ^ differentFrom(?q, ?q) -> Role(?q)",
@@ -105,7 +105,7 @@ def test_rules_of_ontologies_are_checked_likewise(tmp_path: Path) -> None:
     assert [(one.column, one.message) for one in findings] == [
         (1, "fg_status is a data property, but is used as an object property"),
         (22, "class Roel is not defined"),
-        (27, "?z stands in the head, but the body does not bind it"),
+        (27, "?z occurs in the head, but the body does not bind it"),
     ]
 
 

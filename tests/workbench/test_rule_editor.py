@@ -160,7 +160,7 @@ def test_what_else_is_said_of_a_variable_stays(owl: Path) -> None:
     ("edit", "words"),
     [
         (lambda path: add_rule(path, "A: Objective(?o -> Role(?o)"), "the rule: line 1, column 17"),
-        (lambda path: add_rule(path, "A: Objective(?o) -> Role(?p)"), "?p stands in the head"),
+        (lambda path: add_rule(path, "A: Objective(?o) -> Role(?p)"), "?p occurs in the head"),
         (lambda path: add_rule(path, "QAWaterVisibility: Objective(?o) -> Role(?o)"), "there is a rule"),
         (lambda path: add_rule(path, ""), "0 rules instead of one"),
         (lambda path: remove_rule(path, "QAWaterVisibilty"), "did you mean QAWaterVisibility?"),

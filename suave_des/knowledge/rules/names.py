@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -38,13 +39,17 @@ from suave_des.knowledge.vocabulary import (
     nearest,
 )
 
+_COMPARING: Final = "equal notEqual lessThan lessThanOrEqual greaterThan greaterThanOrEqual"
+_TESTING_TEXT: Final = "contains containsIgnoreCase endsWith matches startsWith stringEqualIgnoreCase"
+#: Builtins that compare, so that every argument must be bound; the others compute their first one.
+TESTERS: Final = frozenset(SWRLB + name for name in f"{_COMPARING} {_TESTING_TEXT}".split())
 #: Pellet's builtins, as its registry has them, with the least and the largest number of arguments.
 BUILTINS: Final[Mapping[str, tuple[int, int]]] = MappingProxyType(
     {
         SWRLB + name: counts
         for names, counts in (
-            ("equal notEqual lessThan lessThanOrEqual greaterThan greaterThanOrEqual", (2, 2)),
-            ("contains containsIgnoreCase endsWith matches startsWith stringEqualIgnoreCase", (2, 2)),
+            (_COMPARING, (2, 2)),
+            (_TESTING_TEXT, (2, 2)),
             ("abs ceiling cos floor round sin tan unaryMinus unaryPlus booleanNot", (2, 2)),
             ("lowerCase normalizeSpace stringLength upperCase", (2, 2)),
             ("divide integerDivide mod pow subtract", (3, 3)),
@@ -63,14 +68,6 @@ BUILTINS: Final[Mapping[str, tuple[int, int]]] = MappingProxyType(
         )
         for name in names.split()
     }
-)
-#: Builtins that compare, so that every argument must be bound; the others compute their first one.
-TESTERS: Final = frozenset(
-    SWRLB + name
-    for name in (
-        *("equal", "notEqual", "lessThan", "lessThanOrEqual", "greaterThan", "greaterThanOrEqual"),
-        *("contains", "containsIgnoreCase", "endsWith", "matches", "startsWith", "stringEqualIgnoreCase"),
-    )
 )
 _DECLARED: Final = {
     OWL + "Class": "class",
@@ -101,27 +98,23 @@ class Vocabulary:
     @classmethod
     def of(cls, triples: Collection[Triple], individuals: Iterable[str] = ()) -> Vocabulary:
         """Collect the names in triples, and those of further individuals (that exist only in states)."""
-        kinds: dict[str, set[str]] = {OWL + "Thing": {"class"}, OWL + "Nothing": {"class"}}
+        kinds: dict[str, set[str]] = defaultdict(set, {OWL + "Thing": {"class"}, OWL + "Nothing": {"class"}})
+        ranges: dict[str, set[str]] = defaultdict(set)
+        by_name: dict[str, list[str]] = defaultdict(list)
         for subject, predicate, value in triples:
             if predicate == RDF_TYPE and isinstance(value, str):
-                known = _DECLARED.get(value)
-                if known is not None:
-                    kinds.setdefault(subject, set()).add(known)
-                elif not value.startswith(LANGUAGE_NAMESPACES):
-                    kinds.setdefault(subject, set()).add("individual")
+                if value in _DECLARED or not value.startswith(LANGUAGE_NAMESPACES):
+                    kinds[subject].add(_DECLARED.get(value, "individual"))
             elif not predicate.startswith(LANGUAGE_NAMESPACES):
-                kinds.setdefault(subject, set()).add("individual")
+                kinds[subject].add("individual")
                 if isinstance(value, str):
-                    kinds.setdefault(value, set()).add("individual")
+                    kinds[value].add("individual")
+            elif predicate == RDFS + "range" and isinstance(value, str) and value.startswith(XSD):
+                ranges[subject].add(value)
         for iri in individuals:
-            kinds.setdefault(iri, set()).add("individual")
-        ranges: dict[str, set[str]] = {}
-        for subject, predicate, value in triples:
-            if predicate == RDFS + "range" and isinstance(value, str) and value.startswith(XSD):
-                ranges.setdefault(subject, set()).add(value)
-        by_name: dict[str, list[str]] = {}
+            kinds[iri].add("individual")
         for iri in sorted(kinds):
-            by_name.setdefault(local_name(iri), []).append(iri)
+            by_name[local_name(iri)].append(iri)
         return cls(
             {iri: frozenset(found) for iri, found in kinds.items()},
             {name: tuple(found) for name, found in by_name.items()},
@@ -139,15 +132,12 @@ class Vocabulary:
         """Whether the bare name of an IRI means that IRI."""
         return self.candidates(local_name(iri)) == (iri,)
 
-    def guess(self, name: str, wanted: Collection[str] = ()) -> str | None:
+    def guess(self, name: str, wanted: Collection[str]) -> str | None:
         """Suggest a name of the wanted kinds, as a question."""
         bare = local_name(name)
-        wished = {*wanted}
-        known = [
-            each for each, iris in self.by_name.items() if not wanted or any(self.kinds[iri] & wished for iri in iris)
-        ]
-        if not wanted or "builtin" in wanted:
-            known += [local_name(iri) for iri in BUILTINS]
+        known = [each for each, iris in self.by_name.items() if any(self.kinds[iri] & {*wanted} for iri in iris)]
+        if "builtin" in wanted:
+            known += map(local_name, BUILTINS)
         if bare in known and bare != name:
             return f"did you mean {' or '.join(self.candidates(bare))}?"
         return nearest(bare, known)
@@ -160,19 +150,9 @@ def rule_from_text(parsed: ParsedRule, vocabulary: Vocabulary, file: Path) -> Ru
         RuleError: a name is unknown or ambiguous; with line and column.
     """
     body, head = (tuple(_resolved(atom, vocabulary, file) for atom in side) for side in (parsed.body, parsed.head))
-    return with_triples(
-        Rule(
-            name=parsed.name,
-            text=line_of_rule(body, head).name,
-            file=file,
-            enabled=parsed.enabled,
-            node=BNode(),
-            triples=(),
-            body=body,
-            head=head,
-            place=f"line {parsed.place.line}",
-        )
-    )
+    text = line_of_rule(body, head).name
+    place = f"line {parsed.place.line}"
+    return with_triples(Rule(parsed.name, text, file, parsed.enabled, BNode(), (), body, head, place))
 
 
 def _resolved(atom: Atom, vocabulary: Vocabulary, file: Path) -> Atom:
@@ -215,11 +195,9 @@ def _kind(predicate: str, arguments: tuple[Term, ...], vocabulary: Vocabulary) -
     declared = vocabulary.kinds.get(predicate, frozenset())
     if "datatype" in declared:
         return "range"
-    wanted: Kind = "class"
-    if len(arguments) > 1:
-        wanted = "data" if isinstance(arguments[1], Lit) else "object"
-        if "data property" in declared and "object property" not in declared:
-            return "data"
-        if "object property" in declared and "data property" not in declared:
-            return "object"
-    return wanted
+    if len(arguments) < 2:
+        return "class"
+    used_for = declared & {"data property", "object property"}
+    if len(used_for) == 1:
+        return "data" if "data property" in used_for else "object"
+    return "data" if isinstance(arguments[1], Lit) else "object"

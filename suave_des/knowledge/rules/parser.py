@@ -128,9 +128,10 @@ def parse_rules(text: str, file: Path | str | None = None) -> ParsedRules:
                 errors.append(error)
                 at = builder.failed_at
             except UnexpectedInput as error:
+                state: Any = error.interactive_parser  # which knows what is possible after all that was read
                 at = _BLANK.match(text, error.pos_in_stream or 0).end()  # type: ignore[union-attr]
                 at = len(text) if getattr(getattr(error, "token", None), "type", "") == "$END" else at
-                errors.append(_error(text, at, _accepted(error), file))
+                errors.append(_error(text, at, state.accepts(), file))
             line_end = text.find("\n", at)
             header = _HEADER.search(text, line_end + 1) if line_end >= 0 else None
             start = header.start() if header else None
@@ -157,12 +158,6 @@ def _parser() -> tuple[Lark, _Builder]:
 
     builder = _Builder()
     return Lark(_GRAMMAR, parser="lalr", lexer="contextual", transformer=builder), builder
-
-
-def _accepted(error: Any) -> set[str]:
-    """Terminals that lark would have accepted."""
-    names: set[str] = getattr(error, "expected", None) or getattr(error, "allowed", None) or set()
-    return names
 
 
 def _error(text: str, at: int, accepted: set[str], file: Path | str | None) -> RuleError:

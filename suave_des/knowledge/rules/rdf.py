@@ -98,7 +98,7 @@ def _sides(graph: Graph, rule: Node) -> list[tuple[Atom, ...]]:
         [_read_atom(graph, atom) for atom in _items(graph, graph.value(rule, URIRef(SWRL + side)))]
         for side in ("body", "head")
     ]
-    names = distinct_variables((*sides[0], *sides[1]), local_name)
+    names = distinct_variables((*sides[0], *sides[1]))
 
     def renamed(term: Term) -> Term:
         return Variable(names[term.name]) if isinstance(term, Variable) else term

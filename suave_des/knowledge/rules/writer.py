@@ -13,8 +13,7 @@ from suave_des.knowledge.rules.syntax import Atom, Named, ParsedRule, Place, Ter
 from suave_des.knowledge.vocabulary import SWRLB, XSD, local_name, namespace
 
 _WORD: Final = re.compile(r"[^\W\d](?:[\w.-]*\w)?")
-_LOCAL: Final = re.compile(r"\w(?:[\w.-]*\w)?")
-#: Literals that stand without quotes, by datatype: what the parser makes of such a text.
+#: Literals without quotes, by the datatype that the parser gives them.
 _BARE: Final = {
     XSD + "boolean": re.compile(r"true|false"),
     XSD + "integer": re.compile(r"[+-]?[0-9]+"),
@@ -27,18 +26,18 @@ Naming = Callable[[str], str]
 
 
 def full_name(iri: str) -> str:
-    """An IRI with one of the known prefixes, or in angle brackets; reads back whatever else is known."""
+    """Write an IRI with a known prefix, or in angle brackets: that reads back with any vocabulary."""
     for prefix, start in PREFIXES.items():
-        if iri.startswith(start) and re.fullmatch(r"[^\W\d](?:[\w.-]*\w)?", iri[len(start) :]):
+        if iri.startswith(start) and _WORD.fullmatch(iri[len(start) :]):
             return f"{prefix}:{iri[len(start) :]}"
     return f"<{iri}>"
 
 
 def naming(shared: Callable[[str], bool]) -> Naming:
-    """Bare names, but full ones for IRIs whose last part alone would not be understood.
+    """Write bare names, but full ones for IRIs whose last part alone is ambiguous or unknown.
 
     Args:
-        shared: tells of an IRI whether its bare name means something else, or nothing.
+        shared: whether the bare name of an IRI means something else, or nothing.
     """
 
     def name(iri: str) -> str:
@@ -51,7 +50,7 @@ def naming(shared: Callable[[str], bool]) -> Naming:
 
 
 def write_rule(name: str, body: Sequence[Atom], head: Sequence[Atom], named: Naming, *, enabled: bool = True) -> str:
-    """A rule as a block of a rules file, one atom a line where one line would be long."""
+    """Write a rule for a rules file, one atom a line where one line would be long."""
     word = name if _WORD.fullmatch(name) and name not in ("prefix", "disabled") else _quoted(name)
     start = f"{'' if enabled else 'disabled '}{word}:"
     sides = [[write_atom(atom, named) for atom in side] for side in (body, head)]
@@ -62,10 +61,10 @@ def write_rule(name: str, body: Sequence[Atom], head: Sequence[Atom], named: Nam
 
 
 def line_of_rule(body: Sequence[Atom], head: Sequence[Atom]) -> ParsedRule:
-    """The rule as one line of text, body -> head, with the place of each name in it.
+    """Write a rule on one line, body -> head.
 
     Returns:
-        a rule whose name is the text, and whose atoms know their places.
+        a rule whose name is that text, and whose atoms have their places in it.
     """
     text = ""
     placed: list[list[Atom]] = [[], []]
@@ -84,7 +83,7 @@ def line_of_rule(body: Sequence[Atom], head: Sequence[Atom]) -> ParsedRule:
 
 
 def write_atom(atom: Atom, named: Naming = local_name) -> str:
-    """One atom as text."""
+    """Write one atom."""
     return f"{_predicate(atom, named)}({', '.join(_term(term, named) for term in atom.arguments)})"
 
 
@@ -111,17 +110,12 @@ def _quoted(text: str) -> str:
     return '"' + "".join(_ESCAPES.get(char, char) for char in text) + '"'
 
 
-def distinct_variables(atoms: Iterable[Atom], written: Callable[[str], str]) -> dict[str, str]:
-    """A name for each variable such that no two share one.
-
-    Args:
-        atoms: whose variables are named by something longer, such as an IRI.
-        written: the name that a variable would like to have.
-    """
+def distinct_variables(atoms: Iterable[Atom]) -> dict[str, str]:
+    """Choose a different short name for each variable, which is named by its IRI so far."""
     chosen: dict[str, str] = {}
     taken: set[str] = set()
     for variable in dict.fromkeys(name for atom in atoms for name in atom.variables()):
-        wish = re.sub(r"[^\w-]", "_", written(variable)).lstrip("-") or "v"
+        wish = re.sub(r"[^\w-]", "_", local_name(variable)).lstrip("-") or "v"
         name, number = wish, 2
         while name in taken:
             name, number = f"{wish}_{number}", number + 1
@@ -131,5 +125,5 @@ def distinct_variables(atoms: Iterable[Atom], written: Callable[[str], str]) -> 
 
 
 def literal_text(value: Lit) -> str:
-    """A literal as a rule would write it."""
+    """Write a literal as in a rule."""
     return _term(value, local_name)
