@@ -7,6 +7,7 @@ What a block is follows from its language and the words after it, which readers 
   tests; `picture=NAME` says that the block draws docs/images/NAME. `console setup` is not run. Commands of `console
   background` go on while the rest of the page runs, at a free port in place of 8786; they show nothing.
 - `python`: a script; the `text` block after it is what it prints.
+- A block that is `long` is left out by quick tests and run by refresh_outputs.py; what it shows has a test elsewhere.
 - Any language with `title=FILE` is a file, and with `insert=FILE` and `before=LINE` or `after=LINE` an addition to one.
 - `bibtex` is neither run nor checked.
 
@@ -105,6 +106,9 @@ def run_page(page: Path, folder: Path, *, quick: bool) -> Iterator[tuple[Block, 
     with _inside(folder), contextlib.ExitStack() as background:
         for block in blocks_of(page):
             shown = block.text
+            if quick and "long" in block.marks:
+                yield block, shown
+                continue
             if "title" in block.marks:
                 Path(block.marks["title"]).write_text(block.text, encoding="utf-8")
             elif "insert" in block.marks:

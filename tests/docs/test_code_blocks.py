@@ -33,7 +33,7 @@ def test_blocks_show_what_they_print(page, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "page", [page for page in PAGES if any("test" in block.marks for block in blocks_of(page))], ids=name
+    "page", [page for page in PAGES if any({"test", "long"} & set(block.marks) for block in blocks_of(page))], ids=name
 )
 def test_blocks_that_are_shortened_elsewhere_show_what_they_print(page, tmp_path):
     wrong = outdated(page, tmp_path, quick=False)
