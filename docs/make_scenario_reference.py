@@ -74,7 +74,7 @@ def lead(model: type[BaseModel]) -> str:
 
 
 def kind(model: type[BaseModel], key: str) -> str:
-    """The word that tells a model from its siblings."""
+    """The word that distinguishes a model from its siblings."""
     return str(typing.get_args(model.model_fields[key].annotation)[0])
 
 
@@ -89,7 +89,7 @@ def table(model: type[BaseModel]) -> str:
 
 
 def unit(name: str) -> str:
-    """Unit of a key, which its ending says."""
+    """Unit of a key, by its ending."""
     return next((text for ending, text in UNITS if name.endswith(ending)), "")
 
 

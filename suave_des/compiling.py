@@ -1,4 +1,4 @@
-"""How inner loops are compiled: numba, with the machine code kept on disk between processes."""
+"""Compilation of inner loops by numba, with the machine code cached on disk between processes."""
 
 from __future__ import annotations
 

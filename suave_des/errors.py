@@ -1,4 +1,4 @@
-"""Errors that are meant for the user: each says where, what is wrong, and what would be right."""
+"""Errors for the user: each names the place, what is wrong, and what would be right."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class InputError(SuaveDesError):
 
     Args:
         problem: what is wrong, with the offending value.
-        file: the file it stands in, if there is one.
+        file: that contains it, if there is one.
         place: where in the file: "line 12", a key path such as "signals.water_visibility.period_s", or both.
         remedy: what would be right.
     """
@@ -45,7 +45,7 @@ class InputError(SuaveDesError):
 
 
 def _short(name: str | None) -> str | None:
-    """A file name as it is shown: no name that can exist is cut but those that hide the rest of the message."""
+    """A file name, cut where it would hide the message; no name that can exist is longer."""
     return name if name is None or len(name) <= _NAME_LIMIT else f"{name[:_NAME_LIMIT]}..."
 
 
@@ -80,23 +80,23 @@ KeyPath = tuple[str | int, ...]
 
 
 def place_text(line: int, key_path: KeyPath) -> str:
-    """A place for the user: "line 12, thruster_events[0].time_s"."""
+    """Write a place for the user: "line 12, thruster_events[0].time_s"."""
     keys = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in key_path).lstrip(".")
     return f"line {line}, {keys}" if keys else f"line {line}"
 
 
 _WRITTEN = {"None": "nothing", "True": "true", "False": "false", "inf": ".inf", "-inf": "-.inf", "nan": ".nan"}
-"""How YAML writes what Python writes otherwise."""
+"""Python's spelling of a value, and YAML's."""
 
 
 def shown(value: object, limit: int = 60) -> str:
-    """A value as the user wrote it, cut to a readable length and one line."""
+    """Write a value as the user did, cut to a readable length and one line."""
     text = _WRITTEN.get(repr(value), repr(value))
     return text if len(text) <= limit else text[: limit - 3] + "..."
 
 
 def did_you_mean(word: object, known: Iterable[str], what: str = "known") -> str:
-    """A remedy for a misspelt word: the nearest known one, and the list of all."""
+    """Give the remedy for a misspelt word: the nearest known one, and the list of all."""
     names = list(known)
     near = difflib.get_close_matches(str(word), names, n=1, cutoff=0.6)
     listing = f"{what}: {', '.join(names)}" if names else f"{what}: none"

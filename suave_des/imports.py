@@ -1,4 +1,4 @@
-"""Importing a library, or starting a process, without what it would take along that is not used here."""
+"""Imports of a library, and starts of a process, without the parts that are not used here."""
 
 from __future__ import annotations
 
@@ -30,10 +30,7 @@ def gc_paused() -> Iterator[None]:
 
 @contextmanager
 def hidden(module: str) -> Iterator[None]:
-    """Hide a module from what is imported meanwhile, as if it were not installed; not if it is loaded already.
-
-    Afterwards it can be imported as ever.
-    """
+    """Hide a module from imports in the block, as if it were not installed, unless it is loaded already."""
     with _one_at_a_time:
         if module in sys.modules:
             yield
@@ -47,7 +44,7 @@ def hidden(module: str) -> Iterator[None]:
 
 @contextmanager
 def main_hidden() -> Iterator[None]:
-    """Hide the script that was started from multiprocessing, which would import it, and so run it, in a new process."""
+    """Hide the main script from multiprocessing, which would import it, and so run it, in a new process."""
     with _one_at_a_time:
         main = sys.modules["__main__"]
         sys.modules["__main__"] = ModuleType("__main__")

@@ -35,7 +35,7 @@ def cache_folder() -> Path:
         return (Path(start) if start else Path.home() / "AppData" / "Local") / "suave-des" / "Cache"
     if sys.platform == "darwin":
         return Path.home() / "Library" / "Caches" / "suave-des"
-    start = os.environ.get("XDG_CACHE_HOME")  # to be ignored unless absolute, says the XDG specification
+    start = os.environ.get("XDG_CACHE_HOME")  # ignored unless absolute, as the XDG specification requires
     return (Path(start) if start and Path(start).is_absolute() else Path.home() / ".cache") / "suave-des"
 
 

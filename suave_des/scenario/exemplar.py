@@ -67,7 +67,7 @@ def import_config(
         files: the exemplar's files, in any order; either revision's.
         out: where the scenario will be, which decides how it names other files.
         base: scenario to build on; left out, the shipped one of the revision that the files look like.
-        campaign: where the campaign will be, if one is wanted.
+        campaign: where the campaign will be; None: no campaign is imported.
         managers: names of the managers that can be run.
 
     Raises:
@@ -193,7 +193,7 @@ def _campaign(
     files: Sequence[str],
     notes: list[str],
 ) -> str | None:
-    """Text of the campaign file, if a campaign is configured and wanted; else a note for each of its parameters."""
+    """Text of the campaign file, if a campaign is configured and asked for; else a note for each of its parameters."""
     runner = {each.key: each for each in configuration.parameters if each.node == RUNNER}
     if campaign is None:
         for key, parameter in runner.items():

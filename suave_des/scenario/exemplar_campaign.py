@@ -20,7 +20,7 @@ from suave_des.scenario.quantities import LONGEST_S, Within, wrong
 
 _INTERVAL = "_random_interval"
 _NOMINAL = {"initial_pos_x": -17.0, "initial_pos_y": 2.0}
-"""Where the exemplar starts unless it is told otherwise."""
+"""Where the exemplar starts unless it is configured otherwise."""
 _LIKE_THIS = 'as in {"adaptation_manager": "metacontrol", "num_runs": 20}'
 _EXPERIMENT_KEYS: Mapping[str, str] = {
     "mission_name": "no counterpart: result files have the scenario's name",

@@ -76,7 +76,7 @@ NODES: Mapping[str, Node] = {
     RUNNER: Node(_RUNNER, "release15"),
 }
 NOT_NEEDED: Mapping[str, str] = {
-    "result_path": "campaign --out DIR says where results go",
+    "result_path": "campaign --out DIR names the folder for results",
     "run_duration": "a mission ends by itself here, and no real time is waited for",
     "use_sim_time": "there is one clock here, mission time",
 }
@@ -205,7 +205,7 @@ def _parameters(document: YamlDocument, entry: str, content: Any, notes: list[st
     for other in content:
         if other != _PARAMETERS:
             place = _place(document, (entry, other), entry.removeprefix("/"), other)
-            notes.append(f"{place}: not taken over: it stands beside {_PARAMETERS}, where ROS 2 does not read it")
+            notes.append(f"{place}: not taken over: it is beside {_PARAMETERS}, where ROS 2 does not read it")
     parameters = content[_PARAMETERS]
     if parameters is None:
         return

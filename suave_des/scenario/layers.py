@@ -30,7 +30,7 @@ class Location(NamedTuple):
 
 @dataclass(frozen=True)
 class Layer:
-    """Plain data of one or several merged files, with the place of each key path."""
+    """Plain data of one or several merged files, with the location of each key path."""
 
     data: dict[str, Any]
     places: Mapping[KeyPath, Location]
@@ -48,12 +48,12 @@ class Layer:
                 return place
         return self.places[()]
 
-    def stands(self, key_path: KeyPath) -> bool:
-        """Whether a key path stands in a file, and is not a default."""
+    def has(self, key_path: KeyPath) -> bool:
+        """Whether a key path is in a file, and not a default."""
         return key_path in self.places
 
     def error(self, problem: str, key_path: KeyPath, remedy: str | None) -> InputError:
-        """An error about what stands at a key path."""
+        """An error about the value at a key path."""
         place = self.place(key_path)
         return InputError(problem, file=place.file, place=place_text(place.line, key_path), remedy=remedy)
 
@@ -122,13 +122,13 @@ class Files:
         self.inputs: dict[str, str] = {}
 
     def yaml(self, path: Path) -> YamlDocument:
-        """A YAML file."""
+        """Read a YAML file."""
         document = read_yaml(path)
         self.note(path, document.sha256)
         return document
 
     def ontology(self, path: Path) -> None:
-        """An ontology or a file of rules, which is only hashed here."""
+        """Hash an ontology or a file of rules, which is parsed elsewhere."""
         self.note(path, hashlib.sha256(read_bytes(path, _ONTOLOGY_LIMIT_BYTES)).hexdigest())
 
     def note(self, path: Path, sha256: str) -> None:
@@ -145,7 +145,7 @@ def _shown_name(path: Path) -> str:
 
 
 def scenario_layer(files: Files, path: Path, above: tuple[Path, ...] = ()) -> Layer:
-    """A scenario file merged over its base, its revision written out in full.
+    """Merge a scenario file over its base, with its revision written out in full.
 
     Args:
         files: reader.
@@ -170,7 +170,7 @@ def scenario_layer(files: Files, path: Path, above: tuple[Path, ...] = ()) -> La
 
 
 def find_named(layer: Layer, key_path: KeyPath, name: object, kind: str, remedy: str | None = None) -> Path:
-    """A file that a layer names: beside the file in which its name stands, or shipped.
+    """Find a file that a layer names: beside the file in which its name is given, or shipped.
 
     Raises:
         InputError: there is none, with the line that names it.

@@ -1,4 +1,4 @@
-"""From the name of a scenario to everything that its missions need, read once and checked."""
+"""Loads a scenario by its name, with everything that its missions need, and checks it once."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class LoadedScenario:
         modes_path: the modes file.
         tables: times (s) and values of each table signal, by the signal's name.
         inputs: SHA-256 of each file read, by its name as shown to the user.
-        layer: what stands in the scenario's files, and where.
+        layer: content of the scenario's files, with its lines.
         rules: files of rules as text, in the order in which they count.
     """
 
@@ -53,7 +53,7 @@ class LoadedScenario:
     rules: tuple[Path, ...] = ()
 
     def located(self, error: InputError) -> InputError:
-        """An error about a name that only the ontology could judge, with the file and line in which the name stands.
+        """Add file and line to an error about a name that only the ontology could check.
 
         Args:
             error: with a place such as "values.NAME" or "disabled_rules.NAME"; any other comes back as it is.
@@ -71,7 +71,7 @@ class LoadedScenario:
 
 
 class Replacements(TypedDict, total=False):
-    """What stands in place of a scenario's own files and settings, or is added to them.
+    """What replaces a scenario's own files and settings, or is added to them.
 
     Attributes:
         ontologies: files to use in place of the scenario's.
@@ -129,7 +129,7 @@ def load_layer(files: Files, layer: Layer, path: Path, **replacements: Unpack[Re
     knowledge = scenario.knowledge
 
     def named(key_path: KeyPath, name: str, kind: str, remedy: str | None = None) -> Path:
-        if layer.stands(key_path):
+        if layer.has(key_path):
             return find_named(layer, key_path, name, kind, remedy)
         return find(name, kind, beside=path.parent)  # a default
 
@@ -220,7 +220,7 @@ def _check_modes(layer: Layer, scenario: Scenario, modes: ModeTable) -> None:
     for index, mode in enumerate(scenario.managers.bt.search_modes):
         key_path: KeyPath = ("managers", "bt", "search_modes", index)
         # The default names the shipped modes, which another modes file need not have: it matters only to bt.
-        if layer.stands(key_path):
+        if layer.has(key_path):
             check(GENERATE_SEARCH_PATH, mode, key_path)
 
 
@@ -238,7 +238,7 @@ def _check_managers(layer: Layer, scenario: Scenario) -> None:
 
 
 def with_values(loaded: LoadedScenario, values: Mapping[str, Any]) -> LoadedScenario:
-    """A scenario in which the values at some key paths are others.
+    """Replace the values at some key paths of a scenario.
 
         slower = with_values(loaded, {"signals.water_visibility.period_s": 120})
 
@@ -269,7 +269,7 @@ def _named_files(scenario: Scenario) -> tuple[object, ...]:
 
 
 def value_at(loaded: LoadedScenario, path: str) -> Any:
-    """The value at a key path, as plain data.
+    """Give the value at a key path, as plain data.
 
     Raises:
         InputError: the path leads nowhere.
@@ -296,7 +296,7 @@ def _holder(data: dict[str, Any], path: str) -> tuple[Any, Any]:
             if not part.isdigit() or int(part) >= len(here):
                 raise InputError(f"{path}: there is no entry {part}", remedy=f"entries are 0 to {len(here) - 1}")
         elif not isinstance(here, dict):
-            raise InputError(f"{path}: {'.'.join(parts[:depth])} is a plain value", remedy="leave the rest out")
+            raise InputError(f"{path}: {'.'.join(parts[:depth])} is a plain value", remedy="leave out what follows it")
         elif part not in here:
             raise InputError(f"{path}: unknown key", remedy=did_you_mean(part, sorted(map(str, here))))
         holder, key = here, int(part) if isinstance(here, list) else part

@@ -101,7 +101,7 @@ class ThrusterEvent(Strict):
     event: Literal["failure", "recovery"]
     """What happens to it."""
     time_s: TimeDistribution
-    """When, drawn once a run; the revision says whether after the start or after the event before."""
+    """When, drawn once a run; the revision decides whether after the start or after the event before."""
 
     @model_validator(mode="before")
     @classmethod
@@ -153,13 +153,13 @@ class Calibration(Strict):
     """Parameters of vehicle, autopilot and simulator that the sources leave open, alike for every manager."""
 
     position_gain_per_s: Annotated[float, Field(strict=True), Within(gt=0, le=100, unit="1/s")] = 0.48
-    """Wanted speed for each metre to the set-point."""
+    """Commanded speed for each metre to the set-point."""
     horizontal_speed_limit_m_per_s: Speed = 0.34
-    """Greatest horizontal speed that the autopilot wants."""
+    """Greatest horizontal speed that the autopilot commands."""
     vertical_speed_limit_m_per_s: Speed = 0.36
-    """Greatest vertical speed that the autopilot wants."""
+    """Greatest vertical speed that the autopilot commands."""
     velocity_time_constant_s: Annotated[float, Field(strict=True), Within(0.15, 1000, unit="s")] = 0.5
-    """Lag of the velocity behind the wanted one."""
+    """Lag of the velocity behind the commanded one."""
     altitude_error_m: OffsetDistribution = 0.0
     """Steady error of the autopilot's altitude, drawn once a run: it holds its set-point plus this."""
     altitude_deadband_m: Annotated[Distribution, Within(0.0, 100.0, unit="m", is_floor=True)] = 0.0

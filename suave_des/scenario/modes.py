@@ -114,7 +114,7 @@ class _Node(Strict):
 
 
 def _split(value: Any) -> Any:
-    # Several parts stand on several lines without dashes, which YAML reads as one text with spaces.
+    # The exemplar writes several parts on lines without dashes, which YAML reads as one text with spaces.
     return value.split() if isinstance(value, str) else value
 
 

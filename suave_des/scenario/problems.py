@@ -155,7 +155,7 @@ def _right_key(models: Models, loc: KeyPath) -> str:
     for path, model in models:
         if _matches(path, loc[:-1]):
             siblings = list(model.model_fields)
-        # The parameters of distributions do not count, which may stand anywhere.
+        # Distributions are allowed anywhere: the homes of their parameters would not help.
         if key in model.model_fields and "distribution" not in model.model_fields:
             above = ".".join(part for part in path if part not in tags).replace(f".{_INDEX}", _INDEX)
             homes[f"under {above}" if above else "at the top level"] = None

@@ -60,10 +60,10 @@ class SinusoidSignal(_Signal):
 
 
 class ConstantSignal(_Signal):
-    """The same value all the time."""
+    """A constant value."""
 
     kind: Literal["constant"]
-    """The same value all the time."""
+    """A constant value."""
     value: ValueDistribution
     """The value, drawn once a run."""
 
@@ -98,7 +98,7 @@ Signal = Annotated[SinusoidSignal | ConstantSignal | StepSignal | TableSignal, F
 SignalTable = tuple[tuple[float, ...], tuple[float, ...]]
 """Times in s, strictly increasing, and the value at each."""
 _LARGEST = {"t_s": LONGEST_S, "value": LARGEST}
-"""Columns of a table, and the greatest magnitude of what stands in them."""
+"""Columns of a table, and the greatest magnitude in each."""
 _COLUMNS = ",".join(_LARGEST)
 _SIZE_LIMIT_BYTES = 20_000_000
 

@@ -30,7 +30,7 @@ _TAG = "tag:yaml.org,2002:"
 
 @dataclass(frozen=True)
 class YamlDocument:
-    """One YAML file: plain data, and where each part of it stands.
+    """One YAML file: plain data, and the line of each part of it.
 
     Attributes:
         path: the file.
@@ -52,7 +52,7 @@ class YamlDocument:
         return 1
 
     def error(self, problem: str, key_path: KeyPath, remedy: str | None = None) -> InputError:
-        """An error about what stands at a key path."""
+        """An error about the value at a key path."""
         return InputError(problem, file=self.path, place=place_text(self.line(key_path), key_path), remedy=remedy)
 
 
