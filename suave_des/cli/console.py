@@ -99,11 +99,6 @@ def number(value: object) -> str:
     return f"{value:.2f}" if isinstance(value, float) else ""
 
 
-def interval(low: object, high: object) -> str:
-    """An interval; empty for None."""
-    return f"{low:.1f} to {high:.1f}" if isinstance(low, float) and isinstance(high, float) else ""
-
-
 def print_timeline(console: Console, result: MissionResult) -> None:
     """Print a mission's events and metrics."""
     metrics = result.metrics

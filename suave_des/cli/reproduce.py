@@ -92,8 +92,7 @@ def print_comparison(console: Console, comparison: PaperComparison) -> None:
 
 
 def _table(figures: Sequence[PaperFigure]) -> Table:
-    from suave_des.cli.console import interval, number, plain_table
-    from suave_des.report.paper import MARK
+    from suave_des.cli.console import plain_table
 
     table = plain_table()
     table.add_column("manager", min_width=12)
@@ -102,14 +101,5 @@ def _table(figures: Sequence[PaperFigure]) -> Table:
         table.add_column(heading, justify="right", min_width=8)
     table.add_column("")
     for figure in figures:
-        table.add_row(
-            figure.manager,
-            figure.statistic,
-            number(figure.published),
-            interval(*figure.published_interval),
-            number(figure.ours),
-            interval(*(figure.ours_interval or (None, None))),
-            "" if figure.difference is None else f"{figure.difference:+.2f}",
-            MARK if figure.is_inside is False else "",
-        )
+        table.add_row(figure.manager, figure.statistic, *figure.cells())
     return table

@@ -150,7 +150,7 @@ def _p(test: SampleTest | None) -> str:
 _SIDE = ("n", "mean", "std", "median")
 _TABLES: Mapping[str, tuple[tuple[str, ...], tuple[str, ...], Callable[[Validation], _Rows]]] = {
     "Samples: published, then simulated": (("metric", "manager"), (*_SIDE, *_SIDE), _samples),
-    "Simulated - published": (
+    "Simulated compared with published (difference = simulated - published)": (
         ("metric", "manager"),
         ("difference of means", "95% interval", "std ratio", "95% interval", "KS p", "AD p"),
         _differences,

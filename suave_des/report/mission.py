@@ -1,8 +1,9 @@
-"""Reads the files of one mission."""
+"""Read the files of one mission."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ _REMEDY = "give the --out folder of suave-des run"
 
 @dataclass(frozen=True)
 class MissionRecord:
-    """One mission as its files tell it.
+    """One mission as its files describe it.
 
     Attributes:
         metrics: its row of runs.csv, by column.
@@ -47,21 +48,26 @@ def read_mission(folder: Path) -> MissionRecord:
     try:
         mission = json.loads(path.read_text(encoding="utf-8"))
         metrics, scenario = mission["metrics"], mission["scenario"]
-        missing = [name for name in _METRICS if name not in metrics]
         np.array(scenario["pipeline"]["vertices_m"], dtype=float)
+        _check_columns(path, _METRICS, metrics)
     except FileNotFoundError:
         raise InputError("no such file", file=path, remedy=_REMEDY) from None
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"is no record of a mission: {error}", file=path, remedy=_REMEDY) from None
-    if missing:
-        raise InputError(f"is no record of a mission: {missing[0]} is missing", file=path, remedy=_REMEDY)
-    text = {"source": "str", "event": "str", "detail": "str"}
-    events = _table(folder / "events.csv", ("t_s", *text), text)
-    columns = ("t_s", "x_m", "y_m", "z_m", "mode", "visibility_m")
-    return MissionRecord(metrics, scenario, events, _table(folder / "trajectory.csv", columns, {"mode": "str"}))
+        raise InputError(f"is not the record of a mission: {error}", file=path, remedy=_REMEDY) from None
+    events = _table(folder / "events.csv", ("t_s", "source", "event", "detail"))
+    trajectory = _table(folder / "trajectory.csv", ("t_s", "x_m", "y_m", "z_m", "mode", "visibility_m"))
+    return MissionRecord(metrics, scenario, events, trajectory)
 
 
-def _table(path: Path, columns: tuple[str, ...], text: dict[str, str]) -> pandas.DataFrame:
+def _check_columns(path: Path, needed: Iterable[str], found: Container[str]) -> None:
+    for name in needed:
+        if name not in found:
+            raise InputError(f"{name} is missing", file=path, remedy=_REMEDY)
+
+
+def _table(path: Path, columns: tuple[str, ...]) -> pandas.DataFrame:
+    """Read a table of which `columns` are needed; those of _NUMBERS have finite numbers, the others are text."""
+    text = {name: "str" for name in columns if name not in _NUMBERS}
     try:
         # "none" and "nan" may be words here, so that only numbers have something that counts as missing.
         frame = pandas.read_csv(path, dtype=text, keep_default_na=False, na_values={"visibility_m": [""]})
@@ -69,20 +75,12 @@ def _table(path: Path, columns: tuple[str, ...], text: dict[str, str]) -> pandas
         raise InputError("no such file", file=path, remedy=_REMEDY) from None
     except (OSError, ValueError) as error:
         raise InputError(f"cannot be read: {error}", file=path, remedy=_REMEDY) from None
-    missing = [name for name in columns if name not in frame.columns]
-    if missing or frame.empty:
-        problem = f"has no column {missing[0]}" if missing else "is empty"
-        raise InputError(problem, file=path, remedy=_REMEDY)
-    for name in columns:
-        if name in _NUMBERS:
-            _check_numbers(path, frame, name)
+    _check_columns(path, columns, frame.columns)
+    if frame.empty:
+        raise InputError("is empty", file=path, remedy=_REMEDY)
+    for name in set(columns) & set(_NUMBERS):
+        is_wrong = ~np.isfinite(pandas.to_numeric(frame[name], errors="coerce")) & frame[name].notna()
+        for row in np.flatnonzero(is_wrong)[:1]:
+            problem = f"{name}: expected a finite number, got {str(frame[name].iloc[row])!r}"
+            raise InputError(problem, file=path, place=f"line {row + 2}", remedy=_REMEDY)
     return frame
-
-
-def _check_numbers(path: Path, frame: pandas.DataFrame, name: str) -> None:
-    numbers = pandas.to_numeric(frame[name], errors="coerce")
-    wrong = ~np.isfinite(numbers) & frame[name].notna()
-    if wrong.any():
-        row = int(wrong.to_numpy().argmax())
-        problem = f"{name} {str(frame[name].iloc[row])!r} is no finite number"
-        raise InputError(problem, file=path, place=f"line {row + 2}", remedy=_REMEDY)

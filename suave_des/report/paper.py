@@ -61,6 +61,17 @@ class PaperFigure:
         low, high = self.published_interval
         return None if self.ours is None else low <= self.ours <= high
 
+    def cells(self) -> tuple[str, ...]:
+        """Format the paper's figure and its interval, ours, the difference, and the mark of one outside."""
+        return (
+            f"{self.published:.2f}",
+            _interval(self.published_interval),
+            "" if self.ours is None else f"{self.ours:.2f}",
+            _interval(self.ours_interval),
+            "" if self.difference is None else f"{self.difference:+.2f}",
+            MARK if self.is_inside is False else "",
+        )
+
 
 @dataclass(frozen=True)
 class PaperComparison:
@@ -112,18 +123,8 @@ class PaperComparison:
             "| --- | --- | --- | ---: | ---: | ---: | ---: | ---: | --- |",
         ]
         for figure in self.figures:
-            cells = (
-                figure.manager,
-                METRICS[figure.metric],
-                figure.statistic,
-                f"{figure.published:.2f}",
-                _interval(figure.published_interval),
-                "" if figure.ours is None else f"{figure.ours:.2f}",
-                _interval(figure.ours_interval),
-                "" if figure.difference is None else f"{figure.difference:+.2f}",
-                f"\\{MARK}" if figure.is_inside is False else "",
-            )
-            lines.append(f"| {' | '.join(cells)} |")
+            cells = figure.manager, METRICS[figure.metric], figure.statistic, *figure.cells()
+            lines.append(f"| {' | '.join(cells)} |".replace(MARK, f"\\{MARK}"))
         # A paragraph for each remark, in which the mark is not emphasis.
         return "\n".join([*lines, *(f"\n{remark.replace(MARK, chr(92) + MARK)}" for remark in self.remarks())]) + "\n"
 

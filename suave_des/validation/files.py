@@ -7,8 +7,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict
 
-from suave_des.estimates import Interval
-from suave_des.validation.shares import Proportion
+from suave_des.estimates import Estimate, Interval
+from suave_des.validation.shares import DetectionPlace, ShareComparison
 from suave_des.validation.validation import ManagerComparison, SampleComparison, Validation
 
 TABLES = {
@@ -54,64 +54,56 @@ def _tables(validation: Validation) -> dict[str, list[Record]]:
         "cells": [_sample(each) for each in validation.samples],
         "pairs": [_pair(each) for each in validation.pairs],
         "shares": [
-            {
-                "manager": each.share.manager,
-                "name": each.share.name,
-                **_proportion("published", each.published),
-                **_proportion("simulated", each.simulated),
-                **_ends("target", each.share.target, "low", "high"),
-            }
+            {"manager": each.share.manager, "name": each.share.name}
+            | _proportions(each)
+            | _ends("target", each.share.target, "low", "high")
             for each in validation.shares
         ],
         "positions": [
-            {
-                "manager": each.manager,
-                "detection_x_m": each.detection_x_m,
-                **_proportion("published", each.published),
-                **_proportion("simulated", each.simulated),
-            }
+            {"manager": each.manager, "detection_x_m": each.detection_x_m} | _proportions(each)
             for each in validation.places
         ],
-        "targets": [{**asdict(target), "met": target.met} for target in validation.targets],
+        "targets": [asdict(target) | {"met": target.met} for target in validation.targets],
     }
 
 
 def _sample(compared: SampleComparison) -> Record:
-    published, simulated = compared.published, compared.simulated
+    simulated = _estimate("simulated", compared.simulated)
+    del simulated["simulated_std_ci95_low"], simulated["simulated_std_ci95_high"]  # so narrow that nothing needs them
+    ks, ad = compared.kolmogorov_smirnov, compared.anderson_darling
     return {
         "manager": compared.manager,
         "metric": compared.metric,
-        "published_n": published.n,
-        "published_mean": published.mean,
-        **_ends("published_mean", published.mean_interval),
-        "published_std": published.std,
-        **_ends("published_std", published.std_interval),
-        "published_median": published.median,
-        "simulated_n": simulated.n,
-        "simulated_mean": simulated.mean,
-        **_ends("simulated_mean", simulated.mean_interval),
-        "simulated_std": simulated.std,
-        "simulated_median": simulated.median,
+        **_estimate("published", compared.published),
+        **simulated,
         "difference_of_means": compared.difference,
         **_ends("difference_of_means", compared.difference_interval),
         "std_ratio": compared.std_ratio,
         **_ends("std_ratio", compared.std_ratio_interval),
-        "ks_distance": compared.kolmogorov_smirnov.statistic,
-        "ks_p": compared.kolmogorov_smirnov.p,
-        "ad_statistic": None if compared.anderson_darling is None else compared.anderson_darling.statistic,
-        "ad_p": None if compared.anderson_darling is None else compared.anderson_darling.p,
+        "ks_distance": ks.statistic,
+        "ks_p": ks.p,
+        "ad_statistic": ad and ad.statistic,
+        "ad_p": ad and ad.p,
+    }
+
+
+def _estimate(side: str, found: Estimate) -> Record:
+    return {
+        f"{side}_n": found.n,
+        f"{side}_mean": found.mean,
+        **_ends(f"{side}_mean", found.mean_interval),
+        f"{side}_std": found.std,
+        **_ends(f"{side}_std", found.std_interval),
+        f"{side}_median": found.median,
     }
 
 
 def _pair(pair: ManagerComparison) -> Record:
+    row = {f"published_{name}": value for name, value in asdict(pair.published).items()}
     return {
-        "first": pair.first,
-        "second": pair.second,
-        "metric": pair.metric,
-        "published_superiority": pair.published_superiority,
-        "simulated_superiority": pair.simulated_superiority,
-        "published_first_better_p": pair.published.first_better_p,
-        "published_second_better_p": pair.published.second_better_p,
+        **{name: getattr(pair, name) for name in ("first", "second", "metric")},
+        **{name: getattr(pair, name) for name in ("published_superiority", "simulated_superiority")},
+        **row,
         "published_better": pair.better or "neither",
         "first_n": pair.sizes[0],
         "second_n": pair.sizes[1],
@@ -119,14 +111,16 @@ def _pair(pair: ManagerComparison) -> Record:
     }
 
 
-def _proportion(side: str, found: Proportion) -> Record:
-    share = {f"{side}_count": found.count, f"{side}_n": found.n, f"{side}_share": found.share}
-    return {**share, **_ends(f"{side}_share", found.interval)}
+def _proportions(compared: ShareComparison | DetectionPlace) -> Record:
+    row: Record = {}
+    for side, found in (("published", compared.published), ("simulated", compared.simulated)):
+        row |= {f"{side}_count": found.count, f"{side}_n": found.n, f"{side}_share": found.share}
+        row |= _ends(f"{side}_share", found.interval)
+    return row
 
 
 def _ends(name: str, interval: Interval | None, low: str = "ci95_low", high: str = "ci95_high") -> Record:
-    ends = interval or (None, None)
-    return {f"{name}_{low}": ends[0], f"{name}_{high}": ends[1]}
+    return dict(zip((f"{name}_{low}", f"{name}_{high}"), interval or (None, None), strict=True))
 
 
 def _rounded(record: Record) -> Record:
