@@ -1,8 +1,4 @@
-"""Campaigns for scripts and notebooks: their results as pandas data frames.
-
-The package `suave_des` itself offers the names here and in the modules listed in its __init__; see
-docs/reference/python-api.md.
-"""
+"""Campaigns for scripts and notebooks: their results as pandas data frames; see docs/reference/python-api.md."""
 
 from __future__ import annotations
 
@@ -154,12 +150,8 @@ def _with_progress(
         problem = f"{len(result.failures)} of {result.planned} missions failed, see attrs['failures']: "
         warnings.warn(f"{problem}{result.failures[0]}", stacklevel=3)
     folder = None if result.folder is None else str(result.folder)
-    return result, {
-        **result.report(),
-        "summary": result.summary_records(),
-        "interrupted": interrupted,
-        "folder": folder,
-    }
+    attrs = {"summary": result.summary_records(), "interrupted": interrupted, "folder": folder}
+    return result, {**result.report(), **attrs}
 
 
 def _shown(label: str, progress: bool | None) -> AbstractContextManager[OnProgress | None]:

@@ -1,4 +1,4 @@
-"""What a sample says about its population: mean, spread, median, and 95% intervals."""
+"""Estimates from a sample: mean, spread, median, and 95% intervals."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """A sample's figures; those that need more values than there are, are none.
+    """Estimates from a sample; None where it has too few values.
 
     Attributes:
         n: number of values.
-        mean: none for an empty sample.
-        std: sample standard deviation (n - 1), none for fewer than two values.
-        median: none for an empty sample.
-        mean_interval: 95% interval of the mean by Student's t, none for fewer than two values.
-        std_interval: 95% interval of the standard deviation by chi-square, none for fewer than two values.
+        mean: None for an empty sample.
+        std: sample standard deviation (n - 1), None for fewer than two values.
+        median: None for an empty sample.
+        mean_interval: 95% interval of the mean by Student's t, None for fewer than two values.
+        std_interval: 95% interval of the standard deviation by chi-square, None for fewer than two values.
     """
 
     n: int
@@ -34,9 +34,9 @@ class Estimate:
 
 
 def estimate(values: Sequence[float]) -> Estimate:
-    """Figures of a sample.
+    """Return the estimates from a sample.
 
-    The interval of the mean holds well for samples of twenty and more; that of the standard deviation supposes values
+    The interval of the mean holds well for samples of twenty and more; that of the standard deviation assumes values
     that are normally distributed, and is a rough guide where they are not.
     """
     from scipy.special import chdtri  # scipy.stats would take a second to import
@@ -56,7 +56,7 @@ def estimate(values: Sequence[float]) -> Estimate:
 
 
 def t_quantile(freedom: int) -> float:
-    """Half the width of the 95% interval of Student's t with that many degrees of freedom."""
+    """Return half the width of the 95% interval of Student's t with that many degrees of freedom."""
     from scipy.special import stdtrit
 
     return float(stdtrit(freedom, (1.0 + CONFIDENCE) / 2.0))
@@ -80,7 +80,7 @@ class RunningMean:
 
     @property
     def half_width(self) -> float | None:
-        """Half the width of the 95% interval of the mean by Student's t, none for fewer than two values."""
+        """Half the width of the 95% interval of the mean by Student's t, None for fewer than two values."""
         if self.n < 2:
             return None
         return t_quantile(self.n - 1) * math.sqrt(self._squares / (self.n - 1) / self.n)

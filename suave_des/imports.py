@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import sys
 import threading
 from collections.abc import Iterator
@@ -11,21 +10,6 @@ from types import ModuleType
 from typing import Final
 
 _one_at_a_time: Final = threading.RLock()
-
-
-@contextmanager
-def gc_paused() -> Iterator[None]:
-    """Pause the garbage collector: the objects that imports and the reading of files create, stay.
-
-    Repeated collections while they are created take a seventh of the time that a process needs to start.
-    """
-    was_enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
-            gc.enable()
 
 
 @contextmanager

@@ -1,13 +1,81 @@
-"""Deferral of Ctrl-C and kill while something must not be left half done."""
+"""Ctrl-C and kill: as one exception that ends a command in good order, and deferred while that must not be."""
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import FrameType
+from typing import Any
 
 INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
+_REPEAT_S = 0.05
+_received: list[int] = []
+
+
+class Stopped(KeyboardInterrupt):
+    """A signal asked this process to stop.
+
+    A class of its own for Ctrl-C, too: Python ends as if Ctrl-C had never been caught when a plain KeyboardInterrupt
+    was raised during certain imports.
+    """
+
+
+@contextmanager
+def signals_raised() -> Iterator[None]:
+    """Raise Stopped in the block on signals that ask to stop, unless this process was started to ignore them."""
+    _received.clear()
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    taken = [number for number in INTERRUPTS if signal.getsignal(number) is not signal.SIG_IGN]
+    before = [signal.signal(number, _stop) for number in taken]
+    try:
+        with _repeated_if_lost():
+            yield
+    finally:
+        for number, handler in zip(taken, before, strict=True):
+            signal.signal(number, handler)
+
+
+@contextmanager
+def _repeated_if_lost() -> Iterator[None]:
+    """Send a signal again when the exception that it raised was lost.
+
+    Exceptions are ignored in a __del__, and in Python code that compiled code has called, as numba's does.
+    """
+    timers: list[threading.Timer] = []
+    report = sys.unraisablehook
+
+    def again(lost: Any) -> None:
+        if not isinstance(lost.exc_value, Stopped):
+            report(lost)
+            return
+        timers.append(threading.Timer(_REPEAT_S, os.kill, (os.getpid(), _received[0])))
+        timers[-1].daemon = True
+        timers[-1].start()
+
+    sys.unraisablehook = again
+    try:
+        yield
+    finally:
+        sys.unraisablehook = report
+        for timer in timers:
+            timer.cancel()
+            timer.join()
+
+
+def _stop(number: int, frame: FrameType | None) -> None:
+    _received.append(number)
+    raise Stopped
+
+
+def exit_status() -> int:
+    """Return the exit status of a command that a signal stopped, as shells have it."""
+    return 128 + (_received[0] if _received else signal.SIGINT)
 
 
 @contextmanager

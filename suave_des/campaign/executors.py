@@ -143,8 +143,10 @@ class LocalWorkers:
         with suppress(Empty):
             return self._ended.get(timeout=max(0.0, due_s - time.monotonic()))
         for worker in busy:
-            if not worker.is_overdue and time.monotonic() >= worker.due_s(self._job.time_out_s):
-                worker.is_overdue = True
+            if time.monotonic() >= worker.due_s(self._job.time_out_s):
+                if worker.is_overdue:
+                    raise WorkerError(f"worker process {worker.process.pid} was killed, and does not end")
+                worker.is_overdue, worker.since_s = True, time.monotonic()
                 worker.process.kill()
         return None
 
@@ -226,7 +228,7 @@ class _Worker:
     def due_s(self, time_out_s: float) -> float:
         """Return the time at which its oldest chunk has to be done."""
         if self.is_overdue:  # it is killed, which its pool will notice
-            return time.monotonic() + _MARGIN_S
+            return self.since_s + _MARGIN_S
         return self.since_s + self._start_s + time_out_s * len(next(iter(self.tasks.values())).chunk) + _MARGIN_S
 
     def stop(self, *, wait: bool) -> None:

@@ -35,29 +35,29 @@ FAMILIES: Mapping[str, tuple[str, ...]] = {
     ),
     "fit": ("fitted.yaml", "parameters.csv", "calibration.json", "profiles.png"),
 }
-"""Names of result files by what they tell of; a folder has those of one family, so that nothing in it is misread."""
+"""Names of result files by kind; a folder has those of one family, so that nothing in it is misread."""
 
 DECIMALS = 6
 """Digits after the point in result files."""
 
 
 def rounded(value: float) -> float:
-    """A number as it stands in result files."""
+    """Round a number as in result files."""
     return round(value, DECIMALS) + 0.0  # + 0.0: no minus before a zero
 
 
 def cell(value: object) -> object:
-    """A value as it stands in a CSV file: numbers rounded and in their shortest form, True or False, empty for none."""
+    """Return a value as in a CSV file: numbers rounded and in their shortest form, True or False, empty for None."""
     return repr(rounded(value)) if isinstance(value, float) else value
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    r"""A CSV file: RFC 4180 but for its line ends, which are \n, with a header."""
+    r"""Return a CSV file with a header: RFC 4180, except that lines end with \n."""
     return "".join(csv_pieces(columns, rows))
 
 
 def csv_pieces(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:
-    """A CSV file as csv_text gives it, piece by piece: of many rows, only some are in memory."""
+    """Yield a CSV file as csv_text returns it, piece by piece, so that few of its rows are in memory."""
     rest = iter(rows)
     part: list[Sequence[object]] = [columns]
     while part:
@@ -68,7 +68,7 @@ def csv_pieces(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> Iter
 
 
 def json_text(content: Mapping[str, Any]) -> str:
-    """A JSON file that people read too."""
+    """Return a JSON file that people can read, too."""
     return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
 
@@ -79,13 +79,13 @@ def check_output_folder(
 
     Args:
         folder: where they are to go.
-        family: what they tell of, of FAMILIES.
-        overwrite: whether there may be something in it.
-        left_over: whether a file of some name counts as nothing.
+        family: their kind, a key of FAMILIES.
+        overwrite: whether it need not be empty.
+        left_over: returns whether a file of that name does not count.
 
     Raises:
-        InputError: it has something in it and `overwrite` is false, has results of another family, is a file, or
-            cannot be written.
+        InputError: it is not empty and `overwrite` is false, has results of another family, is a file, or cannot be
+            written.
     """
     try:
         entries = [entry.name for entry in folder.iterdir()] if folder.is_dir() else []
@@ -129,7 +129,7 @@ def make_output_folder(folder: Path) -> None:
 
 
 def remove_derived(folder: Path) -> None:
-    """Remove what was made of a campaign that is replaced.
+    """Remove files that were made from a campaign that is replaced.
 
     Raises:
         InputError: it cannot be removed.
@@ -170,7 +170,7 @@ def write_files(folder: Path, files: Mapping[str, str | bytes | Iterable[str]], 
 
 
 def remove_parts(folder: Path, names: Iterable[str]) -> None:
-    """Remove what a process that was killed while it wrote files of these names has left."""
+    """Remove unfinished files of these names, left by a process that was killed."""
     for name in names:
         for part in folder.glob(f".{name}.*{_PART}"):
             part.unlink(missing_ok=True)

@@ -28,32 +28,25 @@ _LONGEST_TIME_OUT_S = 1e6
 
 
 class CampaignSettings(Strict):
-    """What a campaign file may contain; values given on the command line or in a call take precedence."""
+    """What a campaign file may contain; values given on the command line or in a call take precedence.
+
+    Attributes:
+        campaign: version of the format: 1.
+        scenario: to start from: a file named relative to this one, or the name of a shipped one.
+
+    The others are described at CampaignSpec.
+    """
 
     campaign: int
-    """Version of the format: 1."""
     scenario: str
-    """The scenario to start from: a file named relative to this one, or the name of a shipped one."""
     managers: tuple[str, ...] = ("none", "random", "metacontrol")
-    """Managing subsystems: names, or module:Class."""
     runs: Annotated[int, Field(strict=True)] = 20
-    """Missions for each manager at each point of the sweep."""
     seed: Annotated[int, Field(strict=True)] = 1
-    """Seed of everything that is random."""
     time_out_s: Number = 120.0
-    """Wall-clock time that one mission may take, in s."""
     until_ci: str | None = None
-    """METRIC:HALF_WIDTH: a manager is stopped, at each point separately, when half the 95% interval of the metric's
-    mean is less; `runs` is then how many there are at most, and 10000 if it is left out."""
     perturbations: dict[str, Any] = Field(default_factory=dict)
-    """Distributions by key path of the scenario: each run draws its own value, the same under all managers and at all
-    points."""
     runs_per_draw: Annotated[int, Field(strict=True)] = 1
-    """How many consecutive runs share the values of the perturbations."""
     sweep: dict[str, Any] = Field(default_factory=dict)
-    """Lists of values by key path of the scenario, each combined with each; or a mapping with `grid` (the same), `zip`
-    (lists of which the first values go together, then the second) and `sample` (a sampled design: `method`
-    latin_hypercube or sobol, `points`, and `ranges` by key path), which are combined with each other."""
 
 
 _DEFAULTS = CampaignSettings(campaign=FORMAT, scenario="")
@@ -71,12 +64,15 @@ class CampaignSpec:
     Attributes:
         scenario: path of a scenario or campaign file, or name of a shipped scenario.
         managers: names, or module:Class.
-        runs: missions for each manager, at each point of the sweep; with `until_ci` at most.
+        runs: missions for each manager, at each point of the sweep; with `until_ci` at most, and 10,000 if left out.
         seed: of everything that is random.
         time_out_s: wall-clock time that a mission may take.
-        until_ci: METRIC:HALF_WIDTH, when a manager is stopped before it had all runs; None: never.
-        sweep: lists of values by key path of the scenario; or a mapping with grid, zip and sample, as in a campaign
-            file. Each parameter is a column of runs.csv.
+        until_ci: METRIC:HALF_WIDTH: a manager is stopped, at each point separately, when half the 95% interval of the
+            metric's mean is less; None: never.
+        sweep: lists of values by key path of the scenario, each combined with each; or a mapping with `grid` (the
+            same), `zip` (lists of which the first values go together, then the second) and `sample` (a sampled design:
+            `method` latin_hypercube or sobol, `points`, and `ranges` by key path), which are combined with each other.
+            Each parameter is a column of runs.csv.
         perturbations: distributions by key path of the scenario: each run draws its own value, the same under all
             managers and at all points. Each is a column of runs.csv.
         runs_per_draw: how many consecutive runs share what is drawn.

@@ -69,13 +69,8 @@ _LAYOUT_1_5: _Layout = {
 _LAYOUTS = {"2023": _LAYOUT_2023}
 
 
-def suave_text(revision: str, rows: Iterable[tuple[int, Row]], time_limit_s: float) -> str:
-    """The file's content, as of suave_pieces."""
-    return "".join(suave_pieces(revision, rows, time_limit_s))
-
-
 def suave_pieces(revision: str, rows: Iterable[tuple[int, Row]], time_limit_s: float) -> Iterator[str]:
-    """The file's content, piece by piece.
+    """Yield the file's content, piece by piece.
 
     Args:
         revision: the scenario's; all but 2023 have the current layout, that of 1.5.

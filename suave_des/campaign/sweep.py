@@ -54,16 +54,16 @@ class Sweep:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Key paths of what is swept, as given."""
+        """Key paths of the parameters that are swept, as given."""
         return (*self.grid, *self.zipped, *(self.sample.ranges if self.sample else ()))
 
     @property
     def points(self) -> int:
-        """How many points there are; 1 if nothing is swept."""
+        """Number of points; 1 if nothing is swept."""
         return math.prod(self._sizes())
 
     def values(self, point: int) -> dict[str, Any]:
-        """Value of each parameter at a point."""
+        """Return the value of each parameter at a point."""
         places = []
         for size in reversed(self._sizes()):
             point, place = divmod(point, size)
@@ -76,14 +76,14 @@ class Sweep:
         return values
 
     def each_value(self) -> Iterator[int]:
-        """Points that have, between them, each value of the grid and each row of the zip."""
+        """Yield points that have, between them, each value of the grid and each row of the zip."""
         sizes = self._sizes()
         for place, size in enumerate(sizes):
             stride = math.prod(sizes[place + 1 :])
             yield from range(0, size * stride, stride)
 
     def plain(self) -> dict[str, Any]:
-        """As plain data; nothing but what is swept."""
+        """Return it as plain data, without parts that are not used."""
         plain = {"grid": dict(self.grid), "zip": dict(self.zipped), "sample": self.sample and asdict(self.sample)}
         return {form: content for form, content in plain.items() if content}
 
@@ -106,5 +106,5 @@ class Sweep:
 
 
 def cell_of(value: Any) -> str | int | float | bool | None:
-    """A parameter's value as it stands in runs.csv: lists and mappings as JSON."""
+    """Return a parameter's value as in runs.csv: lists and mappings as JSON."""
     return value if value is None or isinstance(value, str | int | float | bool) else json.dumps(value)

@@ -30,7 +30,7 @@ class Variation:
         sweep: what differs between points.
         drawn: names of what each run draws, by the key path in the scenario.
         paths: key path in the scenario of each parameter that is swept, by its name as given.
-        runs_per_draw: how many runs in a row share what is drawn.
+        runs_per_draw: how many consecutive runs share what is drawn.
     """
 
     sweep: Sweep = field(default_factory=Sweep)
@@ -40,11 +40,11 @@ class Variation:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names of all that varies, as given: further columns of runs.csv."""
+        """Names of all that varies, as given, which are further columns of runs.csv."""
         return (*self.sweep.parameters, *self.drawn.values())
 
     def scenario(self, loaded: LoadedScenario, point: int) -> LoadedScenario:
-        """The scenario of a point's missions.
+        """Return the scenario of a point's missions.
 
         Raises:
             InputError: the scenario does not allow the point's values together.
@@ -66,13 +66,13 @@ def vary(
     runs_per_draw: int,
     seed: int,
 ) -> tuple[LoadedScenario, Variation]:
-    """The scenario with distributions for what is perturbed, and what varies in it.
+    """Put distributions into a scenario for what is perturbed; return it with what varies in it.
 
     Args:
         loaded: the scenario.
         sweep: values by key path; or a mapping with grid, zip and sample.
         perturbations: distribution by key path.
-        runs_per_draw: how many runs in a row share what is drawn.
+        runs_per_draw: how many consecutive runs share what is drawn.
         seed: the campaign's.
 
     Raises:
@@ -84,12 +84,12 @@ def vary(
     perturbed = {name: _full_path(loaded, f"perturbations.{name}", name) for name in perturbations}
     for name, path in perturbed.items():
         loaded = _perturbed(loaded, f"perturbations.{name}", path, perturbations[name])
-    found = _sweep(sweep, seed)
-    paths = {name: _full_path(loaded, _place_of(name, found, sweep), name) for name in found.parameters}
-    _check_each_once(perturbed, {_place_of(name, found, sweep): path for name, path in paths.items()})
+    found, places = _sweep(sweep, seed)
+    paths = {name: _full_path(loaded, places[name], name) for name in found.parameters}
+    _check_each_once(perturbed, {places[name]: path for name, path in paths.items()})
     variation = Variation(found, {path: name for name, path in perturbed.items()}, paths, runs_per_draw)
     _check_drawn(loaded, perturbed)
-    _check_points(loaded, variation, sweep)
+    _check_points(loaded, variation, next(iter(places.values())) if len(places) == 1 else "sweep")
     return loaded, variation
 
 
@@ -98,7 +98,7 @@ def _wrong(place: str, problem: str, remedy: str | None) -> InputError:
 
 
 def _full_path(loaded: LoadedScenario, place: str, name: str) -> str:
-    """The key path that a name stands for: a signal needs no `signals.`, and visibility is water_visibility."""
+    """Return the key path of a name: a signal needs no `signals.`, and visibility is water_visibility."""
     first, *rest = name.split(".")
     if first not in type(loaded.scenario).model_fields:
         signal = "water_visibility" if first == "visibility" else first
@@ -121,37 +121,47 @@ def _perturbed(loaded: LoadedScenario, place: str, path: str, distribution: Any)
         raise _wrong(place, f"{inside}: {first['msg']}".lstrip(": "), remedy) from None
     if not isinstance(distribution, Mapping):
         raise _wrong(
-            place, f"{shown(distribution)} is no distribution", "such as {distribution: normal, mean: 1, std: 2}"
+            place,
+            f"expected a distribution, got {shown(distribution)}",
+            "such as {distribution: normal, mean: 1, std: 2}",
         )
     try:
         for value in stated_values:
             with_values(loaded, {path: value})
         return with_values(loaded, {path: dict(distribution)})
     except InputError as error:
-        raise _wrong(place, f"{path} takes no such distribution: {error.problem}", error.remedy) from None
+        raise _wrong(place, f"{path} cannot have such a distribution: {error.problem}", error.remedy) from None
 
 
-def _sweep(given: Mapping[str, Any], seed: int) -> Sweep:
+def _sweep(given: Mapping[str, Any], seed: int) -> tuple[Sweep, dict[str, str]]:
+    """Read a sweep; return it with the place of each parameter in what was given."""
     forms = [form for form in _FORMS if form in given]
     if not forms:
-        return Sweep(grid=_columns("sweep", given), seed=seed)
+        return Sweep(grid=_columns("sweep", given), seed=seed), {name: f"sweep.{name}" for name in given}
     if others := [name for name in given if name not in _FORMS]:
-        raise _wrong(f"sweep.{others[0]}", f"stands beside {forms[0]}", "put it under grid, zip or sample")
+        raise _wrong(f"sweep.{others[0]}", f"is beside {forms[0]}", "put it under grid, zip or sample")
     zipped = _columns("sweep.zip", given.get("zip", {}))
     lengths = {name: len(values) for name, values in zipped.items()}
     if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-        raise _wrong("sweep.zip", f"the lists differ in length: {told}", "give equally many values, or use grid")
+        listed = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+        raise _wrong("sweep.zip", f"the lists differ in length: {listed}", "give equally many values, or use grid")
     sample = _sample(given["sample"]) if "sample" in given else None
-    return Sweep(_columns("sweep.grid", given.get("grid", {})), zipped, sample, seed)
+    sweep = Sweep(_columns("sweep.grid", given.get("grid", {})), zipped, sample, seed)
+    ranges = sample.ranges if sample else {}
+    named = {"sample.ranges": ranges, "zip": zipped, "grid": sweep.grid}
+    return sweep, {name: f"sweep.{form}.{name}" for form, names in named.items() for name in names}
 
 
 def _columns(place: str, given: Any) -> dict[str, list[Any]]:
     if not isinstance(given, Mapping):
-        raise _wrong(place, f"{shown(given)} is no mapping", "write `key path: [value, value]` lines under it")
+        raise _wrong(
+            place, f"expected a mapping, got {shown(given)}", "write `key path: [value, value]` lines under it"
+        )
     for name, values in given.items():
         if not isinstance(values, list | tuple):
-            raise _wrong(f"{place}.{name}", f"{shown(values)} is no list", f"write it in brackets: [{values}]")
+            raise _wrong(
+                f"{place}.{name}", f"expected a list, got {shown(values)}", f"write it in brackets: [{values}]"
+            )
         if not values:
             raise _wrong(f"{place}.{name}", "is empty", "give at least one value, or leave it out")
         if place != "sweep.zip" and (repeated := _repeated(values)) is not None:
@@ -160,7 +170,7 @@ def _columns(place: str, given: Any) -> dict[str, list[Any]]:
 
 
 def _repeated(values: Sequence[Any]) -> Any:
-    """The first value that stands there twice; none if none does."""
+    """Return the first value that is there twice; None if there is none."""
     seen = set()
     for value in values:
         if (text := json.dumps(value)) in seen:
@@ -173,7 +183,7 @@ def _sample(given: Any) -> Sample:
     place = "sweep.sample"
     keys = ("method", "points", "ranges")
     if not isinstance(given, Mapping):
-        raise _wrong(place, f"{shown(given)} is no mapping", f"give {', '.join(keys)}")
+        raise _wrong(place, f"expected a mapping, got {shown(given)}", f"give {', '.join(keys)}")
     for key in given:
         if key not in keys:
             raise _wrong(f"{place}.{key}", "unknown key", did_you_mean(key, keys))
@@ -187,24 +197,15 @@ def _sample(given: Any) -> Sample:
         raise _wrong(f"{place}.points", f"{shown(points)} is out of range", "a whole number from 1 to 16777216")
     if method == "sobol" and points & (points - 1):
         lower = 1 << points.bit_length() - 1
-        raise _wrong(f"{place}.points", f"{points} is no power of 2, as sobol needs", f"give {lower} or {2 * lower}")
+        raise _wrong(f"{place}.points", f"{points} is not a power of 2, as sobol needs", f"give {lower} or {2 * lower}")
     bounds = _columns(f"{place}.ranges", ranges)
     if not bounds or len(bounds) > SOBOL_DIMENSIONS:
         raise _wrong(f"{place}.ranges", f"has {len(bounds)} parameters", f"1 to {SOBOL_DIMENSIONS}")
     for name, pair in bounds.items():
         numbers = [each for each in pair if isinstance(each, int | float) and not isinstance(each, bool)]
         if len(pair) != 2 or len(numbers) != 2 or not numbers[0] < numbers[1]:
-            raise _wrong(f"{place}.ranges.{name}", f"{shown(pair)} is no range", "give [smallest, greatest]")
+            raise _wrong(f"{place}.ranges.{name}", f"expected a range, got {shown(pair)}", "give [smallest, greatest]")
     return Sample(method, points, {name: (float(low), float(high)) for name, (low, high) in bounds.items()})
-
-
-def _place_of(name: str, sweep: Sweep, given: Mapping[str, Any]) -> str:
-    """Where a swept parameter stands in what was given."""
-    if not any(form in given for form in _FORMS):
-        return f"sweep.{name}"
-    if name in sweep.grid:
-        return f"sweep.grid.{name}"
-    return f"sweep.zip.{name}" if name in sweep.zipped else f"sweep.sample.ranges.{name}"
 
 
 def _check_each_once(perturbed: Mapping[str, str], swept: Mapping[str, str]) -> None:
@@ -232,8 +233,8 @@ def _check_drawn(loaded: LoadedScenario, perturbed: Mapping[str, str]) -> None:
             )
 
 
-def _check_points(loaded: LoadedScenario, variation: Variation, given: Mapping[str, Any]) -> None:
-    """See that the scenario allows the points: all, or of very many each value at least once."""
+def _check_points(loaded: LoadedScenario, variation: Variation, place: str) -> None:
+    """See that the scenario allows the points: all, or of very many those that have each value at least once."""
     sweep = variation.sweep
     points = set(range(0, sweep.points, max(1, sweep.points // _CHECKED_POINTS)))
     points.update(islice(sweep.each_value(), _CHECKED_POINTS))
@@ -241,5 +242,4 @@ def _check_points(loaded: LoadedScenario, variation: Variation, given: Mapping[s
         try:
             variation.scenario(loaded, point)
         except InputError as error:
-            place = _place_of(sweep.parameters[0], sweep, given) if len(sweep.parameters) == 1 else "sweep"
             raise _wrong(place, error.problem, error.remedy) from None

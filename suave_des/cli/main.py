@@ -15,8 +15,8 @@ from typer.core import TyperGroup
 from suave_des import __version__
 from suave_des.cli import bench, campaign, kb, missions, reproduce, validate
 from suave_des.cli.options import remember_command_line
-from suave_des.cli.signals import exit_status, told_by_exceptions
 from suave_des.errors import InputError, SuaveDesError
+from suave_des.interrupts import exit_status, signals_raised
 
 BAD_INPUT, MISSIONS_MISSING = 2, 3
 """Exit statuses besides 0 and those of signals; 3: done, but failed missions have no row."""
@@ -97,7 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     abandoned = _abandoned()
     command = typer.main.get_command(app)
     try:
-        with told_by_exceptions():
+        with signals_raised():
             status = command.main(arguments, prog_name="suave-des", standalone_mode=False) or 0
     except SuaveDesError as error:
         status = _report(str(error), BAD_INPUT if isinstance(error, InputError) else MISSIONS_MISSING)

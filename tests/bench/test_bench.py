@@ -22,7 +22,7 @@ from suave_des.bench.programs import MeasurementError, run
 from suave_des.bench.ratio import MANAGER, SCENARIO, SEED, KernelCall, Replay, record
 from suave_des.bench.stock_reasoner import SEARCH, SEARCHING_HIGH, STATES, MissionState, StockReasoner
 from suave_des.cli.main import main
-from suave_des.cli.signals import told_by_exceptions
+from suave_des.interrupts import signals_raised
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario
 from suave_des.simulation.simulator import Simulator
@@ -301,7 +301,7 @@ class TestMeasuredPrograms:
                 signal.raise_signal(number)
 
         monkeypatch.setattr(subprocess, "Popen", Starting)
-        with told_by_exceptions(), pytest.raises(KeyboardInterrupt):
+        with signals_raised(), pytest.raises(KeyboardInterrupt):
             run(["sleeper"], tmp_path, {})
         (process,) = started
         assert process.returncode is not None

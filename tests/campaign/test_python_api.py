@@ -81,7 +81,7 @@ class TestRunCampaign:
 
     def test_attrs_tell_the_rest_as_plain_values(self, tmp_path: Path) -> None:
         with pytest.warns(
-            UserWarning, match=r"\d of 6 missions failed, see attrs\['failures'\]: manager awkward"
+            UserWarning, match=rf"\d of 6 missions failed, see attrs\['failures'\]: manager {AWKWARD}:"
         ) as told:
             frame = suave_des.run_campaign(
                 "seams2023",

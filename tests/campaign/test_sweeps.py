@@ -153,7 +153,7 @@ def test_a_changed_sweep_cannot_be_resumed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("campaign: 2\nscenario: seams2023\n", "line 1, campaign: a campaign file of version 2"),
         ("campaign: 1\n", "scenario: is missing"),
@@ -162,7 +162,7 @@ def test_a_changed_sweep_cannot_be_resumed(tmp_path: Path) -> None:
         (HEAD + "sweep: [1]\n", "line 6, sweep: expected a mapping of keys to values, got [1]"),
         (HEAD + "sweep:\n  visibility.perod_s: [40]\n", "line 7, sweep.visibility.perod_s: "),
         (HEAD + "sweep:\n  visibility.period_s: []\n", "line 7, sweep.visibility.period_s: is empty"),
-        (HEAD + "sweep:\n  visibility.period_s: 40\n", "is no list (write it in brackets: [40])"),
+        (HEAD + "sweep:\n  visibility.period_s: 40\n", "expected a list, got 40 (write it in brackets: [40])"),
         (HEAD + "sweep:\n  visibility.period_s: [40, 40]\n", "40 is given twice"),
         (
             HEAD + "sweep:\n  visibility.period_s: [40, -3]\n",
@@ -170,26 +170,29 @@ def test_a_changed_sweep_cannot_be_resumed(tmp_path: Path) -> None:
         ),
         (HEAD + "sweep:\n  modes_file: [a.yaml]\n", "files were read with the scenario"),
         (HEAD + "sweep:\n  default_modes.f_generate_search_path: [fd_low]\n", "has no mode 'fd_low'"),
-        (HEAD + "sweep:\n  grid: {}\n  start.x_m: [1]\n", "line 8, sweep.start.x_m: stands beside grid"),
+        (HEAD + "sweep:\n  grid: {}\n  start.x_m: [1]\n", "line 8, sweep.start.x_m: is beside grid"),
         (HEAD + "sweep:\n  zip: {start.x_m: [1], start.y_m: [1, 2]}\n", "start.x_m has 1, start.y_m has 2"),
         (HEAD + "sweep:\n  sample: {method: sobol, points: 6, ranges: {start.x_m: [1, 2]}}\n", "give 4 or 8"),
         (HEAD + "sweep:\n  sample: {method: sobol, points: 8}\n", "sweep.sample: has no ranges"),
-        (HEAD + "sweep:\n  sample: {method: sobol, points: 8, ranges: {start.x_m: [2, 1]}}\n", "[2, 1] is no range"),
+        (
+            HEAD + "sweep:\n  sample: {method: sobol, points: 8, ranges: {start.x_m: [2, 1]}}\n",
+            "expected a range, got [2, 1]",
+        ),
         (HEAD + "runs_per_draw: 0\n", "line 6, runs_per_draw: 0 is out of range"),
-        (HEAD + "perturbations:\n  start.x_m: 3\n", "line 7, perturbations.start.x_m: 3 is no distribution"),
+        (HEAD + "perturbations:\n  start.x_m: 3\n", "line 7, perturbations.start.x_m: expected a distribution, got 3"),
         (HEAD + f"perturbations:\n  start.q_m: {UNIFORM % (1, 2)}\n", "did you mean 'z_m'?"),
         (HEAD + f"perturbations:\n  latencies.mode_change_s: {UNIFORM % (1, 2)}\n", "is not drawn once in a run"),
-        (HEAD + f"perturbations:\n  mission.time_limit_s: {UNIFORM % (1, 2)}\n", "takes no such distribution"),
+        (HEAD + f"perturbations:\n  mission.time_limit_s: {UNIFORM % (1, 2)}\n", "cannot have such a distribution"),
         (
             HEAD + f"perturbations:\n  start.x_m: {UNIFORM % (1, 2)}\nsweep:\n  start.x_m: [1]\n",
             "line 9, sweep.start.x_m: varies start.x_m, as perturbations.start.x_m does",
         ),
     ],
 )
-def test_bad_campaign_files(tmp_path: Path, text: str, said: str) -> None:
+def test_bad_campaign_files(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(InputError) as raised:
         run_campaign(write(tmp_path, text), out=tmp_path / "out")
-    assert said in str(raised.value)
+    assert message in str(raised.value)
     assert str(raised.value).startswith(str(tmp_path))
     assert not (tmp_path / "out").exists()
 

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from suave_des.cli.signals import Stopped, exit_status, told_by_exceptions
+from suave_des.interrupts import Stopped, exit_status, signals_raised
 
 
 class Deaf:
@@ -20,7 +20,7 @@ class Deaf:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_where_an_exception_is_lost_it_is_asked_again(number: int, capsys: pytest.CaptureFixture[str]) -> None:
-    with told_by_exceptions():
+    with signals_raised():
         with pytest.raises(Stopped):
             Deaf(number)
             time.sleep(20.0)
@@ -35,7 +35,7 @@ def test_what_else_is_lost_is_told_as_ever(monkeypatch: pytest.MonkeyPatch) -> N
 
     told = []
     monkeypatch.setattr("sys.unraisablehook", lambda lost: told.append(lost.exc_type))
-    with told_by_exceptions():
+    with signals_raised():
         Clumsy()
     assert told == [ValueError]
 
@@ -44,7 +44,7 @@ def test_when_the_command_has_ended_nothing_is_asked_any_more(monkeypatch: pytes
     heard = []
     before = signal.signal(signal.SIGTERM, lambda number, frame: heard.append(number))
     try:
-        with told_by_exceptions():
+        with signals_raised():
             Deaf(signal.SIGTERM)
         time.sleep(0.3)
     finally:

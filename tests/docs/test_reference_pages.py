@@ -13,7 +13,7 @@ from suave_des import __version__
 from suave_des.campaign.missions import COLUMNS
 from suave_des.campaign.results import SUMMARY_COLUMNS
 from suave_des.campaign.single import EVENT_COLUMNS, TRAJECTORY_COLUMNS, run_mission
-from suave_des.campaign.suave_format import suave_text
+from suave_des.campaign.suave_format import suave_pieces
 
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 CSV_PAGE = ROOT / "docs" / "reference" / "csv.md"
@@ -58,7 +58,7 @@ def test_columns_are_those_of_the_file(page, heading, names):
 @pytest.mark.parametrize(("revision", "place"), [("2023", 0), ("1.5", 1)])
 def test_columns_of_the_exemplar_s_file_are_those_of_its_revision(revision, place):
     cells = [row[place].strip("`") for row in tables(section(CSV_PAGE, "suave_results.csv"))[0]]
-    header = suave_text(revision, [], 300.0).splitlines()[0].replace('"', "").replace("(x,y)", "(x;y)")
+    header = next(suave_pieces(revision, [], 300.0)).strip().replace('"', "").replace("(x,y)", "(x;y)")
     assert [cell for cell in cells if cell] == [name.replace("(x;y)", "(x,y)") for name in header.split(",")]
 
 
