@@ -66,7 +66,7 @@ def test_a_java_home_without_java_is_told(tmp_path: Path, monkeypatch: pytest.Mo
     with pytest.raises(InputError, match="there is no Java that runs in it"):
         java.java_home()
     monkeypatch.setenv("JAVA_HOME", str(fake_java(tmp_path / "jdk", "hello")))
-    with pytest.raises(InputError, match="does not tell its version"):
+    with pytest.raises(InputError, match="does not report its version"):
         java.java_home()
 
 
