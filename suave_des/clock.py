@@ -1,4 +1,8 @@
-"""Small additions to SimPy's clock: ticks of a periodic timer, events at a given mission time, and callbacks."""
+"""Additions to SimPy's clock: ticks of a periodic timer, events at a mission time, alarms.
+
+Activities are SimPy processes. What looks ahead and is often overtaken by events is not: it sets an alarm, and sets it
+anew. Alarms alone use callbacks and SimPy's private fields.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,7 @@ from typing import Any
 
 import simpy
 
-Process = Generator[simpy.Event, None, None]
+Process = Generator[simpy.Event, Any, None]
 
 
 def tick_at_or_after(t_s: float, phase_s: float, period_s: float) -> float:
@@ -22,18 +26,41 @@ def until(env: simpy.Environment, t_s: float) -> simpy.Timeout:
     return simpy.Timeout(env, delay_s if delay_s > 0.0 else 0.0)
 
 
-def call_at(env: simpy.Environment, t_s: float, callback: Callable[[simpy.Event], None]) -> simpy.Event:
-    """Have `callback` called with the returned event at mission time t, or as the next thing now if t has passed."""
-    event = until(env, t_s)
-    callbacks: Any = event.callbacks  # a list, until the event is processed
-    callbacks.append(callback)
-    return event
+class Alarm:
+    """Calls a function at a mission time; setting it anew replaces the call that was pending.
 
+    Args:
+        env: the mission's clock.
+        callback: the function.
+    """
 
-def call_next(env: simpy.Environment, callback: Callable[[simpy.Event], None]) -> simpy.Event:
-    """Have `callback` called with the returned event now, before any other event, as SimPy does with interrupts."""
-    event = simpy.Event(env)
-    event.callbacks = [callback]
-    event._ok, event._value = True, None
-    env.schedule(event, simpy.events.URGENT)
-    return event
+    def __init__(self, env: simpy.Environment, callback: Callable[[], None]) -> None:
+        self._env = env
+        self._callback = callback
+        self._pending: simpy.Event | None = None
+
+    @property
+    def now_s(self) -> float:
+        """Mission time."""
+        return float(self._env.now)
+
+    def set(self, t_s: float) -> None:
+        """Call the function at mission time t, or as the next thing now if t has passed."""
+        self._pending = event = until(self._env, t_s)
+        event.callbacks.append(self._ring)
+
+    def set_now(self) -> None:
+        """Call the function now, when the present event is over and before any other, as SimPy does with interrupts."""
+        self._pending = event = simpy.Event(self._env)
+        event.callbacks = [self._ring]
+        event._ok, event._value = True, None
+        self._env.schedule(event, simpy.events.URGENT)
+
+    def cancel(self) -> None:
+        """Drop the pending call."""
+        self._pending = None
+
+    def _ring(self, event: simpy.Event) -> None:
+        if event is self._pending:
+            self._pending = None
+            self._callback()

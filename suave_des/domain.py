@@ -1,6 +1,6 @@
-"""Facts of the exemplar that several rooms share: the depth of the water, and the names of the mission's functions."""
+"""Facts of the exemplar that several rooms share: the depth of the water, and the mission's functions and tasks."""
 
-from __future__ import annotations
+from dataclasses import dataclass
 
 SEA_BED_Z_M = -20.0
 """The sea bed is the plane of this height in the world frame (z up)."""
@@ -12,3 +12,14 @@ FOLLOW_PIPELINE = "f_follow_pipeline"
 GENERATE_RECHARGE_PATH = "generate_recharge_path"
 MISSION_FUNCTIONS = (MAINTAIN_MOTION, GENERATE_SEARCH_PATH, FOLLOW_PIPELINE)
 """Functions that the mission's two tasks need, so that a modes file must have them."""
+
+UNGROUNDED = "UNGROUNDED"
+"""Status of an objective that no function design is in use for (o_status)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A task of the mission, with the functions that it needs."""
+
+    name: str
+    functions: tuple[str, ...]

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, Self
 from suave_des.campaign.missions import Chunk, Finished, JobSpec, MissionKey, WorkerError, chunked
 from suave_des.imports import main_hidden
 from suave_des.interrupts import INTERRUPTS, signals_deferred
-from suave_des.managing.registry import is_built_in
+from suave_des.registry import is_built_in
 
 if TYPE_CHECKING:
     from suave_des.campaign.mission_runner import MissionRunner

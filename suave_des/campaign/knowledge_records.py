@@ -19,9 +19,9 @@ from pydantic import ValidationError
 
 from suave_des.errors import InputError
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
+from suave_des.metrics.result import KnowledgeRecord
 from suave_des.scenario.loader import set_value
 from suave_des.scenario.models import Scenario
-from suave_des.simulation.result import KnowledgeRecord
 
 KNOWLEDGE_FILE: Final = "knowledge.jsonl"
 CAMPAIGN_KNOWLEDGE_FILE: Final = "knowledge_states.jsonl"

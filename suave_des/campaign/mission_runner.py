@@ -17,8 +17,8 @@ from suave_des.campaign.knowledge_records import mission_line
 from suave_des.campaign.missions import Failure, Finished, JobSpec, MissionKey, Outcome, row_of
 from suave_des.campaign.sweep import cell_of
 from suave_des.errors import MissionError
+from suave_des.metrics.result import MissionResult
 from suave_des.scenario.models import Mission
-from suave_des.simulation.result import MissionResult
 from suave_des.simulation.simulator import Simulator
 
 _REPEAT_S = 1.0

@@ -11,8 +11,8 @@ from typing import NamedTuple, Protocol
 from suave_des.campaign.output import rounded
 from suave_des.campaign.variation import Variation
 from suave_des.errors import MissionError, SuaveDesError
+from suave_des.metrics.result import MissionMetrics
 from suave_des.scenario.loader import LoadedScenario
-from suave_des.simulation.result import MissionMetrics
 
 
 class MissionKey(NamedTuple):

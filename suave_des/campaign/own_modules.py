@@ -12,7 +12,7 @@ from pathlib import Path
 
 import suave_des
 from suave_des.errors import InputError
-from suave_des.managing.registry import manager_class
+from suave_des.registry import manager_class
 
 _INSTALLED = (
     *(Path(sysconfig.get_path(kind)).resolve() for kind in ("stdlib", "platstdlib", "purelib", "platlib")),

@@ -14,7 +14,7 @@ from difflib import get_close_matches
 from suave_des.campaign.missions import COLUMNS, Failure, Finished, Group, Outcome
 from suave_des.errors import InputError
 from suave_des.estimates import RunningMean
-from suave_des.simulation.result import MissionMetrics
+from suave_des.metrics.result import MissionMetrics
 
 FEWEST_RUNS = 20
 """Missions with a value that a manager has at least: the interval of fewer is not reliable (estimates.py)."""

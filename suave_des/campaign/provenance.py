@@ -16,7 +16,7 @@ from suave_des import __version__
 from suave_des.campaign.progress import parse_until_ci
 from suave_des.campaign.spec import CampaignSpec
 from suave_des.errors import InputError, shown
-from suave_des.managing.registry import manager_class
+from suave_des.registry import manager_class
 from suave_des.scenario.layers import Files
 from suave_des.scenario.loader import LoadedScenario
 
@@ -67,7 +67,7 @@ def check_knowledge(loaded: LoadedScenario, managers: Sequence[str], *, given: b
     files = Files()
     if given or any(manager_class(name).needs_knowledge for name in managers):
         from suave_des.knowledge.state import KnowledgeState
-        from suave_des.simulation.knowledge import open_knowledge
+        from suave_des.scenario_knowledge import open_knowledge
 
         knowledge = open_knowledge(loaded)
         knowledge.analyze_and_plan(KnowledgeState())

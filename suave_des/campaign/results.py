@@ -19,8 +19,8 @@ from suave_des.campaign.suave_format import SUAVE_FILE, suave_pieces
 from suave_des.campaign.sweep import cell_of
 from suave_des.campaign.variation import Variation
 from suave_des.estimates import estimate
+from suave_des.metrics.result import MissionMetrics
 from suave_des.scenario.loader import LoadedScenario
-from suave_des.simulation.result import MissionMetrics
 
 if TYPE_CHECKING:
     import pandas

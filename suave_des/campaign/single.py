@@ -11,8 +11,8 @@ from suave_des.campaign.missions import COLUMNS, row_of
 from suave_des.campaign.output import check_output_folder, csv_text, json_text, make_output_folder, write_files
 from suave_des.campaign.provenance import check_knowledge, provenance
 from suave_des.campaign.spec import RUNS_LIMIT, check_range, check_seed
+from suave_des.metrics.result import Event, MissionResult, TrajectoryPoint
 from suave_des.scenario.loader import LoadedScenario, load_scenario
-from suave_des.simulation.result import Event, MissionResult, TrajectoryPoint
 from suave_des.simulation.simulator import Simulator
 
 MISSION_FILE, EVENTS_FILE, TRAJECTORY_FILE = "mission.json", "events.csv", "trajectory.csv"

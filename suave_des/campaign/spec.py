@@ -12,7 +12,7 @@ from pydantic import Field, ValidationError
 
 from suave_des.campaign.progress import RUNS_LIMIT_DEFAULT, parse_until_ci
 from suave_des.errors import InputError, KeyPath, shown
-from suave_des.managing.registry import manager_class
+from suave_des.registry import manager_class
 from suave_des.resources import find
 from suave_des.scenario.layers import Files, Layer, find_named
 from suave_des.scenario.problems import input_error

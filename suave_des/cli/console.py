@@ -14,7 +14,7 @@ from rich.text import Text
 
 if TYPE_CHECKING:
     from suave_des.campaign.progress import OnProgress
-    from suave_des.simulation.result import Event, MissionMetrics, MissionResult
+    from suave_des.metrics.result import Event, MissionMetrics, MissionResult
 
 _PLAIN_WIDTH = 120
 _LEAST_WIDTH = 72

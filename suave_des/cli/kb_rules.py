@@ -90,7 +90,7 @@ def check(
 @grouped_options
 def rules(sources: Sources, form: AsFormat = Format.TEXT) -> None:
     """List all rules as text that --rules reads back."""
-    from suave_des.simulation.knowledge import open_base
+    from suave_des.scenario_knowledge import open_base
 
     base = open_base(sources.load())
     if form is Format.JSON:

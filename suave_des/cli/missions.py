@@ -131,7 +131,7 @@ def import_config(
     """
     from suave_des.campaign.output import write_files
     from suave_des.errors import InputError
-    from suave_des.managing.registry import manager_names
+    from suave_des.registry import manager_names
     from suave_des.scenario.exemplar import import_config as imported_from
 
     targets = [out] if campaign is None else [out, campaign]

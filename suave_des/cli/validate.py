@@ -154,7 +154,7 @@ def _check_known(published: Runs, chosen: tuple[str, ...]) -> None:
         InputError: one cannot, with the line that names it.
     """
     from suave_des.errors import InputError
-    from suave_des.managing.registry import manager_class
+    from suave_des.registry import manager_class
 
     for name in chosen:
         try:

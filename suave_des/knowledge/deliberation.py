@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Final
 
 from suave_des.knowledge.ontology import Ontology
@@ -17,7 +17,7 @@ from suave_des.knowledge.state import Inference, KnowledgeState, Plan
 REMEMBERED: Final = 16384
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Conclusion:
     """The result of analyzing a state and planning on it.
 
@@ -29,7 +29,11 @@ class Conclusion:
 
     inference: Inference
     plan: Plan
-    statuses: frozenset[str]
+
+    @cached_property
+    def statuses(self) -> frozenset[str]:
+        """What was inferred of objectives and groundings, in words."""
+        return frozenset(_statuses(self.inference))
 
 
 class Deliberation:
@@ -69,12 +73,18 @@ class Deliberation:
         """
         return self._cached(state, improve_exceeded)
 
+    def analyze(self, state: KnowledgeState) -> Inference:
+        """Infer what the rules say about a state; see `analyze_and_plan`."""
+        return self.reasoner.infer(state)
+
+    def plan(self, inference: Inference, *, improve_exceeded: bool = False) -> Plan:
+        """Choose function designs for the objectives to adapt; see `analyze_and_plan`."""
+        to_adapt = dict(self._exceeded(inference.state)) if improve_exceeded else {}
+        return plan(self.base, inference.state, inference, to_adapt=to_adapt)
+
     def _analyze_and_plan(self, state: KnowledgeState, improve_exceeded: bool) -> Conclusion:
-        inference = self.reasoner.infer(state)
-        to_adapt = dict(self._exceeded(state)) if improve_exceeded else {}
-        return Conclusion(
-            inference, plan(self.base, state, inference, to_adapt=to_adapt), frozenset(_statuses(inference))
-        )
+        inference = self.analyze(state)
+        return Conclusion(inference, self.plan(inference, improve_exceeded=improve_exceeded))
 
     def _exceeded(self, state: KnowledgeState) -> Iterator[tuple[str, str]]:
         measured = dict(state.measurements)

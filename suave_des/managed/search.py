@@ -1,22 +1,21 @@
 """Generate search path: a spiral around the start, at the altitude that the mode sets (facts: kas-lab/suave)."""
 
-from __future__ import annotations
-
 import math
-from bisect import bisect_right
+from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
-import simpy
 
-from suave_des.clock import tick_at_or_after
+from suave_des.clock import Alarm, tick_at_or_after
 from suave_des.compiling import compiled
-from suave_des.managed.node import SetPointSender
-from suave_des.managed.travel import TravellingNode
+from suave_des.domain import SEA_BED_Z_M
+from suave_des.managed.node import FunctionNode
 from suave_des.scenario.modes import Mode
 from suave_des.scenario.revision import SpiralRevision
+from suave_des.vehicle.guidance import Guidance, SetPointSender
 from suave_des.vehicle.model import Array
-from suave_des.vehicle.vehicle import Vehicle, Watch
-from suave_des.world.pipeline import SEA_BED_Z_M, VIEW_TANGENT
+from suave_des.vehicle.vehicle import ArrivalCheck
+from suave_des.world.pipeline import VIEW_TANGENT
 
 TICK_PERIOD_S = 1.0
 ANGLE_STEP_RAD = 0.1
@@ -27,189 +26,119 @@ INITIAL_ALTITUDE_M = 2.0
 
 
 @compiled
-def spiral(count: int, radius_m: float, altitude_m: float, centre_m: tuple[float, float], places: Array) -> None:
-    """Set-points of the spiral.
+def spiral(step: int, radius_m: float, altitude_m: float, centre_m: tuple[float, float], waypoints: Array) -> None:
+    """Way-points of the spiral.
 
     Args:
-        count: the spiral's counter before the first of them.
+        step: the spiral's step counter at the first of them.
         radius_m: its radius before the first of them.
         altitude_m: altitude above the sea bed; a turn widens the spiral by what the camera sees from there.
         centre_m: x and y of its centre.
-        places: shape (n, 4); x, y, z and the spiral's radius are written into it, in m.
+        waypoints: shape (n, 4); x, y, z and the spiral's radius are written into it, in m.
     """
-    for n in range(places.shape[0]):
-        if count > 0:
+    for n in range(waypoints.shape[0]):
+        if step > 0:
             turn_width = 2.0 * altitude_m * VIEW_TANGENT
             radius_m += turn_width * ANGLE_STEP_RAD / (2.0 * math.pi)
-        angle = ANGLE_STEP_RAD * count
-        places[n, 0] = centre_m[0] + radius_m * math.cos(angle)
-        places[n, 1] = centre_m[1] + radius_m * math.sin(angle)
-        places[n, 2] = SEA_BED_Z_M + altitude_m
-        places[n, 3] = radius_m
-        count += 1
+        angle = ANGLE_STEP_RAD * step
+        waypoints[n, 0] = centre_m[0] + radius_m * math.cos(angle)
+        waypoints[n, 1] = centre_m[1] + radius_m * math.sin(angle)
+        waypoints[n, 2] = SEA_BED_Z_M + altitude_m
+        waypoints[n, 3] = radius_m
+        step += 1
 
 
-class GenerateSearchPath(TravellingNode):
-    """The search function; once a second while active it looks whether its set-point is reached, and sends the next.
+@dataclass(eq=False)
+class GenerateSearchPath(FunctionNode):
+    """The search function: generates the way-points of a spiral, the next one when the present one is reached.
 
-    Args:
-        env: the mission's clock.
-        vehicle: whose position is looked at.
-        sender: the way to the autopilot.
-        revision: how the exemplar's revision behaves.
-        origin_m: origin of the local frame in x and y, where revision 2023 centres the spiral.
+    Attributes:
+        centre_m: x and y of the spiral's centre; in revision 2023 the local frame's origin.
         phase_s: mission time of a tick of the node's timer.
         ready_s: mission time before which the node does not tick, whatever its mode.
+        altitude_m: the node's altitude parameter.
     """
 
-    def __init__(
-        self,
-        env: simpy.Environment,
-        vehicle: Vehicle,
-        sender: SetPointSender,
-        revision: SpiralRevision,
-        origin_m: tuple[float, float],
-        phase_s: float,
-        ready_s: float = 0.0,
-    ) -> None:
-        super().__init__(env, vehicle, sender)
-        self._revision = revision
-        self._phase_s = phase_s
-        self._ready_s = ready_s
-        self._centre_m = origin_m
-        self.altitude_m = INITIAL_ALTITUDE_M
-        self._lowered_m = 0.0
-        self._ticked = self._wake = 0
+    sender: SetPointSender
+    revision: SpiralRevision
+    centre_m: tuple[float, float]
+    phase_s: float
+    ready_s: float = 0.0
+    altitude_m: float = INITIAL_ALTITUDE_M
+    _lowered_m: float = field(default=0.0, init=False)
+
+    def __post_init__(self) -> None:
         self._restart()
+        self._guidance = Guidance(self.sender, self, partial(Alarm, self.env), _arrival_check)
+
+    def _restart(self) -> None:
+        self._step = 0
+        self._radius_m = 0.0
+        self._last_altitude_m: float | None = None  # at the tick before
+        self._present: Array | None = None  # way-point, none before the first
+        self._waited_ticks: int | None = None
 
     def configure(self, mode: Mode) -> None:
-        """Take over the mode's spiral_altitude; the spiral itself goes on."""
+        """Take the mode's spiral_altitude; the spiral itself goes on."""
         altitude = mode.parameters.get("spiral_altitude")
         if altitude is not None and altitude != self.altitude_m:
-            self._catch_up()
+            self._guidance.catch_up()
             self.altitude_m = float(altitude)
-            if self._watch is not None:
-                self._vehicle.drop_ahead(self.env.now, self._watch, self._ticked)
-                self._control_changed(0)
+            self._guidance.way_changed()
 
     def activated(self) -> None:
         """Start ticking; revision 1.5 begins a new spiral here."""
-        if self._revision.restarts_on_activation:
+        if self.revision.restarts_on_activation:
             self._restart()
-        if self._revision.workaround_cleared_on_activation:
+        if self.revision.workaround_cleared_on_activation:
             self._lowered_m = 0.0
-        if self._revision.centre == "activation":
-            self._centre_m = self._vehicle.position(self.env.now)[:2]
-        first_s = tick_at_or_after(max(self.env.now, self._ready_s), self._phase_s, TICK_PERIOD_S)
-        self._rest_until(first_s)
+        if self.revision.centre == "activation":
+            self.centre_m = self.sender.vehicle.position(self.env.now)[:2]
+        first_s = tick_at_or_after(max(self.env.now, self.ready_s), self.phase_s, TICK_PERIOD_S)
+        self._guidance.start_at(first_s, waited_ticks=self._waited_ticks)
 
     def deactivated(self) -> None:
         """Stop ticking."""
-        self._catch_up()
-        self._stop(self._ticked)
+        waited_ticks = self._guidance.stop()
+        self._waited_ticks = None if self._present is None else waited_ticks
 
-    def _restart(self) -> None:
-        self._count = 0
-        self._radius_m = 0.0
-        self._last_altitude_m: float | None = None
-        self._places: Array | None = None
-        self._reached_at: list[int] = []
-        self._waited_ticks = 0
+    # What guidance asks.
 
-    def wake(self) -> None:
-        """Do what there is to do at this tick, and foresee those that follow."""
-        if self._watch is None:
-            self._ticked = self._wake = 0
-            self._watch = Watch(
-                self.env.now, TICK_PERIOD_S, REACHED_BOX_M, REACHED_BOX_M, 1, TICKS_BEFORE_RESENDING + 1
-            )
-        elif self._all_reached():
-            self.foresee_anew()
-            return
-        else:
-            self._catch_up()
-            self._ticked = self._wake
-        self._foresee(self._watch, begin=self._tick())
-
-    def foresee_anew(self) -> None:
-        """Take in the ticks until now, and foresee those that follow."""
-        if self._watch is not None:
-            self._catch_up()
-            self._foresee(self._watch)
-
-    def _foresee(self, watch: Watch, *, begin: bool = False) -> None:
-        """Send the set-points of coming ticks ahead, as far as the tick at which there is more to do; rest until then.
-
-        Args:
-            watch: the ticks.
-            begin: whether to send the present one, too.
-        """
-        first = self._ticked + 1
-        if self._places is None or self.altitude_m != self._last_altitude_m:
-            self._wake = first
-        else:
-            present = self._places[0]
-            self._places = np.empty((1 + self._ahead, 4))
-            self._places[0] = present
-            spiral(self._count, self._radius_m, self.altitude_m, self._centre_m, self._places[1:])
-            last = self._ticked + TICKS_BEFORE_RESENDING + 1 - self._waited_ticks
-            self._reached_at, self._wake = self._sender.send_ahead(
-                self._places, self._commanded_z_m(), watch, first=first, last=last, begin=begin
-            )
-        self._rest_until(watch.time_s(self._wake))
-
-    def _all_reached(self) -> bool:
-        """Whether set-points were sent ahead and all reached: then those after them are sent at the same tick."""
-        return self._places is not None and len(self._reached_at) == len(self._places) > 1
-
-    def _catch_up(self) -> None:
-        """Take in what the ticks until now have done, without the one at which there is more to do."""
-        if self._watch is None:
-            return
-        tick = min(self._watch.last_tick_until(self.env.now), self._wake - 1)
-        reached = bisect_right(self._reached_at, tick)
-        if reached and self._places is not None:
-            self._count += reached
-            self._places = self._places[reached:]
-            self._radius_m = self._places.item(0, 3)
-            self._ticked, self._waited_ticks = self._reached_at[reached - 1], 0
-        self._reached_at = []
-        self._waited_ticks += tick - self._ticked
-        self._ticked = tick
-
-    def _tick(self) -> bool:
-        """Work out the present set-point; whether it is to be sent."""
+    def tick(self) -> None:
+        """Count a step of the spiral where the altitude is another one than at the tick before."""
         if self.altitude_m != self._last_altitude_m:
-            self._count += 1
+            self._step += 1
             self._last_altitude_m = self.altitude_m
-        near_xy, near_z = self._near_set_point()
-        if near_xy and near_z:
-            self._make_next()
-            return True
-        self._waited_ticks += 1
-        if self._waited_ticks <= TICKS_BEFORE_RESENDING:
-            return False
-        self._waited_ticks = 0
-        if near_xy:
-            # The autopilot stops short in z: ask for less altitude than is wanted.
-            self._lowered_m += self._revision.workaround_step_m
-        return True
 
-    def _near_set_point(self) -> tuple[bool, bool]:
-        if self._places is None:
-            return True, True
-        x, y, z = self._vehicle.position(self.env.now)
-        x_set, y_set, z_set, _ = self._places[0].tolist()
-        near_xy = abs(x - x_set) <= REACHED_BOX_M and abs(y - y_set) <= REACHED_BOX_M
-        return near_xy, abs(z - z_set) <= REACHED_BOX_M
+    def waypoints(self, count: int) -> Array:
+        """The present way-point and those that follow it at the present altitude."""
+        if self._present is None:
+            self.reached(1)
+        waypoints = np.empty((count, 4))
+        waypoints[0] = self._present
+        self._spiral(waypoints[1:])
+        return waypoints
 
-    def _make_next(self) -> None:
-        self._places = np.empty((1, 4))
-        spiral(self._count, self._radius_m, self.altitude_m, self._centre_m, self._places)
-        self._radius_m = self._places.item(0, 3)
-        self._count += 1
-        self._waited_ticks = 0
-
-    def _commanded_z_m(self) -> float:
-        # A set-point sent again has the present altitude, though "reached" is judged against the one it was made with.
+    def set_point_z_m(self) -> float:
+        """The altitude of now, less what was lowered; "reached" is judged against the one of the way-point."""
         return SEA_BED_Z_M + self.altitude_m - self._lowered_m
+
+    def reached(self, count: int) -> None:
+        """Go on to the next way-point."""
+        waypoints = np.empty((count, 4))
+        self._spiral(waypoints)
+        self._present = waypoints[-1]
+        self._radius_m = waypoints.item(count - 1, 3)
+        self._step += count
+
+    def not_reached(self, x_y_reached: bool) -> None:
+        """Ask for less altitude than is wanted, where z alone is missing: the autopilot stops short in z."""
+        if x_y_reached:
+            self._lowered_m += self.revision.workaround_step_m
+
+    def _spiral(self, waypoints: Array) -> None:
+        spiral(self._step, self._radius_m, self.altitude_m, self.centre_m, waypoints)
+
+
+def _arrival_check(began_s: float) -> ArrivalCheck:
+    return ArrivalCheck(began_s, TICK_PERIOD_S, REACHED_BOX_M, REACHED_BOX_M, 1, TICKS_BEFORE_RESENDING + 1)

@@ -13,19 +13,20 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import simpy
 
-from suave_des.managed.task import Task
+from suave_des.domain import Task
 from suave_des.monitor.diagnostics import Diagnostic, Kind
-from suave_des.monitor.measurements import Measured
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.modes import UNGROUND_MODE
 
-if TYPE_CHECKING:  # or looking a manager up would load the vehicle and the compiler
+if TYPE_CHECKING:  # or looking a manager up would load the vehicle, the compiler and the reasoner
+    from suave_des.knowledge.deliberation import Deliberation
+    from suave_des.knowledge.state import KnowledgeState
     from suave_des.managed.mode_manager import ModeManager
+    from suave_des.monitor.measurements import Measured
 
-AdaptationProcess = Generator[simpy.Event, None, None]
-Bounds = Mapping[str, tuple[float, ...]]
-"""By quality attribute: a value that a measured one must be above, and one that it must be below; or several such pairs
-in ascending order, of which it must be between any."""
+AdaptationProcess = Generator[simpy.Event, Any, None]
+Thresholds = Mapping[str, tuple[float, ...]]
+"""By quality attribute: the numbers, ascending, that its measured value is compared with."""
 
 
 @dataclass(frozen=True)
@@ -40,10 +41,11 @@ class ManagedSystem:
         lasting_functions: functions that are needed all the time and belong to no task.
         stream: makes a named random stream of this run, the same for every manager.
         log: takes an event and its detail for the mission's record.
-        recorded: whether the record is kept; if not, a manager may leave out what it does for the record alone.
-        knowledge: gives the knowledge base with its reasoner (a Deliberation), opened on the first call.
-        reasoned: takes each KnowledgeState that is reasoned about, for the mission's record.
+        knowledge: gives the knowledge base with its reasoner, opened on the first call.
+        record_state: takes each state of knowledge that is reasoned about, for the mission's record.
+        state_changed: to be called when something that `adapt` depends on has changed of itself, not in a hook.
         measurements: what monitors have measured, by quality attribute; see `measured`.
+        recorded: whether the mission is recorded.
     """
 
     env: simpy.Environment
@@ -53,8 +55,9 @@ class ManagedSystem:
     lasting_functions: tuple[str, ...]
     stream: Callable[[str], random.Random]
     log: Callable[[str, str], None]
-    knowledge: Callable[[], Any]
-    reasoned: Callable[[Any], None] = lambda state: None
+    knowledge: Callable[[], Deliberation]
+    record_state: Callable[[KnowledgeState], None] = lambda state: None
+    state_changed: Callable[[], None] = lambda: None
     measurements: Mapping[str, Measured] = field(default_factory=dict)
     recorded: bool = True
 
@@ -92,52 +95,56 @@ class ManagingSubsystem:
         period_s: time between calls of `adapt`; none: never called.
         starts_s: mission time of the first call of `adapt`.
         needs_knowledge: whether missions need the knowledge base, so that it is checked before the first one.
-        hears: kinds of diagnostics that `diagnostic` is called with. Telling of every measured value takes time: a
-            manager that looks at `system.measured` when it adapts does without.
+        subscribes_to: kinds of diagnostics that `diagnostic` is called with. A manager that reads `system.measured`
+            when it adapts need not subscribe to measured values; publishing each of them takes time.
+
+    A manager that adapts every `period_s` is time-triggered. One whose `adapt` depends on nothing but what it was told
+    in its hooks, and on how measured values compare with fixed thresholds, is event-triggered, and says so by
+    `depends_on`. After a call of `adapt` that returned None, the next call is at the first of its times after a hook
+    was called, or a measured value has crossed a threshold: fewer calls, the same mission (but for an event at the very
+    time of a call, which may come before it).
+
+    Example:
+        >>> class HighInClearWater(ManagingSubsystem):
+        ...     depends_on = {"water_visibility": (3.25,)}
+        ...
+        ...     def __init__(self, system):
+        ...         super().__init__(system)
+        ...         self.period_s = 2.0
+        ...
+        ...     def adapt(self):
+        ...         is_clear = (self.system.measured("water_visibility") or 0.0) >= 3.25
+        ...         mode = "fd_spiral_high" if is_clear else "fd_spiral_low"
+        ...         self.system.change_mode("f_generate_search_path", mode)
     """
 
     needs_knowledge: ClassVar[bool] = False
-    hears: ClassVar[Collection[Kind]] = tuple(Kind)
+    subscribes_to: ClassVar[Collection[Kind]] = tuple(Kind)
 
     def __init__(self, system: ManagedSystem) -> None:
         self.system = system
         self.period_s: float | None = None
         self.starts_s = 0.0
 
+    @property
+    def depends_on(self) -> Thresholds | None:
+        """Thresholds of the measured values that `adapt` depends on; None: it may depend on anything.
+
+        Only the class that defines it is asked: one derived from it may depend on more.
+        """
+        return None
+
     def task_requested(self, task: Task) -> None:
-        """A task begins, and needs its functions."""
+        """Take a task that begins, and needs its functions."""
 
     def task_cancelled(self, task: Task) -> None:
-        """A task is over: by default its functions are set to fd_unground at once."""
+        """Take the end of a task: by default its functions are set to fd_unground at once."""
         for function in task.functions:
             self.system.change_mode(function, UNGROUND_MODE)
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
-        """A monitor has published: a component's status, or a measured value that differs from the one before."""
+        """Take what a monitor publishes: a component's status, or a measured value that differs from the one before."""
 
     def adapt(self) -> AdaptationProcess | None:
-        """Called every `period_s`; a call that would come while an earlier one still runs is left out."""
-        return None
-
-    def rests_while(self) -> Bounds | None:
-        """Between which measured values calls of `adapt` would do nothing, until the manager is told something.
-
-        Asked after each `adapt` that returned None. The calls are then left out until a value is published that is not
-        between its bounds (of several pairs, any), or the manager is told of a task or a component's status; `adapt`
-        comes again at the first of its times from then on. An attribute without bounds may have any value.
-
-        A record is to show what every call does: a mission that is recorded leaves none out. What holds for a class
-        need not hold for one derived from it, which is asked only if it has this method of its own.
-
-        Returns:
-            Bounds, or None: `adapt` is to be called after the next period.
-        """
-        return None
-
-    def rests_after(self) -> Bounds | None:
-        """The same, asked at the end of each `adapt` that took time; and likewise only of a class's own method.
-
-        It is about the values that are measured by then. A call that does nothing may take time, too, but must be over
-        before the next one, or that would be left out.
-        """
+        """Adapt, once every `period_s`; a call that would come while an earlier one still runs is left out."""
         return None

@@ -4,19 +4,20 @@ A tree is walked from its root at every tick: a sequence of what must be in orde
 conditions and modes; each tick asks for the modes of the first condition that holds for each function.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterator
 from math import inf
+from typing import ClassVar
 
-from suave_des.managed.task import FOLLOW, MAINTAIN_MOTION, RECHARGE, SEARCH, Task
-from suave_des.managing.base import Bounds, ManagedSystem, ManagingSubsystem
+from suave_des.domain import FOLLOW_PIPELINE, GENERATE_RECHARGE_PATH, GENERATE_SEARCH_PATH, MAINTAIN_MOTION, Task
+from suave_des.managing.base import ManagedSystem, ManagingSubsystem, Thresholds
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
 from suave_des.scenario.modes import UNGROUND_MODE
 
 
 class BehaviourTree(ManagingSubsystem):
     """bt: recover a failed thruster; search as high as the visibility allows; follow once the pipeline is detected."""
+
+    subscribes_to: ClassVar[Collection[Kind]] = (Kind.COMPONENT_STATUS,)
 
     def __init__(self, system: ManagedSystem) -> None:
         super().__init__(system)
@@ -25,7 +26,6 @@ class BehaviourTree(ManagingSubsystem):
         self.starts_s = system.stream("bt/phase").uniform(0.0, self.period_s)
         self._functions = system.lasting_functions
         self._failed: set[str] = set()
-        self._measured: dict[str, float] = {}
 
     def task_requested(self, task: Task) -> None:
         """From now on the tree acts on the task's functions, too."""
@@ -37,10 +37,8 @@ class BehaviourTree(ManagingSubsystem):
         super().task_cancelled(task)
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
-        """Remember failed thrusters and measured values."""
-        if diagnostic.kind == Kind.QA_STATUS:
-            self._measured[diagnostic.key] = float(diagnostic.value)
-        elif diagnostic.value == FAILED:
+        """Remember failed thrusters."""
+        if diagnostic.value == FAILED:
             self._failed.add(diagnostic.key)
         else:
             self._failed.discard(diagnostic.key)
@@ -50,25 +48,23 @@ class BehaviourTree(ManagingSubsystem):
         for function, mode in self._wanted():
             self.system.change_mode(function, mode)
 
-    def rests_while(self) -> Bounds | None:
-        """While the visibility asks for the same search mode."""
-        return {"water_visibility": _around(self._visibility_m(), self._settings.visibility_thresholds_m)}
-
-    def _visibility_m(self) -> float:
-        # A visibility that was not measured yet counts as good.
-        return self._measured.get("water_visibility", inf)
+    @property
+    def depends_on(self) -> Thresholds:
+        """The thresholds between the search modes."""
+        return {"water_visibility": tuple(sorted(self._settings.visibility_thresholds_m))}
 
     def _wanted(self) -> Iterator[tuple[str, str]]:
         if MAINTAIN_MOTION in self._functions:
             yield MAINTAIN_MOTION, "fd_recover_thrusters" if self._failed else "fd_all_thrusters"
-        if SEARCH in self._functions:
-            yield SEARCH, self._search_mode()
-        if FOLLOW in self._functions:
-            yield FOLLOW, self.system.scenario.default_modes.get(FOLLOW, "fd_follow_pipeline")
+        if GENERATE_SEARCH_PATH in self._functions:
+            yield GENERATE_SEARCH_PATH, self._search_mode()
+        if FOLLOW_PIPELINE in self._functions:
+            yield FOLLOW_PIPELINE, self.system.scenario.default_modes.get(FOLLOW_PIPELINE, "fd_follow_pipeline")
 
     def _search_mode(self) -> str:
-        # Below the lowest threshold the lowest altitude is left.
-        visibility_m = self._visibility_m()
+        # A visibility that was not measured yet counts as good; below the lowest threshold the lowest altitude is left.
+        measured_m = self.system.measured("water_visibility")
+        visibility_m = inf if measured_m is None else measured_m
         pairs = zip(self._settings.visibility_thresholds_m, self._settings.search_modes, strict=True)
         return next((mode for threshold, mode in pairs if visibility_m >= threshold), self._settings.search_modes[-1])
 
@@ -76,12 +72,10 @@ class BehaviourTree(ManagingSubsystem):
 class ExtendedBehaviourTree(BehaviourTree):
     """bt_extended: the same, but with a low battery the vehicle goes to recharge first, and then goes on."""
 
-    def rests_while(self) -> Bounds | None:
-        """The same, and while the battery is as low, or as full, as to the tree it is now."""
-        return {
-            **(super().rests_while() or {}),
-            "battery_level": _around(self._battery_level(), [self._settings.battery_limit]),
-        }
+    @property
+    def depends_on(self) -> Thresholds:
+        """The same, and whether the battery is low."""
+        return {**super().depends_on, "battery_level": (self._settings.battery_limit,)}
 
     def _wanted(self) -> Iterator[tuple[str, str]]:
         if self.system.scenario.battery is None:  # then there is no station to go to
@@ -91,15 +85,8 @@ class ExtendedBehaviourTree(BehaviourTree):
         recharging = self._battery_level() < self._settings.battery_limit
         for function, mode in super()._wanted():
             yield function, UNGROUND_MODE if recharging and function != MAINTAIN_MOTION else mode
-        yield RECHARGE, "normal" if recharging else UNGROUND_MODE
+        yield GENERATE_RECHARGE_PATH, "normal" if recharging else UNGROUND_MODE
 
     def _battery_level(self) -> float:
-        return self._measured.get("battery_level", 1.0)
-
-
-def _around(value: float, thresholds: Iterable[float]) -> tuple[float, float]:
-    """The thresholds next to a value: whatever lies between them is at least, and less than, the same ones."""
-    return (
-        max([threshold for threshold in thresholds if threshold <= value], default=-inf),
-        min([threshold for threshold in thresholds if threshold > value], default=inf),
-    )
+        measured = self.system.measured("battery_level")
+        return 1.0 if measured is None else measured

@@ -1,8 +1,6 @@
 """The paper's two managers without knowledge: none and random (SEAMS 2023 paper; kas-lab/suave)."""
 
-from __future__ import annotations
-
-from suave_des.managed.task import MAINTAIN_MOTION, Task
+from suave_des.domain import MAINTAIN_MOTION, Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
 
 

@@ -1,6 +1,4 @@
-"""The /diagnostics topic: what monitors say, and who hears it."""
-
-from __future__ import annotations
+"""The /diagnostics topic: what monitors publish, and who subscribes to it."""
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
@@ -33,7 +31,7 @@ Subscriber = Callable[[Diagnostic], None]
 
 
 class DiagnosticsBus:
-    """Hands each diagnostic at once to those who want its kind, in the order of subscription."""
+    """Passes each diagnostic on at once to the subscribers to its kind, in the order of subscription."""
 
     def __init__(self) -> None:
         self._subscribers: dict[Kind, list[Subscriber]] = {kind: [] for kind in _KINDS}
@@ -43,11 +41,11 @@ class DiagnosticsBus:
         for kind in kinds:
             self._subscribers[kind].append(subscriber)
 
-    def has_listeners(self, kind: Kind) -> bool:
-        """Whether anybody wants diagnostics of a kind."""
+    def has_subscribers(self, kind: Kind) -> bool:
+        """Whether anybody subscribes to a kind of diagnostic."""
         return bool(self._subscribers[kind])
 
     def publish(self, diagnostic: Diagnostic) -> None:
-        """Pass a diagnostic to those who want its kind."""
+        """Pass a diagnostic on to the subscribers to its kind."""
         for subscriber in self._subscribers[diagnostic.kind]:
             subscriber(diagnostic)

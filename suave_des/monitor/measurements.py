@@ -1,49 +1,44 @@
-"""What monitors measure, as tables: it can be looked up without anybody waiting for its publication."""
+"""What monitors measure, as tables: a whole mission's messages at once, ahead of time.
 
-from __future__ import annotations
+Who looks a value up reads the table; a monitor publishes it only when somebody subscribes (see `monitors`).
+"""
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from suave_des.clock import tick_at_or_after
+from suave_des.world.signals import Signal
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+Array = NDArray[np.float64]
+Thresholds = tuple[float, ...]
+"""Numbers, ascending, that cut the line into regions.
+
+Region 0 is below the first threshold, 1 is the threshold itself, 2 lies between it and the next, and so on; -1 stands
+for no value.
+"""
 
 
-class Measured(Protocol):
-    """What a monitor measures of a quality attribute."""
+Crossings = tuple[list[float], list[int]]
+"""The times at which a measured value comes into another region, and the regions' numbers."""
 
-    @property
-    def key(self) -> str:
-        """Name of the quality attribute."""
 
-    @property
-    def times_s(self) -> Sequence[float]:
-        """Times of the published values that are known by now."""
-
-    @property
-    def values(self) -> Sequence[float]:
-        """The published values that are known by now."""
-
-    def published(self, t_s: float) -> int:
-        """How many values are published until mission time t, which must not lie in the future."""
-
-    def leaves_at_s(self, t_s: float, *bounds: float) -> float:
-        """Time of the first value after t that is, or may be, between no pair of bounds; inf: there is none."""
+def region_of(value: float, thresholds: Thresholds) -> int:
+    """Number of a value's region, see `Thresholds`."""
+    return bisect_left(thresholds, value) + bisect_right(thresholds, value)
 
 
 @dataclass(frozen=True, slots=True)
 class Measurements:
     """What a signal's monitor measures in a run: the times at which the published value changes, and the values.
 
-    A monitor that repeats an unchanged value tells nobody anything new, so only values that differ from the one before
-    are kept; they keep the times that the monitor's period gives them.
+    A monitor that repeats an unchanged value reports nothing new, so only values that differ from the one before are
+    kept; they keep the times that the monitor's period gives them.
     """
 
     key: str
@@ -51,68 +46,123 @@ class Measurements:
     values: tuple[float, ...]
     phase_s: float
     period_s: float
-    arrays: tuple[NDArray[np.float64], NDArray[np.float64]] = field(repr=False, compare=False)
+    arrays: tuple[Array, Array] = field(repr=False, compare=False)
     """Times and values once more, for whoever looks at all of them at once."""
+    _crossings: dict[Thresholds, Crossings] = field(default_factory=dict, repr=False, compare=False)
 
     def published(self, t_s: float) -> int:
         """How many values are published until mission time t."""
         return bisect_right(self.times_s, t_s)
 
-    def leaves_at_s(self, t_s: float, *bounds: float) -> float:
-        """Time of the first value after mission time t that is between no pair of bounds; inf: there is none.
+    def crossings(self, thresholds: Thresholds) -> Crossings:
+        """The measurements that are in another region than the one before; the first one counts."""
+        if thresholds not in self._crossings:
+            places, regions = _crossing_places(self.arrays[1].tobytes(), thresholds)
+            self._crossings[thresholds] = [self.times_s[place] for place in places], regions
+        return self._crossings[thresholds]
 
-        Args:
-            t_s: mission time.
-            bounds: pairs in ascending order.
-        """
-        outside = _outside(self.arrays[1].tobytes(), bounds)
-        first = bisect_left(outside, self.published(t_s))
-        return self.times_s[outside[first]] if first < len(outside) else math.inf
+    def region(self, t_s: float, thresholds: Thresholds) -> int:
+        """Region of the value that was published last at mission time t."""
+        times_s, regions = self.crossings(thresholds)
+        passed = bisect_right(times_s, t_s)
+        return regions[passed - 1] if passed else -1
+
+    def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
+        """Time of the first value after mission time t that is in another region than the one before; inf: none is."""
+        times_s, _ = self.crossings(thresholds)
+        passed = bisect_right(times_s, t_s)
+        return times_s[passed] if passed < len(times_s) else math.inf
 
     def next_message_s(self, t_s: float) -> float:
         """Time of the first message, changed or not, at or after t."""
         return tick_at_or_after(t_s, self.phase_s, self.period_s)
 
 
-@lru_cache(maxsize=64)
-def _outside(values: bytes, bounds: tuple[float, ...]) -> list[int]:
-    """Places of the values (float64) that are between no pair of bounds.
+@dataclass(frozen=True, slots=True)
+class Publishing:
+    """When a monitor measures.
 
-    Without noise they are the same in most runs.
+    Attributes:
+        period_s: time from message to message.
+        phase_s: time of the first message.
+        time_step_s: the signal is looked at at mission time cut to multiples of this; 0: at mission time.
     """
-    if len(bounds) % 2:
-        raise ValueError(f"bounds come in pairs, and {bounds} is not that")
-    import numpy as np  # a process that only hands out missions does without
 
-    measured, edges = np.frombuffer(values), np.array(bounds)
-    passed = np.searchsorted(edges, measured)
-    outside = passed % 2 == 0
-    outside[~outside] = edges[passed[~outside]] == measured[~outside]
-    return np.flatnonzero(outside).tolist()
+    period_s: float
+    phase_s: float
+    time_step_s: float = 0.0
+
+
+def measure(
+    key: str, signal: Signal, duration_s: float, publishing: Publishing, noise: Callable[[], float] | None = None
+) -> Measurements:
+    """Measure a signal over a mission.
+
+    Args:
+        key: the quality attribute.
+        signal: the signal.
+        duration_s: how long to measure.
+        publishing: when.
+        noise: draws the error of one measurement; none if measurements are exact.
+    """
+    period_s, phase_s = publishing.period_s, publishing.phase_s
+    messages = max(0, math.floor((duration_s - phase_s) / period_s)) + 1
+    times: Array = phase_s + period_s * np.arange(messages, dtype=np.float64)
+    looks = times
+    if (step_s := publishing.time_step_s) > 0.0:
+        # A time within a millionth of a step below a multiple counts as it: timers add up rounding errors.
+        looks = np.floor(times / step_s + 1e-6) * step_s
+    values = _looked_up(signal, looks.tobytes())
+    places = _changes(values.tobytes())
+    if noise is not None:
+        values = values + np.array([noise() for _ in range(len(times))])
+        places = _changes(values.tobytes())
+    times, values = times[places], values[places]
+    return Measurements(key, tuple(times.tolist()), tuple(values.tolist()), phase_s, period_s, (times, values))
+
+
+# Cached by the arrays' bytes (float64): without noise, a signal that is looked at in time steps repeats in each run.
+
+
+@lru_cache(maxsize=16)
+def _looked_up(signal: Signal, times_s: bytes) -> Array:
+    times, first = np.frombuffer(times_s), _changes(times_s)
+    return np.repeat([signal(t_s) for t_s in times[first].tolist()], np.diff(first, append=len(times)))
+
+
+@lru_cache(maxsize=64)
+def _changes(values: bytes) -> NDArray[np.int64]:
+    """Places of the values that differ from the one before; the first one does."""
+    return np.flatnonzero(np.diff(np.frombuffer(values), prepend=np.nan))
+
+
+@lru_cache(maxsize=64)
+def _crossing_places(values: bytes, thresholds: Thresholds) -> tuple[list[int], list[int]]:
+    """Places of the values that are in another region than the one before, and the regions' numbers."""
+    measured = np.frombuffer(values)
+    regions = np.searchsorted(thresholds, measured) + np.searchsorted(thresholds, measured, side="right")
+    places = np.flatnonzero(np.diff(regions, prepend=-1))
+    return places.tolist(), regions[places].tolist()
 
 
 class BatteryLevel:
     """The battery's level, which falls linearly from 1 and is back at 1 at once at the recharge station.
 
-    It is worked out when somebody wants to know it, from where the vehicle was at each message.
+    It is worked out when it is asked for, from where the vehicle was at each message.
 
     Args:
         is_at_station: whether the vehicle is at the station at a mission time.
         discharge_time_s: time from full to empty.
-        period_s: publishing period.
-        phase_s: time of the first message.
+        publishing: when it is measured.
     """
 
     key = "battery_level"
 
-    def __init__(
-        self, is_at_station: Callable[[float], bool], *, discharge_time_s: float, period_s: float, phase_s: float
-    ) -> None:
+    def __init__(self, is_at_station: Callable[[float], bool], discharge_time_s: float, publishing: Publishing) -> None:
         self._is_at_station = is_at_station
         self._discharge_time_s = discharge_time_s
-        self.phase_s = phase_s
-        self.period_s = period_s
-        self._next_s = phase_s
+        self.phase_s, self.period_s = publishing.phase_s, publishing.period_s
+        self._next_s = self.phase_s
         self._full_at_s = 0.0
         self.times_s: list[float] = []
         self.values: list[float] = []
@@ -127,7 +177,17 @@ class BatteryLevel:
             self._next_s += self.period_s
         return bisect_right(self.times_s, t_s)
 
-    def leaves_at_s(self, t_s: float, *bounds: float) -> float:
-        """Time of the first value after t, which is now: what it will be depends on where the vehicle goes."""
+    def region(self, t_s: float, thresholds: Thresholds) -> int:
+        """Region of the level that was published last at mission time t."""
+        if not (published := self.published(t_s)):
+            return -1
+        return region_of(self.values[published - 1], thresholds)
+
+    def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
+        """Time of the first level after t, which is now: what it will be depends on where the vehicle goes."""
         self.published(t_s)
         return self._next_s
+
+
+Measured = Measurements | BatteryLevel
+"""What a monitor measures of a quality attribute; times asked about must not lie in the future."""

@@ -1,7 +1,5 @@
 """Monitors: they watch signals, thrusters and battery, and publish diagnostics (facts: kas-lab/suave)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -41,10 +39,9 @@ def thruster_monitor(
     bus: DiagnosticsBus,
     faults: Sequence[ThrusterFault],
     set_health: Callable[[int, float], None],
-    *,
     phase_s: float,
-    period_s: float = 1.0,
     after_previous: bool,
+    period_s: float = 1.0,
 ) -> Process:
     """Bring about the scheduled faults, and publish them.
 
@@ -57,8 +54,8 @@ def thruster_monitor(
         faults: the schedule, in list order.
         set_health: called with a thruster's number and 0 (lost) or 1 (works).
         phase_s: time of the monitor's first look.
-        period_s: time between looks.
         after_previous: whether each time counts from the fault before it (rev 2023) or from the start (rev 1.5).
+        period_s: time between looks.
     """
     counted_from, earliest = 0.0, 0.0
     for fault in faults:

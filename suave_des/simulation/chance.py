@@ -1,19 +1,31 @@
 """Everything that is random in one mission: each use has a stream of its own, named after the scenario's key."""
 
-from __future__ import annotations
-
-import random
 from collections.abc import Callable, Mapping
+from operator import attrgetter
 from types import MappingProxyType
+from typing import Final
 
+from suave_des.scenario.models import Scenario
 from suave_des.scenario.quantities import Distribution, draw
+from suave_des.scenario.signal_kinds import (
+    ConstantSignal,
+    Signal,
+    SignalTable,
+    SinusoidSignal,
+    StepSignal,
+    TableSignal,
+)
 from suave_des.streams import Streams
+from suave_des.world import signals
+
+NONE_SHARED: Final[Mapping[str, int]] = MappingProxyType({})
 
 
 class Chance(Streams):
     """The random streams of a run, and what was drawn from them.
 
     Args:
+        scenario: where the distributions are.
         seed: the campaign's.
         run: number of the run, from 1.
         runs_per_draw: how many runs in a row share the value drawn for a key path; one, if the path is not in it.
@@ -22,23 +34,24 @@ class Chance(Streams):
         drawn: values that hold for the whole run, by key path.
     """
 
-    def __init__(self, seed: int, run: int, runs_per_draw: Mapping[str, int] = MappingProxyType({})) -> None:
+    def __init__(self, scenario: Scenario, seed: int, run: int, runs_per_draw: Mapping[str, int] = NONE_SHARED) -> None:
         super().__init__(seed, run)
-        self._seed, self._run, self._runs_per_draw = seed, run, runs_per_draw
+        self._scenario, self._seed, self._run, self._runs_per_draw = scenario, seed, run, runs_per_draw
         self.drawn: dict[str, float] = {}
 
-    def draw(self, key: str, distribution: Distribution) -> float:
-        """The run's value of a scenario's distribution; a plain number is its own."""
-        value = distribution if isinstance(distribution, float) else draw(distribution, self._stream_of_draw(key))
-        self.drawn[key] = value
-        return value
+    def value(self, path: str, node: str = "") -> float:
+        """The run's value of what the scenario gives at a key path; each node may have its own."""
+        distribution: Distribution = attrgetter(path)(self._scenario)
+        return self.draw(f"{path}/{node}" if node else path, distribution)
 
-    def _stream_of_draw(self, key: str) -> random.Random:
-        shared_by = self._runs_per_draw.get(key, 1)
-        if shared_by == 1:
-            return self.stream(key)
-        first = (self._run - 1) // shared_by * shared_by + 1
-        return Streams(self._seed, first).stream(key)
+    def draw(self, key: str, distribution: Distribution) -> float:
+        """The run's value of a distribution; a plain number is its own."""
+        if not isinstance(distribution, float):
+            shared_by = self._runs_per_draw.get(key, 1)
+            first = (self._run - 1) // shared_by * shared_by + 1  # of the runs that share the value
+            distribution = draw(distribution, Streams(self._seed, first).stream(key))
+        self.drawn[key] = distribution
+        return distribution
 
     def sampler(self, key: str, distribution: Distribution) -> Callable[[], float]:
         """A function that draws a new value at each call."""
@@ -50,3 +63,24 @@ class Chance(Streams):
     def phase(self, timer: str, period_s: float) -> float:
         """Phase of a timer: arbitrary per node, another one in each run."""
         return self.stream(f"phase/{timer}").random() * period_s
+
+    def signal(self, name: str, description: Signal, tables: Mapping[str, SignalTable]) -> signals.Signal:
+        """The run's signal from its description in the scenario.
+
+        Args:
+            name: the signal's name in the scenario.
+            description: the scenario's entry.
+            tables: contents of the CSV files of table signals, by signal name.
+        """
+        match description:
+            case SinusoidSignal():
+                shift_s = self.draw(f"signals.{name}.shift_s", description.shift_s)
+                return signals.sinusoid(description.period_s, description.minimum, description.maximum, shift_s)
+            case ConstantSignal():
+                return signals.constant(self.draw(f"signals.{name}.value", description.value))
+            case StepSignal():
+                time_s = self.draw(f"signals.{name}.time_s", description.time_s)
+                return signals.step(time_s, description.before, description.after)
+            case TableSignal():
+                times_s, values = tables[name]
+                return signals.table(times_s, values, linear=description.interpolation == "linear")

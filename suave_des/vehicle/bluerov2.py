@@ -1,7 +1,5 @@
 """The BlueROV2 (standard configuration, six thrusters) as the exemplar's simulator describes it (kas-lab/suave)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from suave_des.vehicle.model import Thruster, VehicleModel

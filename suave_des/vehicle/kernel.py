@@ -11,8 +11,6 @@ One row of the track holds everything that the next step needs:
 Attitude is a quaternion (Handbook, 2.2.2): no trigonometry in the loop, and no singularity for a vehicle that tumbles.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -58,9 +56,9 @@ def advance(
         last: last row to fill.
         step_s: time between rows, as the simulated world counts it.
         set_point: x, y, z in m, and cosine and sine of half the heading, world frame, shape (5,).
-        parameters: vehicle and autopilot constants in the places named above.
+        parameters: constants in the places named above.
         allocation: thrusts for a demanded wrench, shape (6 thrusters, 6).
-        effectiveness: wrench for thrusts with each thruster's health folded in, shape (6, 6 thrusters).
+        effectiveness: wrench for thrusts, each thruster's health included, shape (6, 6 thrusters).
     """
     prm = parameters
     mass, ixx, iyy, izz = prm[MASS], prm[IXX], prm[IYY], prm[IZZ]
@@ -201,7 +199,7 @@ def advance(
 
 
 @compiled
-def follow_places(
+def fly_waypoints(
     track: Array,
     computed: int,
     step_s: float,
@@ -209,29 +207,29 @@ def follow_places(
     parameters: Array,
     allocation: Array,
     effectiveness: Array,
-    places: Array,
+    waypoints: Array,
     sent_as: tuple[float, float, float],
     box: tuple[float, float],
     timer: tuple[float, float, float],
     window: tuple[int, int, int, int],
-    ticks: Ticks,
+    arrivals: Ticks,
 ) -> tuple[int, int]:
-    """Ticks of a timer at which places are found reached, each that is making the next one the set-point.
+    """Fly through way-points: at each tick of a timer that finds one reached, the next becomes the set-point.
 
     Args:
         track: as for `advance`, likewise step_s, parameters, allocation and effectiveness.
         computed: last row that is filled.
         set_point: as for `advance`; ends as the set-point that was given last.
-        places: x, y and z in the first three columns, m, shape (n, at least 3). The first one's set-point is given
+        waypoints: x, y and z in the first three columns, m, shape (n, at least 3). The first one's set-point is given
             already.
-        sent_as: what is added to a place's x and y in its set-point, and the set-points' z, m.
-        box: half the width and half the height of the box around a place in which it is reached, m.
+        sent_as: what is added to a way-point's x and y in its set-point, and the set-points' z, m.
+        box: half the width and half the height of the box around a way-point in which it is reached, m.
         timer: time of tick 0, time between ticks, and time between rows, s.
-        window: first tick to look at, last one for the first place, and fewest and most ticks from place to place.
-        ticks: shape (n,); the ticks are written into it.
+        window: first tick to look at, last one for the first way-point, and fewest and most ticks from one to the next.
+        arrivals: shape (n,); the ticks that find way-points reached are written into it.
 
     Returns:
-        How many places were reached, and the last row that is filled now. Ticks beyond the track do not count.
+        How many way-points were reached, and the last row that is filled now. Ticks beyond the track do not count.
     """
     half_width, half_height = box
     began_s, period_s, grid_s = timer
@@ -245,20 +243,20 @@ def follow_places(
             advance(track, computed, row, step_s, set_point, parameters, allocation, effectiveness)
             computed = row
         if (
-            abs(track[row, 0] - places[reached, 0]) > half_width
-            or abs(track[row, 1] - places[reached, 1]) > half_width
-            or abs(track[row, 2] - places[reached, 2]) > half_height
+            abs(track[row, 0] - waypoints[reached, 0]) > half_width
+            or abs(track[row, 1] - waypoints[reached, 1]) > half_width
+            or abs(track[row, 2] - waypoints[reached, 2]) > half_height
         ):
             tick += 1
             continue
-        ticks[reached] = tick
+        arrivals[reached] = tick
         reached += 1
-        if reached == places.shape[0]:
+        if reached == waypoints.shape[0]:
             break
-        set_point[0] = places[reached, 0] + sent_as[0]
-        set_point[1] = places[reached, 1] + sent_as[1]
+        set_point[0] = waypoints[reached, 0] + sent_as[0]
+        set_point[1] = waypoints[reached, 1] + sent_as[1]
         set_point[2] = sent_as[2]
-        computed = row  # what was filled beyond is another way now
+        computed = row  # rows beyond it were flown to another set-point
         last = tick + most
         tick += fewest
     return reached, computed

@@ -5,8 +5,6 @@ m, generalised velocity nu = (u, v, w, p, q, r) in m/s and rad/s (Fossen, Handbo
 Motion Control, section 2.1; the axes here follow the exemplar, z up, and so do the signs).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

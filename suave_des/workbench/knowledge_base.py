@@ -12,7 +12,7 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import KnowledgeState, Number
 from suave_des.scenario.loader import load_scenario
-from suave_des.simulation.knowledge import open_base
+from suave_des.scenario_knowledge import open_base
 from suave_des.workbench.explain import Explanation, explain
 from suave_des.workbench.policy import Policy, PolicyDifference, compare, make_policy
 from suave_des.workbench.policy_space import PolicySpace

@@ -1,7 +1,5 @@
 """The pipeline, and the mock-up of its detection: which of its points a downward camera sees (facts: kas-lab/suave)."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from itertools import pairwise
@@ -13,14 +11,13 @@ from suave_des.compiling import compiled
 from suave_des.domain import SEA_BED_Z_M as SEA_BED_Z_M
 from suave_des.domain import SURFACE_Z_M as SURFACE_Z_M
 
+Array = NDArray[np.float64]
 FIELD_OF_VIEW_RAD = math.radians(60.0)
 VIEW_TANGENT = math.tan(FIELD_OF_VIEW_RAD / 2.0)
 
 
 @cache
-def sample_points(
-    vertices_m: tuple[tuple[float, float, float], ...], points_per_piece: int = 20
-) -> NDArray[np.float64]:
+def sample_points(vertices_m: tuple[tuple[float, float, float], ...], points_per_piece: int = 20) -> Array:
     """Points along the pipeline, shape (pieces * points_per_piece, 3), in m.
 
     Each straight piece gives evenly spaced points, its first vertex excluded and its last included.
@@ -33,20 +30,16 @@ def sample_points(
     return points
 
 
-def there_and_back(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The way along all points and back, shape (2 n, 2): x and y in m.
+def there_and_back(points: Array) -> Array:
+    """The way along all points, shape (n, at least 2), and back: x and y in m, shape (2 n, 2).
 
-    From its element `first` on it is the way to follow from the point that is seen first: on to the far end, then back
-    along all points.
-
-    Args:
-        points: x and y in the first two columns, shape (n, at least 2), m.
+    From its element i on it is the way to follow when point i is seen first: on to the far end, then back along all.
     """
     return np.concatenate((points[:, :2], points[::-1, :2]))
 
 
 @compiled
-def first_point_in_view(x_m: float, y_m: float, z_m: float, visibility_m: float, points: NDArray[np.float64]) -> int:
+def first_point_in_view(x_m: float, y_m: float, z_m: float, visibility_m: float, points: Array) -> int:
     """Lowest index of the points that a camera at (x, y, z) sees, -1 if none.
 
     With h the vertical distance to a point, the point is in view within h * tan(field of view / 2) in x and in y, and
@@ -62,11 +55,11 @@ def first_point_in_view(x_m: float, y_m: float, z_m: float, visibility_m: float,
 
 @compiled
 def first_detection(
-    track: NDArray[np.float64],
+    track: Array,
     first_row: int,
     last_row: int,
-    visibility_m: NDArray[np.float64],
-    points: NDArray[np.float64],
+    visibility_m: Array,
+    points: Array,
 ) -> tuple[int, int]:
     """First row of [first_row, last_row] from which a point is seen, and the point's index; (-1, -1) if none.
 

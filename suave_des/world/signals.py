@@ -1,7 +1,5 @@
 """Signals over mission time: what the water, or anything else that is measured, does by itself."""
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Sequence

@@ -6,8 +6,8 @@ import pytest
 from rich.console import Console
 
 from suave_des.cli.console import print_timeline
+from suave_des.metrics.result import MissionResult
 from suave_des.scenario.loader import load_scenario
-from suave_des.simulation.result import MissionResult
 from suave_des.simulation.simulator import Simulator
 
 

@@ -9,7 +9,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from suave_des.managed.task import Task
+from suave_des.domain import Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
 from suave_des.managing.simple import NoManager
 

@@ -1,13 +1,14 @@
 """A managing subsystem by itself: the test calls its hooks and reads the modes that it asks for."""
 
 import random
+from collections import defaultdict
 
 import simpy
 
-from suave_des.managed.task import Task
+from suave_des.domain import Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
-from suave_des.managing.registry import manager_class
 from suave_des.monitor.diagnostics import Diagnostic, Kind
+from suave_des.registry import manager_class
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import Battery, Scenario
 
@@ -30,12 +31,24 @@ class AskedModes:
         return mode in MODES.modes(function)
 
 
+class Published:
+    """Values of a quality attribute, all of them published by now."""
+
+    def __init__(self) -> None:
+        self.times_s: list[float] = []
+        self.values: list[float] = []
+
+    def published(self, t_s: float) -> int:
+        return len(self.values)
+
+
 class AtWork:
     """One manager in one revision."""
 
     def __init__(self, name: str, revision: str = "1.5", *, seed: int = 1, battery: bool = False) -> None:
         self.per_task = revision == "1.5"
         self.modes = AskedModes()
+        self.measurements: defaultdict[str, Published] = defaultdict(Published)
         scenario: Scenario = SCENARIOS[revision].scenario
         if battery:
             scenario = scenario.model_copy(update={"battery": Battery()})
@@ -48,6 +61,7 @@ class AtWork:
             stream=lambda stream: random.Random(f"{seed}/{stream}"),
             log=lambda event, detail: None,
             knowledge=lambda: None,
+            measurements=self.measurements,
         )
         self.manager: ManagingSubsystem = manager_class(name)(system)
 
@@ -69,7 +83,11 @@ class AtWork:
 
     def measured(self, key: str, value: float) -> None:
         """A quality attribute is published."""
-        self.manager.diagnostic(Diagnostic(0.0, Kind.QA_STATUS, key, value))
+        measured = self.measurements[key]
+        measured.times_s.append(0.0)
+        measured.values.append(value)
+        if Kind.QA_STATUS in self.manager.subscribes_to:
+            self.manager.diagnostic(Diagnostic(0.0, Kind.QA_STATUS, key, value))
 
     def reported(self, thruster: int, status: str) -> None:
         """A component's status is published."""

@@ -3,10 +3,11 @@
 from typing import ClassVar
 from weakref import WeakSet
 
-from suave_des.managed.task import Task
+from suave_des.domain import Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
 from suave_des.managing.metacontrol import Metacontrol
-from suave_des.monitor.diagnostics import Diagnostic, Kind
+from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
+from suave_des.monitor.measurements import region_of
 
 
 class Deliberate(ManagingSubsystem):
@@ -32,10 +33,10 @@ class Deliberate(ManagingSubsystem):
 
 
 class Observer(ManagingSubsystem):
-    """Writes down what it hears."""
+    """Records the diagnostics that it gets."""
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
-        self.system.log("heard", f"{diagnostic.key} {diagnostic.value}")
+        self.system.log("received", f"{diagnostic.key} {diagnostic.value}")
 
 
 class Drawing(ManagingSubsystem):
@@ -121,83 +122,154 @@ class NeverAdvances(ManagingSubsystem):
         self.period_s = 0.0
 
 
-class Resting(ManagingSubsystem):
-    """Has nothing to do while the visibility is between 2 and 3 m, and notes the times of its calls."""
+class EventTriggered(ManagingSubsystem):
+    """Depends on how the visibility compares with 2 and 3 m, and notes the times of its calls."""
 
-    hears = (Kind.COMPONENT_STATUS,)
+    subscribes_to: ClassVar = (Kind.COMPONENT_STATUS,)
+    depends_on: ClassVar = {"water_visibility": (2.0, 3.0), "salinity": (0.5,)}
 
     def __init__(self, system: ManagedSystem) -> None:
         super().__init__(system)
-        self.period_s, self.starts_s = 2.0, 1.0
-        self.bounds = {"water_visibility": (2.0, 3.0), "salinity": (0.0, 1.0)}
-        self.called_s = CALLED_S
-        self.called_s.clear()
+        self.period_s = float(system.settings.get("period_s", 2.0))
+        self.starts_s = float(system.settings.get("starts_s", 1.0))
+        CALLED_S.clear()
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
-        """What it hears may change what it does."""
+        """A component's status may change what it does."""
 
-    def adapt(self) -> None:
-        self.called_s.append(self.system.now_s)
-
-    def rests_while(self):
-        return self.bounds
+    def adapt(self):
+        CALLED_S.append(self.system.now_s)
 
 
-class WatchesTheBattery(Resting):
-    def rests_while(self):
-        return {"battery_level": (0.0, 2.0)}
+class EventTriggeredByProperty(EventTriggered):
+    """Its settings say what it depends on."""
+
+    @property
+    def depends_on(self):
+        return {"water_visibility": tuple(self.system.settings.get("thresholds_m", (2.0, 3.0)))}
 
 
-class NotResting(Resting):
-    """Derived from one that rests: what it does in adapt may be anything."""
+class DependsOnTheBattery(EventTriggered):
+    depends_on: ClassVar = {"battery_level": (0.5,)}
 
 
-class NeverIdle(Resting):
-    rests_while = Resting.rests_while
+class DependsOnNoMeasuredValue(EventTriggered):
+    depends_on: ClassVar = {}
+
+
+class MayDependOnAnything(EventTriggered):
+    """Says so by the base class's own word."""
+
+    depends_on: ClassVar = None
+
+
+class DoesNotDeclare(EventTriggered):
+    """Derived from an event-triggered manager: what it does in adapt may depend on anything."""
+
+
+class DeclaresAgain(EventTriggered):
+    depends_on: ClassVar = EventTriggered.depends_on
+
+
+class NeverIdle(EventTriggered):
+    """Each call lets mission time pass, if only none."""
+
+    depends_on: ClassVar = EventTriggered.depends_on
 
     def adapt(self):
         super().adapt()
         yield self.system.env.timeout(0.0)
 
 
-class Acting(Resting):
-    """Each adaptation takes half a second, after which it has nothing to do for as long."""
+class TakesTime(EventTriggered):
+    """Acts for some time in each region of the visibility and after each report, and is idle then."""
 
-    rests_after = Resting.rests_while
-
-    def adapt(self):
-        super().adapt()
-        yield self.system.env.timeout(0.5)
-
-
-class AnyGrid(Acting):
-    """The same with the times that the scenario says."""
-
-    rests_while = Resting.rests_while
-    rests_after = Resting.rests_while
+    depends_on: ClassVar = {"water_visibility": (2.0, 3.0)}
 
     def __init__(self, system: ManagedSystem) -> None:
         super().__init__(system)
-        self.period_s, self.starts_s = system.settings["period_s"], system.settings["starts_s"]
+        self.takes_s = float(system.settings.get("takes_s", 0.5))
+        self.handled: object = None
+        self.reports = 0
+
+    def diagnostic(self, diagnostic: Diagnostic) -> None:
+        self.reports += 1
 
     def adapt(self):
-        self.called_s.append(self.system.now_s)
-        takes_s = self.system.settings["takes_s"]
-        return self._act(takes_s) if takes_s else None
+        super().adapt()
+        state = self.reports, region_of(self.system.measured("water_visibility") or 0.0, (2.0, 3.0))
+        return None if state == self.handled else self._act(state)
 
-    def _act(self, takes_s: float):
-        yield self.system.env.timeout(takes_s)
+    def _act(self, state):
+        yield self.system.env.timeout(self.takes_s)
+        self.handled = state
+        height = ["low", "medium", "high"][(state[1] + 1) // 2]
+        self.system.change_mode("f_generate_search_path", f"fd_spiral_{height}")
 
 
-class StillActing(Acting):
-    """Derived from one that rests after it has acted."""
+class SearchesAsHighAsItCanSee(ManagingSubsystem):
+    """Reads the visibility, recovers thrusters; idle as long as nothing changes."""
+
+    subscribes_to: ClassVar = (Kind.COMPONENT_STATUS,)
+    depends_on: ClassVar = {"water_visibility": (2.25, 3.25)}
+
+    def __init__(self, system: ManagedSystem) -> None:
+        super().__init__(system)
+        self.period_s = float(system.settings.get("period_s", 2.0))
+        self.starts_s = float(system.settings.get("starts_s", 1.0))
+        self.functions: list[str] = []
+        self.failed: set[str] = set()
+
+    def task_requested(self, task: Task) -> None:
+        self.functions.extend(task.functions)
+
+    def task_cancelled(self, task: Task) -> None:
+        self.functions = [name for name in self.functions if name not in task.functions]
+        super().task_cancelled(task)
+
+    def diagnostic(self, diagnostic: Diagnostic) -> None:
+        if diagnostic.kind == Kind.COMPONENT_STATUS:
+            (self.failed.add if diagnostic.value == FAILED else self.failed.discard)(diagnostic.key)
+
+    def adapt(self):
+        visibility_m = self.visibility_m()
+        for name in self.functions:
+            if name == "f_generate_search_path":
+                height = "high" if visibility_m >= 3.25 else "medium" if visibility_m >= 2.25 else "low"
+                self.system.change_mode(name, f"fd_spiral_{height}")
+            elif name == "f_follow_pipeline":
+                self.system.change_mode(name, "fd_follow_pipeline")
+        recovering = "fd_recover_thrusters" if self.failed else "fd_all_thrusters"
+        self.system.change_mode("f_maintain_motion", recovering)
+
+    def visibility_m(self) -> float:
+        return self.system.measured("water_visibility") or 0.0
 
 
-class InTwoRanges(Resting):
-    """Has nothing to do either while the visibility is between 2 and 3 m, or between 3 and 4 m."""
+class SubscribesToMeasuredValues(SearchesAsHighAsItCanSee):
+    """The same, with the visibility that it was told in its hook."""
 
-    def rests_while(self):
-        return {"water_visibility": (2.0, 3.0, 3.0, 4.0)}
+    subscribes_to: ClassVar = tuple(Kind)
+    depends_on: ClassVar = {}
+    told_m = 0.0
+
+    def diagnostic(self, diagnostic: Diagnostic) -> None:
+        super().diagnostic(diagnostic)
+        if diagnostic.key == "water_visibility":
+            self.told_m = float(diagnostic.value)
+
+    def visibility_m(self) -> float:
+        return self.told_m
+
+
+class ChangesModesInHooks(SearchesAsHighAsItCanSee):
+    """Requests a mode at once when a component's status is reported; its next call may take that back."""
+
+    depends_on: ClassVar = SearchesAsHighAsItCanSee.depends_on
+
+    def diagnostic(self, diagnostic: Diagnostic) -> None:
+        super().diagnostic(diagnostic)
+        self.system.change_mode("f_generate_search_path", "fd_spiral_high")
 
 
 class AsksForTheRecord(ManagingSubsystem):
@@ -207,21 +279,20 @@ class AsksForTheRecord(ManagingSubsystem):
 
 
 class BlindInTheDark(Metacontrol):
-    """Takes a visibility below 2 m for no number."""
+    """Takes a visibility below 2 m for not a number."""
 
-    rests_while = Metacontrol.rests_while
-    rests_after = Metacontrol.rests_after
+    depends_on = Metacontrol.depends_on
 
-    def measured(self, attribute):
-        value = super().measured(attribute)
-        return float("nan") if value is not None and value < 2.0 else value
+    def monitor(self):
+        super().monitor()
+        if self.measurements.get("water_visibility", 2.0) < 2.0:
+            self.measurements["water_visibility"] = float("nan")
 
 
 class Hasty(Metacontrol):
     """Begins a cycle sooner than one is over."""
 
-    rests_while = Metacontrol.rests_while
-    rests_after = Metacontrol.rests_after
+    depends_on = Metacontrol.depends_on
 
     def __init__(self, system: ManagedSystem) -> None:
         super().__init__(system)
@@ -229,31 +300,21 @@ class Hasty(Metacontrol):
 
 
 class Meddling(Metacontrol):
-    """Requests a mode at once when a component's status is reported, and rests as metacontrol did at first."""
+    """Requests a mode at once when a component's status is reported."""
 
-    rests_while = Metacontrol.rests_while
+    depends_on = Metacontrol.depends_on
 
     def diagnostic(self, diagnostic):
         super().diagnostic(diagnostic)
         self.system.change_mode("f_generate_search_path", "fd_spiral_high")
 
 
-class MeddlingToo(Meddling):
-    """The same, and rests after executions as well."""
-
-    rests_while = Metacontrol.rests_while
-    rests_after = Metacontrol.rests_after
-
-
 class CountsIdleCycles(Metacontrol):
-    """Requests a mode in the 25th cycle that changes nothing, and so never rests."""
+    """Requests a mode in the 25th cycle that changes nothing, and so does not say what it depends on."""
 
     def __init__(self, system: ManagedSystem) -> None:
         super().__init__(system)
         self._idle = 0
-
-    def rests_while(self):
-        return None
 
     def adapt(self):
         execution = super().adapt()
@@ -261,14 +322,6 @@ class CountsIdleCycles(Metacontrol):
         if self._idle == 25:
             self.system.change_mode("f_generate_search_path", "fd_spiral_low")
         return execution
-
-
-class TakesBoundsApart(Metacontrol):
-    """Knows of one pair of bounds for an attribute."""
-
-    def rests_while(self):
-        bounds = super().rests_while()
-        return None if bounds is None else {name: (low, high) for name, (low, high) in bounds.items()}
 
 
 class DoesMore(Metacontrol):
@@ -282,7 +335,7 @@ class DoesMore(Metacontrol):
 
 
 RECORDED: list[bool] = []
-"""What managers were told of the record."""
+"""Whether missions were recorded, as managers saw it."""
 
 CALLED_S: list[float] = []
 """When the last mission's manager was called."""

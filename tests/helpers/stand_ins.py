@@ -6,19 +6,19 @@ from functools import cache
 
 import simpy
 
-from suave_des.managed.node import Frame, SetPointSender
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.modes import Mode
 from suave_des.scenario.revision import Revision
+from suave_des.vehicle.guidance import SetPointSender
 from suave_des.vehicle.model import Array
-from suave_des.vehicle.vehicle import Watch
+from suave_des.vehicle.vehicle import ArrivalCheck
 
 Place = tuple[float, float, float]
 START = (-17.0, 2.0, -18.5)
 
 
 class PlacedVehicle:
-    """A vehicle that is where the test puts it, and keeps what it was told.
+    """A vehicle that is where the test puts it, and keeps its commands.
 
     With `obeys` it is at each set-point at once, `rise_m` above it.
     """
@@ -36,7 +36,7 @@ class PlacedVehicle:
 
     @place.setter
     def place(self, place: Place) -> None:
-        """Put it elsewhere: as for a change of control, what was foreseen of its way is no longer true."""
+        """Put it elsewhere: like a change of control, this invalidates what was looked ahead."""
         self._place = place
         for listener in self.control_listeners:
             listener(0)
@@ -44,30 +44,30 @@ class PlacedVehicle:
     def position(self, t_s: float) -> Place:
         return self.place
 
-    def give_ahead(
+    def queue_waypoints(
         self,
         t_s: float,
-        places_m: Array,
+        waypoints: Array,
         sent_as_m: tuple[float, float, float],
-        watch: Watch,
+        check: ArrivalCheck,
         *,
         first: int,
         last: int,
-        begin: bool = False,
+        send: bool,
     ) -> tuple[list[int], int]:
-        """Tells of the first place only: it cannot tell where a set-point to come will take it."""
-        if begin:
+        """Look at the first way-point only: where a later set-point takes the vehicle cannot be known beforehand."""
+        if send:
             x_m, y_m, z_m = sent_as_m
-            self.command(t_s, places_m.item(0, 0) + x_m, places_m.item(0, 1) + y_m, z_m)
-        half_widths_m = (watch.half_width_m, watch.half_width_m, watch.half_height_m)
+            self.command(t_s, waypoints.item(0, 0) + x_m, waypoints.item(0, 1) + y_m, z_m)
+        half_widths_m = (check.half_width_m, check.half_width_m, check.half_height_m)
         for tick in range(first, last + 1):
-            errors_m = [abs(a - b) for a, b in zip(self.position(watch.time_s(tick)), places_m[0, :3], strict=True)]
+            errors_m = [abs(a - b) for a, b in zip(self.position(check.time_s(tick)), waypoints[0, :3], strict=True)]
             if all(error_m <= half_m for error_m, half_m in zip(errors_m, half_widths_m, strict=True)):
                 return [tick], tick
         return [], last
 
-    def drop_ahead(self, t_s: float, watch: Watch, tick: int) -> None:
-        """There are never set-points to come."""
+    def cancel_waypoints(self, t_s: float, check: ArrivalCheck) -> None:
+        """Do nothing: no set-point is ever queued."""
 
     def command(self, t_s: float, x_m: float, y_m: float, z_m: float) -> None:
         self.commands.append((t_s, (x_m, y_m, z_m)))
@@ -75,7 +75,7 @@ class PlacedVehicle:
             self.place = (x_m, y_m, z_m + self.rise_m)
 
     @property
-    def told(self) -> list[Place]:
+    def commanded(self) -> list[Place]:
         return [place for _, place in self.commands]
 
     @property
@@ -84,7 +84,7 @@ class PlacedVehicle:
 
 
 class MovingVehicle(PlacedVehicle):
-    """A vehicle that goes its way over time whatever it is told."""
+    """A vehicle that goes its way over time whatever it is commanded."""
 
     def __init__(self, way: Callable[[float], Place]) -> None:
         super().__init__()
@@ -101,8 +101,8 @@ def revision(name: str) -> Revision:
 
 
 def sender(env: simpy.Environment, vehicle: PlacedVehicle) -> SetPointSender:
-    """A way to the autopilot that loses nothing and errs in nothing."""
-    return SetPointSender(env, vehicle, Frame(), 0.0, random.Random(0))
+    """A connection to the autopilot without losses and frame errors."""
+    return SetPointSender(vehicle, lambda: env.now, stream=random.Random(0))
 
 
 def spiral_at(altitude_m: float) -> Mode:

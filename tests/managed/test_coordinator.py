@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import pytest
 import simpy
 
-from suave_des.managed.coordinator import MissionCoordinator
-from suave_des.managed.task import Task
+from suave_des.domain import Task
+from suave_des.managed.coordinator import MissionCoordinator, MissionTiming
 from tests.helpers.stand_ins import revision
 
 BOTH = pytest.mark.parametrize("name", ["2023", "1.5"])
@@ -36,30 +36,26 @@ class Mission:
         self.calls: list[tuple[str, float, str]] = []
         self.tasks: list[Task] = []
         self.on_cancel: Callable[[], None] = lambda: None
-        self.logged: list[tuple[float, str]] = []
+        self.logged: list[tuple[float, str, str]] = []
         self.coordinator = MissionCoordinator(
             self.env,
             revision(name).coordinator,
+            MissionTiming(time_limit_s, start_delay_s, POLL_PHASE_S if name == "2023" else 0.035, LIMIT_PHASE_S),
             self.detector,
             self.follow,
-            self._request,
-            self._cancel,
-            time_limit_s=time_limit_s,
-            start_delay_s=start_delay_s,
-            poll_phase_s=POLL_PHASE_S if name == "2023" else 0.035,
-            limit_phase_s=LIMIT_PHASE_S,
-            log=lambda source, event, detail: self.logged.append((self.env.now, event)),
+            lambda source, event, detail: self.logged.append((self.env.now, event, detail)),
         )
+        self.coordinator.start(self.request, self.cancel)
 
     def run(self) -> "Mission":
         self.env.run(until=self.coordinator.ended)
         return self
 
-    def _request(self, task: Task) -> None:
+    def request(self, task: Task) -> None:
         self.calls.append(("request", round(self.env.now, 6), task.name))
         self.tasks.append(task)
 
-    def _cancel(self, task: Task) -> None:
+    def cancel(self, task: Task) -> None:
         self.calls.append(("cancel", round(self.env.now, 6), task.name))
         if task.name == "inspect_pipeline":
             self.on_cancel()
@@ -114,8 +110,14 @@ def test_detection_before_the_search_was_requested_keeps_its_own_time() -> None:
     assert Mission("1.5", 2.2, start_delay_s=5.0).run().coordinator.search_time_s == 2.0
 
 
-def test_detection_is_told_at_its_own_time() -> None:
-    assert (73.45, "pipeline_detected") in Mission("2023", 73.45).run().logged
+def test_tasks_and_the_missions_end_are_recorded() -> None:
+    assert Mission("2023", 73.45).run().logged == [
+        (0.0, "task_requested", "search_pipeline"),
+        (74.35, "task_done", "search_pipeline"),
+        (74.35, "task_requested", "inspect_pipeline"),
+        (300.2, "task_cancelled", "inspect_pipeline"),
+        (300.2, "mission_ended", "time limit"),
+    ]
 
 
 @pytest.mark.parametrize(("limit_s", "end_s"), [(300.0, 300.2), (100.21, 100.7), (100.7, 100.7)])

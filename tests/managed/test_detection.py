@@ -9,9 +9,12 @@ from numpy.typing import NDArray
 
 from suave_des.managed.detection import PipelineDetector, measured_at_rows
 from suave_des.scenario.models import Pipeline
+from suave_des.vehicle.autopilot import Autopilot
 from suave_des.vehicle.bluerov2 import BLUEROV2
-from suave_des.vehicle.vehicle import STEP_S, Autopilot, Pose, Vehicle, row_at
+from suave_des.vehicle.frames import Pose
+from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at
 from suave_des.world.pipeline import first_point_in_view, sample_points
+from tests.helpers.stand_ins import silent
 
 POINTS = sample_points(Pipeline().vertices_m)
 DURATION_S = 120.0
@@ -25,7 +28,14 @@ class Sight:
         autopilot = Autopilot(0.48, 0.34, 0.36, 0.5)
         self.vehicle = Vehicle(BLUEROV2, autopilot, Pose(-17.0, 4.0, -18.0, 0.0, 0.0, 0.0), DURATION_S)
         self.visibility_m = np.full(self.vehicle.last_row + 1, visibility_m)
-        self.detector = PipelineDetector(self.env, self.vehicle, self.visibility_m, POINTS)
+        self.logged: list[tuple[float, str]] = []
+        self.detector = PipelineDetector(
+            self.env,
+            self.vehicle,
+            self.visibility_m,
+            POINTS,
+            lambda source, event, detail: self.logged.append((self.env.now, event)),
+        )
         for t_s, place in commands:
             self.env.process(self._at(t_s, lambda place=place: self.vehicle.command(self.env.now, *place)))
         for t_s in readings:
@@ -58,10 +68,16 @@ def test_detection_is_the_first_row_of_the_way_with_a_point_in_view() -> None:
     assert sight.run() == first_sight(sight)
 
 
+def test_detection_is_recorded_at_its_own_time() -> None:
+    sight = Sight(TO_THE_PIPELINE)
+    detected_s, _ = sight.run()
+    assert sight.logged == [(detected_s, "pipeline_detected")]
+
+
 def test_vehicle_that_starts_over_the_pipeline_sees_it_at_once() -> None:
     env = simpy.Environment()
     vehicle = Vehicle(BLUEROV2, Autopilot(0.48, 0.34, 0.36, 0.5), Pose(-17.0, 0.0, -18.0, 0, 0, 0), 10.0)
-    detector = PipelineDetector(env, vehicle, np.full(vehicle.last_row + 1, 3.0), POINTS)
+    detector = PipelineDetector(env, vehicle, np.full(vehicle.last_row + 1, 3.0), POINTS, silent)
     env.run(until=1.0)
     assert detector.detected_s == 0.0
 

@@ -8,19 +8,21 @@ import simpy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from suave_des.managed.follow import FollowPipeline, Way
+from suave_des.managed.follow import FollowPipeline, InspectionPath
+from suave_des.vehicle.autopilot import Autopilot
 from suave_des.vehicle.bluerov2 import BLUEROV2
-from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle, row_at
+from suave_des.vehicle.frames import Pose
+from suave_des.vehicle.vehicle import Vehicle, row_at
 from tests.helpers.stand_ins import ACTIVE, INACTIVE, MovingVehicle, PlacedVehicle, revision, sender
 
 BOTH = pytest.mark.parametrize("name", ["2023", "1.5"])
-LINE = [(-0.5 * n, 0.0) for n in range(21)]
+LINE = [(-0.5 * n, 0.0) for n in range(45)]  # more than are queued at a time
 SPEED = 0.25
 
 
 def follow_of(env: simpy.Environment, name: str, vehicle: PlacedVehicle, path=LINE) -> FollowPipeline:
-    way = None if path is None else Way.along(np.array(path))
-    return FollowPipeline(env, vehicle, sender(env, vehicle), revision(name).follow, lambda: way)
+    way = None if path is None else InspectionPath.along(np.array(path))
+    return FollowPipeline(env, sender(env, vehicle), revision(name).follow, lambda: way)
 
 
 def along_the_line() -> MovingVehicle:
@@ -38,7 +40,7 @@ def test_set_points_are_1_25_m_above_the_bed(env: simpy.Environment, name: str) 
     vehicle = PlacedVehicle()
     follow_of(env, name, vehicle).apply(ACTIVE)
     env.run(until=0.1)
-    assert vehicle.told == [(0.0, 0.0, -18.75)]
+    assert vehicle.commanded == [(0.0, 0.0, -18.75)]
 
 
 @BOTH
@@ -46,7 +48,7 @@ def test_points_are_visited_in_order(env: simpy.Environment, name: str) -> None:
     vehicle = PlacedVehicle(obeys=True)
     follow_of(env, name, vehicle).apply(ACTIVE)
     env.run(until=100.0)
-    assert [(x, y) for x, y, _ in vehicle.told] == LINE
+    assert [(x, y) for x, y, _ in vehicle.commanded] == LINE
 
 
 @BOTH
@@ -77,7 +79,7 @@ def test_box_within_which_a_point_is_reached(
     vehicle = PlacedVehicle(tuple(place))
     follow_of(env, name, vehicle, [(0.0, 0.0), (9.0, 9.0)]).apply(ACTIVE)
     env.run(until=0.1)
-    assert (len(vehicle.told) == 2) is reached
+    assert (len(vehicle.commanded) == 2) is reached
 
 
 @BOTH
@@ -85,7 +87,7 @@ def test_depth_does_not_matter_for_reaching_a_point(env: simpy.Environment, name
     vehicle = PlacedVehicle((0.0, 0.0, -15.0))
     follow_of(env, name, vehicle, [(0.0, 0.0), (9.0, 9.0)]).apply(ACTIVE)
     env.run(until=0.1)
-    assert len(vehicle.told) == 2
+    assert len(vehicle.commanded) == 2
 
 
 # The box of a point 2.125 m along is entered after 6.9 s in 2023, after 6.5 s in 1.5; polls follow at 7 and at 8 s.
@@ -112,7 +114,7 @@ def test_a_point_reached_at_the_tenth_poll_is_not_sent_again(env: simpy.Environm
     vehicle = MovingVehicle(lambda t_s: (0.0 if t_s > 1.9 else 50.0, 0.0, -18.75))
     follow_of(env, "2023", vehicle, [(0.0, 0.0), (9.0, 9.0)]).apply(ACTIVE)
     env.run(until=2.1)
-    assert [place[:2] for place in vehicle.told] == [(0.0, 0.0), (9.0, 9.0)]
+    assert [place[:2] for place in vehicle.commanded] == [(0.0, 0.0), (9.0, 9.0)]
 
 
 @BOTH
@@ -137,7 +139,7 @@ def switched_off(env: simpy.Environment, name: str, at_s: float = 8.5) -> tuple[
 
 
 def last_reached(vehicle: MovingVehicle) -> float:
-    return vehicle.told[-2][0]  # the last one sent was not reached any more
+    return vehicle.commanded[-2][0]  # the last one sent was not reached any more
 
 
 def test_revision_2023_adds_the_way_from_the_last_point_when_switched_off(env: simpy.Environment) -> None:
@@ -160,9 +162,9 @@ def test_revision_2023_adds_nothing_before_a_first_point(env: simpy.Environment)
 
 def test_switched_off_it_sends_nothing(env: simpy.Environment) -> None:
     _, vehicle = switched_off(env, "2023")
-    sent = len(vehicle.told)
+    sent = len(vehicle.commanded)
     env.run(until=50.0)
-    assert len(vehicle.told) == sent
+    assert len(vehicle.commanded) == sent
 
 
 @BOTH
@@ -180,7 +182,7 @@ def test_switched_on_again_it_publishes_nothing_until_there_is_a_new_distance(
 @BOTH
 def test_switched_on_again_the_distance_counts_from_zero(env: simpy.Environment, name: str) -> None:
     follow, vehicle = switched_off(env, name)
-    first_new = len(vehicle.told)
+    first_new = len(vehicle.commanded)
     vehicle.obeys = True
     here = [vehicle.position(env.now)]
     vehicle._way = lambda _: here[-1]
@@ -193,25 +195,25 @@ def test_switched_on_again_the_distance_counts_from_zero(env: simpy.Environment,
     vehicle.command = obey
     follow.apply(ACTIVE)
     env.run(until=30.0)
-    new = [place[:2] for place in vehicle.told[first_new:]]
+    new = [place[:2] for place in vehicle.commanded[first_new:]]
     assert follow.distance_m == pytest.approx(math.dist(new[0], new[-1]))
 
 
 def test_revision_2023_starts_the_path_again(env: simpy.Environment) -> None:
     follow, vehicle = switched_off(env, "2023")
-    sent = len(vehicle.told)
+    sent = len(vehicle.commanded)
     follow.apply(ACTIVE)
     env.run(until=env.now + 0.1)
-    assert vehicle.told[sent][0] == 0.0
+    assert vehicle.commanded[sent][0] == 0.0
 
 
 def test_revision_15_goes_on_with_the_point_not_reached(env: simpy.Environment) -> None:
     follow, vehicle = switched_off(env, "1.5")
-    pending = vehicle.told[-1]
-    sent = len(vehicle.told)
+    pending = vehicle.commanded[-1]
+    sent = len(vehicle.commanded)
     follow.apply(ACTIVE)
     env.run(until=env.now + 0.1)
-    assert vehicle.told[sent] == pending
+    assert vehicle.commanded[sent] == pending
 
 
 @BOTH
@@ -219,7 +221,7 @@ def test_without_a_detection_there_is_nothing_to_follow(env: simpy.Environment, 
     vehicle = PlacedVehicle()
     follow_of(env, name, vehicle, None).apply(ACTIVE)
     env.run(until=60.0)
-    assert vehicle.told == []
+    assert vehicle.commanded == []
 
 
 @BOTH
@@ -228,11 +230,11 @@ def test_a_finished_path_is_not_followed_again(env: simpy.Environment, name: str
     follow = follow_of(env, name, vehicle)
     follow.apply(ACTIVE)
     env.run(until=5.0)
-    sent = len(vehicle.told)
+    sent = len(vehicle.commanded)
     follow.apply(INACTIVE)
     follow.apply(ACTIVE)
     env.run(until=10.0)
-    assert len(vehicle.told) == sent
+    assert len(vehicle.commanded) == sent
 
 
 @BOTH
@@ -246,7 +248,7 @@ def test_the_real_vehicle_follows_a_straight_line_at_the_observed_speed(env: sim
     assert 0.21 < follow.distance_m / 100.0 < 0.30  # published runs: 0.21 to 0.30 m/s
 
 
-# Foreseeing polls is the same as looking at each of them
+# Looking ahead is the same as looking at each poll
 
 
 def real_follow(name: str, disturbances: list, *, polling: bool) -> tuple[list, float]:
@@ -289,7 +291,7 @@ def real_follow(name: str, disturbances: list, *, polling: bool) -> tuple[list, 
         follow.apply(ACTIVE)
     for t_s, what in disturbances:
         env.process(disturb(t_s, what))
-    env.run(until=75.0)
+    env.run(until=75.1)  # not the time of a poll
     vehicle.look_ahead(row_at(75.0))
     return vehicle.track[: row_at(75.0)].tolist(), way[0] if polling else follow.distance_m
 
@@ -299,10 +301,10 @@ def real_follow(name: str, disturbances: list, *, polling: bool) -> tuple[list, 
 @given(
     disturbances=st.lists(st.tuples(st.integers(0, 60), st.integers(0, 9)), max_size=4, unique_by=lambda each: each[0])
 )
-def test_foreseeing_polls_is_the_same_as_looking_at_each(name: str, disturbances: list) -> None:
-    foreseen, distance_m = real_follow(name, disturbances, polling=False)
+def test_looking_ahead_is_the_same_as_looking_at_each_poll(name: str, disturbances: list) -> None:
+    ahead, distance_m = real_follow(name, disturbances, polling=False)
     polled, way_m = real_follow(name, disturbances, polling=True)
-    assert (foreseen, distance_m) == (polled, pytest.approx(way_m))
+    assert (ahead, distance_m) == (polled, pytest.approx(way_m))
 
 
 # When several things happen at one time
@@ -342,14 +344,14 @@ def real_end(name: str, changed_s: float | None) -> tuple[float, float, list[flo
     env = simpy.Environment()
     vehicle = Vehicle(BLUEROV2, Autopilot(0.48, 0.34, 0.36, 0.5), Pose(1.0, 0.3, -18.75, 0.0, 0.0, 0.0), 120.0)
     follow = follow_of(env, name, vehicle)
-    give_ahead, acting_s = vehicle.give_ahead, []
+    queue_waypoints, acting_s = vehicle.queue_waypoints, []
 
-    def give(t_s, places_m, sent_as_m, watch, **others):
-        reached, act_at = give_ahead(t_s, places_m, sent_as_m, watch, **others)
-        acting_s.append(watch.time_s(act_at))
+    def queue(t_s, waypoints, sent_as_m, check, **others):
+        reached, act_at = queue_waypoints(t_s, waypoints, sent_as_m, check, **others)
+        acting_s.append(check.time_s(act_at))
         return reached, act_at
 
-    vehicle.give_ahead = give
+    vehicle.queue_waypoints = queue
     if changed_s is not None:
         env.timeout(changed_s).callbacks.append(lambda _: vehicle.set_thruster_health(env.now, 1, 0.999999))
     follow.apply(ACTIVE)
@@ -358,7 +360,7 @@ def real_end(name: str, changed_s: float | None) -> tuple[float, float, list[flo
 
 
 @BOTH
-def test_control_that_changes_at_the_poll_that_ends_what_was_sent_ahead_changes_nothing_else(name: str) -> None:
+def test_control_that_changes_at_the_poll_that_ends_the_queue_changes_nothing_else(name: str) -> None:
     end_s, distance_m, acting_s = real_end(name, None)
     assert len(acting_s) > 1
     for at_s in acting_s:

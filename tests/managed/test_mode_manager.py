@@ -114,12 +114,12 @@ def test_an_unknown_function_has_no_modes(managed: Managed) -> None:
     assert managed.modes.available_modes("f_dock") == ()
 
 
-def test_listeners_hear_of_effects_not_of_requests(managed: Managed) -> None:
-    heard: list[tuple[float, str, str]] = []
-    managed.modes.on_effect(lambda function, mode: heard.append((managed.env.now, function, mode.name)))
+def test_listeners_are_called_at_effects_not_at_requests(managed: Managed) -> None:
+    effects: list[tuple[float, str, str]] = []
+    managed.modes.listeners.append(lambda function, mode: effects.append((managed.env.now, function, mode.name)))
     managed.modes.change_mode(SEARCH, "fd_spiral_low")
     managed.env.run()
-    assert heard == [(0.5, SEARCH, "fd_spiral_low")]
+    assert effects == [(0.5, SEARCH, "fd_spiral_low")]
 
 
 @pytest.mark.parametrize(

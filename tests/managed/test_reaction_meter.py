@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import simpy
 
-from suave_des.managed.reactions import ReactionMeter
+from suave_des.metrics.reactions import ReactionMeter
 from suave_des.monitor.diagnostics import Diagnostic, Kind
 from suave_des.monitor.measurements import Measurements
 from suave_des.scenario.models import ReactionMetric

@@ -16,7 +16,7 @@ def recharging() -> tuple[simpy.Environment, PlacedVehicle, GenerateRechargePath
 def test_active_it_sends_the_vehicle_to_the_station_at_altitude_1_25() -> None:
     env, vehicle, _ = recharging()
     env.run(until=1.0)
-    assert vehicle.told == [(-3.0, -2.0, -18.75)]
+    assert vehicle.commanded == [(-3.0, -2.0, -18.75)]
 
 
 def test_inactive_it_leaves_the_autopilot_to_others() -> None:
@@ -24,4 +24,4 @@ def test_inactive_it_leaves_the_autopilot_to_others() -> None:
     env.run(until=1.0)
     node.apply(INACTIVE)
     env.run(until=100.0)
-    assert len(vehicle.told) == 1
+    assert len(vehicle.commanded) == 1

@@ -3,19 +3,18 @@
 import random
 
 import pytest
-import simpy
 
-from suave_des.managed.node import Frame, SetPointSender
+from suave_des.vehicle.guidance import SetPointSender
 from tests.helpers.stand_ins import Place, PlacedVehicle
 
 
-def sent(count: int, loss_probability: float, frame: Frame | None = None) -> list[Place]:
+def sent(count: int, loss_probability: float, frame_error_m: Place = (0.0, 0.0, 0.0)) -> list[Place]:
     """What arrives of so many set-points."""
     vehicle = PlacedVehicle()
-    sender = SetPointSender(simpy.Environment(), vehicle, frame or Frame(), loss_probability, random.Random(1))
+    sender = SetPointSender(vehicle, lambda: 0.0, frame_error_m, loss_probability, random.Random(1))
     for n in range(count):
         sender.send(float(n), 0.0, -18.0)
-    return vehicle.told
+    return vehicle.commanded
 
 
 def test_without_loss_every_set_point_arrives() -> None:
@@ -33,4 +32,4 @@ def test_share_of_lost_set_points(probability: float) -> None:
 
 
 def test_frame_error_shifts_every_set_point() -> None:
-    assert sent(1, 0.0, Frame(0.1, -0.2, 0.3)) == [pytest.approx((0.1, -0.2, -17.7))]
+    assert sent(1, 0.0, (0.1, -0.2, 0.3)) == [pytest.approx((0.1, -0.2, -17.7))]

@@ -8,8 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.managed.search import GenerateSearchPath
+from suave_des.vehicle.autopilot import Autopilot
 from suave_des.vehicle.bluerov2 import BLUEROV2
-from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle, row_at
+from suave_des.vehicle.frames import Pose
+from suave_des.vehicle.vehicle import Vehicle, row_at
 from tests.helpers.stand_ins import INACTIVE, START, PlacedVehicle, revision, sender, spiral_at
 
 ORIGIN = (-17.0, 2.3)
@@ -24,9 +26,7 @@ class Search:
     def __init__(self, name: str, vehicle: PlacedVehicle) -> None:
         self.env = simpy.Environment()
         self.vehicle = vehicle
-        self.node = GenerateSearchPath(
-            self.env, vehicle, sender(self.env, vehicle), revision(name).spiral, ORIGIN, PHASE_S
-        )
+        self.node = GenerateSearchPath(self.env, sender(self.env, vehicle), revision(name).spiral, ORIGIN, PHASE_S)
 
     def ticks(self, count: int) -> None:
         """Let a number of ticks pass."""
@@ -34,11 +34,11 @@ class Search:
 
     @property
     def last(self) -> tuple[float, float, float]:
-        return self.vehicle.told[-1]
+        return self.vehicle.commanded[-1]
 
     def spiral(self, centre: tuple[float, float]) -> list[tuple[float, float]]:
         """Radius and angle of each set-point."""
-        offsets = [(x - centre[0], y - centre[1]) for x, y, _ in self.vehicle.told]
+        offsets = [(x - centre[0], y - centre[1]) for x, y, _ in self.vehicle.commanded]
         return [(math.hypot(dx, dy), math.atan2(dy, dx) % (2 * math.pi)) for dx, dy in offsets]
 
 
@@ -112,7 +112,7 @@ def test_reached_means_within_0_4_m_in_x_y_and_z(name: str, error_m: tuple[float
     x, y, z = search.last
     search.vehicle.place = (x + error_m[0], y + error_m[1], z + error_m[2])
     search.ticks(1)
-    assert (len(search.vehicle.told) == 2) is goes_on
+    assert (len(search.vehicle.commanded) == 2) is goes_on
 
 
 @BOTH
@@ -129,7 +129,7 @@ def test_when_only_z_is_missed_each_resending_asks_for_less_altitude(name: str, 
     search = searching(name, rise_m=0.5, obeys=True)
     search.vehicle.rise_m = 5.0  # whatever is commanded, z is not reached
     search.ticks(34)
-    assert [z for _, _, z in search.vehicle.told] == pytest.approx([-19.0 - step_m * times for times in range(4)])
+    assert [z for _, _, z in search.vehicle.commanded] == pytest.approx([-19.0 - step_m * times for times in range(4)])
 
 
 def test_the_work_around_frees_a_vehicle_that_stops_half_a_metre_short() -> None:
@@ -141,7 +141,7 @@ def test_the_work_around_frees_a_vehicle_that_stops_half_a_metre_short() -> None
 def test_later_set_points_keep_the_lowered_command() -> None:
     search = searching("2023", obeys=True, rise_m=0.5)
     search.ticks(20)
-    assert {z for _, _, z in search.vehicle.told[1:]} == {-19.5}
+    assert {z for _, _, z in search.vehicle.commanded[1:]} == {-19.5}
 
 
 @pytest.mark.parametrize(("name", "z_m"), [("2023", -19.5), ("1.5", -19.0)])
@@ -165,19 +165,19 @@ def stalled_at_3_m() -> Search:
 def test_a_set_point_sent_again_in_a_stall_has_the_new_altitude() -> None:
     search = stalled_at_3_m()
     search.ticks(10)
-    assert search.last == pytest.approx((*search.vehicle.told[0][:2], -19.0 - 0.5))
+    assert search.last == pytest.approx((*search.vehicle.commanded[0][:2], -19.0 - 0.5))
 
 
 def test_altitude_change_in_a_stall_locks_the_spiral_up() -> None:
     search = stalled_at_3_m()
     search.ticks(100)
-    assert len({place[:2] for place in search.vehicle.told}) == 1
+    assert len({place[:2] for place in search.vehicle.commanded}) == 1
 
 
 def test_offset_goes_on_falling_in_a_lock_up() -> None:
     search = stalled_at_3_m()
     search.ticks(50)
-    assert [z for _, _, z in search.vehicle.told[1:]] == [-19.5, -20.0, -20.5, -21.0]
+    assert [z for _, _, z in search.vehicle.commanded[1:]] == [-19.5, -20.0, -20.5, -21.0]
 
 
 @BOTH
@@ -186,7 +186,7 @@ def test_inactive_it_sends_nothing(name: str) -> None:
     search.ticks(3)
     search.node.apply(INACTIVE)
     search.ticks(30)
-    assert len(search.vehicle.told) == 3
+    assert len(search.vehicle.commanded) == 3
 
 
 def test_revision_2023_goes_on_with_its_spiral_when_activated_again() -> None:
@@ -213,7 +213,7 @@ def test_before_any_mode_the_altitude_parameter_is_2_m() -> None:
     assert Search("1.5", PlacedVehicle()).node.altitude_m == 2.0
 
 
-# Sending set-points ahead is the same as looking at each tick
+# Queueing way-points is the same as checking at each tick
 
 
 class PlainSpiral:
@@ -265,7 +265,7 @@ def real_search(happenings: list, *, plainly: bool) -> list:
     autopilot = Autopilot(0.48, 0.34, 0.36, 0.5, altitude_deadband_m=0.3)
     vehicle = Vehicle(BLUEROV2, autopilot, Pose(*ORIGIN, -18.75, 0.0, 0.0, 0.0), 80.0)
     plain = PlainSpiral(env, vehicle) if plainly else None
-    node = GenerateSearchPath(env, vehicle, sender(env, vehicle), revision("2023").spiral, ORIGIN, PHASE_S)
+    node = GenerateSearchPath(env, sender(env, vehicle), revision("2023").spiral, ORIGIN, PHASE_S)
 
     def happen(t_s: float, what: int):
         yield env.timeout(t_s + 0.013)  # never at the very time of a tick
@@ -289,6 +289,6 @@ def real_search(happenings: list, *, plainly: bool) -> list:
 
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.tuples(st.integers(1, 70), st.integers(0, 7)), max_size=6, unique_by=lambda each: each[0]))
-def test_sending_set_points_ahead_is_the_same_as_looking_at_each_tick(happenings: list) -> None:
+def test_queueing_waypoints_is_the_same_as_checking_at_each_tick(happenings: list) -> None:
     ahead, plainly = real_search(happenings, plainly=False), real_search(happenings, plainly=True)
     assert [pytest.approx(place, abs=1e-9) for place in plainly] == ahead

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from suave_des.errors import InputError, MissionError
+from suave_des.metrics.result import MissionResult
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario, with_values
-from suave_des.simulation.result import MissionResult
 from suave_des.simulation.simulator import Simulator
 from tests.helpers.exemplar_files import write_exemplar_files
 

@@ -9,7 +9,7 @@ import pytest
 
 from suave_des.errors import InputError
 from suave_des.managing.base import ManagingSubsystem
-from suave_des.managing.registry import manager_class, manager_names
+from suave_des.registry import manager_class, manager_names
 
 
 @pytest.mark.parametrize("name", ["none", "random", "metacontrol", "bt", "bt_extended"])

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from suave_des.simulation.result import MissionResult
+from suave_des.metrics.result import MissionResult
 from suave_des.world.pipeline import there_and_back
 
 NO_ERRORS = {"calibration": {"altitude_error_m": 0.0, "real_time_factor_loss": 0.0}}

@@ -5,7 +5,7 @@ import pickle
 import pytest
 
 from suave_des.errors import MissionError
-from suave_des.simulation.result import MissionResult
+from suave_des.metrics.result import MissionResult
 from tests.helpers import OUTSIDE
 
 QUIET = {"calibration": {"altitude_error_m": 0.0, "real_time_factor_loss": 0.0}}
@@ -42,9 +42,9 @@ def test_an_outside_manager_can_complete_the_mission(simulator) -> None:
     assert mission(simulator, "Deliberate", **QUIET).metrics.distance_inspected_m > 0.0
 
 
-def test_it_hears_measured_values_and_components(simulator) -> None:
-    heard = [each.detail for each in mission(simulator, "Observer").events if each.event == "heard"]
-    assert heard[0] == "water_visibility 3.75" and "c_thruster_1 FALSE" in heard
+def test_it_gets_measured_values_and_components(simulator) -> None:
+    received = [each.detail for each in mission(simulator, "Observer").events if each.event == "received"]
+    assert received[0] == "water_visibility 3.75" and "c_thruster_1 FALSE" in received
 
 
 def test_its_random_stream_depends_on_the_run_alone(simulator) -> None:

@@ -8,7 +8,7 @@ import pytest
 from suave_des.errors import InputError
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario
-from suave_des.simulation.knowledge import open_base, open_knowledge
+from suave_des.scenario_knowledge import open_base, open_knowledge
 
 
 @pytest.fixture(autouse=True)

@@ -5,7 +5,7 @@ import simpy
 from hypothesis import given
 from hypothesis import strategies as st
 
-from suave_des.clock import call_at, call_next, tick_at_or_after, until
+from suave_des.clock import Alarm, tick_at_or_after, until
 from suave_des.streams import Streams
 
 names = st.text(min_size=1, max_size=20)
@@ -57,21 +57,41 @@ def test_waiting_for_a_time_that_has_passed_takes_no_time() -> None:
     assert env.now == 5.0
 
 
-def test_callback_comes_at_its_time_with_its_event() -> None:
+def test_an_alarm_rings_at_its_time_once() -> None:
     env, called = simpy.Environment(), []
-    event = call_at(env, 4.0, lambda happened: called.append((env.now, happened)))
+    alarm = Alarm(env, lambda: called.append(env.now))
+    alarm.set(4.0)
+    env.run(until=10.0)
+    assert called == [4.0]
+
+
+def test_setting_an_alarm_anew_replaces_the_call_that_was_pending() -> None:
+    env, called = simpy.Environment(), []
+    alarm = Alarm(env, lambda: called.append(env.now))
+    alarm.set(4.0)
+    alarm.set(6.0)
     env.run()
-    assert called == [(4.0, event)]
+    assert called == [6.0]
 
 
-def test_what_is_called_next_comes_before_all_else_of_its_time_but_not_at_once() -> None:
+def test_a_cancelled_alarm_does_not_ring() -> None:
     env, called = simpy.Environment(), []
+    alarm = Alarm(env, lambda: called.append(env.now))
+    alarm.set(4.0)
+    alarm.cancel()
+    env.run()
+    assert called == []
 
-    def first(_: simpy.Event) -> None:
-        call_next(env, lambda _: called.append((env.now, "next")))
+
+def test_an_alarm_set_now_rings_before_all_else_of_its_time_but_not_at_once() -> None:
+    env, called = simpy.Environment(), []
+    now = Alarm(env, lambda: called.append((env.now, "now")))
+
+    def first() -> None:
+        now.set_now()
         called.append((env.now, "first"))
 
-    call_at(env, 4.0, first)
-    call_at(env, 4.0, lambda _: called.append((env.now, "second")))
+    Alarm(env, first).set(4.0)
+    Alarm(env, lambda: called.append((env.now, "second"))).set(4.0)
     env.run()
-    assert called == [(4.0, "first"), (4.0, "next"), (4.0, "second")]
+    assert called == [(4.0, "first"), (4.0, "now"), (4.0, "second")]

@@ -2,8 +2,10 @@ from collections.abc import Callable
 
 import pytest
 
+from suave_des.vehicle.autopilot import Autopilot
 from suave_des.vehicle.bluerov2 import BLUEROV2
-from suave_des.vehicle.vehicle import Autopilot, Pose, Vehicle
+from suave_des.vehicle.frames import Pose
+from suave_des.vehicle.vehicle import Vehicle
 
 START = Pose(0.0, 0.0, -18.0, 0.0, 0.0, 0.0)
 MakeVehicle = Callable[..., Vehicle]

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from suave_des.vehicle.vehicle import STEP_S, Vehicle, euler_angles, quaternion, row_at
+from suave_des.vehicle.frames import euler_angles, quaternion
+from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at
 
 DURATION_S = 40.0
 times = st.floats(0.0, DURATION_S)
@@ -46,15 +47,15 @@ def test_looking_ahead_does_not_bind_the_future(make_vehicle, plan: list, ahead:
 
 
 def test_a_thruster_that_is_as_it_was_is_no_change_of_control(make_vehicle) -> None:
-    vehicle, told = make_vehicle(), []
-    vehicle.control_listeners.append(told.append)
+    vehicle, rows = make_vehicle(), []
+    vehicle.control_listeners.append(rows.append)
     vehicle.set_thruster_health(1.0, 2, 1.0)
     vehicle.set_thruster_health(2.0, 2, 0.0)
     vehicle.set_thruster_health(3.0, 2, 0.0)
-    assert told == [row_at(2.0)]
+    assert rows == [row_at(2.0)]
 
 
-def test_change_of_control_is_told_with_the_row_of_its_time(make_vehicle) -> None:
+def test_listeners_get_the_row_of_a_change_of_control(make_vehicle) -> None:
     vehicle, rows = make_vehicle(), []
     vehicle.control_listeners.append(rows.append)
     vehicle.command(3.0, 1.0, 0.0, -18.0)

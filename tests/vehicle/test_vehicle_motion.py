@@ -7,7 +7,8 @@ import pytest
 
 from suave_des.vehicle import kernel
 from suave_des.vehicle.bluerov2 import BLUEROV2
-from suave_des.vehicle.vehicle import STEP_S, Pose, Vehicle, row_at
+from suave_des.vehicle.frames import Pose
+from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at
 
 DIRECTIONS = pytest.mark.parametrize("direction_deg", [0, 45, 90, 180, 270])
 PLACE_M = (0.0, 0.0, -18.0)
@@ -195,7 +196,7 @@ def test_vehicle_stays_in_the_water(make_vehicle, z_m: float, limit_m: float) ->
     assert vehicle.position(100.0)[2] == limit_m
 
 
-def test_vehicle_leaves_the_sea_bed_at_once_when_told(make_vehicle) -> None:
+def test_vehicle_leaves_the_sea_bed_at_once_when_commanded(make_vehicle) -> None:
     vehicle = make_vehicle(z_limits_m=(-20.0, 0.0))
     vehicle.command(0.0, 0.0, 0.0, -30.0)
     vehicle.command(100.0, 0.0, 0.0, -18.0)

@@ -6,9 +6,9 @@ import pytest
 
 from suave_des.campaign.knowledge_records import KNOWLEDGE_FILE, knowledge_text
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
+from suave_des.metrics.result import KnowledgeRecord
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario
-from suave_des.simulation.result import KnowledgeRecord
 
 SEARCH = "f_generate_search_path"
 RULE = 'near: FunctionGrounding(?fg) -> fg_status(?fg, "IN_ERROR_NFR")'

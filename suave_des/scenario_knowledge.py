@@ -1,10 +1,8 @@
 """Opens the knowledge base of a scenario, and checks that it fits the mission and the modes file."""
 
-from __future__ import annotations
-
+from collections.abc import Hashable
 from decimal import Decimal
-from functools import lru_cache
-from pathlib import Path
+from typing import Final
 
 from suave_des.domain import MISSION_FUNCTIONS
 from suave_des.errors import InputError, KnowledgeError
@@ -12,6 +10,10 @@ from suave_des.knowledge.deliberation import Deliberation
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.scenario.loader import LoadedScenario
+
+OPENED: Final = 4
+_opened: dict[Hashable, Deliberation] = {}
+"""Knowledge bases that are kept open, the oldest first."""
 
 
 def open_base(loaded: LoadedScenario) -> Ontology:
@@ -21,12 +23,10 @@ def open_base(loaded: LoadedScenario) -> Ontology:
         KnowledgeError: the ontologies or rules cannot be read.
     """
     knowledge = loaded.scenario.knowledge
+    values = {name: Decimal(repr(value)) for name, value in knowledge.values.items()}
     try:
         return Ontology.load(
-            loaded.ontologies,
-            values={name: Decimal(repr(value)) for name, value in knowledge.values.items()},
-            rules=loaded.rules,
-            disabled_rules=knowledge.disabled_rules,
+            loaded.ontologies, values=values, rules=loaded.rules, disabled_rules=knowledge.disabled_rules
         )
     except KnowledgeError as error:
         raise loaded.located(error) from None
@@ -39,19 +39,19 @@ def open_knowledge(loaded: LoadedScenario) -> Deliberation:
         KnowledgeError: the ontologies cannot be read, or lack a design for a function of the mission.
         InputError: a function design of the knowledge base has no mode of its name in the modes file.
     """
-    knowledge = loaded.scenario.knowledge
-    values = tuple((name, Decimal(repr(value))) for name, value in sorted(knowledge.values.items()))
-    try:
-        deliberation = _open(
-            loaded.ontologies,
-            tuple(sorted(loaded.inputs.items())),
-            values,
-            loaded.rules,
-            knowledge.disabled_rules,
-            knowledge.reasoner,
-        )
-    except KnowledgeError as error:
-        raise loaded.located(error) from None
+    # What was inferred stays true in scenarios that differ in other things, while the files' hashes are the same.
+    knowledge = loaded.scenario.knowledge.model_dump_json(), tuple(sorted(loaded.inputs.items()))
+    same = *knowledge, loaded.ontologies, loaded.rules
+    deliberation = _opened.get(same)
+    if deliberation is None:
+        base = open_base(loaded)
+        try:
+            deliberation = Deliberation(base, make_reasoner(loaded.scenario.knowledge.reasoner, base))
+        except KnowledgeError as error:
+            raise loaded.located(error) from None
+        if len(_opened) >= OPENED:
+            del _opened[next(iter(_opened))]
+        _opened[same] = deliberation
     base = deliberation.base
     base.check(MISSION_FUNCTIONS)
     for function in MISSION_FUNCTIONS:
@@ -64,17 +64,3 @@ def open_knowledge(loaded: LoadedScenario) -> Deliberation:
                     remedy="add the mode, or remove the design from the ontology",
                 )
     return deliberation
-
-
-@lru_cache(maxsize=4)
-def _open(
-    ontologies: tuple[Path, ...],
-    hashes: tuple[tuple[str, str], ...],
-    values: tuple[tuple[str, Decimal], ...],
-    rules: tuple[Path, ...],
-    disabled_rules: tuple[str, ...],
-    reasoner: str,
-) -> Deliberation:
-    """Kept between scenarios that differ in other things: what was inferred stays true while the files' hashes do."""
-    base = Ontology.load(ontologies, values=dict(values), rules=rules, disabled_rules=disabled_rules)
-    return Deliberation(base, make_reasoner(reasoner, base))

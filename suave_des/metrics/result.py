@@ -1,14 +1,17 @@
-"""What a mission gives: its metrics, and, if asked for, its events and trajectory."""
+"""Results of a mission: its metrics, and, if it was recorded, its events, trajectory and states of knowledge."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from suave_des.knowledge.state import KnowledgeState
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something worth telling that happened in a mission."""
+    """An event of a mission's record."""
 
     t_s: float
     source: str
@@ -23,7 +26,7 @@ class MissionMetrics:
     Attributes:
         scenario: name of the scenario.
         manager: name of the managing subsystem.
-        run: number of the run, from 1; equal runs of different managers meet the same sea.
+        run: number of the run, from 1; runs with the same number use common random numbers under all managers.
         seed: seed of the campaign.
         initial_x_m: where the vehicle was put, world frame; likewise initial_y_m.
         mission_duration_s: mission time at the end.
@@ -73,7 +76,7 @@ class KnowledgeRecord:
     """A KnowledgeState that was reasoned about at a mission time, and again until that of the next record."""
 
     t_s: float
-    state: Any
+    state: KnowledgeState
 
 
 @dataclass(frozen=True)
@@ -85,4 +88,4 @@ class MissionResult:
     trajectory: tuple[TrajectoryPoint, ...] = ()
     knowledge: tuple[KnowledgeRecord, ...] = ()
     drawn: dict[str, float] = field(default_factory=dict)
-    """What this run's streams gave for the scenario's distributions, by key path."""
+    """Values drawn for the scenario's distributions in this run, by key path."""

@@ -4,44 +4,43 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
-from typing import Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import simpy
 
-from suave_des.managed.task import MAINTAIN_MOTION
+from suave_des.domain import MAINTAIN_MOTION
+from suave_des.metrics.result import Event, KnowledgeRecord, TrajectoryPoint
 from suave_des.monitor.diagnostics import Diagnostic, Kind
 from suave_des.monitor.measurements import Measurements
 from suave_des.scenario.modes import Mode
-from suave_des.simulation.result import Event, KnowledgeRecord, TrajectoryPoint
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
+
+if TYPE_CHECKING:
+    from suave_des.knowledge.state import KnowledgeState
 
 TRAJECTORY_PERIOD_ROWS = 4
 
 
+@dataclass(eq=False)
 class Recorder:
-    """Takes note of what happens, if it is enabled; a campaign's missions do without.
+    """Records what happens, if it is enabled; missions of a campaign are not recorded."""
 
-    Args:
-        env: the mission's clock.
-        enabled: whether to keep anything.
-    """
-
-    def __init__(self, env: simpy.Environment, *, enabled: bool) -> None:
-        self._env = env
-        self.enabled = enabled
-        self.events: list[Event] = []
-        self.knowledge: list[KnowledgeRecord] = []
-        self._modes: list[tuple[float, str]] = [(0.0, "")]
+    env: simpy.Environment
+    enabled: bool
+    events: list[Event] = field(default_factory=list)
+    knowledge: list[KnowledgeRecord] = field(default_factory=list)
+    _modes: list[tuple[float, str]] = field(default_factory=lambda: [(0.0, "")])
 
     def log(self, source: str, event: str, detail: str) -> None:
         """Keep an event."""
         if self.enabled:
-            self.events.append(Event(float(self._env.now), source, event, detail))
+            self.events.append(Event(float(self.env.now), source, event, detail))
 
-    def reasoned(self, state: Any) -> None:
+    def record_state(self, state: KnowledgeState) -> None:
         """Keep a state that is reasoned about, if it differs from the one before."""
         if self.enabled and (not self.knowledge or self.knowledge[-1].state != state):
-            self.knowledge.append(KnowledgeRecord(float(self._env.now), state))
+            self.knowledge.append(KnowledgeRecord(float(self.env.now), state))
 
     def diagnostic_of(self, thresholds: Sequence[float]) -> Callable[[Diagnostic], None]:
         """A subscriber that keeps component reports, and visibility measurements that cross a threshold."""
@@ -67,7 +66,7 @@ class Recorder:
     def mode_effect(self, function: str, mode: Mode) -> None:
         """Keep the mode of the function that moves the vehicle, for the trajectory."""
         if function != MAINTAIN_MOTION:
-            self._modes.append((float(self._env.now), mode.name))
+            self._modes.append((float(self.env.now), mode.name))
 
     def trajectory(self, vehicle: Vehicle, visibility: Measurements) -> tuple[TrajectoryPoint, ...]:
         """The vehicle's way until now, with the mode in force and the visibility measured at each point."""
@@ -75,7 +74,7 @@ class Recorder:
             return ()
         points = []
         mode_times = [t_s for t_s, _ in self._modes]
-        for row in range(0, int(self._env.now / STEP_S) + 1, TRAJECTORY_PERIOD_ROWS):
+        for row in range(0, int(self.env.now / STEP_S) + 1, TRAJECTORY_PERIOD_ROWS):
             t_s = round(row * STEP_S, 6)
             pose = vehicle.pose(t_s)
             measured = bisect_right(visibility.times_s, t_s)

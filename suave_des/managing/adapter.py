@@ -1,0 +1,85 @@
+"""The adapter between the managing and the managed subsystem: tasks become objectives, plans become mode changes."""
+
+from collections.abc import Callable, Collection
+from functools import partial
+
+from suave_des.clock import Alarm, tick_at_or_after
+from suave_des.domain import Task
+from suave_des.knowledge.state import Decision, Plan
+from suave_des.managing.base import ManagedSystem
+
+
+class TaskBridge:
+    """Passes the mission's tasks on as functions that need an objective (the exemplar's task bridge).
+
+    Args:
+        system: the managed subsystem.
+        period_s: tasks are passed on at ticks of this period; 0: at once.
+        phase_s: mission time of a tick.
+    """
+
+    def __init__(self, system: ManagedSystem, period_s: float, phase_s: float) -> None:
+        self._system, self._period_s, self._phase_s = system, period_s, phase_s
+
+    def pass_on(self, task: Task, update: Callable[[tuple[str, ...]], None]) -> None:
+        """Call `update` with the task's functions when the bridge comes to it."""
+        env = self._system.env
+        alarm = Alarm(env, partial(self._arrive, task, update))
+        if self._period_s > 0.0:
+            alarm.set(tick_at_or_after(env.now, self._phase_s, self._period_s))
+        else:
+            alarm.set_now()
+
+    def _arrive(self, task: Task, update: Callable[[tuple[str, ...]], None]) -> None:
+        update(task.functions)
+        self._system.state_changed()
+
+
+class Adapter:
+    """Maps plans to mode changes: a function design is carried out by the mode of its name."""
+
+    def __init__(self, system: ManagedSystem) -> None:
+        self._system = system
+        self._without_design: frozenset[str] = frozenset()  # functions, as far as that is recorded
+
+    def is_in_force(self, plan: Plan) -> bool:
+        """Whether carrying a plan out would neither change a mode nor record anything."""
+        current_mode = self._system.modes.current_mode
+        are_set = (each.design is None or current_mode(each.function) == each.design for each in plan.decisions)
+        return _without_design(plan) == self._without_design and all(are_set)
+
+    def carry_out(self, plan: Plan, present: dict[str, str], functions: Collection[str]) -> dict[str, str]:
+        """Request the modes of a plan.
+
+        Args:
+            plan: the decisions.
+            present: the function designs in use, by function.
+            functions: those that still have an objective; decisions on others are dropped.
+
+        Returns:
+            The function designs that are in use from now on, by function.
+        """
+        grounded = {}
+        for decision in plan.decisions:
+            function, design = decision.function, decision.design
+            if function not in functions:
+                continue
+            if design is None:
+                if function not in self._without_design:
+                    self._log("no_design_left", function, decision)
+            elif self._system.change_mode(function, design):
+                grounded[function] = design
+                before = present.get(function, "ungrounded")
+                if before != design:
+                    self._log("adaptation", f"{function}: {before} -> {design}", decision)
+        self._without_design = _without_design(plan)
+        return grounded
+
+    def _log(self, event: str, what: str, decision: Decision) -> None:
+        if self._system.recorded:
+            left_out = "".join([f"; not {each.design}: {each.reason}" for each in decision.rejected])
+            self._system.log(event, f"{what}: {decision.reason}{left_out}")
+
+
+def _without_design(plan: Plan) -> frozenset[str]:
+    return frozenset([each.function for each in plan.decisions if each.design is None])

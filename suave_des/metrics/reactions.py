@@ -1,0 +1,149 @@
+"""Mean reaction time, the metric of revision 1.5's metrics node (facts: kas-lab/suave, revision 1.5)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from operator import itemgetter
+from typing import Any
+
+import simpy
+
+from suave_des.domain import GENERATE_RECHARGE_PATH, MAINTAIN_MOTION
+from suave_des.managed.search import INITIAL_ALTITUDE_M
+from suave_des.monitor.diagnostics import FAILED, Diagnostic
+from suave_des.monitor.measurements import Measured, Measurements
+from suave_des.scenario.models import ReactionMetric
+from suave_des.scenario.modes import Mode
+
+
+@dataclass(eq=False)
+class ReactionMeter:
+    """Times from an event that asks for an adaptation to the adaptation's effect.
+
+    Three kinds of event: a thruster failure is reported, until maintain_motion is active; the measured visibility does
+    not fit the search altitude, until the fitting altitude is set; the battery is low, until the recharge path is
+    active. An event that is never answered does not count.
+
+    During the mission reports and effects are only noted; what was measured is read from its tables at the end.
+    """
+
+    env: simpy.Environment
+    settings: ReactionMetric
+    visibility: Measurements
+    battery: Measured | None = None
+    _noted: list[_Entry] = field(default_factory=list, init=False)
+
+    def diagnostic(self, diagnostic: Diagnostic) -> None:
+        """Note a component's status."""
+        if diagnostic.value == FAILED:
+            self._noted.append((self.env.now, _OpenEvents.failure, None))
+
+    def mode_effect(self, function: str, mode: Mode) -> None:
+        """Note that a mode has taken effect."""
+        if mode.active:
+            self._noted.append((self.env.now, _OpenEvents.mode_effect, (function, mode)))
+
+    def reactions_s(self) -> list[float]:
+        """The reactions completed by now, in the order of their completion."""
+        open_events = _OpenEvents(self.visibility.next_message_s)
+        entries = [*self._fitting_altitudes(), *self._low_battery(), *self._noted]
+        for t_s, method, value in sorted(entries, key=itemgetter(0)):
+            method(open_events, t_s, value)
+        return open_events.completed_s
+
+    def mean_s(self) -> float | None:
+        """Mean of the completed reactions; none if there was none."""
+        reactions_s = self.reactions_s()
+        return sum(reactions_s) / len(reactions_s) if reactions_s else None
+
+    def _fitting_altitudes(self) -> Iterator[_Entry]:
+        """The messages from which on another altitude fits than before."""
+        altitudes_m = (None, *self.settings.expected_altitudes_m[::-1])
+        crossings = self.visibility.crossings(self.settings.visibility_thresholds_m[::-1])
+        band_before = -1
+        for t_s, region in zip(*crossings, strict=True):
+            band = (region + 1) // 2  # a threshold itself belongs to what lies above it
+            if t_s > self.env.now:
+                break
+            if band != band_before:
+                yield t_s, _OpenEvents.expect, altitudes_m[band]
+            band_before = band
+
+    def _low_battery(self) -> Iterator[_Entry]:
+        if self.battery is not None:
+            for message in range(self.battery.published(self.env.now)):
+                low = self.battery.values[message] < self.settings.battery_limit
+                yield self.battery.times_s[message], _OpenEvents.battery, low
+
+
+class _OpenEvents:
+    """The events that wait for their adaptation, and the reactions to those that were answered.
+
+    The altitude is compared at every visibility message of the whole mission, except while the battery is low. A
+    mismatch ends only when the expected altitude is set, not when the visibility comes back.
+
+    Args:
+        next_message_s: gives the time of the next visibility message, changed or not.
+    """
+
+    def __init__(self, next_message_s: Callable[[float], float]) -> None:
+        self._next_message_s = next_message_s
+        self._altitude_m = INITIAL_ALTITUDE_M
+        self._expected_m: float | None = None
+        self._battery_low = False
+        self._since_s: dict[str, float] = {}  # when each kind of event began that is open
+        self.completed_s: list[float] = []
+
+    def failure(self, t_s: float, _: None) -> None:
+        """A thruster failure is reported."""
+        self._since_s.setdefault("failure", t_s)
+
+    def expect(self, t_s: float, altitude_m: float | None) -> None:
+        """From this visibility message on another altitude fits; none: no altitude does."""
+        self._expected_m = altitude_m
+        self._compare_at(t_s)
+
+    def battery(self, t_s: float, low: bool) -> None:
+        """A message of the battery's level."""
+        if low:
+            self._since_s.setdefault("low battery", t_s)
+            if self._since_s.get("mismatch", t_s) > t_s:
+                del self._since_s["mismatch"]  # the message that would have shown it comes too late
+        elif self._battery_low:
+            self._battery_low = False
+            self._compare_at(self._next_message_s(t_s))
+        self._battery_low = low
+
+    def mode_effect(self, t_s: float, effect: tuple[str, Mode]) -> None:
+        """An active mode has taken effect."""
+        function, mode = effect
+        if function == MAINTAIN_MOTION:
+            self._answer("failure", t_s)
+        elif function == GENERATE_RECHARGE_PATH:
+            self._answer("low battery", t_s)
+        altitude = mode.parameters.get("spiral_altitude")
+        if altitude is not None:
+            self._altitude_m = float(altitude)
+            if self._altitude_m == self._expected_m and "mismatch" in self._since_s:
+                self._answer("mismatch", t_s)
+            else:
+                # The next message finds the mismatch, if there is one, though its value may not be new.
+                self._compare_at(self._next_message_s(t_s))
+
+    def _answer(self, kind: str, t_s: float) -> None:
+        since_s = self._since_s.pop(kind, math.inf)
+        if since_s < t_s or (since_s == t_s and kind != "mismatch"):
+            self.completed_s.append(t_s - since_s)
+
+    def _compare_at(self, message_s: float) -> None:
+        if not self._battery_low and self._expected_m is not None:
+            if self._altitude_m != self._expected_m:
+                self._since_s.setdefault("mismatch", message_s)
+            elif self._since_s.get("mismatch", -math.inf) >= message_s:
+                del self._since_s["mismatch"]
+
+
+_Entry = tuple[float, Callable[[_OpenEvents, float, Any], None], Any]
+"""Time, method that takes the entry, and its value."""

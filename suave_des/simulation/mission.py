@@ -1,0 +1,236 @@
+"""One mission: scenario, manager, run and seed, wired into a SimPy environment."""
+
+from collections.abc import Mapping
+from functools import partial
+
+import simpy
+
+from suave_des.domain import FOLLOW_PIPELINE, GENERATE_RECHARGE_PATH, GENERATE_SEARCH_PATH, MAINTAIN_MOTION
+from suave_des.errors import SuaveDesError
+from suave_des.managed.coordinator import MissionCoordinator, MissionTiming
+from suave_des.managed.detection import PipelineDetector, measured_at_rows
+from suave_des.managed.follow import NO_PATH, FollowPipeline, InspectionPath
+from suave_des.managed.mode_manager import ModeManager
+from suave_des.managed.motion import MaintainMotion
+from suave_des.managed.node import FunctionNode
+from suave_des.managed.recharge import GenerateRechargePath
+from suave_des.managed.search import GenerateSearchPath
+from suave_des.managing.base import ManagedSystem
+from suave_des.metrics.reactions import ReactionMeter
+from suave_des.metrics.recording import Recorder
+from suave_des.metrics.result import MissionMetrics, MissionResult
+from suave_des.monitor.diagnostics import DiagnosticsBus, Kind
+from suave_des.monitor.measurements import BatteryLevel, Measured, Measurements, Publishing, measure
+from suave_des.monitor.monitors import ThrusterFault, battery_monitor, signal_monitor, thruster_monitor
+from suave_des.scenario.models import Battery
+from suave_des.simulation.chance import Chance
+from suave_des.simulation.host import RAISED, ManagerHost
+from suave_des.simulation.simulator import MissionMemory, Simulator
+from suave_des.vehicle.autopilot import Autopilot
+from suave_des.vehicle.bluerov2 import BLUEROV2
+from suave_des.vehicle.frames import Pose
+from suave_des.vehicle.guidance import SetPointSender
+from suave_des.vehicle.vehicle import Vehicle
+from suave_des.world.pipeline import SEA_BED_Z_M, SURFACE_Z_M
+
+
+class Mission:
+    """The parts of one mission, made and connected; see `Simulator.run` for the arguments."""
+
+    def __init__(
+        self, simulator: Simulator, manager: str, run: int, seed: int, memory: MissionMemory, *, record: bool
+    ) -> None:
+        self._simulator = simulator
+        self._scenario = simulator.loaded.scenario
+        self._revision = self._scenario.revision
+        self._manager, self._run, self._seed = manager, run, seed
+        self._chance = Chance(self._scenario, seed, run, simulator.runs_per_draw)
+        self.env = simpy.Environment()
+        self._recorder = Recorder(self.env, enabled=record)
+        self._bus = DiagnosticsBus()
+
+        self._vehicle = self._make_vehicle(memory)
+        self._signals = {name: self._measure(name) for name in sorted(self._scenario.signals)}
+        self._visibility = self._signals["water_visibility"]
+        self._battery = None if self._scenario.battery is None else self._make_battery(self._scenario.battery)
+        measured_at_rows(*self._visibility.arrays, memory.visibility_m)
+        self._detector = PipelineDetector(
+            self.env, self._vehicle, memory.visibility_m, simulator.detection_points, self._recorder.log
+        )
+
+        nodes = self._make_functions()
+        latency_s = self._chance.sampler("latencies.mode_change_s", self._scenario.latencies.mode_change_s)
+        self._modes = ModeManager(self.env, simulator.loaded.modes, nodes, latency_s, self._recorder.log)
+        self._reactions = ReactionMeter(self.env, self._scenario.reaction_metric, self._visibility, self._battery)
+        self._bus.subscribe(self._reactions.diagnostic, (Kind.COMPONENT_STATUS,))
+        if record:
+            thresholds_m = self._scenario.reaction_metric.visibility_thresholds_m
+            self._bus.subscribe(self._recorder.diagnostic_of(thresholds_m))
+            self._modes.listeners.append(self._recorder.mode_effect)
+        self._modes.listeners.append(self._reactions.mode_effect)
+        self._coordinator = self._make_coordinator()
+        self._host = self._make_host()
+        self._coordinator.start(self._host.request, self._host.cancel)
+        self._start_monitors()
+
+    def result(self) -> MissionResult:
+        """Run to the end and read the metrics."""
+        try:
+            self.env.run(until=self._coordinator.ended)
+        except SuaveDesError:
+            raise
+        except RAISED as error:  # in a process that the manager started by itself
+            raise self._host.mission_error(error) from error
+        recorder, drawn = self._recorder, self._chance.drawn
+        trajectory = recorder.trajectory(self._vehicle, self._visibility)
+        return MissionResult(self._metrics(), tuple(recorder.events), trajectory, tuple(recorder.knowledge), drawn)
+
+    def _metrics(self) -> MissionMetrics:
+        coordinator, detector = self._coordinator, self._detector
+        found = coordinator.search_time_s is not None
+        x_m, y_m = self._simulator.points[detector.first_point, :2].tolist() if found else (None, None)
+        return MissionMetrics(
+            scenario=self._scenario.name,
+            manager=self._manager,
+            run=self._run,
+            seed=self._seed,
+            initial_x_m=self._chance.drawn["start.x_m"],
+            initial_y_m=self._chance.drawn["start.y_m"],
+            mission_duration_s=float(self.env.now),
+            pipeline_found=found,
+            search_time_s=coordinator.search_time_or_limit_s(),
+            distance_inspected_m=coordinator.distance_inspected_m,
+            mean_reaction_time_s=self._reactions.mean_s(),
+            adaptations=self._modes.adaptations,
+            detection_time_s=detector.detected_s if found else None,
+            detection_x_m=x_m,
+            detection_y_m=y_m,
+        )
+
+    # World and vehicle.
+
+    def _make_vehicle(self, memory: MissionMemory) -> Vehicle:
+        value, calibration = self._chance.value, self._scenario.calibration
+        x_m, y_m = value("start.x_m"), value("start.y_m")
+        self._origin_m = x_m + value("calibration.drift_x_m"), y_m + value("calibration.drift_y_m")
+        z_m, heading_rad = value("start.z_m"), value("start.heading_rad")
+        autopilot = Autopilot(
+            calibration.position_gain_per_s,
+            calibration.horizontal_speed_limit_m_per_s,
+            calibration.vertical_speed_limit_m_per_s,
+            calibration.velocity_time_constant_s,
+            value("calibration.altitude_error_m"),
+            value("calibration.altitude_deadband_m"),
+        )
+        return Vehicle(
+            BLUEROV2,
+            autopilot,
+            Pose(*self._origin_m, z_m, 0.0, 0.0, heading_rad),
+            self._simulator.duration_s,
+            current_m_per_s=(value("current.x_m_per_s"), value("current.y_m_per_s"), value("current.z_m_per_s")),
+            time_scale=1.0 / (1.0 + value("calibration.real_time_factor_loss")),
+            z_limits_m=(SEA_BED_Z_M, SURFACE_Z_M),
+            memory=memory.track,
+        )
+
+    # Monitors.
+
+    def _measure(self, name: str) -> Measurements:
+        signal, chance = self._scenario.signals[name], self._chance
+        period_s = signal.publishing_period_s or self._revision.monitors.visibility_publishing_period_s
+        publishing = Publishing(period_s, chance.phase(f"signals.{name}", period_s), signal.time_step_s)
+        noise = chance.sampler(f"signals.{name}.noise", signal.noise) if signal.noise != 0.0 else None
+        described = chance.signal(name, signal, self._simulator.loaded.tables)
+        return measure(name, described, self._simulator.duration_s, publishing, noise)
+
+    def _make_battery(self, battery: Battery) -> BatteryLevel:
+        def is_at_station(t_s: float) -> bool:
+            x_m, y_m, _ = self._vehicle.position(t_s)
+            return max(abs(x_m - battery.station_x_m), abs(y_m - battery.station_y_m)) <= battery.station_radius_m
+
+        period_s = battery.publishing_period_s
+        publishing = Publishing(period_s, self._chance.phase("battery_monitor", period_s))
+        return BatteryLevel(is_at_station, battery.discharge_time_s, publishing)
+
+    def _start_monitors(self) -> None:
+        if self._bus.has_subscribers(Kind.QA_STATUS):  # who looks values up reads the measurements
+            for measurements in self._signals.values():
+                self.env.process(signal_monitor(self.env, self._bus, measurements))
+            if self._battery is not None:
+                self.env.process(battery_monitor(self.env, self._bus, self._battery))
+        draw, events = self._chance.draw, enumerate(self._scenario.thruster_events)
+        faults = [
+            ThrusterFault(event.thruster, event.event == "failure", draw(f"thruster_events.{n}.time_s", event.time_s))
+            for n, event in events
+        ]
+        phase_s = self._chance.phase("thruster_monitor", 1.0)
+        after_previous = self._revision.monitors.thruster_event_times == "after_previous"
+        set_health = self._set_thruster_health
+        self.env.process(thruster_monitor(self.env, self._bus, faults, set_health, phase_s, after_previous))
+
+    def _set_thruster_health(self, thruster: int, health: float) -> None:
+        self._vehicle.set_thruster_health(self.env.now, thruster, health)
+
+    # The managed subsystem.
+
+    def _make_functions(self) -> dict[str, FunctionNode]:
+        env, revision, chance = self.env, self._revision, self._chance
+        loss_probability = chance.value("revision.set_points.loss_probability")
+        follow, search, recharge = FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, GENERATE_RECHARGE_PATH
+        make_sender = partial(self._make_sender, loss_probability)
+        phase_s, ready_s = chance.phase(search, 1.0), chance.value("latencies.guided_start_s")
+        self._follow = FollowPipeline(env, make_sender(follow), revision.follow, self._path)
+        restore = partial(self._set_thruster_health, health=1.0)
+        nodes: dict[str, FunctionNode] = {
+            MAINTAIN_MOTION: MaintainMotion(env, self._bus, revision.recovery, restore),
+            search: GenerateSearchPath(env, make_sender(search), revision.spiral, self._origin_m, phase_s, ready_s),
+            follow: self._follow,
+        }
+        if (battery := self._scenario.battery) is not None:
+            station_m = (battery.station_x_m, battery.station_y_m)
+            nodes[recharge] = GenerateRechargePath(env, make_sender(recharge), station_m)
+        return nodes
+
+    def _make_sender(self, loss_probability: float, node: str) -> SetPointSender:
+        value, offset = self._chance.value, "revision.set_points.node_frame_offset_"
+        frame_error_m = value(f"{offset}x_m", node), value(f"{offset}y_m", node), value(f"{offset}z_m", node)
+        stream = self._chance.stream(f"set_points/{node}") if loss_probability else None
+        return SetPointSender(self._vehicle, lambda: self.env.now, frame_error_m, loss_probability, stream)
+
+    def _path(self) -> InspectionPath:
+        first = self._detector.first_point
+        return NO_PATH if first is None else self._simulator.path.from_point(first)
+
+    def _make_coordinator(self) -> MissionCoordinator:
+        settings, phase = self._revision.coordinator, self._chance.phase
+        timing = MissionTiming(
+            time_limit_s=self._scenario.mission.time_limit_s,
+            start_delay_s=self._chance.value("latencies.task_start_s"),
+            poll_phase_s=phase("coordinator", settings.poll_period_s),
+            limit_phase_s=phase("limit", settings.limit_check_period_s),
+        )
+        return MissionCoordinator(self.env, settings, timing, self._detector, self._follow, self._recorder.log)
+
+    # The managing subsystem.
+
+    def _make_host(self) -> ManagerHost:
+        name = self._manager
+        settings = (self._scenario.managers.model_extra or {}).get(name)
+        measurements: dict[str, Measured] = {**self._signals}
+        if self._battery is not None:
+            measurements[self._battery.key] = self._battery
+        system = ManagedSystem(
+            env=self.env,
+            scenario=self._scenario,
+            settings=settings if isinstance(settings, Mapping) else {},
+            modes=self._modes,
+            lasting_functions=self._coordinator.lasting_functions,
+            stream=lambda stream: self._chance.stream(f"manager/{stream}"),
+            log=partial(self._recorder.log, name),
+            knowledge=lambda: self._simulator.knowledge,
+            record_state=self._recorder.record_state,
+            state_changed=lambda: self._host.state_changed(),
+            measurements=measurements,
+            recorded=self._recorder.enabled,
+        )
+        return ManagerHost(name, self._run, system, self._bus, skips_idle_calls=not self._recorder.enabled)

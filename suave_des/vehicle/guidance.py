@@ -1,0 +1,231 @@
+"""Guidance: flies a function's way-points one after the other, without an event for each.
+
+The exemplar's functions check at every tick of a timer whether their way-point is reached; then they send the next one.
+Nothing else changes between most ticks, so guidance looks ahead: it queues the next way-points, knows the tick at which
+each will be reached, and sets an alarm for the tick at which the function has to act. When the vehicle's control
+changes before, it catches up with the ticks until then and plans the rest anew.
+"""
+
+import random
+from bisect import bisect_right
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from suave_des.vehicle.model import Array
+from suave_des.vehicle.vehicle import ArrivalCheck, Vehicle
+
+QUEUED_WAYPOINTS: Final = 20
+"""Way-points that are queued at a time, besides the present one."""
+
+
+class Alarm(Protocol):
+    """A wake-up call in mission time, see `suave_des.clock.Alarm`."""
+
+    @property
+    def now_s(self) -> float: ...  # noqa: D102
+    def set(self, t_s: float) -> None: ...  # noqa: D102
+    def set_now(self) -> None: ...  # noqa: D102
+    def cancel(self) -> None: ...  # noqa: D102
+
+
+class WaypointSource(Protocol):
+    """What guidance asks of a function that generates way-points."""
+
+    def tick(self) -> None:
+        """Take in a tick of the timer at which guidance acts; called before anything else then."""
+
+    def waypoints(self, count: int) -> Array:
+        """The present way-point and those that will follow it: x, y, z in the first three columns, shape (n, >= 3).
+
+        At most `count`; none when the last one has been reached.
+        """
+
+    def set_point_z_m(self) -> float:
+        """The z to send, which need not be the way-point's."""
+
+    def reached(self, count: int) -> None:
+        """Go on by so many way-points: the present one, and those after it, have been reached."""
+
+    def not_reached(self, x_y_reached: bool) -> None:
+        """React to a way-point that was not reached in time; it will be sent again."""
+
+
+@dataclass(eq=False)
+class SetPointSender:
+    """A node's connection to the autopilot.
+
+    Attributes:
+        vehicle: whose autopilot gets the set-points.
+        now_s: gives the mission time.
+        frame_error_m: steady error of the node's frame in x, y and z: where the vehicle ends up in the simulator, less
+            where the node sent it.
+        loss_probability: chance that a message is lost.
+        stream: decides which; not needed if none can be.
+    """
+
+    vehicle: Vehicle
+    now_s: Callable[[], float]
+    frame_error_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    loss_probability: float = 0.0
+    stream: random.Random | None = None
+
+    def send(self, x_m: float, y_m: float, z_m: float) -> None:
+        """Send a set-point, world frame; the sender does not learn whether it arrived."""
+        if not self._is_lost():
+            x_error_m, y_error_m, z_error_m = self.frame_error_m
+            self.vehicle.command(self.now_s(), x_m + x_error_m, y_m + y_error_m, z_m + z_error_m)
+
+    def queue(
+        self, waypoints: Array, z_m: float, check: ArrivalCheck, *, first: int, last: int, send: bool
+    ) -> tuple[list[int], int]:
+        """Queue set-points, see `Vehicle.queue_waypoints`; where messages can be lost, none is queued."""
+        if self.stream is not None and self.loss_probability > 0.0:
+            waypoints = waypoints[:1]
+            send = send and not self._is_lost()
+        x_m, y_m, z_error_m = self.frame_error_m
+        sent_as_m = x_m, y_m, z_m + z_error_m
+        return self.vehicle.queue_waypoints(
+            self.now_s(), waypoints, sent_as_m, check, first=first, last=last, send=send
+        )
+
+    def _is_lost(self) -> bool:
+        return self.stream is not None and self.stream.random() < self.loss_probability
+
+
+class Guidance:
+    """Flies the way-points of one function.
+
+    Args:
+        sender: the connection to the autopilot.
+        source: the function.
+        make_alarm: makes an alarm that calls a function.
+        check: makes the arrival check whose tick 0 is at a mission time.
+    """
+
+    def __init__(
+        self,
+        sender: SetPointSender,
+        source: WaypointSource,
+        make_alarm: Callable[[Callable[[], None]], Alarm],
+        check: Callable[[float], ArrivalCheck],
+    ) -> None:
+        self._sender = sender
+        self._vehicle = sender.vehicle
+        self._source = source
+        self._make_check = check
+        self._alarm = make_alarm(self._act)
+        self._replanning = make_alarm(self._replan)
+        self._check: ArrivalCheck | None = None  # none before the first tick and after the last
+        self._sent = 0  # tick at which the present way-point was sent last
+        self._arrivals: list[int] = []  # ticks that will find the planned way-points reached
+        self._act_at = 0  # tick of the alarm
+        self._is_planned = False  # until that tick
+        self._is_due = False  # whether a way-point is to be sent then
+        self._is_acting = False
+        self._vehicle.control_listeners.append(self._control_changed)
+
+    def start_at(self, t_s: float, *, waited_ticks: int | None = None) -> None:
+        """Tick from mission time t on.
+
+        Args:
+            t_s: time of the first tick.
+            waited_ticks: for how many ticks the present way-point has been waited for; none: it is to be sent.
+        """
+        self._is_due = waited_ticks is None
+        self._sent = -1 - (waited_ticks or 0)
+        self._arrivals, self._act_at, self._is_planned = [], 0, False
+        if t_s <= self._alarm.now_s:
+            self._act()
+        else:
+            self._alarm.set(t_s)
+
+    def stop(self) -> int:
+        """Stop ticking, and cancel what is queued; return for how many ticks the present way-point was waited for."""
+        self._alarm.cancel()
+        self._replanning.cancel()
+        check = self._check
+        if check is None:
+            return -1 - self._sent
+        self.catch_up()
+        self._check = None
+        self._vehicle.cancel_waypoints(self._alarm.now_s, check)
+        return self._last_tick(check) - self._sent
+
+    def catch_up(self) -> None:
+        """Tell the function of the way-points that were reached by now."""
+        if self._check is not None:
+            self._count_arrivals(self._last_tick(self._check))
+
+    def way_changed(self) -> None:
+        """Plan anew at the next tick: the function has other way-points now (call `catch_up` before it has)."""
+        check = self._check
+        if check is not None and self._act_at > (tick := self._last_tick(check)):
+            self._is_acting = True
+            self._vehicle.cancel_waypoints(self._alarm.now_s, check)
+            self._is_acting = False
+            self._replanning.cancel()
+            self._arrivals, self._is_planned, self._is_due = [], False, False
+            self._set_alarm(check, tick + 1)
+
+    def _act(self) -> None:
+        """Do what is due at this tick; plan until the next one at which there is something to do."""
+        check = self._check = self._check or self._make_check(self._alarm.now_s)
+        tick = self._act_at
+        self._count_arrivals(tick)
+        self._source.tick()
+        while self._check is not None and self._act_at == tick:
+            if self._is_planned and not self._is_due:
+                self._source.not_reached(self._are_x_and_y_reached(check))
+                self._is_due = True
+            if self._is_due:
+                self._sent = tick
+            self._plan(check, tick, first=tick + check.fewest_ticks if self._is_due else tick)
+
+    def _plan(self, check: ArrivalCheck, tick: int, first: int) -> None:
+        """Send the present way-point, if that is due, and look ahead from a tick on."""
+        waypoints = self._source.waypoints(1 + QUEUED_WAYPOINTS)
+        if len(waypoints) == 0:
+            self._check = None
+            return
+        last, z_m = self._sent + check.most_ticks, self._source.set_point_z_m()
+        self._is_acting = True
+        self._arrivals, act_at = self._sender.queue(waypoints, z_m, check, first=first, last=last, send=self._is_due)
+        self._is_acting = False
+        self._is_planned = True
+        self._is_due = self._arrivals[-1:] == [act_at]
+        if act_at > tick:
+            self._set_alarm(check, act_at)
+        else:
+            self._act_at = tick
+            self._count_arrivals(tick)
+
+    def _control_changed(self, row: int) -> None:
+        if self._check is not None and self._is_planned and not self._is_acting:
+            self._replanning.set_now()  # whatever else changes control in this event has done so by then
+
+    def _replan(self) -> None:
+        check = self._check
+        if check is not None and self._act_at > (tick := self._last_tick(check)):
+            self._count_arrivals(tick)
+            self._is_due = False
+            self._plan(check, tick, first=tick + 1)
+
+    def _count_arrivals(self, tick: int) -> None:
+        reached = bisect_right(self._arrivals, tick)
+        if reached:
+            self._sent = self._arrivals[reached - 1]
+            del self._arrivals[:reached]
+            self._source.reached(reached)
+
+    def _last_tick(self, check: ArrivalCheck) -> int:
+        return check.last_tick_until(self._alarm.now_s)
+
+    def _set_alarm(self, check: ArrivalCheck, tick: int) -> None:
+        self._act_at = tick
+        self._alarm.set(check.time_s(tick))
+
+    def _are_x_and_y_reached(self, check: ArrivalCheck) -> bool:
+        x_m, y_m, _ = self._vehicle.position(self._alarm.now_s)
+        present = self._source.waypoints(1)
+        return max(abs(x_m - present.item(0, 0)), abs(y_m - present.item(0, 1))) <= check.half_width_m

@@ -1,0 +1,220 @@
+"""The plain version of whatever looks ahead: everything is polled, nothing is left out. Missions must be the same.
+
+- Guidance reads the vehicle's position at each tick, and sends one set-point at a time.
+- The detector looks at each row of the vehicle's track when its time has come.
+- Managers are called at each of their times.
+- Monitors publish each measured value, and managers read what was published.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Final
+from unittest import mock
+
+import numpy as np
+import simpy
+from numpy.typing import NDArray
+
+from suave_des.clock import Process, until
+from suave_des.managed.mode_manager import ModeManager
+from suave_des.managed.node import Log
+from suave_des.metrics.result import MissionMetrics
+from suave_des.monitor.diagnostics import Diagnostic, Kind
+from suave_des.monitor.measurements import Thresholds
+from suave_des.scenario.modes import Mode
+from suave_des.simulation import mission
+from suave_des.simulation.host import ManagerHost
+from suave_des.simulation.simulator import Simulator
+from suave_des.vehicle.guidance import Alarm, SetPointSender, WaypointSource
+from suave_des.vehicle.vehicle import STEP_S, ArrivalCheck, Vehicle
+from suave_des.world.pipeline import first_point_in_view
+
+
+class PollingGuidance:
+    """Guidance without looking ahead: see `suave_des.vehicle.guidance.Guidance` for what it does."""
+
+    def __init__(
+        self,
+        sender: SetPointSender,
+        source: WaypointSource,
+        make_alarm: Callable[[Callable[[], None]], Alarm],
+        check: Callable[[float], ArrivalCheck],
+    ) -> None:
+        self._sender = sender
+        self._source = source
+        self._alarm = make_alarm(self._tick)
+        self._make_check = check
+        self._check: ArrivalCheck | None = None
+        self._next_tick = 0
+        self._sent = 0
+        self._is_due = True
+
+    def start_at(self, t_s: float, *, waited_ticks: int | None = None) -> None:
+        self._is_due = waited_ticks is None
+        self._sent = -1 - (waited_ticks or 0)
+        self._next_tick = 0
+        if t_s <= self._alarm.now_s:
+            self._tick()
+        else:
+            self._alarm.set(t_s)
+
+    def stop(self) -> int:
+        self.catch_up()
+        self._alarm.cancel()
+        check, self._check = self._check, None
+        return max(0, -1 - self._sent) if check is None else self._next_tick - 1 - self._sent
+
+    def catch_up(self) -> None:
+        """A tick that is due at this very time comes first."""
+        while self._check is not None and self._next_tick <= self._check.last_tick_until(self._alarm.now_s):
+            self._tick()
+
+    def way_changed(self) -> None:
+        """The next tick asks for the way-point anyway."""
+
+    def _tick(self) -> None:
+        if self._check is None:
+            self._check = self._make_check(self._alarm.now_s)
+        check, source, tick = self._check, self._source, self._next_tick
+        source.tick()
+        while True:
+            if not len(source.waypoints(1)):
+                self._check = None
+                return
+            if self._is_due:
+                self._sender.send(*source.waypoints(1)[0, :2].tolist(), source.set_point_z_m())
+                self._sent, self._is_due = tick, False
+            if tick < self._sent + check.fewest_ticks:
+                break
+            near_x_y, near_z = self._is_near(check, tick)
+            if near_x_y and near_z:
+                source.reached(1)
+            elif tick >= self._sent + check.most_ticks:
+                source.not_reached(near_x_y)
+            else:
+                break
+            self._is_due = True
+        self._next_tick = tick + 1
+        self._alarm.set(check.time_s(self._next_tick))
+
+    def _is_near(self, check: ArrivalCheck, tick: int) -> tuple[bool, bool]:
+        position = self._sender.vehicle.position(check.time_s(tick))
+        waypoint = self._source.waypoints(1)[0]
+        x_m, y_m, z_m = (abs(a - b) for a, b in zip(position, waypoint[:3].tolist(), strict=True))
+        return x_m <= check.half_width_m and y_m <= check.half_width_m, z_m <= check.half_height_m
+
+
+class PollingDetector:
+    """Looks at each row of the track at its time: see `suave_des.managed.detection.PipelineDetector`."""
+
+    def __init__(
+        self,
+        env: simpy.Environment,
+        vehicle: Vehicle,
+        visibility_m: NDArray[np.float64],
+        points: NDArray[np.float64],
+        log: Log,
+    ) -> None:
+        self._log = log
+        self.detected = env.event()
+        self.first_point: int | None = None
+        self.detected_s: float | None = None
+        env.process(self._look(env, vehicle, visibility_m, points))
+
+    def _look(
+        self, env: simpy.Environment, vehicle: Vehicle, visibility_m: NDArray[np.float64], points: NDArray[np.float64]
+    ) -> Process:
+        for row in range(vehicle.last_row + 1):
+            yield until(env, row * STEP_S)
+            seen = first_point_in_view(*vehicle.position(env.now), visibility_m[row], points)
+            if seen >= 0:
+                self.first_point, self.detected_s = seen, float(env.now)
+                self._log("detection", "pipeline_detected", f"point {seen}")
+                self.detected.succeed()
+                return
+
+
+class Published:
+    """What was published of a quality attribute: see `suave_des.monitor.measurements.Measured`."""
+
+    def __init__(self, key: str) -> None:
+        self.key = key
+        self.times_s: list[float] = []
+        self.values: list[float] = []
+
+    def diagnostic(self, diagnostic: Diagnostic) -> None:
+        if diagnostic.key == self.key:
+            self.times_s.append(diagnostic.time_s)
+            self.values.append(float(diagnostic.value))
+
+    def published(self, t_s: float) -> int:
+        return bisect_right(self.times_s, t_s)
+
+    def region(self, t_s: float, thresholds: Thresholds) -> int:
+        raise AssertionError("managers that are called at each of their times need no regions")
+
+    def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
+        raise AssertionError("what will be published is not known")
+
+
+class PlainMission(mission.Mission):
+    """A mission whose managers read what monitors have published."""
+
+    def _make_host(self) -> ManagerHost:
+        tables = self._signals, self._battery
+        self._signals = {name: self._published(name) for name in self._signals}  # type: ignore[assignment]
+        self._battery = None if self._battery is None else self._published(self._battery.key)  # type: ignore[assignment]
+        try:
+            return super()._make_host()
+        finally:
+            self._signals, self._battery = tables
+
+    def _published(self, key: str) -> Published:
+        published = Published(key)
+        self._bus.subscribe(published.diagnostic, (Kind.QA_STATUS,))
+        return published
+
+
+def time_triggered(*arguments: object, skips_idle_calls: bool) -> ManagerHost:
+    """A host that calls its manager at each of its times."""
+    return ManagerHost(*arguments, skips_idle_calls=False)  # type: ignore[arg-type]
+
+
+PARTS: Final = {
+    "guidance": {
+        "suave_des.managed.search.Guidance": PollingGuidance,
+        "suave_des.managed.follow.Guidance": PollingGuidance,
+    },
+    "detector": {"suave_des.simulation.mission.PipelineDetector": PollingDetector},
+    "calls": {"suave_des.simulation.mission.ManagerHost": time_triggered},
+    "monitors": {"suave_des.simulation.mission.Mission": PlainMission},  # needs "calls"
+}
+
+
+@contextmanager
+def polled(*parts: str) -> Iterator[None]:
+    """Some parts of the missions that are run meanwhile poll, see `PARTS`; all of them if none is named."""
+    with ExitStack() as stack:
+        for part in parts or PARTS:
+            for name, plain in PARTS[part].items():
+                stack.enter_context(mock.patch(name, plain))
+        yield
+
+
+Effect = tuple[float, str]
+
+
+def unrecorded(simulator: Simulator, manager: str, run: int) -> tuple[MissionMetrics, list[Effect]]:
+    """Metrics of a mission that is not recorded, and the modes that took effect with their times."""
+    effects: list[Effect] = []
+    take_effect = ModeManager._take_effect
+
+    def noted(self: ModeManager, function: str, mode: Mode) -> None:
+        effects.append((self.env.now, f"{function} = {mode.name}"))
+        take_effect(self, function, mode)
+
+    with mock.patch.object(ModeManager, "_take_effect", noted):
+        return simulator.run(manager, run, 1).metrics, effects

@@ -1,0 +1,122 @@
+"""Missions that look ahead and leave calls out are those in which everything is polled: see `tests.helpers.polling`."""
+
+from functools import cache
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from suave_des.scenario.loader import load_scenario, with_values
+from suave_des.simulation.simulator import Simulator
+from tests.helpers.polling import polled, unrecorded
+
+MANAGERS = ("none", "random", "bt", "bt_extended", "metacontrol")
+LOADED = {name: load_scenario(name) for name in ("seams2023", "release15")}
+
+
+def uniform(minimum: float, maximum: float) -> dict[str, object]:
+    return {"distribution": "uniform", "minimum": minimum, "maximum": maximum}
+
+
+def normal(std: float) -> dict[str, object]:
+    return {"distribution": "normal", "mean": 0.0, "std": std}
+
+
+def faults(*events: tuple[int, str, object]) -> dict[str, object]:
+    return {
+        "thruster_events": [{"thruster": thruster, "event": event, "time_s": t_s} for thruster, event, t_s in events]
+    }
+
+
+NOISE = {"signals.water_visibility.noise": normal(0.1)}
+DRAWN_LATENCIES = {"latencies.inference_s": uniform(0.1, 3.0), "latencies.mode_change_s": uniform(0.1, 2.0)}
+LOST_SET_POINTS = {"revision.set_points.loss_probability": 0.3}
+BATTERY = {"battery": {}, "mission.time_limit_s": 400.0}
+FAULTS = faults(
+    (1, "failure", 20.0),
+    (3, "failure", 5.0),
+    (1, "recovery", 15.0),
+    (5, "failure", uniform(40.0, 90.0)),
+    (2, "failure", 60.0),
+)
+CURRENT = {"current.x_m_per_s": normal(0.08), "current.y_m_per_s": 0.1, "current.z_m_per_s": -0.02}
+FRAMES = {
+    "revision.set_points.node_frame_offset_x_m": normal(0.3),
+    "revision.set_points.node_frame_offset_z_m": normal(0.2),
+}
+CONDITIONS = {
+    "as shipped": {},
+    "noise": NOISE,
+    "drawn latencies": DRAWN_LATENCIES,
+    "lost set-points": LOST_SET_POINTS,
+    "battery": BATTERY,
+    "faults": FAULTS,
+    "current": CURRENT,
+    "frame errors": FRAMES,
+    "all of it": {**NOISE, **DRAWN_LATENCIES, **LOST_SET_POINTS, **BATTERY, **FAULTS, **CURRENT, **FRAMES},
+}
+
+
+@cache
+def simulator(name: str, condition: str) -> Simulator:
+    return Simulator(with_values(LOADED[name], CONDITIONS[condition]))
+
+
+def assert_same(simulator: Simulator, manager: str, run: int) -> None:
+    """Recorded and not, a mission is the one in which everything is polled."""
+    with polled():
+        plain = simulator.run(manager, run, 1, record=True)
+    recorded = simulator.run(manager, run, 1, record=True)
+    assert recorded.events == plain.events
+    assert recorded.metrics == plain.metrics
+    assert recorded.trajectory == plain.trajectory
+    assert recorded.knowledge == plain.knowledge
+    effects = [(event.t_s, event.detail) for event in plain.events if event.event == "mode_set"]
+    for _ in range(2):  # at first metacontrol's memo may be empty
+        assert unrecorded(simulator, manager, run) == (plain.metrics, effects)
+
+
+@pytest.mark.parametrize("manager", MANAGERS)
+@pytest.mark.parametrize("condition", CONDITIONS)
+@pytest.mark.parametrize("name", sorted(LOADED))
+def test_looking_ahead_changes_nothing(name: str, condition: str, manager: str) -> None:
+    """Each cell has a run of its own, so that there are as many different missions."""
+    run = 1 + 10 * list(CONDITIONS).index(condition) + MANAGERS.index(manager)
+    assert_same(simulator(name, condition), manager, run)
+
+
+@given(
+    name=st.sampled_from(sorted(LOADED)),
+    manager=st.sampled_from(MANAGERS),
+    run=st.integers(1, 10**6),
+    loss=st.sampled_from([0.0, 0.0, 0.1, 0.6]),
+    period_s=st.floats(10.0, 120.0),
+    latency_s=st.floats(0.0, 3.0),
+    failures_s=st.lists(st.floats(0.0, 100.0), max_size=4),
+    poll_s=st.sampled_from([0.1, 0.2, 0.37, 2.0]),
+    deadband_m=st.floats(0.0, 0.5),
+    slower=st.floats(0.0, 1.0),
+)
+@settings(max_examples=10)
+def test_looking_ahead_changes_nothing_whatever_the_scenario(
+    name: str,
+    manager: str,
+    run: int,
+    loss: float,
+    period_s: float,
+    latency_s: float,
+    failures_s: list[float],
+    poll_s: float,
+    deadband_m: float,
+    slower: float,
+) -> None:
+    values = {
+        "revision.set_points.loss_probability": loss,
+        "revision.follow.poll_period_s": poll_s,
+        "signals.water_visibility.period_s": period_s,
+        "latencies.mode_change_s": latency_s,
+        "calibration.altitude_deadband_m": deadband_m,
+        "calibration.real_time_factor_loss": slower,
+        **faults(*((1 + number, "failure", t_s) for number, t_s in enumerate(failures_s))),
+    }
+    assert_same(Simulator(with_values(LOADED[name], values)), manager, run)

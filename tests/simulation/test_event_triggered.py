@@ -1,0 +1,350 @@
+"""Event-triggered managers are called when something has changed; their missions are those of time-triggered ones."""
+
+import random
+from contextlib import nullcontext
+from dataclasses import replace
+from unittest import mock
+
+import numpy as np
+import pytest
+import simpy
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from suave_des.clock import Alarm
+from suave_des.errors import MissionError
+from suave_des.managing.base import ManagedSystem
+from suave_des.managing.metacontrol import Metacontrol
+from suave_des.monitor.diagnostics import FAILED, Diagnostic, DiagnosticsBus, Kind
+from suave_des.monitor.measurements import Measurements
+from suave_des.scenario.loader import LoadedScenario, load_scenario, with_values
+from suave_des.scenario.signal_kinds import ConstantSignal
+from suave_des.simulation.host import ManagerHost
+from suave_des.simulation.simulator import Simulator
+from tests.helpers import OUTSIDE, outside_managers
+from tests.helpers.polling import polled, unrecorded
+
+NO_FAULTS = {"thruster_events": [], "mission.time_limit_s": 60.0}
+LOADED = {name: load_scenario(name) for name in ("seams2023", "release15")}
+DECLARING = pytest.mark.parametrize("manager", ["EventTriggered", "EventTriggeredByProperty", "DeclaresAgain"])
+
+
+def steps(before: float, after: float, time_s: float) -> dict:
+    return {"signals.water_visibility": {"kind": "step", "time_s": time_s, "before": before, "after": after}}
+
+
+def failure(time_s: float) -> list[dict]:
+    return [{"thruster": 1, "event": "failure", "time_s": time_s}]
+
+
+def with_settings(manager: str, **given: object) -> dict:
+    return {f"managers.{OUTSIDE}:{manager}": given}
+
+
+def simulator_of(values: dict, name: str = "seams2023") -> Simulator:
+    """The keys of `values` are paths; that of a manager given as module:Class has dots in its name."""
+    managers = {key.partition(".")[2]: value for key, value in values.items() if key.startswith(f"managers.{OUTSIDE}")}
+    loaded = with_values(LOADED[name], {key: value for key, value in values.items() if "managers.tests" not in key})
+    if managers:
+        data = loaded.scenario.model_dump(mode="python")
+        data["managers"].update(managers)
+        loaded = replace(loaded, scenario=type(loaded.scenario).model_validate(data))
+    return Simulator(loaded)
+
+
+def called_s(values: dict, manager: str = "EventTriggered", *, record: bool = False) -> list[float]:
+    """Times at which the manager's adapt is called, once the first task is under way."""
+    simulator_of({**NO_FAULTS, **values}).run(f"{OUTSIDE}:{manager}", 1, 1, record=record)
+    return [t_s for t_s in outside_managers.CALLED_S if t_s > 10.0]
+
+
+EVERY_S = pytest.approx([11.0 + 2.0 * count for count in range(25)], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("manager", "record"),
+    [("EventTriggered", True), ("MayDependOnAnything", False), ("DoesNotDeclare", False), ("NeverIdle", False)],
+)
+def test_no_call_is_skipped(manager: str, record: bool) -> None:
+    """Of a recorded mission, of a class that does not say itself what it depends on, after a call that changed much."""
+    assert called_s(steps(2.5, 2.6, 30.0), manager, record=record) == EVERY_S
+
+
+@DECLARING
+def test_while_no_value_crosses_a_threshold_it_is_not_called(manager: str) -> None:
+    assert called_s(steps(2.5, 2.6, 30.0), manager) == []
+
+
+@DECLARING
+@pytest.mark.parametrize("value", [3.5, 3.0, 2.0, 1.0], ids=["above", "on the upper", "on the lower", "below"])
+def test_it_is_called_at_the_first_of_its_times_after_a_value_has_crossed_a_threshold(
+    manager: str, value: float
+) -> None:
+    assert called_s(steps(2.5, value, 31.5), manager) == [33.0]
+
+
+@DECLARING
+def test_it_is_called_at_the_first_of_its_times_after_a_diagnostic(manager: str) -> None:
+    assert called_s({**steps(2.5, 2.6, 30.0), "thruster_events": failure(40.0)}, manager) == [41.0]
+
+
+def test_a_region_in_which_it_was_idle_since_the_last_change_of_state_needs_no_call() -> None:
+    swings = {"kind": "sinusoid", "minimum": 1.5, "maximum": 2.5, "period_s": 10.0, "shift_s": 0.0}
+    values = {"signals.water_visibility": swings, "thruster_events": failure(40.0)}
+    calls = called_s(values)
+    assert len(calls) == 2 and all(41.0 <= t_s < 51.0 for t_s in calls)  # one in each region
+
+
+def test_thresholds_may_come_from_its_settings() -> None:
+    given = with_settings("EventTriggeredByProperty", thresholds_m=[2.55])
+    assert called_s({**steps(2.5, 3.5, 31.5), **given}, "EventTriggeredByProperty") == [33.0]
+    assert called_s({**steps(2.6, 3.5, 31.5), **given}, "EventTriggeredByProperty") == []
+
+
+def test_one_that_depends_on_no_measured_value_is_called_after_its_hooks_alone() -> None:
+    manager = "DependsOnNoMeasuredValue"
+    assert called_s({**steps(2.5, 1.0, 31.5), "thruster_events": failure(40.0)}, manager) == [41.0]
+    assert called_s(steps(2.5, 1.0, 31.5), manager) == []
+
+
+def test_a_period_longer_than_the_mission_so_far_keeps_its_times() -> None:
+    given = with_settings("EventTriggered", period_s=25.0, starts_s=1.0)
+    assert called_s({**steps(2.5, 1.0, 20.0), **given}) == [26.0]
+    assert called_s({**steps(2.5, 1.0, 40.0), **given}) == [26.0, 51.0]
+
+
+def test_the_batterys_level_is_not_known_beforehand() -> None:
+    battery = {"battery": {"publishing_period_s": 5.0, "discharge_time_s": 80.0}}
+    crossed = called_s(battery, "DependsOnTheBattery")
+    assert len(crossed) == 1 and 41.0 <= crossed[0] <= 47.0
+
+
+def test_a_manager_can_see_whether_the_mission_is_recorded() -> None:
+    outside_managers.RECORDED.clear()
+    simulator = Simulator(LOADED["seams2023"])
+    for record in (True, False):
+        simulator.run(f"{OUTSIDE}:AsksForTheRecord", 1, 1, record=record)
+    assert outside_managers.RECORDED == [True, False]
+
+
+# Metacontrol
+
+
+@pytest.fixture
+def calls(monkeypatch) -> list[float]:
+    """Times of metacontrol's cycles."""
+    times_s: list[float] = []
+    adapt = Metacontrol.adapt
+
+    def counted(self: Metacontrol):
+        times_s.append(self.system.now_s)
+        return adapt(self)
+
+    monkeypatch.setattr(Metacontrol, "adapt", counted)
+    return times_s
+
+
+def test_metacontrol_reasons_when_something_has_changed(calls) -> None:
+    simulator = Simulator(LOADED["seams2023"])
+    simulator.run("metacontrol", 1, 1)
+    event_triggered = len(calls)
+    simulator.run("metacontrol", 1, 1, record=True)
+    assert len(calls) - event_triggered == 150 and event_triggered < 40
+
+
+def test_a_measured_value_that_is_not_a_number_is_an_error_at_once() -> None:
+    simulator = simulator_of({**NO_FAULTS, **steps(3.5, 1.5, 24.5)})
+    errors = []
+    for record in (True, False, False):
+        with pytest.raises(MissionError, match="not a finite number") as raised:
+            simulator.run(f"{OUTSIDE}:BlindInTheDark", 1, 1, record=record)
+        errors.append(str(raised.value))
+    assert errors[0] == errors[1] == errors[2]
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"latencies.inference_s": {"distribution": "uniform", "minimum": 0.5, "maximum": 3.0}},
+        {"knowledge.reasoner": "pellet"},
+    ],
+    ids=["drawn latency", "reasoner that tells all values apart"],
+)
+def test_metacontrol_skips_no_cycle_with(values: dict, calls) -> None:
+    simulator = simulator_of({"mission.time_limit_s": 30.0, **values})
+    simulator.run("metacontrol", 1, 1)
+    unrecorded_s = calls.copy()
+    calls.clear()
+    simulator.run("metacontrol", 1, 1, record=True)
+    assert unrecorded_s == calls
+
+
+# The same missions
+
+
+def assert_same_missions(simulator: Simulator, manager: str, runs: range) -> None:
+    """Metrics and effects are the same whether the manager is event-triggered or called at each of its times."""
+    for run in runs:
+        found = []
+        for called_at_each_time in (True, False, False):  # at first metacontrol's memo is empty
+            with polled("calls", "monitors") if called_at_each_time else nullcontext():
+                found.append(unrecorded(simulator, manager, run))
+        assert found[0] == found[1] == found[2]
+        assert simulator.run(manager, run, 1, record=True).metrics == found[0][0]
+
+
+SLOW = {"managers.metacontrol.reasoning_period_s": 7.3, "latencies.inference_s": 5.0}
+FAULT = {"thruster_events": failure(40.0), "mission.time_limit_s": 60.0}
+
+
+@pytest.mark.parametrize(
+    "manager",
+    ["metacontrol", *(f"{OUTSIDE}:{name}" for name in ("Hasty", "DoesMore", "Meddling", "CountsIdleCycles"))],
+)
+@pytest.mark.parametrize(
+    "values",
+    [{}, SLOW, *({**FAULT, **steps(3.5, 1.5, time_s)} for time_s in (38.5, 39.5, 40.5, 41.5, 42.5))],
+    ids=[
+        "as shipped",
+        "latency longer than the period",
+        "before a fault",
+        "just before",
+        "with it",
+        "while it is reasoned about",
+        "after it",
+    ],
+)
+@pytest.mark.parametrize("name", sorted(LOADED))
+def test_metacontrol_and_what_is_derived_from_it(manager: str, values: dict, name: str) -> None:
+    assert_same_missions(simulator_of(values, name), manager, range(1, 4))
+
+
+NOISE = {"signals.water_visibility.noise": {"distribution": "normal", "mean": 0.0, "std": 0.3}}
+DRAWN = {"latencies.mode_change_s": {"distribution": "uniform", "minimum": 0.1, "maximum": 5.0}}
+AGAIN = {
+    "thruster_events": [
+        {"thruster": thruster, "event": event, "time_s": 30.0}
+        for thruster, event in ((1, "failure"), (2, "failure"), (1, "recovery"), (2, "failure"))
+    ]
+}
+
+
+@pytest.mark.parametrize(
+    "manager", ["SearchesAsHighAsItCanSee", "SubscribesToMeasuredValues", "ChangesModesInHooks", "TakesTime"]
+)
+@pytest.mark.parametrize(
+    "values",
+    [{}, NOISE, DRAWN, AGAIN, {"battery": {"discharge_time_s": 90.0}}, {"mission.time_limit_s": 20.0}],
+    ids=["as shipped", "noise", "drawn latencies", "faults again and again", "battery", "short"],
+)
+@pytest.mark.parametrize("period_s", [0.1, 2.0, 45.0])
+def test_outside_managers(manager: str, values: dict, period_s: float) -> None:
+    given = with_settings(manager, period_s=period_s, starts_s=0.3 * period_s, takes_s=1.7 * period_s)
+    assert_same_missions(simulator_of({**values, **given}), f"{OUTSIDE}:{manager}", range(1, 3))
+
+
+FAILURE = Diagnostic(0.0, Kind.COMPONENT_STATUS, "c_thruster_1", FAILED)
+
+
+@given(
+    period_s=st.floats(0.05, 4.0),
+    start=st.floats(0.0, 1.0),
+    takes=st.floats(0.0, 3.0),
+    changes=st.lists(st.floats(0.0, 12.0), max_size=4).map(sorted),
+    reports=st.lists(st.floats(0.0, 2.0) | st.floats(0.0, 12.0), max_size=3),
+    manager=st.sampled_from(["EventTriggered", "TakesTime"]),
+)
+@settings(max_examples=300, deadline=None)
+def test_calls_that_are_not_skipped_come_at_the_very_same_times(
+    period_s, start, takes, changes, reports, manager
+) -> None:
+    """Times are given in periods; at each change the value crosses a threshold."""
+    levels = [2.5, *([3.5, 2.5] * 2)[: len(changes)]]
+    times_s = (0.0, *(period_s * time for time in changes))
+    arrays = (np.array(times_s), np.array(levels))
+    measured = Measurements("water_visibility", times_s, tuple(levels), 0.0, period_s, arrays)
+    found, requested = [], []
+    for skips_idle_calls in (False, True):
+        env, bus = simpy.Environment(), DiagnosticsBus()
+        modes = mock.Mock(requests=0)
+        system = ManagedSystem(
+            env,
+            LOADED["seams2023"].scenario,
+            {"period_s": period_s, "starts_s": start * period_s, "takes_s": takes * period_s},
+            modes=modes,
+            lasting_functions=(),
+            stream=random.Random,
+            log=lambda event, detail: None,
+            knowledge=lambda: None,
+            measurements={measured.key: measured},
+        )
+        ManagerHost(f"{OUTSIDE}:{manager}", 1, system, bus, skips_idle_calls=skips_idle_calls)
+        for time in reports:
+            Alarm(env, lambda publish=bus.publish: publish(FAILURE)).set(time * period_s)
+        env.run(until=12.0 * period_s)
+        found.append(outside_managers.CALLED_S.copy())
+        requested.append(modes.change_mode.call_args_list)
+    every, event_triggered = found
+    assert set(event_triggered) <= set(every) and requested[0] == requested[1]
+
+
+VALUES = st.sampled_from([1.0, 1.25, 1.2500000000000002, 2.0, 2.25, 3.0, 3.25, 3.75]) | st.floats(0.5, 4.5)
+TIMES_S = st.floats(5.0, 110.0)
+SIGNALS = st.one_of(
+    st.builds(lambda value: {"kind": "constant", "value": value}, VALUES),
+    st.builds(
+        lambda before, after, time_s: {"kind": "step", "before": before, "after": after, "time_s": time_s},
+        VALUES,
+        VALUES,
+        TIMES_S,
+    ),
+    st.builds(
+        lambda low, more, period_s, shift_s, step_s: {
+            "kind": "sinusoid",
+            "minimum": low,
+            "maximum": low + more,
+            "period_s": period_s,
+            "shift_s": shift_s,
+            "time_step_s": step_s,
+        },
+        VALUES,
+        st.floats(0.1, 3.0),
+        st.floats(5.0, 120.0),
+        st.floats(0.0, 80.0),
+        st.sampled_from([0.0, 1.0]),
+    ),
+)
+
+
+def with_another_signal(name: str) -> LoadedScenario:
+    scenario = LOADED[name].scenario
+    signals = {**scenario.signals, "performance": ConstantSignal(kind="constant", value=1.0)}
+    return replace(LOADED[name], scenario=scenario.model_copy(update={"signals": signals}))
+
+
+@given(
+    name=st.sampled_from(sorted(LOADED)),
+    signal=SIGNALS,
+    other=st.none() | SIGNALS,
+    inference_s=st.sampled_from([0.0, 1.0, 1.4999999999999998, 1.9999999999999998, 2.5]),
+    mode_change_s=st.sampled_from([0.0, 0.5, 1.0]),
+    fault_s=TIMES_S,
+    run=st.integers(1, 1000),
+    manager=st.sampled_from(["metacontrol", "bt", "bt_extended"]),
+    battery=st.none() | st.builds(lambda s: {"discharge_time_s": s}, st.floats(30.0, 300.0)),
+)
+@settings(max_examples=40, deadline=None)
+def test_built_in_managers(name, signal, other, inference_s, mode_change_s, fault_s, run, manager, battery) -> None:
+    values = {
+        "mission.time_limit_s": 120.0,
+        "signals.water_visibility": signal,
+        "latencies.inference_s": inference_s,
+        "latencies.mode_change_s": mode_change_s,
+        "thruster_events": failure(fault_s),
+    }
+    if battery is not None:
+        values["battery"] = battery
+    if other is not None:
+        values["signals.performance"] = other
+    loaded = LOADED[name] if other is None else with_another_signal(name)
+    assert_same_missions(Simulator(with_values(loaded, values)), manager, range(run, run + 1))
