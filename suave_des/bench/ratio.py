@@ -31,7 +31,7 @@ from suave_des.vehicle.model import Array
 SCENARIO, MANAGER, SEED = "seams2023", "metacontrol", 1
 MISSIONS, ROUNDS = 100, 8
 _SUBSTEP_RUNS = 50
-_STEPPING = ("advance", "follow_places")
+_STEPPING = ("advance", "fly_waypoints")
 """The kernel's functions that step the track. Arguments 0 and 1 of each are the track and the row to start from;
 argument 2 of the first is the last row to fill.
 """

@@ -18,9 +18,9 @@ from matplotlib.ticker import MaxNLocator
 
 from suave_des.errors import InputError
 from suave_des.estimates import estimate
+from suave_des.metrics.result import MissionMetrics
 from suave_des.report import mission_map, style
 from suave_des.report.runs import METRICS, read_runs
-from suave_des.metrics.result import MissionMetrics
 
 ENDINGS = (".png", ".pdf", ".svg")
 _MOST_PARAMETERS = 4

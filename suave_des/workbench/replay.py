@@ -18,10 +18,10 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rules.files import RulesFile, hash_with_rules
 from suave_des.knowledge.rules.parser import parse_rule, parse_rules
 from suave_des.knowledge.state import Fact, KnowledgeState, Value
+from suave_des.metrics.result import KnowledgeRecord
 from suave_des.resources import find
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import Scenario
-from suave_des.metrics.result import KnowledgeRecord
 from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.state_input import ManagingSettings
 from suave_des.workbench.tracing import Tracer
