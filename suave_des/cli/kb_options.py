@@ -165,18 +165,18 @@ def grouped_options(command: Callable[..., None]) -> Callable[..., None]:
     """
     hints = get_type_hints(command, include_extras=True)
     groups: dict[str, Any] = {name: hint for name, hint in hints.items() if dataclasses.is_dataclass(hint)}
-    parameters: list[inspect.Parameter] = []
-    for parameter in inspect.signature(command).parameters.values():
-        name = parameter.name
-        if name not in groups:
-            parameters.append(parameter.replace(annotation=hints[name], kind=inspect.Parameter.KEYWORD_ONLY))
-            continue
-        fields = get_type_hints(groups[name], include_extras=True)
+    parameters = [
+        each.replace(annotation=hints[each.name], kind=inspect.Parameter.KEYWORD_ONLY)
+        for each in inspect.signature(command).parameters.values()
+        if each.name not in groups
+    ]
+    for group in groups.values():
+        fields = get_type_hints(group, include_extras=True)
         parameters += [
             inspect.Parameter(
                 each.name, inspect.Parameter.KEYWORD_ONLY, default=each.default, annotation=fields[each.name]
             )
-            for each in dataclasses.fields(groups[name])
+            for each in dataclasses.fields(group)
         ]
 
     @functools.wraps(command)
