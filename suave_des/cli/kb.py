@@ -6,8 +6,7 @@ What reads ontologies or starts Java is imported when a command runs, so that he
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
-from decimal import Decimal
+from collections.abc import Iterator
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -30,10 +29,8 @@ from suave_des.cli.kb_options import (
 from suave_des.errors import InputError
 
 if TYPE_CHECKING:
-    from suave_des.workbench.policy import CasePair, Policy, PolicyDifference
-    from suave_des.workbench.policy_space import ValueRange
+    from suave_des.workbench.policy import Policy
     from suave_des.workbench.policy_table import FunctionTable
-    from suave_des.workbench.replay import Firing, MissionReplay, ReplayedCycle
 
 _EXAMPLES = 5
 _WIDE = 300
@@ -183,7 +180,7 @@ def _print_function_table(table: FunctionTable) -> None:
 
 
 def _policy_summary(found: Policy) -> Iterator[str]:
-    from suave_des.workbench.policy import NONE_LEFT
+    from suave_des.workbench.policy import NONE_LEFT, no_proof
 
     kinds, most = len(found.cases), found.max_failed
     yield f"{found.states} states of {kinds} kinds, with at most {most} components reporting"
@@ -193,7 +190,7 @@ def _policy_summary(found: Policy) -> Iterator[str]:
     for name in found.without_effect:
         yield f"without any effect: measured {name}"
     if found.computing:
-        yield _no_proof(found.computing)
+        yield no_proof(found.computing)
     for mark, states in found.marks.items():
         yield f"{mark}: {states} states"
         cases = () if mark == NONE_LEFT else found.marked(mark)
@@ -201,10 +198,6 @@ def _policy_summary(found: Policy) -> Iterator[str]:
             yield f"  {case.state}" + (f": {case.problem}" if case.problem else "")
         if len(cases) > _EXAMPLES:
             yield f"  and {len(cases) - _EXAMPLES} more kinds: see --csv"
-
-
-def _no_proof(computing: Sequence[str]) -> str:
-    return f"not a proof, as measured values are samples for rules that compute: {', '.join(computing)}"
 
 
 @app.command()
@@ -226,8 +219,7 @@ def diff(
     """
     difference = knowledge.with_file(one).bench().diff(knowledge.with_file(other).bench(), max_failed)
     if form is Format.TEXT:
-        for line in _difference_lines(difference):
-            print(line)
+        print(*difference.lines(), sep="\n")
         return
     content = {
         "compared": difference.compared,
@@ -250,44 +242,6 @@ def diff(
         ],
     }
     print_json(content)
-
-
-def _difference_lines(difference: PolicyDifference) -> Iterator[str]:
-    from suave_des.workbench.policy_table import outcome_text, present
-
-    yield f"{difference.states} of {difference.compared} states are decided differently"
-    if difference.reported:
-        yield f"{difference.states_reported} more have other statuses, but the same decisions"
-    if difference.computing:
-        yield _no_proof(difference.computing)
-    for which, designs in (("A", difference.only_one), ("B", difference.only_other)):
-        if designs:
-            yield f"only {which} has {', '.join(designs)}"
-    groups: dict[str, list[CasePair]] = {}
-    for pair in difference.differing:
-        for name in pair.functions or pair.one.asked:
-            before, after = (outcome_text(case, name) for case in (pair.one, pair.other))
-            groups.setdefault(f"{name}, now {present(pair.one, name)}: A {before}, B {after}", []).append(pair)
-    for heading, pairs in groups.items():
-        yield heading
-        for ranges, states in _joined(pairs):
-            yield f"  {'; '.join(map(str, ranges))}: {states} states"
-        yield f"  for instance {pairs[0].one.state}"
-
-
-def _joined(pairs: Sequence[CasePair]) -> list[tuple[tuple[ValueRange, ...], int]]:
-    """Ranges of measured values with the number of states; neighbouring ranges of a single attribute are joined."""
-    counts: dict[tuple[ValueRange, ...], int] = {}
-    for pair in pairs:
-        counts[pair.one.ranges] = counts.get(pair.one.ranges, 0) + pair.one.reports.combinations
-    joined: list[tuple[tuple[ValueRange, ...], int]] = []
-    for ranges, states in counts.items():
-        last = joined[-1][0] if joined else ()
-        if len(ranges) == len(last) == 1 and last[0].high == ranges[0].low is not None:
-            joined[-1] = (last[0].joined(ranges[0]),), joined[-1][1] + states
-        else:
-            joined.append((ranges, states))
-    return joined
 
 
 class TableFormat(StrEnum):
@@ -372,8 +326,7 @@ def try_rule(
         return
     for mission in missions:
         if mission.moments or len(missions) == 1:
-            for line in _replay_lines(mission):
-                print(line)
+            print(*mission.lines(), sep="\n")
     if len(missions) > 1:
         moments = [mission.moments for mission in missions]
         firing = sum(any(each.firings for each in one) for one in moments)
@@ -383,41 +336,6 @@ def try_rule(
             f"{len(missions)} missions: fires in {firing}, different decisions in {sum(map(bool, changed))} "
             f"({sum(changed)} decisions), contradictions in {contradictions}"
         )
-
-
-def _replay_lines(mission: MissionReplay) -> Iterator[str]:
-    firings: dict[str, list[ReplayedCycle]] = {}
-    decisions: dict[str, list[ReplayedCycle]] = {}
-    for cycle in mission.moments:
-        for firing in cycle.firings:
-            firings.setdefault(_firing_text(firing), []).append(cycle)
-        for each in cycle.decisions:
-            then, recorded = each.then or "no change", each.recorded or "no change"
-            decisions.setdefault(f"{each.function}: {then} instead of {recorded}", []).append(cycle)
-    which = f": {mission.mission}" if mission.mission else ""
-    firing_cycles = sum(bool(cycle.firings) for cycle in mission.moments)
-    yield f"{mission.folder}{which}: fires in {firing_cycles} of {mission.states} recorded states"
-    for text, cycles in firings.items():
-        yield f"  {_times(cycles)}: {text}"
-    yield f"  decisions that would have been different: {sum(map(len, decisions.values()))}"
-    for text, cycles in decisions.items():
-        yield f"    {_times(cycles)}: {text}"
-    contradicting = [cycle for cycle in mission.moments if cycle.contradiction]
-    if contradicting:
-        yield f"  states that would contradict themselves: {len(contradicting)} ({_times(contradicting)})"
-        yield f"    {contradicting[0].contradiction}"
-
-
-def _firing_text(firing: Firing) -> str:
-    """What is concluded with which individuals; numbers, which differ each time, are left out."""
-    bound = ", ".join(f"?{name} = {value}" for name, value in firing.bindings if not isinstance(value, Decimal))
-    known = "" if firing.is_new else " (known without it)"
-    return f"{', '.join(map(str, firing.facts))}{known} with {bound or 'nothing bound'}"
-
-
-def _times(cycles: Sequence[ReplayedCycle]) -> str:
-    first, last = cycles[0].t_s, cycles[-1].t_s
-    return f"{first:.2f} s" if first == last else f"{first:.2f} s to {last:.2f} s, {len(cycles)} states"
 
 
 for _command in (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final
@@ -27,6 +27,7 @@ from suave_des.workbench.state_input import LASTING, ManagingSettings
 #: Beyond this many inferences a policy is refused: at a millisecond and a half each it would take ten minutes.
 LARGEST: Final = 400_000
 INCONSISTENT, NONE_LEFT, FLIP_FLOP = "inconsistent", "none left", "flip-flop"
+NO_GROUNDING: Final = "ungrounded"
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,16 @@ class PolicyCase:
         if design is None:
             return NONE_LEFT
         return "stays" if design == self.state.grounded(function) else design
+
+    def outcome_text(self, function: str) -> str:
+        """The outcome, and whether the choice flips back and forth."""
+        return self.outcome(function) + (f" ({FLIP_FLOP})" if function in self.flipping else "")
+
+    def present(self, function: str) -> str:
+        """The design that a function has in this state, "ungrounded" or "not asked for"."""
+        if function not in self.asked:
+            return "not asked for"
+        return self.state.grounded(function) or NO_GROUNDING
 
     @property
     def after(self) -> tuple[tuple[str, str], ...]:
@@ -270,6 +281,27 @@ class PolicyDifference:
         """Number of states in which only statuses differ."""
         return sum(pair.one.reports.combinations for pair in self.reported)
 
+    def lines(self) -> Iterator[str]:
+        """The difference as `kb diff` prints it."""
+        yield f"{self.states} of {self.compared} states are decided differently"
+        if self.reported:
+            yield f"{self.states_reported} more have other statuses, but the same decisions"
+        if self.computing:
+            yield no_proof(self.computing)
+        for which, designs in (("A", self.only_one), ("B", self.only_other)):
+            if designs:
+                yield f"only {which} has {', '.join(designs)}"
+        groups: dict[str, list[CasePair]] = {}
+        for pair in self.differing:
+            for name in pair.functions or pair.one.asked:
+                before, after = (case.outcome_text(name) for case in (pair.one, pair.other))
+                groups.setdefault(f"{name}, now {pair.one.present(name)}: A {before}, B {after}", []).append(pair)
+        for heading, pairs in groups.items():
+            yield heading
+            for ranges, states in _joined(pairs):
+                yield f"  {'; '.join(map(str, ranges))}: {states} states"
+            yield f"  for instance {pairs[0].one.state}"
+
 
 def compare(one: Policy, other: Policy) -> PolicyDifference:
     """Compare two policies over the same space."""
@@ -292,3 +324,23 @@ def compare(one: Policy, other: Policy) -> PolicyDifference:
         only_other=tuple(sorted(designs[1] - designs[0])),
         computing=tuple(sorted({*one.computing, *other.computing})),
     )
+
+
+def _joined(pairs: Sequence[CasePair]) -> list[tuple[tuple[ValueRange, ...], int]]:
+    """Ranges of measured values with the number of states; neighbouring ranges of a single attribute are joined."""
+    counts: dict[tuple[ValueRange, ...], int] = {}
+    for pair in pairs:
+        counts[pair.one.ranges] = counts.get(pair.one.ranges, 0) + pair.one.reports.combinations
+    joined: list[tuple[tuple[ValueRange, ...], int]] = []
+    for ranges, states in counts.items():
+        last = joined[-1][0] if joined else ()
+        if len(ranges) == len(last) == 1 and last[0].high == ranges[0].low is not None:
+            joined[-1] = (last[0].joined(ranges[0]),), joined[-1][1] + states
+        else:
+            joined.append((ranges, states))
+    return joined
+
+
+def no_proof(computing: Sequence[str]) -> str:
+    """Say that a policy is not a proof, because of rules that compute."""
+    return f"not a proof, as measured values are samples for rules that compute: {', '.join(computing)}"

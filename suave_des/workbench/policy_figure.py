@@ -10,11 +10,11 @@ from typing import Any
 
 from suave_des.errors import InputError
 from suave_des.report.style import MODE_COLOURS, OTHER_MODES, VERMILION, WIDTH_IN, publication
-from suave_des.workbench.policy import FLIP_FLOP, INCONSISTENT, NONE_LEFT, Policy
+from suave_des.workbench.policy import FLIP_FLOP, INCONSISTENT, NO_GROUNDING, NONE_LEFT, Policy
 from suave_des.workbench.policy_space import ValueRange
-from suave_des.workbench.policy_table import UNGROUNDED, FunctionTable, TableRow, function_table
+from suave_des.workbench.policy_table import FunctionTable, TableRow, function_table
 
-_FIXED = {INCONSISTENT: "#B00020", NONE_LEFT: "#D9D9D9", UNGROUNDED: "#FFFFFF"}
+_FIXED = {INCONSISTENT: "#B00020", NONE_LEFT: "#D9D9D9", NO_GROUNDING: "#FFFFFF"}
 _LEGEND = {NONE_LEFT: "none left: as before", INCONSISTENT: "contradiction"}
 _ROW_IN = 0.21
 _MOST_ROWS = 60
@@ -195,7 +195,7 @@ def _tile(
 
 def _design_after(outcome: str, row: TableRow, table: FunctionTable) -> str:
     """The design in use afterwards, or why there is none."""
-    now = row.groundings.get(table.function, UNGROUNDED)
+    now = row.groundings.get(table.function, NO_GROUNDING)
     return outcome.replace("stays", now, 1) if outcome.startswith("stays") else outcome
 
 

@@ -6,10 +6,9 @@ import itertools
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
 
-from suave_des.workbench.policy import FLIP_FLOP, Policy, PolicyCase
+from suave_des.workbench.policy import Policy
 from suave_des.workbench.policy_space import ComponentReports, ValueRange
 
-UNGROUNDED, NOT_ASKED = "ungrounded", "not asked for"
 _Groundings = tuple[tuple[str, str], ...]
 _Column = tuple[ValueRange, ...]
 
@@ -55,9 +54,9 @@ def function_table(policy: Policy, function: str) -> FunctionTable:
     for case in policy.cases:
         if function in case.asked:
             reports = case.reports if ("components", "") in dimensions else None
-            row = found.setdefault((reports, tuple((name, present(case, name)) for name in grounded)), {})
+            row = found.setdefault((reports, tuple((name, case.present(name)) for name in grounded)), {})
             column = tuple(case.ranges[policy.attributes.index(name)] for name in attributes)
-            result = outcome_text(case, function)
+            result = case.outcome_text(function)
             before = row.setdefault(column, result)
             if before != result:
                 row[column] = f"{before} or {result}, by the order of the values"
@@ -87,11 +86,11 @@ def _dimensions(policy: Policy, function: str) -> list[tuple[str, str]]:
     """What a function's outcome depends on: other groundings, components, attributes, and its own grounding."""
     cases = [case for case in policy.cases if function in case.asked]
     values: dict[tuple[str, str], list[Hashable]] = {
-        **{("grounding", name): [present(case, name) for case in cases] for name in policy.functions},
+        **{("grounding", name): [case.present(name) for case in cases] for name in policy.functions},
         ("components", ""): [case.reports for case in cases],
         **{("attribute", name): [case.ranges[place] for case in cases] for place, name in enumerate(policy.attributes)},
     }
-    outcomes = [outcome_text(case, function) for case in cases]
+    outcomes = [case.outcome_text(function) for case in cases]
     kept = list(values)
     for dimension in values:
         fewer = [each for each in kept if each != dimension]
@@ -117,18 +116,6 @@ def _joined(
         else:
             joined.append((one, one))
     return joined
-
-
-def present(case: PolicyCase, function: str) -> str:
-    """The design that a function has in a case, "ungrounded" or "not asked for"."""
-    if function not in case.asked:
-        return NOT_ASKED
-    return case.state.grounded(function) or UNGROUNDED
-
-
-def outcome_text(case: PolicyCase, function: str) -> str:
-    """What happens to a function's grounding, and whether the choice flips back and forth."""
-    return case.outcome(function) + (f" ({FLIP_FLOP})" if function in case.flipping else "")
 
 
 def _reports_text(group: Sequence[ComponentReports], policy: Policy) -> str:
@@ -162,7 +149,7 @@ def rows_of(policy: Policy) -> Iterator[tuple[object, ...]]:
             *map(str, case.ranges),
             "; ".join(f"{name}={status}" for name, status in case.reports.components),
             case.reports.combinations,
-            *(present(case, name) if is_asked else "" for name, is_asked in zip(policy.functions, asked, strict=True)),
+            *(case.present(name) if is_asked else "" for name, is_asked in zip(policy.functions, asked, strict=True)),
             "; ".join(case.statuses),
             *(case.outcome(name) if is_asked else "" for name, is_asked in zip(policy.functions, asked, strict=True)),
             "; ".join(case.marks),

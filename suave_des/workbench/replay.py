@@ -95,6 +95,41 @@ class MissionReplay:
     states: int
     moments: tuple[ReplayedCycle, ...]
 
+    def lines(self) -> Iterator[str]:
+        """The replay as `kb try` prints it."""
+        firings: dict[str, list[ReplayedCycle]] = {}
+        decisions: dict[str, list[ReplayedCycle]] = {}
+        for cycle in self.moments:
+            for firing in cycle.firings:
+                firings.setdefault(_firing_text(firing), []).append(cycle)
+            for each in cycle.decisions:
+                then, recorded = each.then or "no change", each.recorded or "no change"
+                decisions.setdefault(f"{each.function}: {then} instead of {recorded}", []).append(cycle)
+        which = f": {self.mission}" if self.mission else ""
+        firing_cycles = sum(bool(cycle.firings) for cycle in self.moments)
+        yield f"{self.folder}{which}: fires in {firing_cycles} of {self.states} recorded states"
+        for text, cycles in firings.items():
+            yield f"  {_times(cycles)}: {text}"
+        yield f"  decisions that would have been different: {sum(map(len, decisions.values()))}"
+        for text, cycles in decisions.items():
+            yield f"    {_times(cycles)}: {text}"
+        contradicting = [cycle for cycle in self.moments if cycle.contradiction]
+        if contradicting:
+            yield f"  states that would contradict themselves: {len(contradicting)} ({_times(contradicting)})"
+            yield f"    {contradicting[0].contradiction}"
+
+
+def _firing_text(firing: Firing) -> str:
+    """What is concluded with which individuals; numbers, which differ each time, are left out."""
+    bound = ", ".join(f"?{name} = {value}" for name, value in firing.bindings if not isinstance(value, Decimal))
+    known = "" if firing.is_new else " (known without it)"
+    return f"{', '.join(map(str, firing.facts))}{known} with {bound or 'nothing bound'}"
+
+
+def _times(cycles: Sequence[ReplayedCycle]) -> str:
+    first, last = cycles[0].t_s, cycles[-1].t_s
+    return f"{first:.2f} s" if first == last else f"{first:.2f} s to {last:.2f} s, {len(cycles)} states"
+
 
 @dataclass(frozen=True)
 class RuleChange:

@@ -18,10 +18,10 @@ from suave_des.knowledge import jvm
 from suave_des.knowledge.content import RULE_IRI, Content
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import InProcessPellet, load_n_triples, one_at_a_time, read_term
-from suave_des.knowledge.rdf import Lit, Triple, canonical, facts_of, n_triple, value_of
+from suave_des.knowledge.rdf import Lit, Triple, canonical, facts_of, is_fact, n_triple, value_of
 from suave_des.knowledge.rules.syntax import Atom, Kind, Rule
 from suave_des.knowledge.state import Fact, KnowledgeState, Value
-from suave_des.knowledge.vocabulary import LANGUAGE_NAMESPACES, OWL, RDF_TYPE
+from suave_des.knowledge.vocabulary import OWL, RDF_TYPE
 from suave_des.workbench.derivations import Binding, Clash, Derivation, matched, partial_matches
 
 _RULE: Final = re.compile(r"^rule\(" + re.escape(RULE_IRI) + r"(\d+)")
@@ -74,18 +74,18 @@ class Tracer:
         mentioned = [atom for rule in self.base.content.enabled_rules for atom in rule.atoms]
         entailed = self.entailed().union(_values_of(load_n_triples(text), mentioned))
         jvm.take_warnings()
-        return tuple(sorted({_canonical(triple) for triple in entailed if _is_fact(triple)}, key=str))
+        return tuple(sorted({_canonical(triple) for triple in entailed if is_fact(triple)}, key=str))
 
     @cached_property
     def _leaves(self) -> dict[Triple, Triple]:
         """What is asserted, by its canonical form."""
-        return {_canonical(triple): triple for triple in sorted(filter(_is_fact, self.asserted), key=str)}
+        return {_canonical(triple): triple for triple in sorted(filter(is_fact, self.asserted), key=str)}
 
     @cached_property
     def _schema(self) -> Content:
         """The ontologies without facts about individuals; all rules keep their numbers."""
         content = self.base.content
-        return replace(content, triples=tuple(each for each in content.triples if not _is_fact(each)))
+        return replace(content, triples=tuple(each for each in content.triples if not is_fact(each)))
 
     def derive(self, triple: Triple) -> Derivation:
         """Derive a triple that is entailed."""
@@ -259,12 +259,6 @@ def _matches(rule: Rule, binding: Binding, known: Iterable[Triple]) -> list[tupl
     """Ways to match a rule's body with facts, in a fixed order; comparisons are left to Pellet."""
     ways = partial_matches(rule.body, binding, known)
     return sorted(((bound, body) for depth, bound, body in ways if depth == len(rule.body)), key=str)
-
-
-def _is_fact(triple: Triple) -> bool:
-    """Whether a triple is about an individual, and not in the terms of the languages themselves."""
-    term = triple[2] if triple[1] == RDF_TYPE else triple[1]
-    return isinstance(term, str) and not term.startswith(LANGUAGE_NAMESPACES)
 
 
 def _canonical(triple: Triple) -> Triple:
