@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import io
 import subprocess
-import tempfile
 from collections.abc import Iterator, Sequence
 from decimal import Decimal
+from pathlib import Path
+from types import TracebackType
 from typing import Any, Final
 
 import owlready2
@@ -92,21 +93,29 @@ def _below(graph: Any, name: str) -> set[Node]:
 
 def _reason(world: owlready2.World) -> bool:
     """Let owlready2 run Pellet; false when the ontology is inconsistent."""
-    before = tempfile.tempdir
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        tempfile.tempdir = folder  # where owlready2 leaves a file behind when its reasoner fails or is interrupted
-        try:
-            owlready2.sync_reasoner_pellet(world, infer_property_values=True, infer_data_property_values=True, debug=0)
-        except owlready2.OwlReadyInconsistentOntologyError:
+    try:
+        owlready2.sync_reasoner_pellet(world, infer_property_values=True, infer_data_property_values=True, debug=0)
+    except BaseException as error:
+        _remove_temporary_file(error.__traceback__)
+        if isinstance(error, owlready2.OwlReadyInconsistentOntologyError):
             return False
-        except subprocess.TimeoutExpired as error:
+        if isinstance(error, subprocess.TimeoutExpired):
             raise TimeoutError from error
-        except owlready2.OwlReadyJavaError as error:
+        if isinstance(error, owlready2.OwlReadyJavaError):
             reason = " ".join(str(error).split())[:400]
             raise KnowledgeError(f"Pellet, run by owlready2, failed: {reason}") from error
-        finally:
-            tempfile.tempdir = before
+        raise
     return True
+
+
+def _remove_temporary_file(trace: TracebackType | None) -> None:
+    """Remove the file that owlready2 leaves behind when its reasoner fails or is interrupted, in whatever thread."""
+    while trace is not None:
+        file = trace.tb_frame.f_locals.get("tmp")
+        if trace.tb_frame.f_code.co_name == "sync_reasoner_pellet" and file is not None:
+            file.close()
+            Path(file.name).unlink(missing_ok=True)
+        trace = trace.tb_next
 
 
 def _add_exactly(world: owlready2.World, ontology: owlready2.Ontology, triple: Triple) -> None:
