@@ -13,9 +13,6 @@ GENERATE_RECHARGE_PATH = "generate_recharge_path"
 MISSION_FUNCTIONS = (MAINTAIN_MOTION, GENERATE_SEARCH_PATH, FOLLOW_PIPELINE)
 """Functions that the mission's two tasks need, so that a modes file must have them."""
 
-UNGROUNDED = "UNGROUNDED"
-"""Status of an objective that no function design is in use for (o_status)."""
-
 
 @dataclass(frozen=True, slots=True)
 class Task:

@@ -10,9 +10,9 @@ from math import isfinite
 from typing import ClassVar, Final
 from weakref import WeakKeyDictionary
 
-from suave_des.domain import GENERATE_SEARCH_PATH, UNGROUNDED, Task
+from suave_des.domain import GENERATE_SEARCH_PATH, Task
 from suave_des.knowledge.deliberation import Conclusion, Deliberation
-from suave_des.knowledge.state import Inference, KnowledgeState, ObjectiveState, Plan
+from suave_des.knowledge.state import UNGROUNDED, Inference, KnowledgeState, ObjectiveState, Plan
 from suave_des.managing.adapter import Adapter, TaskBridge
 from suave_des.managing.base import AdaptationProcess, ManagedSystem, ManagingSubsystem, Thresholds
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, Kind
@@ -93,9 +93,12 @@ class Metacontrol(ManagingSubsystem):
         """Read the measured values; components report by themselves, see `diagnostic`."""
         if self._is_listening():
             for attribute in self.system.measurements:
-                value = self.system.measured(attribute, self._listens_since_s)
-                if value is not None:
+                if (value := self.measured(attribute)) is not None:
                     self.measurements[attribute] = value
+
+    def measured(self, attribute: str) -> float | None:
+        """The value of a quality attribute that `monitor` takes; none if nothing was published."""
+        return self.system.measured(attribute, self._listens_since_s)
 
     def analyze(self) -> Inference:
         """Infer what the rules say about the present state."""
