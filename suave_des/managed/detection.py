@@ -27,7 +27,8 @@ def measured_at_rows(times_s: Array, values: Array, at_rows: Array) -> None:
     """
     first = np.minimum(np.rint(times_s / STEP_S).astype(np.int64), len(at_rows))  # rounded as Vehicle does
     at_rows[: first[0]] = np.nan
-    at_rows[first[0] :] = np.repeat(values, np.diff(first, append=len(at_rows)))
+    at_rows[first[0] : first[-1]] = np.repeat(values[:-1], first[1:] - first[:-1])
+    at_rows[first[-1] :] = values[-1]
 
 
 @dataclass(eq=False)

@@ -242,8 +242,9 @@ class Vehicle:
                 self._take(queue.waypoints, sent, queue.sent_as_m)
 
     def _notify(self, t_s: float) -> None:
+        row = row_at(t_s)
         for listener in self.control_listeners:
-            listener(row_at(t_s))
+            listener(row)
 
 
 def track_rows(duration_s: float) -> int:
