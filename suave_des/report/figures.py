@@ -71,7 +71,7 @@ def draw_distributions(path: Path) -> Figure:
     Raises:
         InputError: the file is not a runs.csv, or has no missions.
     """
-    runs = read_runs(path).frame
+    runs = read_runs(path, are_simulated=True).frame
     figure = Figure(figsize=(style.WIDTH_IN, 2.7), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
     for axes, letter, (metric, title) in zip((left, right), "ab", METRICS.items(), strict=True):
@@ -116,7 +116,7 @@ def draw_sweep(folder: Path, parameters: Sequence[str]) -> Figure:
         InputError: its runs.csv cannot be read.
     """
     parameters = parameters[:_MOST_PARAMETERS]
-    runs = read_runs(folder / "runs.csv", further=parameters)
+    runs = read_runs(folder / "runs.csv", further=parameters, are_simulated=True)
     managers = list(runs.managers)
     width_in = style.WIDTH_IN if len(parameters) > 1 else style.WIDTH_IN / 2
     figure = Figure(figsize=(width_in, 4.2), layout="constrained")

@@ -7,7 +7,7 @@ import hashlib
 import io
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,6 +16,7 @@ import pandas
 from numpy.typing import NDArray
 
 from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.metrics.result import MissionMetrics
 from suave_des.scenario.yamlfile import decode, read_bytes
 
 METRICS = {"search_time_s": "search time (s)", "distance_inspected_m": "distance inspected (m)"}
@@ -23,6 +24,7 @@ METRICS = {"search_time_s": "search time (s)", "distance_inspected_m": "distance
 COLUMNS = ("manager", *METRICS, "detection_x_m")
 """Columns of a frame of missions; detection_x_m is nan where it is not known or nothing was detected."""
 _SIZE_LIMIT_BYTES = 500_000_000
+_WHOLE_LIMIT = 2**63
 
 
 class _Layout(NamedTuple):
@@ -97,7 +99,7 @@ class Runs:
                 raise InputError(f"has no mission of manager {manager!r}", file=self.path, remedy=remedy)
 
 
-def read_runs(path: str | Path, *, further: Sequence[str] = ()) -> Runs:
+def read_runs(path: str | Path, *, further: Sequence[str] = (), are_simulated: bool = False) -> Runs:
     """Read missions from a runs.csv, a file like the published seams2023_runs.csv, or the exemplar's own results.
 
     Search times are taken as they stand, but for the -1 with which revision 2023 says that nothing was found: the time
@@ -106,6 +108,7 @@ def read_runs(path: str | Path, *, further: Sequence[str] = ()) -> Runs:
     Args:
         path: of the file; it may have columns that are not read.
         further: columns to read too, such as those of a sweep; numbers where all their values are.
+        are_simulated: whether the missions are a campaign's: all columns of its runs.csv that are there are checked.
 
     Raises:
         InputError: with file and line: the file cannot be read, has other columns, no mission, or an impossible value.
@@ -117,7 +120,9 @@ def read_runs(path: str | Path, *, further: Sequence[str] = ()) -> Runs:
     try:
         header = [name.strip() for name in next(reader, [])]
         layout = _layout(path, header, further)
+        metrics = [field for field in fields(MissionMetrics) if are_simulated and field.name in header]
         wanted = (*layout[:3], *layout.detection_x_m, layout.time_limit_s, layout.scenario, *further)
+        wanted += tuple(field.name for field in metrics)
         names = [name for name in dict.fromkeys(wanted) if name in header]
         places = [header.index(name) for name in names]
         for cells in reader:
@@ -133,7 +138,10 @@ def read_runs(path: str | Path, *, further: Sequence[str] = ()) -> Runs:
     if not rows:
         raise _error(path, 1, "has no missions under its header", "one line for each mission is needed")
     cells_by_name = pandas.DataFrame(rows, columns=names, index=lines, dtype=str)
-    frame = _missions(_Cells(path, cells_by_name), layout)
+    checked = _Cells(path, cells_by_name)
+    frame = _missions(checked, layout)
+    for field in metrics:
+        checked.check_kind(field.name, str(field.type))
     managers = _first_lines(frame["manager"])
     scenarios = _first_lines(cells_by_name[layout.scenario]) if layout.scenario in names else {}
     frame = frame.assign(**{name: _numbers_or_words(cells_by_name[name]) for name in further})
@@ -204,6 +212,17 @@ class _Cells(NamedTuple):
             is_right |= (self.text[column] == "").to_numpy()
         self.check(column, is_right, "a finite number" + (f", at least {least:g}" if least > -math.inf else ""))
         return numbers
+
+    def check_kind(self, column: str, kind: str) -> None:
+        """Check a column whose values are of a type of MissionMetrics."""
+        text = self.text[column]
+        if kind == "bool":
+            self.check(column, text.isin(("True", "False")), "True or False")
+        elif kind == "int":
+            is_whole = [len(each) < 20 and each.isdecimal() and int(each) < _WHOLE_LIMIT for each in text]
+            self.check(column, is_whole, f"a whole number below {_WHOLE_LIMIT}")
+        elif kind.startswith("float"):
+            self.numbers(column, least=-math.inf, may_be_empty=True)
 
     def check(self, column: str, is_right: Iterable[bool], wanted: str) -> None:
         """Check a column.

@@ -305,7 +305,7 @@ class TestBadInput:
             (["campaign", "seams2023", "--managers", "none", "--out", "/proc/x"], "cannot be written"),
             (["reproduce", "--runs", "0", *OUT], "runs: 0"),
             (["figure", "nothing", "--out", "map.png"], "nothing: has neither trajectory.csv nor runs.csv"),
-            (["figure", ".", "--out", "map.xyz"], ".xyz is no kind of picture"),
+            (["figure", ".", "--out", "map.xyz"], "map.xyz: expected a picture, got .xyz"),
             (["campain"], "Did you mean 'campaign'?"),
             (["run", "seams2023", "--mangager", "none"], "--mangager"),
         ],
