@@ -6,6 +6,8 @@ from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
+from numpy.typing import NDArray
 
 from suave_des.imports import hidden
 
@@ -14,6 +16,9 @@ from suave_des.imports import hidden
 with hidden("scipy.linalg"):
     from numba.np import arraymath
 arraymath._HAVE_BLAS = True
+
+Array = NDArray[np.float64]
+Ticks = NDArray[np.int64]
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 

@@ -23,10 +23,10 @@ from unittest.mock import patch
 
 import numpy as np
 
+from suave_des.compiling import Array
 from suave_des.scenario.loader import load_scenario
 from suave_des.simulation.simulator import Simulator
 from suave_des.vehicle import kernel
-from suave_des.vehicle.model import Array
 
 SCENARIO, MANAGER, SEED = "seams2023", "metacontrol", 1
 MISSIONS, ROUNDS = 100, 8
@@ -125,8 +125,14 @@ def _recording(calls: list[KernelCall], tracks: list[Array]) -> Iterator[None]:
 
 
 def _copied(arguments: tuple[object, ...]) -> tuple[object, ...]:
-    """Copy the arrays among some arguments, as the kernel writes into some of them."""
-    return tuple(each.copy() if isinstance(each, np.ndarray) else each for each in arguments)
+    """Copy the arrays among some arguments and in their tuples, as the kernel writes into some of them."""
+
+    def copy(argument: object) -> object:
+        if isinstance(argument, tuple):
+            return _copied(argument)
+        return argument.copy() if isinstance(argument, np.ndarray) else argument
+
+    return tuple(map(copy, arguments))
 
 
 def figures(missions: int = MISSIONS, rounds: int = ROUNDS) -> Mapping[str, float]:

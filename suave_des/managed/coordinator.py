@@ -16,7 +16,7 @@ from suave_des.scenario.revision import CoordinatorRevision
 
 
 class MissionTiming(NamedTuple):
-    """Times of one mission, s: its limit, when it starts, and the phases of two timers."""
+    """Times of one mission, s: its limit, when its first task starts, and the phases of two timers."""
 
     time_limit_s: float
     start_delay_s: float

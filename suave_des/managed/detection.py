@@ -7,8 +7,8 @@ import numpy as np
 import simpy
 
 from suave_des.clock import Alarm
+from suave_des.compiling import Array
 from suave_des.managed.node import Log
-from suave_des.vehicle.model import Array
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
 from suave_des.world.pipeline import first_detection
 

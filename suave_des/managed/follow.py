@@ -1,4 +1,4 @@
-"""Follow pipeline: visits the points of the path to inspect, in order, and adds up the way (facts: kas-lab/suave)."""
+"""Follow pipeline: visits the points of the path in order, and adds up the distance (facts: kas-lab/suave)."""
 
 import math
 from collections.abc import Callable
@@ -11,11 +11,11 @@ import numpy as np
 import simpy
 
 from suave_des.clock import Alarm
+from suave_des.compiling import Array
 from suave_des.domain import SEA_BED_Z_M
 from suave_des.managed.node import FunctionNode
 from suave_des.scenario.revision import FollowRevision
-from suave_des.vehicle.guidance import Guidance, SetPointSender
-from suave_des.vehicle.model import Array
+from suave_des.vehicle.guidance import Guidance, SetPointSender, WaypointSource
 from suave_des.vehicle.vehicle import ArrivalCheck
 
 ALTITUDE_M = 1.25
@@ -37,9 +37,9 @@ class InspectionPath(NamedTuple):
     @classmethod
     def along(cls, points_m: Array) -> Self:
         """The path along points: x and y in the first two columns, shape (points, at least 2)."""
-        above = np.full((len(points_m), 3), Z_M)
-        above[:, :2] = points_m[:, :2]
-        return cls(above, (0.0, *(math.dist(a, b) for a, b in pairwise(above[:, :2].tolist()))))
+        x_y_m = points_m[:, :2]
+        lengths_m = (math.dist(a, b) for a, b in pairwise(x_y_m.tolist()))
+        return cls(np.insert(x_y_m, 2, Z_M, axis=1), (0.0, *lengths_m))
 
     def from_point(self, first: int) -> Self:
         """The rest of the path from a point on."""
@@ -50,7 +50,7 @@ NO_PATH = InspectionPath(np.empty((0, 3)), ())
 
 
 @dataclass(eq=False)
-class FollowPipeline(FunctionNode):
+class FollowPipeline(FunctionNode, WaypointSource):
     """The follow function: its way-points are the points of the path, the next one when the present one is reached.
 
     Attributes:
@@ -78,7 +78,7 @@ class FollowPipeline(FunctionNode):
         return self._published_m
 
     def activated(self) -> None:
-        """Set off; the distance counts from zero again, though the published value stays until there is a new one."""
+        """Start; the distance counts from zero again, though the published value stays until there is a new one."""
         self._travelled_m = 0.0
         self._has_arrived = False
         if self.revision.restarts_on_activation:
@@ -88,7 +88,7 @@ class FollowPipeline(FunctionNode):
             self._guidance.start_at(self.env.now)
 
     def deactivated(self) -> None:
-        """Stop; revision 2023 adds the way from the last point to here, if it was on its way from one."""
+        """Stop; revision 2023 adds the distance from the last point to here, if one was reached."""
         if self.finished.triggered:
             return
         self._guidance.stop()
@@ -103,9 +103,6 @@ class FollowPipeline(FunctionNode):
 
     # What guidance asks.
 
-    def tick(self) -> None:
-        """Nothing changes with a poll alone."""
-
     def waypoints(self, count: int) -> Array:
         """The present point and those after it; none when the end is reached."""
         if self._next == len(self._way.lengths_m):
@@ -117,13 +114,10 @@ class FollowPipeline(FunctionNode):
         return Z_M
 
     def reached(self, count: int) -> None:
-        """Add up the way, from the first point on; it is published at each point after that."""
+        """Add up the distance, from the first point on; it is published at each point after that."""
         lengths_m = self._way.lengths_m[self._next + (not self._has_arrived) : self._next + count]
         self._next += count
         self._has_arrived = True
         for length_m in lengths_m:
             self._travelled_m += length_m
             self._published_m = self._travelled_m
-
-    def not_reached(self, x_y_reached: bool) -> None:
-        """The point is sent again as it is."""

@@ -7,13 +7,12 @@ from functools import partial
 import numpy as np
 
 from suave_des.clock import Alarm, tick_at_or_after
-from suave_des.compiling import compiled
+from suave_des.compiling import Array, compiled
 from suave_des.domain import SEA_BED_Z_M
 from suave_des.managed.node import FunctionNode
 from suave_des.scenario.modes import Mode
 from suave_des.scenario.revision import SpiralRevision
-from suave_des.vehicle.guidance import Guidance, SetPointSender
-from suave_des.vehicle.model import Array
+from suave_des.vehicle.guidance import Guidance, SetPointSender, WaypointSource
 from suave_des.vehicle.vehicle import ArrivalCheck
 from suave_des.world.pipeline import VIEW_TANGENT
 
@@ -21,8 +20,7 @@ TICK_PERIOD_S = 1.0
 ANGLE_STEP_RAD = 0.1
 REACHED_BOX_M = 0.4
 TICKS_BEFORE_RESENDING = 10
-INITIAL_ALTITUDE_M = 2.0
-"""The node's altitude parameter before any mode is set."""
+INITIAL_ALTITUDE_M = 2.0  # before any mode is set
 
 
 @compiled
@@ -49,7 +47,7 @@ def spiral(step: int, radius_m: float, altitude_m: float, centre_m: tuple[float,
 
 
 @dataclass(eq=False)
-class GenerateSearchPath(FunctionNode):
+class GenerateSearchPath(FunctionNode, WaypointSource):
     """The search function: generates the way-points of a spiral, the next one when the present one is reached.
 
     Attributes:
@@ -105,7 +103,7 @@ class GenerateSearchPath(FunctionNode):
     # What guidance asks.
 
     def tick(self) -> None:
-        """Count a step of the spiral where the altitude is another one than at the tick before."""
+        """Count a step of the spiral where the altitude differs from that at the tick before."""
         if self.altitude_m != self._last_altitude_m:
             self._step += 1
             self._last_altitude_m = self.altitude_m
@@ -120,24 +118,23 @@ class GenerateSearchPath(FunctionNode):
         return waypoints
 
     def set_point_z_m(self) -> float:
-        """The altitude of now, less what was lowered; "reached" is judged against the one of the way-point."""
+        """The present altitude, less what was lowered; whether it is reached is checked against the way-point's."""
         return SEA_BED_Z_M + self.altitude_m - self._lowered_m
 
     def reached(self, count: int) -> None:
         """Go on to the next way-point."""
-        waypoints = np.empty((count, 4))
-        self._spiral(waypoints)
-        self._present = waypoints[-1]
-        self._radius_m = waypoints.item(count - 1, 3)
+        self._present = self._spiral(np.empty((count, 4)))[-1]
+        self._radius_m = self._present.item(3)
         self._step += count
 
     def not_reached(self, x_y_reached: bool) -> None:
-        """Ask for less altitude than is wanted, where z alone is missing: the autopilot stops short in z."""
+        """Command a lower altitude if only z is not reached: the autopilot stops short of its altitude set-point."""
         if x_y_reached:
             self._lowered_m += self.revision.workaround_step_m
 
-    def _spiral(self, waypoints: Array) -> None:
+    def _spiral(self, waypoints: Array) -> Array:
         spiral(self._step, self._radius_m, self.altitude_m, self.centre_m, waypoints)
+        return waypoints
 
 
 def _arrival_check(began_s: float) -> ArrivalCheck:

@@ -1,11 +1,10 @@
 """The behaviour tree managers of revision 1.5 (facts: kas-lab/suave, revision 1.5).
 
-A tree is walked from its root at every tick: a sequence of what must be in order first. Written out, this is a table of
-conditions and modes; each tick asks for the modes of the first condition that holds for each function.
+A tree is ticked from its root: a sequence of checks, the most important first. Written out, this is a table of
+conditions and modes; each tick requests, for each function, the mode of the first condition that holds.
 """
 
 from collections.abc import Collection, Iterator
-from math import inf
 from typing import ClassVar
 
 from suave_des.domain import FOLLOW_PIPELINE, GENERATE_RECHARGE_PATH, GENERATE_SEARCH_PATH, MAINTAIN_MOTION, Task
@@ -28,11 +27,11 @@ class BehaviourTree(ManagingSubsystem):
         self._failed: set[str] = set()
 
     def task_requested(self, task: Task) -> None:
-        """From now on the tree acts on the task's functions, too."""
+        """From now on the tree controls the task's functions, too."""
         self._functions += task.functions
 
     def task_cancelled(self, task: Task) -> None:
-        """The task's functions are set to fd_unground, and left alone."""
+        """Set the task's functions to fd_unground, and leave them alone."""
         self._functions = tuple(name for name in self._functions if name not in task.functions)
         super().task_cancelled(task)
 
@@ -44,7 +43,7 @@ class BehaviourTree(ManagingSubsystem):
             self._failed.discard(diagnostic.key)
 
     def adapt(self) -> None:
-        """One tick of the tree."""
+        """Tick the tree."""
         for function, mode in self._wanted():
             self.system.change_mode(function, mode)
 
@@ -63,14 +62,14 @@ class BehaviourTree(ManagingSubsystem):
 
     def _search_mode(self) -> str:
         # A visibility that was not measured yet counts as good; below the lowest threshold the lowest altitude is left.
-        measured_m = self.system.measured("water_visibility")
-        visibility_m = inf if measured_m is None else measured_m
-        pairs = zip(self._settings.visibility_thresholds_m, self._settings.search_modes, strict=True)
-        return next((mode for threshold, mode in pairs if visibility_m >= threshold), self._settings.search_modes[-1])
+        visibility_m = self.system.measured("water_visibility")
+        thresholds_m, modes = self._settings.visibility_thresholds_m, self._settings.search_modes
+        pairs = zip(thresholds_m, modes, strict=True)
+        return next((mode for least_m, mode in pairs if visibility_m is None or visibility_m >= least_m), modes[-1])
 
 
 class ExtendedBehaviourTree(BehaviourTree):
-    """bt_extended: the same, but with a low battery the vehicle goes to recharge first, and then goes on."""
+    """bt_extended: the same, but with a low battery the vehicle goes to recharge first."""
 
     @property
     def depends_on(self) -> Thresholds:
@@ -82,11 +81,8 @@ class ExtendedBehaviourTree(BehaviourTree):
             yield from super()._wanted()
             return
         # Once on its way the vehicle goes on until the level has risen: the station refills the battery at once.
-        recharging = self._battery_level() < self._settings.battery_limit
+        level = self.system.measured("battery_level")
+        recharging = level is not None and level < self._settings.battery_limit
         for function, mode in super()._wanted():
             yield function, UNGROUND_MODE if recharging and function != MAINTAIN_MOTION else mode
         yield GENERATE_RECHARGE_PATH, "normal" if recharging else UNGROUND_MODE
-
-    def _battery_level(self) -> float:
-        measured = self.system.measured("battery_level")
-        return 1.0 if measured is None else measured

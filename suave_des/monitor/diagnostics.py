@@ -1,6 +1,6 @@
 """The /diagnostics topic: what monitors publish, and who subscribes to it."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -26,7 +26,6 @@ class Diagnostic:
     value: float | str
 
 
-_KINDS = tuple(Kind)
 Subscriber = Callable[[Diagnostic], None]
 
 
@@ -34,9 +33,9 @@ class DiagnosticsBus:
     """Passes each diagnostic on at once to the subscribers to its kind, in the order of subscription."""
 
     def __init__(self) -> None:
-        self._subscribers: dict[Kind, list[Subscriber]] = {kind: [] for kind in _KINDS}
+        self._subscribers: dict[Kind, list[Subscriber]] = {kind: [] for kind in Kind}
 
-    def subscribe(self, subscriber: Subscriber, kinds: Collection[Kind] = _KINDS) -> None:
+    def subscribe(self, subscriber: Subscriber, kinds: Iterable[Kind] = Kind) -> None:
         """Have every later diagnostic of some kinds passed to `subscriber`."""
         for kind in kinds:
             self._subscribers[kind].append(subscriber)

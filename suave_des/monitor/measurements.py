@@ -1,6 +1,6 @@
 """What monitors measure, as tables: a whole mission's messages at once, ahead of time.
 
-Who looks a value up reads the table; a monitor publishes it only when somebody subscribes (see `monitors`).
+To look a value up is to read the table; a monitor publishes it only when somebody subscribes (see `monitors`).
 """
 
 import math
@@ -8,28 +8,24 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from suave_des.clock import tick_at_or_after
+from suave_des.compiling import Array, Ticks
 from suave_des.world.signals import Signal
 
-Array = NDArray[np.float64]
 Thresholds = tuple[float, ...]
-"""Numbers, ascending, that cut the line into regions.
-
-Region 0 is below the first threshold, 1 is the threshold itself, 2 lies between it and the next, and so on; -1 stands
-for no value.
+"""Numbers, ascending, that divide the values into regions: 0 lies below the first threshold, 1 is the threshold itself,
+2 lies between it and the next, and so on; -1 stands for no value.
 """
-
-
 Crossings = tuple[list[float], list[int]]
-"""The times at which a measured value comes into another region, and the regions' numbers."""
+"""The times at which a measured value enters another region, and the regions' numbers."""
 
 
 def region_of(value: float, thresholds: Thresholds) -> int:
-    """Number of a value's region, see `Thresholds`."""
+    """Number of a value's region."""
     return bisect_left(thresholds, value) + bisect_right(thresholds, value)
 
 
@@ -37,8 +33,7 @@ def region_of(value: float, thresholds: Thresholds) -> int:
 class Measurements:
     """What a signal's monitor measures in a run: the times at which the published value changes, and the values.
 
-    A monitor that repeats an unchanged value reports nothing new, so only values that differ from the one before are
-    kept; they keep the times that the monitor's period gives them.
+    A monitor that repeats an unchanged value reports nothing new: only values that differ from the one before are kept.
     """
 
     key: str
@@ -47,7 +42,7 @@ class Measurements:
     phase_s: float
     period_s: float
     arrays: tuple[Array, Array] = field(repr=False, compare=False)
-    """Times and values once more, for whoever looks at all of them at once."""
+    """Times and values once more, for computing with all of them at once."""
     _crossings: dict[Thresholds, Crossings] = field(default_factory=dict, repr=False, compare=False)
 
     def published(self, t_s: float) -> int:
@@ -85,7 +80,7 @@ class Publishing:
     Attributes:
         period_s: time from message to message.
         phase_s: time of the first message.
-        time_step_s: the signal is looked at at mission time cut to multiples of this; 0: at mission time.
+        time_step_s: the signal is read at mission time rounded down to multiples of this; 0: at mission time.
     """
 
     period_s: float
@@ -96,42 +91,33 @@ class Publishing:
 def measure(
     key: str, signal: Signal, duration_s: float, publishing: Publishing, noise: Callable[[], float] | None = None
 ) -> Measurements:
-    """Measure a signal over a mission.
-
-    Args:
-        key: the quality attribute.
-        signal: the signal.
-        duration_s: how long to measure.
-        publishing: when.
-        noise: draws the error of one measurement; none if measurements are exact.
-    """
+    """Measure a signal, a quality attribute named `key`, over a mission; `noise` draws the error of one measurement."""
     period_s, phase_s = publishing.period_s, publishing.phase_s
     messages = max(0, math.floor((duration_s - phase_s) / period_s)) + 1
     times: Array = phase_s + period_s * np.arange(messages, dtype=np.float64)
-    looks = times
+    read_at = times
     if (step_s := publishing.time_step_s) > 0.0:
         # A time within a millionth of a step below a multiple counts as it: timers add up rounding errors.
-        looks = np.floor(times / step_s + 1e-6) * step_s
-    values = _looked_up(signal, looks.tobytes())
-    places = _changes(values.tobytes())
+        read_at = np.floor(times / step_s + 1e-6) * step_s
+    values = _values_at(signal, read_at.tobytes())
     if noise is not None:
         values = values + np.array([noise() for _ in range(len(times))])
-        places = _changes(values.tobytes())
+    places = _changes(values.tobytes())
     times, values = times[places], values[places]
     return Measurements(key, tuple(times.tolist()), tuple(values.tolist()), phase_s, period_s, (times, values))
 
 
-# Cached by the arrays' bytes (float64): without noise, a signal that is looked at in time steps repeats in each run.
+# Cached by the arrays' bytes (float64): without noise, a signal that is read in time steps is the same in each run.
 
 
 @lru_cache(maxsize=16)
-def _looked_up(signal: Signal, times_s: bytes) -> Array:
+def _values_at(signal: Signal, times_s: bytes) -> Array:
     times, first = np.frombuffer(times_s), _changes(times_s)
     return np.repeat([signal(t_s) for t_s in times[first].tolist()], np.diff(first, append=len(times)))
 
 
 @lru_cache(maxsize=64)
-def _changes(values: bytes) -> NDArray[np.int64]:
+def _changes(values: bytes) -> Ticks:
     """Places of the values that differ from the one before; the first one does."""
     return np.flatnonzero(np.diff(np.frombuffer(values), prepend=np.nan))
 
@@ -145,43 +131,43 @@ def _crossing_places(values: bytes, thresholds: Thresholds) -> tuple[list[int], 
     return places.tolist(), regions[places].tolist()
 
 
+@dataclass(eq=False)
 class BatteryLevel:
     """The battery's level, which falls linearly from 1 and is back at 1 at once at the recharge station.
 
-    It is worked out when it is asked for, from where the vehicle was at each message.
+    It is computed on demand, from where the vehicle was at each message.
 
-    Args:
+    Attributes:
         is_at_station: whether the vehicle is at the station at a mission time.
         discharge_time_s: time from full to empty.
         publishing: when it is measured.
     """
 
-    key = "battery_level"
+    key: ClassVar[str] = "battery_level"
+    is_at_station: Callable[[float], bool]
+    discharge_time_s: float
+    publishing: Publishing
+    times_s: list[float] = field(default_factory=list, init=False)
+    values: list[float] = field(default_factory=list, init=False)
+    _full_at_s: float = field(default=0.0, init=False)
 
-    def __init__(self, is_at_station: Callable[[float], bool], discharge_time_s: float, publishing: Publishing) -> None:
-        self._is_at_station = is_at_station
-        self._discharge_time_s = discharge_time_s
-        self.phase_s, self.period_s = publishing.phase_s, publishing.period_s
-        self._next_s = self.phase_s
-        self._full_at_s = 0.0
-        self.times_s: list[float] = []
-        self.values: list[float] = []
+    def __post_init__(self) -> None:
+        self._next_s = self.publishing.phase_s
 
     def published(self, t_s: float) -> int:
         """How many values are published until mission time t, which must not lie in the future."""
         while self._next_s <= t_s:
-            if self._is_at_station(self._next_s):
+            if self.is_at_station(self._next_s):
                 self._full_at_s = self._next_s
             self.times_s.append(self._next_s)
-            self.values.append(max(0.0, 1.0 - (self._next_s - self._full_at_s) / self._discharge_time_s))
-            self._next_s += self.period_s
+            self.values.append(max(0.0, 1.0 - (self._next_s - self._full_at_s) / self.discharge_time_s))
+            self._next_s += self.publishing.period_s
         return bisect_right(self.times_s, t_s)
 
     def region(self, t_s: float, thresholds: Thresholds) -> int:
         """Region of the level that was published last at mission time t."""
-        if not (published := self.published(t_s)):
-            return -1
-        return region_of(self.values[published - 1], thresholds)
+        published = self.published(t_s)
+        return region_of(self.values[published - 1], thresholds) if published else -1
 
     def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
         """Time of the first level after t, which is now: what it will be depends on where the vehicle goes."""

@@ -1,4 +1,4 @@
-"""Monitors: they watch signals, thrusters and battery, and publish diagnostics (facts: kas-lab/suave)."""
+"""Monitors: processes that watch signals, thrusters and battery, and publish diagnostics (facts: kas-lab/suave)."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -19,11 +19,11 @@ def signal_monitor(env: simpy.Environment, bus: DiagnosticsBus, measurements: Me
 
 def battery_monitor(env: simpy.Environment, bus: DiagnosticsBus, level: BatteryLevel) -> Process:
     """Publish the battery's level, once a period."""
-    yield until(env, level.phase_s)
+    yield until(env, level.publishing.phase_s)
     while True:
         newest = level.published(env.now) - 1
         bus.publish(Diagnostic(env.now, Kind.QA_STATUS, level.key, level.values[newest]))
-        yield env.timeout(level.period_s)
+        yield env.timeout(level.publishing.period_s)
 
 
 class ThrusterFault(NamedTuple):
@@ -43,19 +43,18 @@ def thruster_monitor(
     after_previous: bool,
     period_s: float = 1.0,
 ) -> Process:
-    """Bring about the scheduled faults, and publish them.
+    """Inject the scheduled faults, and publish them.
 
-    Once a period the monitor looks at the first fault of the list that has not happened yet: so several that are due
+    Once a period the monitor checks the first fault of the list that has not happened yet: so several that are due
     come one period apart, in list order, and a later one waits for the one before it.
 
     Args:
-        env: the mission's clock.
-        bus: where to publish.
-        faults: the schedule, in list order.
+        env, bus: the mission's clock, and where to publish.
+        faults: the schedule.
         set_health: called with a thruster's number and 0 (lost) or 1 (works).
-        phase_s: time of the monitor's first look.
+        phase_s: time of the first check.
         after_previous: whether each time counts from the fault before it (rev 2023) or from the start (rev 1.5).
-        period_s: time between looks.
+        period_s: time between checks.
     """
     counted_from, earliest = 0.0, 0.0
     for fault in faults:

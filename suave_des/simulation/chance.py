@@ -2,23 +2,12 @@
 
 from collections.abc import Callable, Mapping
 from operator import attrgetter
-from types import MappingProxyType
-from typing import Final
 
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.quantities import Distribution, draw
-from suave_des.scenario.signal_kinds import (
-    ConstantSignal,
-    Signal,
-    SignalTable,
-    SinusoidSignal,
-    StepSignal,
-    TableSignal,
-)
+from suave_des.scenario.signal_kinds import ConstantSignal, Signal, SignalTable, SinusoidSignal, StepSignal, TableSignal
 from suave_des.streams import Streams
 from suave_des.world import signals
-
-NONE_SHARED: Final[Mapping[str, int]] = MappingProxyType({})
 
 
 class Chance(Streams):
@@ -34,7 +23,7 @@ class Chance(Streams):
         drawn: values that hold for the whole run, by key path.
     """
 
-    def __init__(self, scenario: Scenario, seed: int, run: int, runs_per_draw: Mapping[str, int] = NONE_SHARED) -> None:
+    def __init__(self, scenario: Scenario, seed: int, run: int, runs_per_draw: Mapping[str, int]) -> None:
         super().__init__(seed, run)
         self._scenario, self._seed, self._run, self._runs_per_draw = scenario, seed, run, runs_per_draw
         self.drawn: dict[str, float] = {}
@@ -65,13 +54,7 @@ class Chance(Streams):
         return self.stream(f"phase/{timer}").random() * period_s
 
     def signal(self, name: str, description: Signal, tables: Mapping[str, SignalTable]) -> signals.Signal:
-        """The run's signal from its description in the scenario.
-
-        Args:
-            name: the signal's name in the scenario.
-            description: the scenario's entry.
-            tables: contents of the CSV files of table signals, by signal name.
-        """
+        """The run's signal from its entry in the scenario; `tables` has the contents of CSV files, by signal name."""
         match description:
             case SinusoidSignal():
                 shift_s = self.draw(f"signals.{name}.shift_s", description.shift_s)

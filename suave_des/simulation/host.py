@@ -1,6 +1,7 @@
 """Hosts a managing subsystem in a mission: calls its hooks; what it raises fails its mission, and nothing else."""
 
 from collections.abc import Callable, Generator
+from dataclasses import dataclass, field
 from math import inf
 from typing import Any, TypeVar
 
@@ -14,65 +15,69 @@ from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus
 from suave_des.registry import manager_class
 
 RAISED = (Exception, SystemExit)
-"""What a manager may raise: one that calls sys.exit must not end a campaign, or a mission as if all were well."""
+"""What a manager may raise: one that calls sys.exit must end neither a campaign nor, without an error, its mission."""
 
 _T = TypeVar("_T")
 
 
+@dataclass(eq=False)
 class ManagerHost:
     """Makes a manager and calls its hooks.
 
-    An event-triggered manager (see `ManagingSubsystem`) is not called at each of its times: a call that would find
-    what an earlier one found, and changed nothing then, is left out.
+    An event-triggered manager (see `ManagingSubsystem`) is not called at each of its times: a call in a state in which
+    an earlier one changed nothing is left out.
 
-    Args:
+    Attributes:
         name: the manager's name, or module:Class.
         run: number of the run, for errors.
         system: the manager's view of the managed subsystem.
         bus: where the diagnostics come from that the manager subscribes to.
         skips_idle_calls: whether calls are left out at all.
+        manager: the manager.
 
     Raises:
         MissionError: the manager raised; here, or in any hook later.
         InputError: there is no such manager, or it cannot work with the mission's input.
     """
 
-    def __init__(
-        self, name: str, run: int, system: ManagedSystem, bus: DiagnosticsBus, *, skips_idle_calls: bool
-    ) -> None:
-        self._name, self._run = name, run
-        self._env = system.env
-        self._modes = system.modes
-        self._is_waiting = False  # for an event
-        self._idle_regions: set[tuple[int, ...]] = set()  # of measured values, where a call has changed nothing so far
-        kind = manager_class(name)
+    name: str
+    run: int
+    system: ManagedSystem
+    bus: DiagnosticsBus
+    skips_idle_calls: bool
+    manager: ManagingSubsystem = field(init=False)
+    _is_waiting: bool = False  # for an event
+    _idle_regions: set[tuple[int, ...]] = field(default_factory=set)  # of measured values: there, calls change nothing
+
+    def __post_init__(self) -> None:
+        kind = manager_class(self.name)
         try:
-            self.manager = kind(system)
+            self.manager = kind(self.system)
             own = "depends_on" in vars(kind)  # a derived class may depend on more
-            thresholds = self.manager.depends_on if own and skips_idle_calls else None
+            thresholds = self.manager.depends_on if own and self.skips_idle_calls else None
         except InputError:
             raise  # such as an ontology that cannot be used: it concerns every mission
         except RAISED as error:
             raise self.mission_error(error) from error
         self._is_event_triggered = thresholds is not None
         edges = thresholds or {}
-        self._depends_on = [(each, edges[name]) for name, each in system.measurements.items() if name in edges]
+        self._depends_on = [(each, edges[name]) for name, each in self.system.measurements.items() if name in edges]
         if kind.diagnostic is not ManagingSubsystem.diagnostic:
-            bus.subscribe(self._diagnostic, kind.subscribes_to)
+            self.bus.subscribe(self._diagnostic, kind.subscribes_to)
         period_s = self.manager.period_s
         if period_s is not None:
             if not period_s > 0.0:
                 raise self.mission_error(ValueError(f"period_s is {period_s}; it must be above 0, or None"))
-            self._process = self._env.process(self._adapt_periodically(period_s))
+            self._process = self.system.env.process(self._adapt_periodically(period_s))
 
     def request(self, task: Task) -> None:
-        """Tell the manager of a task that begins."""
+        """Pass on to the manager a task that begins."""
         self._guarded(self.manager.task_requested, task)
         self.state_changed()
 
     def cancel(self, task: Task) -> None:
-        """Tell the manager of a task that is over."""
-        self._modes.task_over(task.functions)
+        """Pass on to the manager a task that is over."""
+        self.system.modes.task_over(task.functions)
         self._guarded(self.manager.task_cancelled, task)
         self.state_changed()
 
@@ -84,26 +89,26 @@ class ManagerHost:
             self._process.interrupt()
 
     def mission_error(self, error: BaseException) -> SuaveDesError:
-        """What a manager raised, as the error that ends its mission."""
+        """Turn what a manager raised into the error that ends its mission."""
         if isinstance(error, MissionError):
             return error
         cause = str(error) if isinstance(error, SuaveDesError) else f"{type(error).__name__}: {error}"
-        return MissionError(self._name, self._run, float(self._env.now), cause)
+        return MissionError(self.name, self.run, self.system.now_s, cause)
 
     def _diagnostic(self, diagnostic: Diagnostic) -> None:
         self._guarded(self.manager.diagnostic, diagnostic)
         self.state_changed()
 
     def _adapt_periodically(self, period_s: float) -> Process:
-        env = self._env
+        env, modes = self.system.env, self.system.modes
         yield until(env, self.manager.starts_s)
         due_s = env.now
         while True:
-            requests = self._modes.requests
+            requests = modes.requests
             adaptation = self._guarded(self.manager.adapt)
             if adaptation is not None:
                 yield from self._guarded_steps(adaptation)
-            if adaptation is not None or self._modes.requests > requests:
+            if adaptation is not None or modes.requests > requests:
                 self._idle_regions.clear()
             while due_s <= env.now:
                 due_s += period_s
@@ -114,14 +119,13 @@ class ManagerHost:
 
     def _wait_for_event(self, due_s: float, period_s: float) -> Generator[simpy.Event, Any, float]:
         """Wait until the first time of `adapt`, from `due_s` on, at which a call may change something; return it."""
-        env = self._env
+        env = self.system.env
         self._is_waiting = True
         try:
             while True:
                 self._idle_regions.add(self._regions())
                 crossings_s = [each.next_crossing_s(env.now, edges) for each, edges in self._depends_on]
-                event_s = min(crossings_s, default=inf)
-                if event_s == inf:
+                if (event_s := min(crossings_s, default=inf)) == inf:
                     yield env.event()  # until interrupted
                 tick_s = _tick_at_or_after(event_s, due_s, period_s)
                 if tick_s > 2.0 * env.now:
@@ -137,7 +141,8 @@ class ManagerHost:
             return tick_s
 
     def _regions(self) -> tuple[int, ...]:
-        return tuple([measured.region(self._env.now, edges) for measured, edges in self._depends_on])
+        now_s = self.system.env.now
+        return tuple([measured.region(now_s, edges) for measured, edges in self._depends_on])
 
     def _guarded_steps(self, adaptation: AdaptationProcess) -> Process:
         value = None

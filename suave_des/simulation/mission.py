@@ -5,7 +5,7 @@ from functools import partial
 
 import simpy
 
-from suave_des.domain import FOLLOW_PIPELINE, GENERATE_RECHARGE_PATH, GENERATE_SEARCH_PATH, MAINTAIN_MOTION
+from suave_des import domain
 from suave_des.errors import SuaveDesError
 from suave_des.managed.coordinator import MissionCoordinator, MissionTiming
 from suave_des.managed.detection import PipelineDetector, measured_at_rows
@@ -31,7 +31,6 @@ from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.frames import Pose
 from suave_des.vehicle.guidance import SetPointSender
 from suave_des.vehicle.vehicle import Vehicle
-from suave_des.world.pipeline import SEA_BED_Z_M, SURFACE_Z_M
 
 
 class Mission:
@@ -54,10 +53,8 @@ class Mission:
         self._visibility = self._signals["water_visibility"]
         self._battery = None if self._scenario.battery is None else self._make_battery(self._scenario.battery)
         measured_at_rows(*self._visibility.arrays, memory.visibility_m)
-        self._detector = PipelineDetector(
-            self.env, self._vehicle, memory.visibility_m, simulator.detection_points, self._recorder.log
-        )
-
+        points, log = simulator.detection_points, self._recorder.log
+        self._detector = PipelineDetector(self.env, self._vehicle, memory.visibility_m, points, log)
         nodes = self._make_functions()
         latency_s = self._chance.sampler("latencies.mode_change_s", self._scenario.latencies.mode_change_s)
         self._modes = ModeManager(self.env, simulator.loaded.modes, nodes, latency_s, self._recorder.log)
@@ -129,7 +126,7 @@ class Mission:
             self._simulator.duration_s,
             current_m_per_s=(value("current.x_m_per_s"), value("current.y_m_per_s"), value("current.z_m_per_s")),
             time_scale=1.0 / (1.0 + value("calibration.real_time_factor_loss")),
-            z_limits_m=(SEA_BED_Z_M, SURFACE_Z_M),
+            z_limits_m=(domain.SEA_BED_Z_M, domain.SURFACE_Z_M),
             memory=memory.track,
         )
 
@@ -176,13 +173,13 @@ class Mission:
     def _make_functions(self) -> dict[str, FunctionNode]:
         env, revision, chance = self.env, self._revision, self._chance
         loss_probability = chance.value("revision.set_points.loss_probability")
-        follow, search, recharge = FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, GENERATE_RECHARGE_PATH
+        follow, search, recharge = domain.FOLLOW_PIPELINE, domain.GENERATE_SEARCH_PATH, domain.GENERATE_RECHARGE_PATH
         make_sender = partial(self._make_sender, loss_probability)
         phase_s, ready_s = chance.phase(search, 1.0), chance.value("latencies.guided_start_s")
         self._follow = FollowPipeline(env, make_sender(follow), revision.follow, self._path)
         restore = partial(self._set_thruster_health, health=1.0)
         nodes: dict[str, FunctionNode] = {
-            MAINTAIN_MOTION: MaintainMotion(env, self._bus, revision.recovery, restore),
+            domain.MAINTAIN_MOTION: MaintainMotion(env, self._bus, revision.recovery, restore),
             search: GenerateSearchPath(env, make_sender(search), revision.spiral, self._origin_m, phase_s, ready_s),
             follow: self._follow,
         }

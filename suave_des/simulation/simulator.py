@@ -11,11 +11,11 @@ import numpy as np
 import simpy
 
 from suave_des.clock import Process
+from suave_des.compiling import Array
 from suave_des.managed.follow import InspectionPath
 from suave_des.metrics.result import MissionResult
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.vehicle.kernel import ROW
-from suave_des.vehicle.model import Array
 from suave_des.vehicle.vehicle import track_rows
 from suave_des.world.pipeline import sample_points, there_and_back
 
@@ -26,7 +26,7 @@ OnTime = Callable[[float, float], None]
 
 
 class MissionMemory(NamedTuple):
-    """What a mission fills row by row, kept for the next one: allocated for each, it leaves memory in pieces."""
+    """What a mission fills row by row, kept for the next one: to allocate it for each would fragment memory."""
 
     track: Array
     visibility_m: Array
@@ -49,11 +49,9 @@ class Simulator:
         self.loaded = loaded
         self.runs_per_draw = dict(runs_per_draw)
         scenario = loaded.scenario
-        pipeline = scenario.pipeline
-        self.points = sample_points(pipeline.vertices_m, pipeline.points_per_piece)
+        self.points = sample_points(scenario.pipeline.vertices_m, scenario.pipeline.points_per_piece)
         self.path = InspectionPath.along(there_and_back(self.points))
-        height = scenario.revision.monitors.detected_point_height_m
-        self.detection_points = self.points + np.array([0.0, 0.0, height])
+        self.detection_points = self.points + np.array([0.0, 0.0, scenario.revision.monitors.detected_point_height_m])
         self.duration_s = scenario.mission.time_limit_s + scenario.revision.coordinator.limit_check_period_s
         self._spare_memory: list[MissionMemory] = []
 
@@ -82,7 +80,10 @@ class Simulator:
         """
         from suave_des.simulation.mission import Mission
 
-        memory = self._spare_memory.pop() if self._spare_memory else self._make_memory()
+        rows = track_rows(self.duration_s)
+        memory = (
+            self._spare_memory.pop() if self._spare_memory else MissionMemory(np.empty((rows, ROW)), np.empty(rows))
+        )
         try:
             mission = Mission(self, manager, run, seed, memory, record=record)
             if on_time is not None:
@@ -90,10 +91,6 @@ class Simulator:
             return mission.result()
         finally:
             self._spare_memory.append(memory)
-
-    def _make_memory(self) -> MissionMemory:
-        rows = track_rows(self.duration_s)
-        return MissionMemory(np.empty((rows, ROW)), np.empty(rows))
 
 
 def _report_time(env: simpy.Environment, on_time: OnTime, limit_s: float) -> Process:

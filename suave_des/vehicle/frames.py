@@ -3,7 +3,7 @@
 from math import asin, atan2, cos, sin
 from typing import NamedTuple
 
-from suave_des.vehicle.model import Array
+from suave_des.compiling import Array
 
 
 class Pose(NamedTuple):

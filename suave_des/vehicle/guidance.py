@@ -1,22 +1,21 @@
 """Guidance: flies a function's way-points one after the other, without an event for each.
 
 The exemplar's functions check at every tick of a timer whether their way-point is reached; then they send the next one.
-Nothing else changes between most ticks, so guidance looks ahead: it queues the next way-points, knows the tick at which
-each will be reached, and sets an alarm for the tick at which the function has to act. When the vehicle's control
-changes before, it catches up with the ticks until then and plans the rest anew.
+Nothing else changes at most ticks, so guidance looks ahead: it queues the next way-points, knows the tick at which each
+will be reached, and sets an alarm for the tick at which the function has to act. When the vehicle's control changes
+earlier, it counts the ticks until then, and plans again from there.
 """
 
 import random
 from bisect import bisect_right
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, Protocol
 
-from suave_des.vehicle.model import Array
+from suave_des.compiling import Array
 from suave_des.vehicle.vehicle import ArrivalCheck, Vehicle
 
-QUEUED_WAYPOINTS: Final = 20
-"""Way-points that are queued at a time, besides the present one."""
+QUEUED_WAYPOINTS: Final = 20  # at a time, besides the present one
 
 
 class Alarm(Protocol):
@@ -33,22 +32,24 @@ class WaypointSource(Protocol):
     """What guidance asks of a function that generates way-points."""
 
     def tick(self) -> None:
-        """Take in a tick of the timer at which guidance acts; called before anything else then."""
+        """Take note of a tick of the timer; called before anything else when guidance acts. By default: nothing."""
+        return
 
     def waypoints(self, count: int) -> Array:
-        """The present way-point and those that will follow it: x, y, z in the first three columns, shape (n, >= 3).
+        """At most `count` way-points from the present one on: x, y, z in the first three columns, shape (n, >= 3).
 
-        At most `count`; none when the last one has been reached.
+        None is left when the last one has been reached.
         """
 
     def set_point_z_m(self) -> float:
         """The z to send, which need not be the way-point's."""
 
     def reached(self, count: int) -> None:
-        """Go on by so many way-points: the present one, and those after it, have been reached."""
+        """Go on by `count` way-points: the present one, and those after it, have been reached."""
 
     def not_reached(self, x_y_reached: bool) -> None:
-        """React to a way-point that was not reached in time; it will be sent again."""
+        """React to a way-point that was not reached in time, and will be sent again. By default: nothing."""
+        return
 
 
 @dataclass(eq=False)
@@ -58,9 +59,8 @@ class SetPointSender:
     Attributes:
         vehicle: whose autopilot gets the set-points.
         now_s: gives the mission time.
-        frame_error_m: steady error of the node's frame in x, y and z: where the vehicle ends up in the simulator, less
-            where the node sent it.
-        loss_probability: chance that a message is lost.
+        frame_error_m: steady error of the node's frame in x, y and z: where the vehicle arrives less where it was sent.
+        loss_probability: probability that a message is lost.
         stream: decides which; not needed if none can be.
     """
 
@@ -79,58 +79,50 @@ class SetPointSender:
     def queue(
         self, waypoints: Array, z_m: float, check: ArrivalCheck, *, first: int, last: int, send: bool
     ) -> tuple[list[int], int]:
-        """Queue set-points, see `Vehicle.queue_waypoints`; where messages can be lost, none is queued."""
+        """Send and queue set-points, see `Vehicle.queue_waypoints`; where messages can be lost, none is queued."""
         if self.stream is not None and self.loss_probability > 0.0:
             waypoints = waypoints[:1]
             send = send and not self._is_lost()
-        x_m, y_m, z_error_m = self.frame_error_m
-        sent_as_m = x_m, y_m, z_m + z_error_m
-        return self.vehicle.queue_waypoints(
-            self.now_s(), waypoints, sent_as_m, check, first=first, last=last, send=send
-        )
+        sent_as_m = *self.frame_error_m[:2], z_m + self.frame_error_m[2]
+        now_s = self.now_s()
+        return self.vehicle.queue_waypoints(now_s, waypoints, sent_as_m, check, first=first, last=last, send=send)
 
     def _is_lost(self) -> bool:
         return self.stream is not None and self.stream.random() < self.loss_probability
 
 
+@dataclass(eq=False)
 class Guidance:
     """Flies the way-points of one function.
 
-    Args:
+    Attributes:
         sender: the connection to the autopilot.
         source: the function.
         make_alarm: makes an alarm that calls a function.
-        check: makes the arrival check whose tick 0 is at a mission time.
+        make_check: makes the arrival check whose tick 0 is at a mission time.
     """
 
-    def __init__(
-        self,
-        sender: SetPointSender,
-        source: WaypointSource,
-        make_alarm: Callable[[Callable[[], None]], Alarm],
-        check: Callable[[float], ArrivalCheck],
-    ) -> None:
-        self._sender = sender
-        self._vehicle = sender.vehicle
-        self._source = source
-        self._make_check = check
-        self._alarm = make_alarm(self._act)
-        self._replanning = make_alarm(self._replan)
-        self._check: ArrivalCheck | None = None  # none before the first tick and after the last
-        self._sent = 0  # tick at which the present way-point was sent last
-        self._arrivals: list[int] = []  # ticks that will find the planned way-points reached
-        self._act_at = 0  # tick of the alarm
-        self._is_planned = False  # until that tick
-        self._is_due = False  # whether a way-point is to be sent then
-        self._is_acting = False
-        self._vehicle.control_listeners.append(self._control_changed)
+    sender: SetPointSender
+    source: WaypointSource
+    make_alarm: Callable[[Callable[[], None]], Alarm]
+    make_check: Callable[[float], ArrivalCheck]
+    _check: ArrivalCheck | None = None  # none before the first tick and after the last
+    _sent: int = 0  # tick at which the present way-point was sent last
+    _arrivals: list[int] = field(default_factory=list)  # ticks that will find the planned way-points reached
+    _act_at: int = 0  # tick of the alarm
+    _is_planned: bool = False  # until that tick
+    _is_due: bool = False  # whether a way-point is to be sent then
+    _is_acting: bool = False
+
+    def __post_init__(self) -> None:
+        self._alarm = self.make_alarm(self._act)
+        self._replanning = self.make_alarm(self._replan)
+        self.sender.vehicle.control_listeners.append(self._control_changed)
 
     def start_at(self, t_s: float, *, waited_ticks: int | None = None) -> None:
         """Tick from mission time t on.
 
-        Args:
-            t_s: time of the first tick.
-            waited_ticks: for how many ticks the present way-point has been waited for; none: it is to be sent.
+        `waited_ticks` have passed since the present way-point was sent; none: it is to be sent.
         """
         self._is_due = waited_ticks is None
         self._sent = -1 - (waited_ticks or 0)
@@ -141,7 +133,7 @@ class Guidance:
             self._alarm.set(t_s)
 
     def stop(self) -> int:
-        """Stop ticking, and cancel what is queued; return for how many ticks the present way-point was waited for."""
+        """Stop ticking, and cancel what is queued; return the ticks since the present way-point was sent."""
         self._alarm.cancel()
         self._replanning.cancel()
         check = self._check
@@ -149,7 +141,7 @@ class Guidance:
             return -1 - self._sent
         self.catch_up()
         self._check = None
-        self._vehicle.cancel_waypoints(self._alarm.now_s, check)
+        self.sender.vehicle.cancel_waypoints(self._alarm.now_s, check)
         return self._last_tick(check) - self._sent
 
     def catch_up(self) -> None:
@@ -158,11 +150,11 @@ class Guidance:
             self._count_arrivals(self._last_tick(self._check))
 
     def way_changed(self) -> None:
-        """Plan anew at the next tick: the function has other way-points now (call `catch_up` before it has)."""
+        """Plan again at the next tick: the function's way-points have changed (call `catch_up` before they do)."""
         check = self._check
         if check is not None and self._act_at > (tick := self._last_tick(check)):
             self._is_acting = True
-            self._vehicle.cancel_waypoints(self._alarm.now_s, check)
+            self.sender.vehicle.cancel_waypoints(self._alarm.now_s, check)
             self._is_acting = False
             self._replanning.cancel()
             self._arrivals, self._is_planned, self._is_due = [], False, False
@@ -170,13 +162,13 @@ class Guidance:
 
     def _act(self) -> None:
         """Do what is due at this tick; plan until the next one at which there is something to do."""
-        check = self._check = self._check or self._make_check(self._alarm.now_s)
+        check = self._check = self._check or self.make_check(self._alarm.now_s)
         tick = self._act_at
         self._count_arrivals(tick)
-        self._source.tick()
+        self.source.tick()
         while self._check is not None and self._act_at == tick:
             if self._is_planned and not self._is_due:
-                self._source.not_reached(self._are_x_and_y_reached(check))
+                self.source.not_reached(self._are_x_and_y_reached(check))
                 self._is_due = True
             if self._is_due:
                 self._sent = tick
@@ -184,13 +176,13 @@ class Guidance:
 
     def _plan(self, check: ArrivalCheck, tick: int, first: int) -> None:
         """Send the present way-point, if that is due, and look ahead from a tick on."""
-        waypoints = self._source.waypoints(1 + QUEUED_WAYPOINTS)
+        waypoints = self.source.waypoints(1 + QUEUED_WAYPOINTS)
         if len(waypoints) == 0:
             self._check = None
             return
-        last, z_m = self._sent + check.most_ticks, self._source.set_point_z_m()
+        last, z_m = self._sent + check.most_ticks, self.source.set_point_z_m()
         self._is_acting = True
-        self._arrivals, act_at = self._sender.queue(waypoints, z_m, check, first=first, last=last, send=self._is_due)
+        self._arrivals, act_at = self.sender.queue(waypoints, z_m, check, first=first, last=last, send=self._is_due)
         self._is_acting = False
         self._is_planned = True
         self._is_due = self._arrivals[-1:] == [act_at]
@@ -216,7 +208,7 @@ class Guidance:
         if reached:
             self._sent = self._arrivals[reached - 1]
             del self._arrivals[:reached]
-            self._source.reached(reached)
+            self.source.reached(reached)
 
     def _last_tick(self, check: ArrivalCheck) -> int:
         return check.last_tick_until(self._alarm.now_s)
@@ -226,6 +218,6 @@ class Guidance:
         self._alarm.set(check.time_s(tick))
 
     def _are_x_and_y_reached(self, check: ArrivalCheck) -> bool:
-        x_m, y_m, _ = self._vehicle.position(self._alarm.now_s)
-        present = self._source.waypoints(1)
+        x_m, y_m, _ = self.sender.vehicle.position(self._alarm.now_s)
+        present = self.source.waypoints(1)
         return max(abs(x_m - present.item(0, 0)), abs(y_m - present.item(0, 1))) <= check.half_width_m

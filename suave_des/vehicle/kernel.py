@@ -15,52 +15,40 @@ import math
 
 import numpy as np
 
-from suave_des.compiling import compiled
-from suave_des.vehicle.model import Array, Ticks
+from suave_des.compiling import Array, Ticks, compiled
 
 ROW = 17
 POSITION, ATTITUDE, VELOCITY, INTEGRAL = slice(0, 3), slice(3, 7), slice(7, 13), slice(13, 17)
 
-# Places in the parameter vector.
-MASS, IXX, IYY, IZZ, NET_BUOYANCY, RIGHTING = 0, 1, 2, 3, 4, 5
-DRAG = 6  # six places
-THRUST_LIMIT = 12
-POSITION_GAIN, SPEED_LIMIT_XY, SPEED_LIMIT_Z = 13, 14, 15
-VELOCITY_GAIN, VELOCITY_INTEGRAL_GAIN, INTEGRAL_LIMIT = 16, 17, 18
-ATTITUDE_GAIN, RATE_GAIN, HEADING_INTEGRAL_GAIN, HEADING_INTEGRAL_LIMIT = 19, 20, 21, 22
-CURRENT = 23  # three places, world frame
-FLOOR, CEILING = 26, 27  # z between which the water is, world frame
-ALTITUDE_DEADBAND = 28
-# To multiply takes a fraction of the time of a division.
-INVERSE_MASS, INVERSE_IXX, INVERSE_IYY, INVERSE_IZZ = 29, 30, 31, 32
-DRAG_RATE = 33  # six places: drag by mass or moment of inertia
-PARAMETERS = 39
+# Places in the parameter vector, see `autopilot.kernel_parameters`. Drag takes six, the current three.
+MASS, IXX, IYY, IZZ, NET_BUOYANCY, RIGHTING, DRAG = range(7)
+THRUST_LIMIT, POSITION_GAIN, SPEED_LIMIT_XY, SPEED_LIMIT_Z, ALTITUDE_DEADBAND = range(12, 17)
+VELOCITY_GAIN, VELOCITY_INTEGRAL_GAIN, INTEGRAL_LIMIT = range(17, 20)
+ATTITUDE_GAIN, RATE_GAIN, HEADING_INTEGRAL_GAIN, HEADING_INTEGRAL_LIMIT = range(20, 24)
+CURRENT, FLOOR, CEILING = 24, 27, 28
+
+Dynamics = tuple[float, Array, Array, Array, Array]
+"""What moves the vehicle, besides its state:
+
+- the time between rows, as the simulated world counts it, s;
+- set-point: x, y, z in m, and cosine and sine of half the heading, world frame, shape (5,);
+- parameters: constants in the places named above;
+- allocation: thrusts for a demanded wrench, shape (6 thrusters, 6);
+- effectiveness: wrench for thrusts, each thruster's health included, shape (6, 6 thrusters).
+"""
 
 
 @compiled
-def advance(
-    track: Array,
-    first: int,
-    last: int,
-    step_s: float,
-    set_point: Array,
-    parameters: Array,
-    allocation: Array,
-    effectiveness: Array,
-) -> None:
+def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
     """Fill rows first + 1 .. last of the track from row `first`, with one set-point and thruster health throughout.
 
     Args:
         track: shape (rows, 17), see above; written in place.
         first: row to start from.
         last: last row to fill.
-        step_s: time between rows, as the simulated world counts it.
-        set_point: x, y, z in m, and cosine and sine of half the heading, world frame, shape (5,).
-        parameters: constants in the places named above.
-        allocation: thrusts for a demanded wrench, shape (6 thrusters, 6).
-        effectiveness: wrench for thrusts, each thruster's health included, shape (6, 6 thrusters).
+        dynamics: time step, set-point and constants.
     """
-    prm = parameters
+    h, set_point, prm, allocation, effectiveness = dynamics
     mass, ixx, iyy, izz = prm[MASS], prm[IXX], prm[IYY], prm[IZZ]
     heading_w, heading_z = set_point[3], set_point[4]
     # Number by number: to unpack a slice makes an array of it, which takes as long as a step.
@@ -69,8 +57,10 @@ def advance(
     u, v, w = track[first, 7], track[first, 8], track[first, 9]
     p, q, r = track[first, 10], track[first, 11], track[first, 12]
     ix, iy, iz, ir = track[first, 13], track[first, 14], track[first, 15], track[first, 16]
-    h = step_s
-    t0 = t1 = t2 = t3 = t5 = 0.0
+    # To multiply takes a fraction of the time of a division.
+    inverse_mass, inverse_ixx, inverse_iyy, inverse_izz = 1.0 / mass, 1.0 / ixx, 1.0 / iyy, 1.0 / izz
+    drag_u, drag_v, drag_w = prm[DRAG] / mass, prm[DRAG + 1] / mass, prm[DRAG + 2] / mass
+    drag_p, drag_q, drag_r = prm[DRAG + 3] / ixx, prm[DRAG + 4] / iyy, prm[DRAG + 5] / izz
     for row in range(first + 1, last + 1):
         # Rotation matrix R, body to world (Handbook, 2.69).
         r00 = 1.0 - 2.0 * (qy * qy + qz * qz)
@@ -106,7 +96,7 @@ def advance(
         fx = mass * (prm[VELOCITY_GAIN] * ex + ix)
         fy = mass * (prm[VELOCITY_GAIN] * ey + iy)
         fz = mass * (prm[VELOCITY_GAIN] * ez + iz)
-        # Fed forward: the thrust that holds the wanted velocity in still water; the loop corrects the rest only.
+        # Fed forward: the thrust that holds the wanted velocity in still water; the loop corrects what is left.
         u_sp = r00 * vx_sp + r10 * vy_sp + r20 * vz_sp
         v_sp = r01 * vx_sp + r11 * vy_sp + r21 * vz_sp
         w_sp = r02 * vx_sp + r12 * vy_sp + r22 * vz_sp
@@ -128,13 +118,8 @@ def advance(
         t0 = t1 = t2 = t3 = t4 = t5 = 0.0
         limit = prm[THRUST_LIMIT]
         for i in range(6):
-            thrust = (
-                allocation[i, 0] * d0
-                + allocation[i, 1] * d1
-                + allocation[i, 2] * d2
-                + allocation[i, 3] * d3
-                + allocation[i, 5] * d5
-            )
+            thrust = allocation[i, 0] * d0 + allocation[i, 1] * d1 + allocation[i, 2] * d2
+            thrust = thrust + allocation[i, 3] * d3 + allocation[i, 5] * d5
             thrust = min(max(thrust, -limit), limit)
             t0 += effectiveness[0, i] * thrust
             t1 += effectiveness[1, i] * thrust
@@ -154,18 +139,18 @@ def advance(
         cu = r00 * prm[CURRENT] + r10 * prm[CURRENT + 1] + r20 * prm[CURRENT + 2]
         cv = r01 * prm[CURRENT] + r11 * prm[CURRENT + 1] + r21 * prm[CURRENT + 2]
         cw = r02 * prm[CURRENT] + r12 * prm[CURRENT + 1] + r22 * prm[CURRENT + 2]
-        au = t0 * prm[INVERSE_MASS] - (q * w - r * v)
-        av = t1 * prm[INVERSE_MASS] - (r * u - p * w)
-        aw = t2 * prm[INVERSE_MASS] - (p * v - q * u)
-        ap = (t3 - (izz - iyy) * q * r) * prm[INVERSE_IXX]
-        aq = (t4 - (ixx - izz) * r * p) * prm[INVERSE_IYY]
-        ar = (t5 - (iyy - ixx) * p * q) * prm[INVERSE_IZZ]
-        u = cu + (u + h * au - cu) / (1.0 + h * prm[DRAG_RATE] * abs(u - cu))
-        v = cv + (v + h * av - cv) / (1.0 + h * prm[DRAG_RATE + 1] * abs(v - cv))
-        w = cw + (w + h * aw - cw) / (1.0 + h * prm[DRAG_RATE + 2] * abs(w - cw))
-        p = (p + h * ap) / (1.0 + h * prm[DRAG_RATE + 3] * abs(p))
-        q = (q + h * aq) / (1.0 + h * prm[DRAG_RATE + 4] * abs(q))
-        r = (r + h * ar) / (1.0 + h * prm[DRAG_RATE + 5] * abs(r))
+        au = t0 * inverse_mass - (q * w - r * v)
+        av = t1 * inverse_mass - (r * u - p * w)
+        aw = t2 * inverse_mass - (p * v - q * u)
+        ap = (t3 - (izz - iyy) * q * r) * inverse_ixx
+        aq = (t4 - (ixx - izz) * r * p) * inverse_iyy
+        ar = (t5 - (iyy - ixx) * p * q) * inverse_izz
+        u = cu + (u + h * au - cu) / (1.0 + h * drag_u * abs(u - cu))
+        v = cv + (v + h * av - cv) / (1.0 + h * drag_v * abs(v - cv))
+        w = cw + (w + h * aw - cw) / (1.0 + h * drag_w * abs(w - cw))
+        p = (p + h * ap) / (1.0 + h * drag_p * abs(p))
+        q = (q + h * aq) / (1.0 + h * drag_q * abs(q))
+        r = (r + h * ar) / (1.0 + h * drag_r * abs(r))
 
         # Kinematics with the new velocity (semi-implicit Euler): p' = R v, q' = T_q(q) omega (Handbook, 2.86).
         x += h * (r00 * u + r01 * v + r02 * w)
@@ -202,11 +187,7 @@ def advance(
 def fly_waypoints(
     track: Array,
     computed: int,
-    step_s: float,
-    set_point: Array,
-    parameters: Array,
-    allocation: Array,
-    effectiveness: Array,
+    dynamics: Dynamics,
     waypoints: Array,
     sent_as: tuple[float, float, float],
     box: tuple[float, float],
@@ -217,9 +198,9 @@ def fly_waypoints(
     """Fly through way-points: at each tick of a timer that finds one reached, the next becomes the set-point.
 
     Args:
-        track: as for `advance`, likewise step_s, parameters, allocation and effectiveness.
+        track: as for `advance`.
         computed: last row that is filled.
-        set_point: as for `advance`; ends as the set-point that was given last.
+        dynamics: as for `advance`; its set-point ends as the one that was given last.
         waypoints: x, y and z in the first three columns, m, shape (n, at least 3). The first one's set-point is given
             already.
         sent_as: what is added to a way-point's x and y in its set-point, and the set-points' z, m.
@@ -234,13 +215,13 @@ def fly_waypoints(
     half_width, half_height = box
     began_s, period_s, grid_s = timer
     tick, last, fewest, most = window
-    reached = 0
+    set_point, reached = dynamics[1], 0
     while tick <= last:
         row = int(np.rint((began_s + tick * period_s) / grid_s))
         if row >= track.shape[0]:
             break
         if row > computed:
-            advance(track, computed, row, step_s, set_point, parameters, allocation, effectiveness)
+            advance(track, computed, row, dynamics)
             computed = row
         if (
             abs(track[row, 0] - waypoints[reached, 0]) > half_width

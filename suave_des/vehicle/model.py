@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
-Ticks = NDArray[np.int64]
+from suave_des.compiling import Array
+
 GRAVITY_M_PER_S2 = 9.80665
 
 
@@ -26,7 +26,7 @@ class Thruster:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VehicleModel:
-    """A rigid body with thrusters in water; equal to itself alone, so that what follows from it is quickly looked up.
+    """A rigid body with thrusters in water; compared by identity, which makes cached results quick to look up.
 
     Attributes:
         inertia_kg_m2: principal moments (Ixx, Iyy, Izz).
@@ -58,13 +58,8 @@ class VehicleModel:
 @cache
 def allocation_matrix(model: VehicleModel) -> Array:
     """B in tau = B u, shape (6, number of thrusters): column i is the wrench of thruster i at 1 N (Handbook, 12.3)."""
-    columns = [
-        np.concatenate([thruster.direction, np.cross(thruster.position_m, thruster.direction)])
-        for thruster in model.thrusters
-    ]
-    matrix = np.ascontiguousarray(np.array(columns, dtype=np.float64).T)
-    matrix.flags.writeable = False
-    return matrix
+    wrenches = [(*each.direction, *np.cross(each.position_m, each.direction)) for each in model.thrusters]
+    return _read_only(np.array(wrenches).T)
 
 
 @cache
@@ -74,6 +69,10 @@ def autopilot_allocation(model: VehicleModel) -> Array:
     The autopilot allocates as if every thruster worked; a wrench that no thruster can make (pitch, on a BlueROV2) gets
     none.
     """
-    matrix = np.ascontiguousarray(np.linalg.pinv(allocation_matrix(model), rcond=1e-9))
+    return _read_only(np.linalg.pinv(allocation_matrix(model), rcond=1e-9))
+
+
+def _read_only(values: ArrayLike) -> Array:
+    matrix: Array = np.ascontiguousarray(values)
     matrix.flags.writeable = False
     return matrix

@@ -3,15 +3,16 @@
 import math
 from bisect import bisect_right
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, InitVar, dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
+from suave_des.compiling import Array
 from suave_des.vehicle import kernel
 from suave_des.vehicle.autopilot import Autopilot, kernel_parameters
 from suave_des.vehicle.frames import Pose, euler_angles, quaternion
-from suave_des.vehicle.model import Array, VehicleModel, allocation_matrix, autopilot_allocation
+from suave_des.vehicle.model import VehicleModel, allocation_matrix, autopilot_allocation
 
 STEP_S = 0.05
 Point = tuple[float, float, float]
@@ -61,6 +62,7 @@ class _Queue(NamedTuple):
         return bisect_right(self.ticks, self.check.last_tick_until(t_s))
 
 
+@dataclass(eq=False)
 class Vehicle:
     """The vehicle of one mission.
 
@@ -69,7 +71,7 @@ class Vehicle:
     are first needed; a change of control drops the rows after it. So reading, however often, never changes the
     trajectory, and looking ahead under the present control costs nothing but the integration.
 
-    Args:
+    Attributes:
         model: constants of body and thrusters.
         autopilot: the guided controller.
         start: pose at t = 0, at rest; the autopilot's first set-point is this place with heading 0.
@@ -78,6 +80,8 @@ class Vehicle:
         time_scale: simulated seconds that pass in a second of mission time (the simulator's real-time factor).
         z_limits_m: sea bed and surface, which stop the vehicle.
         memory: where to keep the track, instead of memory of its own; see `track_rows`.
+        control_listeners: each is called after a change of control, with the first row that it affects.
+        computed_row: last row of the track that is filled.
 
     Example:
         >>> vehicle = Vehicle(BLUEROV2, autopilot, Pose(0, 0, -18, 0, 0, 0), duration_s=60.0)
@@ -85,51 +89,47 @@ class Vehicle:
         >>> x_m, y_m, z_m = vehicle.position(10.0)
     """
 
-    def __init__(
-        self,
-        model: VehicleModel,
-        autopilot: Autopilot,
-        start: Pose,
-        duration_s: float,
-        *,
-        current_m_per_s: Point = (0.0, 0.0, 0.0),
-        time_scale: float = 1.0,
-        z_limits_m: tuple[float, float] = (-math.inf, math.inf),
-        memory: Array | None = None,
-    ) -> None:
-        self._B = allocation_matrix(model)
-        self._allocation = autopilot_allocation(model)
-        self._health = np.array([1.0] * len(model.thrusters))
-        self._effectiveness = self._B.copy()
-        self._parameters = kernel_parameters(model, autopilot, current_m_per_s, z_limits_m)
-        self._altitude_error_m = autopilot.altitude_error_m
-        self._step_s = STEP_S * time_scale
-        rows = track_rows(duration_s)
+    model: VehicleModel
+    autopilot: Autopilot
+    start: Pose
+    duration_s: float
+    _: KW_ONLY
+    current_m_per_s: Point = (0.0, 0.0, 0.0)
+    time_scale: float = 1.0
+    z_limits_m: tuple[float, float] = (-math.inf, math.inf)
+    memory: InitVar[Array | None] = None
+    control_listeners: list[Callable[[int], None]] = field(default_factory=list, init=False)
+    computed_row: int = field(default=0, init=False)
+    _queue: _Queue | None = field(default=None, init=False)
+
+    def __post_init__(self, memory: Array | None) -> None:
+        model, start, rows = self.model, self.start, track_rows(self.duration_s)
         self.last_row = rows - 1
         self.track: Array = np.empty((rows, kernel.ROW)) if memory is None else memory
         self.track[0] = 0.0
         self.track[0, kernel.POSITION] = start[:3]
         self.track[0, kernel.ATTITUDE] = quaternion(*start[3:])
-        self.computed_row = 0
-        self._set_point = np.array([start.x_m, start.y_m, start.z_m, 1.0, 0.0])  # heading 0, see kernel.advance
-        self._queue: _Queue | None = None
-        self.control_listeners: list[Callable[[int], None]] = []
-        """Each is called with the row from which on the way is another one."""
+        self._health = np.array([1.0] * len(model.thrusters))
+        self._effectiveness = allocation_matrix(model).copy()
+        self._set_point = np.array([*start[:3], 1.0, 0.0])  # heading 0
+        parameters = kernel_parameters(model, self.autopilot, self.current_m_per_s, self.z_limits_m)
+        step_s, allocation = STEP_S * self.time_scale, autopilot_allocation(model)
+        self._dynamics = step_s, self._set_point, parameters, allocation, self._effectiveness
 
     # Control.
 
     def command(self, t_s: float, x_m: float, y_m: float, z_m: float) -> None:
         """Give the autopilot a new position set-point; it replaces the one before."""
         self._cancel_after(t_s)
-        self._set_point[:3] = x_m, y_m, z_m + self._altitude_error_m
+        self._set_point[:3] = x_m, y_m, z_m + self.autopilot.altitude_error_m
         self._notify(t_s)
 
     def set_thruster_health(self, t_s: float, thruster: int, health: float) -> None:
-        """Set the share of its thrust that thruster 1 .. n gives: 1 works, 0 is lost. The autopilot is not told."""
+        """Set the share of its thrust that thruster 1 .. n gives: 1 works, 0 is lost. The autopilot does not know."""
         if self._health[thruster - 1] != health:
             self._cancel_after(t_s)
             self._health[thruster - 1] = health
-            self._effectiveness[:] = self._B * self._health
+            self._effectiveness[:] = allocation_matrix(self.model) * self._health
             self._notify(t_s)
 
     def queue_waypoints(
@@ -137,13 +137,12 @@ class Vehicle:
     ) -> tuple[list[int], int]:
         """Look ahead, and queue set-points: at the tick that finds a way-point reached, the next one is commanded.
 
-        A change of control cancels the set-points that are still to come then. While there are such, none is queued,
-        and only the first way-point is looked at.
+        A change of control cancels the set-points that are still queued then. While there are any, none is added, and
+        only the first way-point is looked at.
 
         Args:
             t_s: mission time.
-            waypoints: where the vehicle is to come, one after the other: x, y, z in the first three columns, shape
-                (n, at least 3). What comes after the last is for the caller to command.
+            waypoints: where the vehicle is to go: x, y, z in the first three columns, m, shape (n, at least 3).
             sent_as_m: what is added to a way-point's x and y in its set-point, and the set-points' z.
             check: the ticks, and what counts as reached.
             first: first tick to look at.
@@ -151,11 +150,10 @@ class Vehicle:
             send: whether to command the first way-point's set-point now; else it is commanded already.
 
         Returns:
-            The tick at which each way-point will be found reached, as far as it will if control does not change; and
-            the tick at which the caller has to act: the last way-point is reached then, or one not in time.
+            The ticks at which way-points will be found reached if control does not change; and the tick at which the
+            caller has to act: the last way-point is reached then, or one is not reached in time.
         """
-        x_m, y_m, z_m = sent_as_m
-        sent_as_m = x_m, y_m, z_m + self._altitude_error_m
+        sent_as_m = *sent_as_m[:2], sent_as_m[2] + self.autopilot.altitude_error_m
         if send:
             self._cancel_after(t_s)
             self._take(waypoints, 0, sent_as_m)
@@ -166,7 +164,7 @@ class Vehicle:
         reached, self.computed_row = kernel.fly_waypoints(
             self.track,
             self.computed_row,
-            *self._dynamics(),
+            self._dynamics,
             waypoints,
             sent_as_m,
             (check.half_width_m, check.half_height_m),
@@ -215,11 +213,8 @@ class Vehicle:
             return
         if row > self.last_row:  # compiled code would write past the track
             raise ValueError(f"the vehicle's track ends at {self.last_row * STEP_S:g} s, before {row * STEP_S:g} s")
-        kernel.advance(self.track, self.computed_row, row, *self._dynamics())
+        kernel.advance(self.track, self.computed_row, row, self._dynamics)
         self.computed_row = row
-
-    def _dynamics(self) -> tuple[float, Array, Array, Array, Array]:
-        return self._step_s, self._set_point, self._parameters, self._allocation, self._effectiveness
 
     def _row(self, t_s: float) -> int:
         row = row_at(t_s)
@@ -227,18 +222,16 @@ class Vehicle:
         return row
 
     def _take(self, waypoints: Array, place: int, sent_as_m: Point) -> None:
-        self._set_point[0] = waypoints.item(place, 0) + sent_as_m[0]
-        self._set_point[1] = waypoints.item(place, 1) + sent_as_m[1]
-        self._set_point[2] = sent_as_m[2]
+        x_m, y_m, z_m = sent_as_m
+        self._set_point[:3] = waypoints.item(place, 0) + x_m, waypoints.item(place, 1) + y_m, z_m
 
     def _cancel_after(self, t_s: float) -> None:
         """Fill the track up to time t, and no further; from there on the set-point in force then is the only one."""
         self.computed_row = self._row(t_s)
         queue, self._queue = self._queue, None
         if queue is not None:
-            self._set_point = queue.before
-            sent = queue.sent_until(t_s)
-            if sent:
+            self._set_point[:] = queue.before
+            if sent := queue.sent_until(t_s):
                 self._take(queue.waypoints, sent, queue.sent_as_m)
 
     def _notify(self, t_s: float) -> None:

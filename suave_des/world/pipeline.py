@@ -5,13 +5,9 @@ from functools import cache
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from suave_des.compiling import compiled
-from suave_des.domain import SEA_BED_Z_M as SEA_BED_Z_M
-from suave_des.domain import SURFACE_Z_M as SURFACE_Z_M
+from suave_des.compiling import Array, compiled
 
-Array = NDArray[np.float64]
 FIELD_OF_VIEW_RAD = math.radians(60.0)
 VIEW_TANGENT = math.tan(FIELD_OF_VIEW_RAD / 2.0)
 
@@ -22,10 +18,8 @@ def sample_points(vertices_m: tuple[tuple[float, float, float], ...], points_per
 
     Each straight piece gives evenly spaced points, its first vertex excluded and its last included.
     """
-    vertices = np.array(vertices_m, dtype=np.float64)
-    share = np.arange(1, points_per_piece + 1) / points_per_piece
-    pieces = [a + share[:, None] * (b - a) for a, b in pairwise(vertices)]
-    points = np.concatenate(pieces)
+    share = np.arange(1, points_per_piece + 1)[:, None] / points_per_piece
+    points = np.concatenate([a + share * (b - a) for a, b in pairwise(np.array(vertices_m))])
     points.flags.writeable = False
     return points
 
@@ -54,28 +48,18 @@ def first_point_in_view(x_m: float, y_m: float, z_m: float, visibility_m: float,
 
 
 @compiled
-def first_detection(
-    track: Array,
-    first_row: int,
-    last_row: int,
-    visibility_m: Array,
-    points: Array,
-) -> tuple[int, int]:
+def first_detection(track: Array, first_row: int, last_row: int, visibility_m: Array, points: Array) -> tuple[int, int]:
     """First row of [first_row, last_row] from which a point is seen, and the point's index; (-1, -1) if none.
 
     Args:
         track: positions x, y, z in the first three columns, shape (rows, at least 3), m.
-        first_row: first row to look at.
-        last_row: last row to look at.
+        first_row: where to begin.
+        last_row: the last row that counts.
         visibility_m: measured water visibility at each row, shape (rows,); nan while there is no measurement.
         points: points as the detection places them, shape (n, 3), m.
     """
-    low_x, high_x, low_y, high_y, low_z = np.inf, -np.inf, np.inf, -np.inf, np.inf
-    high_z = -np.inf
-    for index in range(points.shape[0]):
-        low_x, high_x = min(low_x, points[index, 0]), max(high_x, points[index, 0])
-        low_y, high_y = min(low_y, points[index, 1]), max(high_y, points[index, 1])
-        low_z, high_z = min(low_z, points[index, 2]), max(high_z, points[index, 2])
+    low_x, low_y, low_z = points[:, 0].min(), points[:, 1].min(), points[:, 2].min()
+    high_x, high_y, high_z = points[:, 0].max(), points[:, 1].max(), points[:, 2].max()
     for row in range(first_row, last_row + 1):
         x, y, z = track[row, 0], track[row, 1], track[row, 2]
         # Far from the pipeline's bounding box no point can be in view: most rows of a search end here.

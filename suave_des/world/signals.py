@@ -11,9 +11,7 @@ Signal = Callable[[float], float]
 
 @lru_cache(maxsize=64)
 def sinusoid(period_s: float, minimum: float, maximum: float, shift_s: float = 0.0) -> Signal:
-    """a cos(2 pi (t + shift) / period) + a + minimum with a = (maximum - minimum) / 2, the exemplar's water
-    visibility.
-    """
+    """a cos(2 pi (t + shift) / period) + a + minimum, a = (maximum - minimum) / 2: the exemplar's water visibility."""
     amplitude = (maximum - minimum) / 2.0
     return lambda t_s: amplitude * math.cos(2.0 * math.pi * (t_s + shift_s) / period_s) + amplitude + minimum
 

@@ -6,11 +6,11 @@ from functools import cache
 
 import simpy
 
+from suave_des.compiling import Array
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.modes import Mode
 from suave_des.scenario.revision import Revision
 from suave_des.vehicle.guidance import SetPointSender
-from suave_des.vehicle.model import Array
 from suave_des.vehicle.vehicle import ArrivalCheck
 
 Place = tuple[float, float, float]

@@ -8,7 +8,7 @@ import simpy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from suave_des.managed.follow import FollowPipeline, InspectionPath
+from suave_des.managed.follow import NO_PATH, FollowPipeline, InspectionPath
 from suave_des.vehicle.autopilot import Autopilot
 from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.frames import Pose
@@ -21,7 +21,7 @@ SPEED = 0.25
 
 
 def follow_of(env: simpy.Environment, name: str, vehicle: PlacedVehicle, path=LINE) -> FollowPipeline:
-    way = None if path is None else InspectionPath.along(np.array(path))
+    way = NO_PATH if path is None else InspectionPath.along(np.array(path))
     return FollowPipeline(env, sender(env, vehicle), revision(name).follow, lambda: way)
 
 
