@@ -165,7 +165,7 @@ def _as_lines(display: _Display, console: Console) -> Iterator[None]:
     finally:
         over.set()
         writer.join()
-        if has_written.is_set():
+        if has_written.is_set() and display.progress is not None:
             display.look()
             write()
 

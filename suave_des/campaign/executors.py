@@ -204,6 +204,7 @@ class _Worker:
         with nullcontext() if needs_script else main_hidden():
             self._pool.submit(_import)
         self.process = context.process
+        context.close_writer()
 
     def prepare(self, job: JobSpec) -> None:
         """Give it what all its missions have in common; the first thing to do."""
@@ -248,9 +249,21 @@ class _Worker:
 
 
 class _Context(SpawnContext):
-    """Starts processes by spawning, and knows the last one."""
+    """Starts the process of a pool by spawning, and knows it and the queue of its results."""
 
     process: BaseProcess
+    _results: Any
+
+    def SimpleQueue(self) -> Any:  # type: ignore[override]  # noqa: N802
+        self._results = super().SimpleQueue()
+        return self._results
+
+    def close_writer(self) -> None:
+        """Leave the process alone to write results: if it dies in the middle of one, the pool reads an end of file.
+
+        As long as this process could write, too, the pool would wait for the other half.
+        """
+        self._results._writer.close()
 
     def Process(self, *arguments: Any, **named: Any) -> BaseProcess:  # type: ignore[override]  # noqa: N802
         self.process = SpawnProcess(*arguments, **named)

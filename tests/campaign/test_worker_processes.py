@@ -35,6 +35,7 @@ def run_script(text: str, folder: Path) -> subprocess.CompletedProcess[str]:
         cwd=folder,
         env={**os.environ, "PYTHONPATH": path},
         check=False,
+        timeout=240.0,
     )
 
 
@@ -102,3 +103,36 @@ def test_what_a_manager_has_written_is_there_when_workers_have_ended(scenario: P
     done = run_script(call(scenario, ["writer:Writer"], 2), tmp_path)
     assert done.returncode == 0, done.stderr
     assert sum(path.read_text().count("a mission") for path in tmp_path.glob("written_*.txt")) == 12
+
+
+CUT = """
+import multiprocessing
+import os
+import signal
+from multiprocessing.connection import Connection
+from pathlib import Path
+from suave_des.managing.simple import NoManager
+send = Connection._send
+def send_half(connection, data):
+    try:
+        Path("cut.txt").touch(exist_ok=False)
+    except FileExistsError:
+        return send(connection, data)
+    os.write(connection.fileno(), bytes(data)[: len(data) // 2])
+    os.kill(os.getpid(), signal.SIGKILL)
+class Cut(NoManager):
+    def __init__(self, system):
+        super().__init__(system)
+        if multiprocessing.parent_process() is not None:
+            Connection._send = send_half
+"""
+
+
+def test_a_worker_that_dies_in_the_middle_of_a_result_costs_nothing(scenario: Path, tmp_path: Path) -> None:
+    (tmp_path / "cut.py").write_text(CUT)
+    alone = run_script(call(scenario, ["cut:Cut"], 1), tmp_path)
+    assert not (tmp_path / "cut.txt").exists()
+    shared = run_script(call(scenario, ["cut:Cut"], 2), tmp_path)
+    assert (tmp_path / "cut.txt").exists()
+    assert (shared.returncode, shared.stderr) == (0, "")
+    assert shared.stdout == alone.stdout
