@@ -8,7 +8,7 @@ from typing import Any, TypedDict, Unpack
 
 from suave_des.campaign.progress import OnProgress, Progress
 from suave_des.campaign.results import CampaignResult
-from suave_des.campaign.runner import CampaignInterrupted, resume, run
+from suave_des.campaign.runner import CampaignInterrupted, resume_campaign, run
 from suave_des.campaign.spec import CampaignSpec
 
 __all__ = ["CampaignInterrupted", "CampaignOptions", "CampaignResult", "Progress", "resume_campaign", "run_campaign"]
@@ -68,30 +68,3 @@ def run_campaign(
     """
     given = {"managers": managers, "runs": runs, "seed": seed, "workers": workers, "out": out}
     return run(CampaignSpec.of(scenario, **given, **options), on_progress)
-
-
-def resume_campaign(
-    folder: str | Path,
-    workers: int = 1,
-    *,
-    runs: int | None = None,
-    until_ci: str | None = None,
-    on_progress: OnProgress | None = None,
-    scheduler: str | None = None,
-) -> CampaignResult:
-    """Go on with a campaign where it stopped; its specification is in its folder.
-
-    Missions that failed for reasons that may not recur (time-out, a worker that was killed) are run again.
-
-    Args:
-        folder: the campaign's output folder.
-        workers: as of run_campaign; it may be another number.
-        runs: more runs than were asked for at first; left out: as many.
-        until_ci: the metric asked for at first with a smaller half-width; left out: as at first.
-        on_progress: called when missions are done.
-        scheduler: as of run_campaign; it may be another, or none.
-
-    Raises:
-        InputError, WorkerError, StoreError, CampaignInterrupted: as runner.resume.
-    """
-    return resume(Path(folder), on_progress, workers=workers, scheduler=scheduler, runs=runs, until_ci=until_ci)

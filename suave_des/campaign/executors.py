@@ -254,7 +254,7 @@ class _Context(SpawnContext):
     process: BaseProcess
     _results: Any
 
-    def SimpleQueue(self) -> Any:  # type: ignore[override]  # noqa: N802
+    def SimpleQueue(self) -> Any:  # noqa: N802
         self._results = super().SimpleQueue()
         return self._results
 

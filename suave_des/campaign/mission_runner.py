@@ -15,7 +15,7 @@ from types import FrameType
 
 from suave_des.campaign.knowledge_records import mission_line
 from suave_des.campaign.missions import Failure, Finished, JobSpec, MissionKey, Outcome, row_of
-from suave_des.campaign.sweep import cell_of
+from suave_des.campaign.variation import cell_of
 from suave_des.errors import MissionError
 from suave_des.metrics.result import MissionResult
 from suave_des.scenario.models import Mission

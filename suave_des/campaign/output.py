@@ -7,6 +7,7 @@ import io
 import json
 import os
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -87,12 +88,10 @@ def check_output_folder(
         InputError: it is not empty and `overwrite` is false, has results of another family, is a file, or cannot be
             written.
     """
-    try:
+    with _user_errors(folder):
         entries = [entry.name for entry in folder.iterdir()] if folder.is_dir() else []
         found = min((name for name in entries if not left_over(name)), default=None)
         is_there, has_parent = folder.exists() or folder.is_symlink(), folder.parent.is_dir()
-    except OSError as error:
-        raise _not_written(folder, error) from None
     for other, names in FAMILIES.items():
         known = min((name for name in names if name in entries), default=None)
         if other != family and known is not None:
@@ -122,10 +121,8 @@ def make_output_folder(folder: Path) -> None:
     Raises:
         InputError: it cannot be made.
     """
-    try:
+    with _user_errors(folder):
         folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise _not_written(folder, error) from None
 
 
 def remove_derived(folder: Path) -> None:
@@ -134,11 +131,9 @@ def remove_derived(folder: Path) -> None:
     Raises:
         InputError: it cannot be removed.
     """
-    try:
+    with _user_errors(folder):
         for name in DERIVED:
             (folder / name).unlink(missing_ok=True)
-    except OSError as error:
-        raise _not_written(folder, error) from None
 
 
 def write_files(folder: Path, files: Mapping[str, str | bytes | Iterable[str]], *, stale: Collection[str] = ()) -> None:
@@ -152,20 +147,19 @@ def write_files(folder: Path, files: Mapping[str, str | bytes | Iterable[str]], 
     Raises:
         InputError: the disk is full, or the folder cannot be written; nothing half-written stays.
     """
-    written: list[tuple[Path, Path]] = []
+    written = {folder / name: folder / f".{name}.{os.getpid()}{_PART}" for name in files}
     try:
-        for name, content in files.items():
-            temporary = folder / f".{name}.{os.getpid()}{_PART}"
-            written.append((temporary, folder / name))
-            _write(temporary, content)
-        for temporary, final in written:
-            temporary.replace(final)
-        for name in set(stale) - set(files):
-            (folder / name).unlink(missing_ok=True)
-    except OSError as error:
-        raise _not_written(folder, error) from None
+        with _user_errors(folder):
+            for content, temporary in zip(files.values(), written.values(), strict=True):
+                pieces = (content,) if isinstance(content, str | bytes) else content
+                with temporary.open("wb") as file:
+                    file.writelines(piece if isinstance(piece, bytes) else piece.encode() for piece in pieces)
+            for final, temporary in written.items():
+                temporary.replace(final)
+            for name in set(stale) - set(files):
+                (folder / name).unlink(missing_ok=True)
     finally:
-        for temporary, _ in written:
+        for temporary in written.values():
             temporary.unlink(missing_ok=True)
 
 
@@ -176,16 +170,11 @@ def remove_parts(folder: Path, names: Iterable[str]) -> None:
             part.unlink(missing_ok=True)
 
 
-def _write(path: Path, content: str | bytes | Iterable[str]) -> None:
-    if isinstance(content, str | bytes):
-        path.write_bytes(content if isinstance(content, bytes) else content.encode())
-        return
-    with path.open("wb") as file:
-        for piece in content:
-            file.write(piece.encode())
-
-
-def _not_written(folder: Path, error: OSError) -> InputError:
-    return InputError(
-        f"the output folder cannot be written: {error.strerror}", file=folder, remedy="give a folder that is yours"
-    )
+@contextmanager
+def _user_errors(folder: Path) -> Iterator[None]:
+    """Turn errors of the system into errors for the user."""
+    try:
+        yield
+    except OSError as error:
+        problem = f"the output folder cannot be written: {error.strerror}"
+        raise InputError(problem, file=folder, remedy="give a folder that is yours") from None

@@ -16,8 +16,7 @@ from suave_des.campaign.progress import FEWEST_RUNS, GroupProgress, parse_until_
 from suave_des.campaign.provenance import provenance
 from suave_des.campaign.spec import CampaignSpec
 from suave_des.campaign.suave_format import SUAVE_FILE, suave_pieces
-from suave_des.campaign.sweep import cell_of
-from suave_des.campaign.variation import Variation
+from suave_des.campaign.variation import Variation, cell_of
 from suave_des.estimates import estimate
 from suave_des.metrics.result import MissionMetrics
 from suave_des.scenario.loader import LoadedScenario

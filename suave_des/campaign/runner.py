@@ -79,22 +79,33 @@ def run(spec: CampaignSpec, on_progress: OnProgress | None = None) -> CampaignRe
         return campaign.run(on_progress, resumed=False)
 
 
-def resume(
-    folder: Path,
-    on_progress: OnProgress | None = None,
-    *,
+def resume_campaign(
+    folder: str | Path,
     workers: int = 1,
-    scheduler: str | None = None,
+    *,
     runs: int | None = None,
     until_ci: str | None = None,
+    on_progress: OnProgress | None = None,
+    scheduler: str | None = None,
 ) -> CampaignResult:
-    """Run what is missing of the campaign in a folder; see campaign.resume_campaign.
+    """Go on with a campaign where it stopped; its specification is in its folder.
+
+    Missions that failed for reasons that may not recur (time-out, a worker that was killed) are run again.
+
+    Args:
+        folder: the campaign's output folder.
+        workers: as of run_campaign; it may be another number.
+        runs: more runs than were asked for at first; left out: as many.
+        until_ci: the metric asked for at first with a smaller half-width; left out: as at first.
+        on_progress: called when missions are done.
+        scheduler: as of run_campaign; it may be another, or none.
 
     Raises:
         InputError: there is no campaign, it is damaged or in use, or something that decides results has changed; the
             difference is named.
         WorkerError, StoreError, CampaignInterrupted: as run.
     """
+    folder = Path(folder)
     spec = _stored_spec(folder, runs, until_ci)
     spec = replace(spec, out=folder, workers=workers, scheduler=scheduler)
     with ExitStack() as stack:
@@ -215,7 +226,7 @@ class _Campaign:
             store = self._store(resumed=resumed)
             try:
                 stopped = self._work(store, executor, on_progress)
-                is_empty = store.count() == 0
+                is_empty = next(store.outcomes(), None) is None
             finally:
                 if folder is not None:
                     store.close()

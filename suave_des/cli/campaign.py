@@ -146,15 +146,16 @@ def campaign(
     elif scenario is None or out is None:
         missing = "SCENARIO" if scenario is None else "--out DIR"
         raise InputError(f"{missing} is missing", remedy="see suave-des campaign --help")
-    from suave_des.campaign.runner import resume as resume_in
-    from suave_des.campaign.runner import run
+    from suave_des.campaign.runner import resume_campaign, run
     from suave_des.campaign.spec import CampaignSpec
     from suave_des.cli.console import output, progress
     from suave_des.cli.summary import print_stops, print_summary
 
     with progress(str(resume or scenario), quiet=quiet) as show:
         if resume is not None:
-            result = resume_in(resume, show, workers=workers, scheduler=scheduler, runs=runs, until_ci=until_ci)
+            result = resume_campaign(
+                resume, workers, runs=runs, until_ci=until_ci, on_progress=show, scheduler=scheduler
+            )
         else:
             assert scenario is not None
             spec = CampaignSpec.of(
