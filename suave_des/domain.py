@@ -20,3 +20,8 @@ class Task:
 
     name: str
     functions: tuple[str, ...]
+
+
+def thruster_name(thruster: int) -> str:
+    """Name of a thruster in diagnostics and in the knowledge base."""
+    return f"c_thruster_{thruster}"

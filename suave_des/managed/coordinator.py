@@ -1,4 +1,4 @@
-"""The mission coordinator: the two tasks, one after the other, the time limit, and the two metrics it writes down."""
+"""The mission coordinator: the two tasks, one after the other, the time limit, and the two metrics it records."""
 
 import math
 from collections.abc import Callable
@@ -53,7 +53,7 @@ class MissionCoordinator:
         self._inspect = Task("inspect_pipeline", (*per_task, FOLLOW_PIPELINE))
 
     def start(self, request: Callable[[Task], None], cancel: Callable[[Task], None]) -> None:
-        """Start the mission: its tasks are requested, and cancelled, by calling these."""
+        """Start the mission, which calls these to request and to cancel its tasks."""
         self._request, self._cancel = request, cancel
         self.env.process(self._watch_time_limit())
         self.env.process(self._carry_out_tasks())
@@ -78,8 +78,8 @@ class MissionCoordinator:
         self._finish("the end of the path is reached")
 
     def _watch_time_limit(self) -> Process:
-        limit_s, phase_s = self.timing.time_limit_s, self.timing.limit_phase_s
-        yield until(self.env, tick_at_or_after(limit_s, phase_s, self.revision.limit_check_period_s))
+        timing, period_s = self.timing, self.revision.limit_check_period_s
+        yield until(self.env, tick_at_or_after(timing.time_limit_s, timing.limit_phase_s, period_s))
         self._finish("time limit")
 
     def _next_poll(self) -> simpy.Event:

@@ -14,17 +14,11 @@ from suave_des.world.pipeline import first_detection
 
 _FEWEST_ROWS = 22
 _MARGIN_ROWS = 2
-"""How far to look at least, and beyond what guidance has looked at: where that ends, the way mostly changes."""
+"""How far to look at least, and beyond what guidance has looked at: where that ends, the set-point mostly changes."""
 
 
 def measured_at_rows(times_s: Array, values: Array, at_rows: Array) -> None:
-    """Last measured value at each row of a track; nan before the first measurement.
-
-    Args:
-        times_s: times of the measurements, increasing.
-        values: what was measured.
-        at_rows: shape (rows,); written into.
-    """
+    """Write the value measured last at each row of a track into `at_rows`, shape (rows,); nan before the first."""
     first = np.minimum(np.rint(times_s / STEP_S).astype(np.int64), len(at_rows))  # rounded as Vehicle does
     at_rows[: first[0]] = np.nan
     at_rows[first[0] : first[-1]] = np.repeat(values[:-1], first[1:] - first[:-1])
@@ -63,7 +57,7 @@ class PipelineDetector:
         self._look_ahead(0)
 
     def _look_ahead(self, row: int) -> None:
-        """Check the rows from one on; be back at the first sight, or where no row further on has been checked."""
+        """Check the rows from one on; return at the first sight, or where no later row has been checked."""
         last = min(max(row + _FEWEST_ROWS, self.vehicle.computed_row + _MARGIN_ROWS), self.vehicle.last_row)
         if row >= last:
             self._alarm.cancel()

@@ -101,8 +101,6 @@ class FollowPipeline(FunctionNode, WaypointSource):
         period_s, width_m = self.revision.poll_period_s, self.revision.acceptance_m
         return ArrivalCheck(began_s, period_s, width_m, math.inf, 0, POLLS_BEFORE_RESENDING)
 
-    # What guidance asks.
-
     def waypoints(self, count: int) -> Array:
         """The present point and those after it; none when the end is reached."""
         if self._next == len(self._way.lengths_m):

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 import simpy
 
 from suave_des.clock import Process
+from suave_des.domain import thruster_name
 from suave_des.managed.node import FunctionNode
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, DiagnosticsBus, Kind
-from suave_des.monitor.monitors import thruster_name
 from suave_des.scenario.revision import RecoveryRevision
 
 RECOVERY_TIME_S = 10.0
@@ -22,7 +22,7 @@ class MaintainMotion(FunctionNode):
 
     bus: DiagnosticsBus
     revision: RecoveryRevision
-    restore: Callable[[int], None]
+    set_health: Callable[[float, int, float], None]
     _recovery: simpy.Process | None = field(default=None, init=False)
 
     def activated(self) -> None:
@@ -31,7 +31,7 @@ class MaintainMotion(FunctionNode):
             self._recovery = self.env.process(self._recover())
 
     def deactivated(self) -> None:
-        """Back to normal operation; revision 1.5 breaks a recovery off."""
+        """Return to normal operation; revision 1.5 aborts a recovery."""
         if self._recovery is not None and not self.revision.survives_deactivation:
             self._recovery.interrupt()
             self._recovery = None
@@ -40,9 +40,9 @@ class MaintainMotion(FunctionNode):
         try:
             yield self.env.timeout(RECOVERY_TIME_S)
             for thruster in range(1, THRUSTERS + 1):
-                self.restore(thruster)
-                status = Diagnostic(self.env.now, Kind.COMPONENT_STATUS, thruster_name(thruster), RECOVERED)
-                self.bus.publish(status)
+                self.set_health(self.env.now, thruster, 1.0)
+                name = thruster_name(thruster)
+                self.bus.publish(Diagnostic(self.env.now, Kind.COMPONENT_STATUS, name, RECOVERED))
                 yield self.env.timeout(THRUSTER_PERIOD_S)
             self._recovery = None
         except simpy.Interrupt:

@@ -1,4 +1,4 @@
-"""What every function of the managed subsystem is: a node with a life cycle."""
+"""The base of every function of the managed subsystem: a node with a life cycle."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -23,15 +23,12 @@ class FunctionNode:
     active: bool = field(default=False, init=False)
 
     def apply(self, mode: Mode) -> None:
-        """Go over to a mode."""
+        """Change to a mode."""
         if mode.active:
             self.configure(mode)
         if mode.active != self.active:
             self.active = mode.active
-            if mode.active:
-                self.activated()
-            else:
-                self.deactivated()
+            (self.activated if mode.active else self.deactivated)()
 
     def configure(self, mode: Mode) -> None:
         """Take the mode's parameters; called before the activation that the mode brings, too."""

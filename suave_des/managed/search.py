@@ -28,8 +28,7 @@ def spiral(step: int, radius_m: float, altitude_m: float, centre_m: tuple[float,
     """Way-points of the spiral.
 
     Args:
-        step: the spiral's step counter at the first of them.
-        radius_m: its radius before the first of them.
+        step, radius_m: the spiral's step counter and its radius before the first of them.
         altitude_m: altitude above the sea bed; a turn widens the spiral by what the camera sees from there.
         centre_m: x and y of its centre.
         waypoints: shape (n, 4); x, y, z and the spiral's radius are written into it, in m.
@@ -41,8 +40,7 @@ def spiral(step: int, radius_m: float, altitude_m: float, centre_m: tuple[float,
         angle = ANGLE_STEP_RAD * step
         waypoints[n, 0] = centre_m[0] + radius_m * math.cos(angle)
         waypoints[n, 1] = centre_m[1] + radius_m * math.sin(angle)
-        waypoints[n, 2] = SEA_BED_Z_M + altitude_m
-        waypoints[n, 3] = radius_m
+        waypoints[n, 2], waypoints[n, 3] = SEA_BED_Z_M + altitude_m, radius_m
         step += 1
 
 
@@ -74,7 +72,6 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         self._radius_m = 0.0
         self._last_altitude_m: float | None = None  # at the tick before
         self._present: Array | None = None  # way-point, none before the first
-        self._waited_ticks: int | None = None
 
     def configure(self, mode: Mode) -> None:
         """Take the mode's spiral_altitude; the spiral itself goes on."""
@@ -93,14 +90,11 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         if self.revision.centre == "activation":
             self.centre_m = self.sender.vehicle.position(self.env.now)[:2]
         first_s = tick_at_or_after(max(self.env.now, self.ready_s), self.phase_s, TICK_PERIOD_S)
-        self._guidance.start_at(first_s, waited_ticks=self._waited_ticks)
+        self._guidance.start_at(first_s, resumes=self._present is not None)
 
     def deactivated(self) -> None:
         """Stop ticking."""
-        waited_ticks = self._guidance.stop()
-        self._waited_ticks = None if self._present is None else waited_ticks
-
-    # What guidance asks.
+        self._guidance.stop()
 
     def tick(self) -> None:
         """Count a step of the spiral where the altitude differs from that at the tick before."""

@@ -1,7 +1,7 @@
 """The adapter between the managing and the managed subsystem: tasks become objectives, plans become mode changes."""
 
 from collections.abc import Callable, Collection
-from functools import partial
+from dataclasses import dataclass
 
 from suave_des.clock import Alarm, tick_at_or_after
 from suave_des.domain import Task
@@ -9,30 +9,31 @@ from suave_des.knowledge.state import Decision, Plan
 from suave_des.managing.base import ManagedSystem
 
 
+@dataclass(frozen=True)
 class TaskBridge:
     """Passes the mission's tasks on as functions that need an objective (the exemplar's task bridge).
 
-    Args:
-        system: the managed subsystem.
+    Attributes:
         period_s: tasks are passed on at ticks of this period; 0: at once.
         phase_s: mission time of a tick.
     """
 
-    def __init__(self, system: ManagedSystem, period_s: float, phase_s: float) -> None:
-        self._system, self._period_s, self._phase_s = system, period_s, phase_s
+    system: ManagedSystem
+    period_s: float
+    phase_s: float
 
     def pass_on(self, task: Task, update: Callable[[tuple[str, ...]], None]) -> None:
-        """Call `update` with the task's functions when the bridge comes to it."""
-        env = self._system.env
-        alarm = Alarm(env, partial(self._arrive, task, update))
-        if self._period_s > 0.0:
-            alarm.set(tick_at_or_after(env.now, self._phase_s, self._period_s))
-        else:
-            alarm.set_now()
+        """Call `update` with the task's functions at the bridge's next tick."""
 
-    def _arrive(self, task: Task, update: Callable[[tuple[str, ...]], None]) -> None:
-        update(task.functions)
-        self._system.state_changed()
+        def arrive() -> None:
+            update(task.functions)
+            self.system.state_changed()
+
+        env = self.system.env
+        if self.period_s > 0.0:
+            Alarm(env, arrive).set(tick_at_or_after(env.now, self.phase_s, self.period_s))
+        else:
+            Alarm(env, arrive).set_now()
 
 
 class Adapter:

@@ -36,13 +36,13 @@ class ManagedSystem:
     Attributes:
         env: the mission's clock; `env.timeout(s)` is an event to wait for.
         scenario: the mission's scenario.
-        settings: what the scenario says under managers: for this manager's name.
+        settings: the scenario's entry under managers: for this manager.
         modes: the mode manager.
         lasting_functions: functions that are needed all the time and belong to no task.
         stream: makes a named random stream of this run, the same for every manager.
-        log: takes an event and its detail for the mission's record.
+        log: adds an event and its detail to the mission's record.
         knowledge: gives the knowledge base with its reasoner, opened on the first call.
-        record_state: takes each state of knowledge that is reasoned about, for the mission's record.
+        record_state: adds a state of knowledge that is reasoned about to the mission's record.
         state_changed: to be called when something that `adapt` depends on has changed of itself, not in a hook.
         measurements: what monitors have measured, by quality attribute; see `measured`.
         recorded: whether the mission is recorded.
@@ -67,13 +67,9 @@ class ManagedSystem:
         return float(self.env.now)
 
     def measured(self, attribute: str, since_s: float = 0.0) -> float | None:
-        """Value of a quality attribute that was published last, none if there is none.
+        """Value of a quality attribute, such as water_visibility, that was published last, not before `since_s`.
 
-        A repetition of the value before is not a publication.
-
-        Args:
-            attribute: name of the quality attribute, such as water_visibility.
-            since_s: publications before this mission time do not count.
+        None if there is none; a repetition of the value before is not a publication.
         """
         measurements = self.measurements.get(attribute)
         if measurements is None or not (published := measurements.published(self.env.now)):
@@ -98,8 +94,8 @@ class ManagingSubsystem:
         subscribes_to: kinds of diagnostics that `diagnostic` is called with. A manager that reads `system.measured`
             when it adapts need not subscribe to measured values; publishing each of them takes time.
 
-    A manager that adapts every `period_s` is time-triggered. One whose `adapt` depends on nothing but what it was told
-    in its hooks, and on how measured values compare with fixed thresholds, is event-triggered, and says so by
+    A manager that adapts every `period_s` is time-triggered. One whose `adapt` depends only on what its hooks were
+    called with, and on how measured values compare with fixed thresholds, is event-triggered, and declares it by
     `depends_on`. After a call of `adapt` that returned None, the next call is at the first of its times after a hook
     was called, or a measured value has crossed a threshold: fewer calls, the same mission (but for an event at the very
     time of a call, which may come before it).

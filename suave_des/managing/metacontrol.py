@@ -1,8 +1,7 @@
 """Metacontrol: a MAPE-K loop over an OWL knowledge base (paper, section on Metacontrol; kas-lab/suave).
 
 Monitor: diagnostics update the state of the knowledge. Analyze: a reasoner infers what the rules say about that state.
-Plan: the best function design for each objective that needs one. Execute: request the design's mode, which has its
-name.
+Plan: the best function design for each objective that needs one. Execute: request the mode of the design's name.
 """
 
 from collections.abc import Collection, Hashable
@@ -118,7 +117,7 @@ class Metacontrol(ManagingSubsystem):
         return self._knowledge.plan(inference, improve_exceeded=self._revision.search_improves_when_exceeded)
 
     def execute(self, conclusion: Conclusion, latency_s: float) -> AdaptationProcess:
-        """Request the plan's modes when the reasoner has taken its time; objectives with a new design are well."""
+        """Request the plan's modes after the reasoner's latency; objectives with a new design lose their status."""
         recovered = self._recovered()
         yield self.system.env.timeout(latency_s)
         for line in sorted(conclusion.statuses - self._recorded_statuses):

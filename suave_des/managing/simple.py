@@ -24,10 +24,8 @@ class RandomManager(ManagingSubsystem):
 
     def __init__(self, system: ManagedSystem) -> None:
         super().__init__(system)
-        revision = system.scenario.revision.random
         self.period_s = system.scenario.managers.random.adaptation_period_s
         self._stream = system.stream("random_manager/picks")
-        self._on_task_request = revision.on_task_request
         # Timers of nodes run since launch: the phase at t = 0 is another one in each run.
         self.starts_s = system.stream("random_manager/phase").uniform(0.0, self.period_s)
         self._functions: tuple[str, ...] = ()
@@ -35,7 +33,7 @@ class RandomManager(ManagingSubsystem):
     def task_requested(self, task: Task) -> None:
         """Remember the task's functions."""
         self._functions = tuple(name for name in task.functions if name != MAINTAIN_MOTION)
-        if self._on_task_request:
+        if self.system.scenario.revision.random.on_task_request:
             self.adapt()
 
     def task_cancelled(self, task: Task) -> None:

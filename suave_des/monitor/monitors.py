@@ -6,6 +6,7 @@ from typing import NamedTuple
 import simpy
 
 from suave_des.clock import Process, tick_at_or_after, until
+from suave_des.domain import thruster_name
 from suave_des.monitor.diagnostics import FAILED, RECOVERED, Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.measurements import BatteryLevel, Measurements
 
@@ -38,7 +39,7 @@ def thruster_monitor(
     env: simpy.Environment,
     bus: DiagnosticsBus,
     faults: Sequence[ThrusterFault],
-    set_health: Callable[[int, float], None],
+    set_health: Callable[[float, int, float], None],
     phase_s: float,
     after_previous: bool,
     period_s: float = 1.0,
@@ -51,7 +52,7 @@ def thruster_monitor(
     Args:
         env, bus: the mission's clock, and where to publish.
         faults: the schedule.
-        set_health: called with a thruster's number and 0 (lost) or 1 (works).
+        set_health: called with the time, a thruster's number and 0 (lost) or 1 (works).
         phase_s: time of the first check.
         after_previous: whether each time counts from the fault before it (rev 2023) or from the start (rev 1.5).
         period_s: time between checks.
@@ -61,14 +62,9 @@ def thruster_monitor(
         due = counted_from + fault.time_s
         tick = tick_at_or_after(max(due, earliest), phase_s, period_s)
         yield until(env, tick)
-        set_health(fault.thruster, 0.0 if fault.fails else 1.0)
+        set_health(env.now, fault.thruster, 0.0 if fault.fails else 1.0)
         status = FAILED if fault.fails else RECOVERED
         bus.publish(Diagnostic(env.now, Kind.COMPONENT_STATUS, thruster_name(fault.thruster), status))
         earliest = tick + period_s
         if after_previous:
             counted_from = tick
-
-
-def thruster_name(thruster: int) -> str:
-    """Name of a thruster in diagnostics and in the knowledge base."""
-    return f"c_thruster_{thruster}"

@@ -33,7 +33,6 @@ class ManagerHost:
         system: the manager's view of the managed subsystem.
         bus: where the diagnostics come from that the manager subscribes to.
         skips_idle_calls: whether calls are left out at all.
-        manager: the manager.
 
     Raises:
         MissionError: the manager raised; here, or in any hook later.

@@ -83,7 +83,7 @@ class Mission:
         return MissionResult(self._metrics(), tuple(recorder.events), trajectory, tuple(recorder.knowledge), drawn)
 
     def _metrics(self) -> MissionMetrics:
-        coordinator, detector = self._coordinator, self._detector
+        coordinator, detector, drawn = self._coordinator, self._detector, self._chance.drawn
         found = coordinator.search_time_s is not None
         x_m, y_m = self._simulator.points[detector.first_point, :2].tolist() if found else (None, None)
         return MissionMetrics(
@@ -91,8 +91,8 @@ class Mission:
             manager=self._manager,
             run=self._run,
             seed=self._seed,
-            initial_x_m=self._chance.drawn["start.x_m"],
-            initial_y_m=self._chance.drawn["start.y_m"],
+            initial_x_m=drawn["start.x_m"],
+            initial_y_m=drawn["start.y_m"],
             mission_duration_s=float(self.env.now),
             pipeline_found=found,
             search_time_s=coordinator.search_time_or_limit_s(),
@@ -103,8 +103,6 @@ class Mission:
             detection_x_m=x_m,
             detection_y_m=y_m,
         )
-
-    # World and vehicle.
 
     def _make_vehicle(self, memory: MissionMemory) -> Vehicle:
         value, calibration = self._chance.value, self._scenario.calibration
@@ -119,18 +117,17 @@ class Mission:
             value("calibration.altitude_error_m"),
             value("calibration.altitude_deadband_m"),
         )
+        start = Pose(*self._origin_m, z_m, 0.0, 0.0, heading_rad)
         return Vehicle(
             BLUEROV2,
             autopilot,
-            Pose(*self._origin_m, z_m, 0.0, 0.0, heading_rad),
+            start,
             self._simulator.duration_s,
             current_m_per_s=(value("current.x_m_per_s"), value("current.y_m_per_s"), value("current.z_m_per_s")),
             time_scale=1.0 / (1.0 + value("calibration.real_time_factor_loss")),
             z_limits_m=(domain.SEA_BED_Z_M, domain.SURFACE_Z_M),
             memory=memory.track,
         )
-
-    # Monitors.
 
     def _measure(self, name: str) -> Measurements:
         signal, chance = self._scenario.signals[name], self._chance
@@ -155,20 +152,13 @@ class Mission:
                 self.env.process(signal_monitor(self.env, self._bus, measurements))
             if self._battery is not None:
                 self.env.process(battery_monitor(self.env, self._bus, self._battery))
-        draw, events = self._chance.draw, enumerate(self._scenario.thruster_events)
-        faults = [
-            ThrusterFault(event.thruster, event.event == "failure", draw(f"thruster_events.{n}.time_s", event.time_s))
-            for n, event in events
-        ]
-        phase_s = self._chance.phase("thruster_monitor", 1.0)
+        faults = []
+        for n, event in enumerate(self._scenario.thruster_events):
+            time_s = self._chance.draw(f"thruster_events.{n}.time_s", event.time_s)
+            faults.append(ThrusterFault(event.thruster, event.event == "failure", time_s))
+        phase_s, set_health = self._chance.phase("thruster_monitor", 1.0), self._vehicle.set_thruster_health
         after_previous = self._revision.monitors.thruster_event_times == "after_previous"
-        set_health = self._set_thruster_health
         self.env.process(thruster_monitor(self.env, self._bus, faults, set_health, phase_s, after_previous))
-
-    def _set_thruster_health(self, thruster: int, health: float) -> None:
-        self._vehicle.set_thruster_health(self.env.now, thruster, health)
-
-    # The managed subsystem.
 
     def _make_functions(self) -> dict[str, FunctionNode]:
         env, revision, chance = self.env, self._revision, self._chance
@@ -177,9 +167,10 @@ class Mission:
         make_sender = partial(self._make_sender, loss_probability)
         phase_s, ready_s = chance.phase(search, 1.0), chance.value("latencies.guided_start_s")
         self._follow = FollowPipeline(env, make_sender(follow), revision.follow, self._path)
-        restore = partial(self._set_thruster_health, health=1.0)
         nodes: dict[str, FunctionNode] = {
-            domain.MAINTAIN_MOTION: MaintainMotion(env, self._bus, revision.recovery, restore),
+            domain.MAINTAIN_MOTION: MaintainMotion(
+                env, self._bus, revision.recovery, self._vehicle.set_thruster_health
+            ),
             search: GenerateSearchPath(env, make_sender(search), revision.spiral, self._origin_m, phase_s, ready_s),
             follow: self._follow,
         }
@@ -207,8 +198,6 @@ class Mission:
             limit_phase_s=phase("limit", settings.limit_check_period_s),
         )
         return MissionCoordinator(self.env, settings, timing, self._detector, self._follow, self._recorder.log)
-
-    # The managing subsystem.
 
     def _make_host(self) -> ManagerHost:
         name = self._manager

@@ -1,7 +1,5 @@
 """Runs missions of one scenario."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from types import MappingProxyType
@@ -56,7 +54,7 @@ class Simulator:
         self._spare_memory: list[MissionMemory] = []
 
     @cached_property
-    def knowledge(self) -> Deliberation:
+    def knowledge(self) -> "Deliberation":
         """The scenario's knowledge base with its reasoner, opened and checked on first use."""
         from suave_des.scenario_knowledge import open_knowledge  # owlready2 is loaded only when it is needed
 

@@ -6,26 +6,21 @@ will be reached, and sets an alarm for the tick at which the function has to act
 earlier, it counts the ticks until then, and plans again from there.
 """
 
+from __future__ import annotations
+
 import random
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 from suave_des.compiling import Array
 from suave_des.vehicle.vehicle import ArrivalCheck, Vehicle
 
+if TYPE_CHECKING:  # the vehicle itself needs no events
+    from suave_des.clock import Alarm
+
 QUEUED_WAYPOINTS: Final = 20  # at a time, besides the present one
-
-
-class Alarm(Protocol):
-    """A wake-up call in mission time, see `suave_des.clock.Alarm`."""
-
-    @property
-    def now_s(self) -> float: ...  # noqa: D102
-    def set(self, t_s: float) -> None: ...  # noqa: D102
-    def set_now(self) -> None: ...  # noqa: D102
-    def cancel(self) -> None: ...  # noqa: D102
 
 
 class WaypointSource(Protocol):
@@ -107,7 +102,7 @@ class Guidance:
     make_alarm: Callable[[Callable[[], None]], Alarm]
     make_check: Callable[[float], ArrivalCheck]
     _check: ArrivalCheck | None = None  # none before the first tick and after the last
-    _sent: int = 0  # tick at which the present way-point was sent last
+    _sent: int = -1  # tick at which the present way-point was sent last
     _arrivals: list[int] = field(default_factory=list)  # ticks that will find the planned way-points reached
     _act_at: int = 0  # tick of the alarm
     _is_planned: bool = False  # until that tick
@@ -119,33 +114,27 @@ class Guidance:
         self._replanning = self.make_alarm(self._replan)
         self.sender.vehicle.control_listeners.append(self._control_changed)
 
-    def start_at(self, t_s: float, *, waited_ticks: int | None = None) -> None:
-        """Tick from mission time t on.
-
-        `waited_ticks` have passed since the present way-point was sent; none: it is to be sent.
-        """
-        self._is_due = waited_ticks is None
-        self._sent = -1 - (waited_ticks or 0)
+    def start_at(self, t_s: float, *, resumes: bool = False) -> None:
+        """Tick from mission time t on, and send the present way-point, unless the one sent last before is resumed."""
+        self._is_due = not resumes
         self._arrivals, self._act_at, self._is_planned = [], 0, False
-        if t_s <= self._alarm.now_s:
-            self._act()
-        else:
+        if t_s > self._alarm.now_s:
             self._alarm.set(t_s)
+        else:
+            self._act()
 
-    def stop(self) -> int:
-        """Stop ticking, and cancel what is queued; return the ticks since the present way-point was sent."""
+    def stop(self) -> None:
+        """Stop ticking, and cancel what is queued."""
         self._alarm.cancel()
         self._replanning.cancel()
-        check = self._check
-        if check is None:
-            return -1 - self._sent
         self.catch_up()
-        self._check = None
-        self.sender.vehicle.cancel_waypoints(self._alarm.now_s, check)
-        return self._last_tick(check) - self._sent
+        check, self._check = self._check, None
+        if check is not None:
+            self.sender.vehicle.cancel_waypoints(self._alarm.now_s, check)
+            self._sent -= self._last_tick(check) + 1  # on resumption the first tick is 0 again
 
     def catch_up(self) -> None:
-        """Tell the function of the way-points that were reached by now."""
+        """Report to the function the way-points that were reached by now."""
         if self._check is not None:
             self._count_arrivals(self._last_tick(self._check))
 

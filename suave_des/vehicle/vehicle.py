@@ -43,7 +43,7 @@ class ArrivalCheck:
         return self.began_s + tick * self.period_s
 
     def last_tick_until(self, t_s: float) -> int:
-        """Number of the last tick until time t; one at t counts, as it was due before what else happens then."""
+        """Number of the last tick until time t; one at t counts, as it comes before whatever else happens then."""
         tick = math.floor((t_s - self.began_s) / self.period_s + 1e-9)
         return tick if self.time_s(tick) <= t_s else tick - 1
 
@@ -116,8 +116,6 @@ class Vehicle:
         step_s, allocation = STEP_S * self.time_scale, autopilot_allocation(model)
         self._dynamics = step_s, self._set_point, parameters, allocation, self._effectiveness
 
-    # Control.
-
     def command(self, t_s: float, x_m: float, y_m: float, z_m: float) -> None:
         """Give the autopilot a new position set-point; it replaces the one before."""
         self._cancel_after(t_s)
@@ -187,8 +185,6 @@ class Vehicle:
         if self._queue is not None and self._queue.check is check:
             self._cancel_after(t_s)
             self._notify(t_s)
-
-    # Readings.
 
     def position(self, t_s: float) -> Point:
         """Position x, y, z in m at time t."""

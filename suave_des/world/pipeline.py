@@ -8,8 +8,7 @@ import numpy as np
 
 from suave_des.compiling import Array, compiled
 
-FIELD_OF_VIEW_RAD = math.radians(60.0)
-VIEW_TANGENT = math.tan(FIELD_OF_VIEW_RAD / 2.0)
+VIEW_TANGENT = math.tan(math.radians(60.0) / 2.0)  # of half the camera's field of view
 
 
 @cache

@@ -18,7 +18,7 @@ import numpy as np
 import simpy
 from numpy.typing import NDArray
 
-from suave_des.clock import Process, until
+from suave_des.clock import Alarm, Process, until
 from suave_des.managed.mode_manager import ModeManager
 from suave_des.managed.node import Log
 from suave_des.metrics.result import MissionMetrics
@@ -28,7 +28,7 @@ from suave_des.scenario.modes import Mode
 from suave_des.simulation import mission
 from suave_des.simulation.host import ManagerHost
 from suave_des.simulation.simulator import Simulator
-from suave_des.vehicle.guidance import Alarm, SetPointSender, WaypointSource
+from suave_des.vehicle.guidance import SetPointSender, WaypointSource
 from suave_des.vehicle.vehicle import STEP_S, ArrivalCheck, Vehicle
 from suave_des.world.pipeline import first_point_in_view
 
@@ -52,20 +52,20 @@ class PollingGuidance:
         self._sent = 0
         self._is_due = True
 
-    def start_at(self, t_s: float, *, waited_ticks: int | None = None) -> None:
-        self._is_due = waited_ticks is None
-        self._sent = -1 - (waited_ticks or 0)
+    def start_at(self, t_s: float, *, resumes: bool = False) -> None:
+        self._is_due = not resumes
         self._next_tick = 0
         if t_s <= self._alarm.now_s:
             self._tick()
         else:
             self._alarm.set(t_s)
 
-    def stop(self) -> int:
+    def stop(self) -> None:
         self.catch_up()
         self._alarm.cancel()
-        check, self._check = self._check, None
-        return max(0, -1 - self._sent) if check is None else self._next_tick - 1 - self._sent
+        if self._check is not None:
+            self._check = None
+            self._sent -= self._next_tick
 
     def catch_up(self) -> None:
         """A tick that is due at this very time comes first."""

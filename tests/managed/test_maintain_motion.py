@@ -20,7 +20,7 @@ class Motion:
         self.restored: list[tuple[float, int]] = []
         bus.subscribe(self.published.append)
         self.node = MaintainMotion(
-            self.env, bus, revision(name).recovery, lambda thruster: self.restored.append((self.env.now, thruster))
+            self.env, bus, revision(name).recovery, lambda t_s, thruster, health: self.restored.append((t_s, thruster))
         )
 
 

@@ -161,7 +161,7 @@ def publish_faults(subscriber: Subscriber, *faults: ThrusterFault, after_previou
             subscriber.env,
             subscriber.bus,
             faults,
-            lambda thruster, health: healths.append((subscriber.env.now, thruster, health)),
+            lambda t_s, thruster, health: healths.append((t_s, thruster, health)),
             phase_s=phase_s,
             after_previous=after_previous,
         )
