@@ -14,13 +14,14 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from functools import cache
+from itertools import islice
 from multiprocessing import resource_tracker
 from multiprocessing.context import SpawnContext, SpawnProcess
 from multiprocessing.process import BaseProcess
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Self
 
-from suave_des.campaign.missions import Chunk, Finished, JobSpec, MissionKey, WorkerError, chunked
+from suave_des.campaign.missions import Chunk, Finished, JobSpec, MissionKey, WorkerError
 from suave_des.imports import main_hidden
 from suave_des.interrupts import INTERRUPTS, signals_deferred
 from suave_des.registry import is_built_in
@@ -104,7 +105,8 @@ class LocalWorkers:
         """Yield outcomes chunk by chunk; see Executor."""
         self._job = job
         size = max(1, min(_LARGEST_CHUNK, total // (self._size * 10)))
-        self._tasks = (_Task(chunk) for chunk in chunked(missions, size))
+        remaining = iter(missions)
+        self._tasks = map(_Task, iter(lambda: tuple(islice(remaining, size)), ()))
         for worker in self._workers:
             worker.prepare(job)
         self._hand_out()

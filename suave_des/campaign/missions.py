@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, fields
-from itertools import islice
 from operator import attrgetter
 from typing import NamedTuple, Protocol
 
@@ -58,13 +57,6 @@ def plan(
                 break
             if run not in known:
                 yield MissionKey(*group, run)
-
-
-def chunked(missions: Iterable[MissionKey], size: int) -> Iterator[Chunk]:
-    """Split missions into chunks of `size`, the last one perhaps smaller."""
-    remaining = iter(missions)
-    while chunk := tuple(islice(remaining, size)):
-        yield chunk
 
 
 COLUMNS = tuple(field.name for field in fields(MissionMetrics))

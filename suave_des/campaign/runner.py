@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, closing, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -137,12 +137,8 @@ def _is_of_campaign(name: str) -> bool:
 def _stored_spec(folder: Path, runs: int | None, until_ci: str | None) -> CampaignSpec:
     if not (folder / STORE_FILE).is_file():
         raise InputError("there is no campaign to resume", file=folder, remedy="start one with --out")
-    with locked(folder):
-        store = Store(folder / STORE_FILE)
-        try:
-            return CampaignSpec.of_stored(store.about("request"), runs=runs, until_ci=until_ci)
-        finally:
-            store.close()
+    with locked(folder), closing(Store(folder / STORE_FILE)) as store:
+        return CampaignSpec.of_stored(store.about("request"), runs=runs, until_ci=until_ci)
 
 
 class _Campaign:
