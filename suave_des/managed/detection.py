@@ -30,7 +30,7 @@ class PipelineDetector:
     """Watches from t = 0 until a point of the pipeline is seen for the first time.
 
     The exemplar checks at each pose message. Here each row of the vehicle's track is checked, ahead of time under the
-    present control, and anew when control changes; so the moment does not depend on who reads the position, or when.
+    present control, and again when control changes; so the moment does not depend on when the position is read.
 
     Attributes:
         visibility_m: measured water visibility at each row of the vehicle's track.

@@ -48,7 +48,7 @@ class ModeManager:
         return self._requested.get(function)
 
     def task_over(self, functions: Iterable[str]) -> None:
-        """The functions' task is over: what comes now is no adaptation, until they are given a mode again."""
+        """Take the end of the functions' task: changes do not count as adaptations until they are active again."""
         self._in_use.difference_update(functions)
 
     def change_mode(self, function: str, mode: str) -> bool:

@@ -101,11 +101,8 @@ class Metacontrol(ManagingSubsystem):
 
     def analyze(self) -> Inference:
         """Infer what the rules say about the present state."""
-        always = self._revision.search_always_improves
-        objectives = [
-            ObjectiveState(function, status, always and function == GENERATE_SEARCH_PATH)
-            for function, status in self.objectives.items()
-        ]
+        improves = {GENERATE_SEARCH_PATH} if self._revision.search_always_improves else set()
+        objectives = [ObjectiveState(name, status, name in improves) for name, status in self.objectives.items()]
         return self._knowledge.analyze(
             KnowledgeState.of(
                 objectives, groundings=self.groundings, components=self.components, measurements=self.measurements
@@ -175,7 +172,7 @@ class Metacontrol(ManagingSubsystem):
         return dict.fromkeys(self.system.measurements, tuple(map(float, regions.thresholds)))
 
     def _symbolic_state(self) -> Hashable:
-        """The state, with regions in place of measured values; a record names the values themselves."""
+        """The state, with regions in place of measured values, unless the mission is recorded: then with the values."""
         values: tuple[Hashable, ...] = tuple(self.measurements.values())
         regions = None if self.system.recorded else self._knowledge.regions
         if regions is not None and all(map(isfinite, self.measurements.values())):
@@ -187,7 +184,7 @@ class Metacontrol(ManagingSubsystem):
         return *(tuple(part.items()) for part in parts), tuple(self.measurements), values, revision
 
     def _is_in_force(self, conclusion: Conclusion) -> bool:
-        """Whether to execute a plan would change nothing."""
+        """Whether executing a plan would change nothing."""
         if self._recovered() or (self.system.recorded and conclusion.statuses - self._recorded_statuses):
             return False
         for decision in conclusion.plan.decisions:

@@ -36,7 +36,7 @@ class DiagnosticsBus:
         self._subscribers: dict[Kind, list[Subscriber]] = {kind: [] for kind in Kind}
 
     def subscribe(self, subscriber: Subscriber, kinds: Iterable[Kind] = Kind) -> None:
-        """Have every later diagnostic of some kinds passed to `subscriber`."""
+        """Pass every later diagnostic of some kinds to `subscriber`."""
         for kind in kinds:
             self._subscribers[kind].append(subscriber)
 

@@ -147,7 +147,7 @@ class Mission:
         return BatteryLevel(is_at_station, battery.discharge_time_s, publishing)
 
     def _start_monitors(self) -> None:
-        if self._bus.has_subscribers(Kind.QA_STATUS):  # who looks values up reads the measurements
+        if self._bus.has_subscribers(Kind.QA_STATUS):  # to look values up, the measurements are enough
             for measurements in self._signals.values():
                 self.env.process(signal_monitor(self.env, self._bus, measurements))
             if self._battery is not None:

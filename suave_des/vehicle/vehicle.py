@@ -158,17 +158,10 @@ class Vehicle:
         elif self._queue is not None and self._queue.sent_until(t_s) < len(self._queue.ticks):
             waypoints = waypoints[:1]
         count, before = len(waypoints), self._set_point.copy()
-        ticks = np.empty(count, dtype=np.int64)
+        box, timer = (check.half_width_m, check.half_height_m), (check.began_s, check.period_s, STEP_S)
+        window, ticks = (first, last, check.fewest_ticks, check.most_ticks), np.empty(count, dtype=np.int64)
         reached, self.computed_row = kernel.fly_waypoints(
-            self.track,
-            self.computed_row,
-            self._dynamics,
-            waypoints,
-            sent_as_m,
-            (check.half_width_m, check.half_height_m),
-            (check.began_s, check.period_s, STEP_S),
-            (first, last, check.fewest_ticks, check.most_ticks),
-            ticks,
+            self.track, self.computed_row, self._dynamics, waypoints, sent_as_m, box, timer, window, ticks
         )
         arrivals: list[int] = ticks[:reached].tolist()
         is_queued = reached > 0 and count > 1
@@ -181,7 +174,7 @@ class Vehicle:
         return arrivals, arrivals[-1] + check.most_ticks if arrivals else last
 
     def cancel_waypoints(self, t_s: float, check: ArrivalCheck) -> None:
-        """Cancel the set-points after time t that were queued with a check; nothing, if that is done already."""
+        """Cancel the set-points after time t that were queued with a check, if there are any left."""
         if self._queue is not None and self._queue.check is check:
             self._cancel_after(t_s)
             self._notify(t_s)
