@@ -8,16 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli.options import (
-    DisabledRules,
-    Modes,
-    Ontologies,
-    Overwrite,
-    Quiet,
-    Reasoner,
-    RuleFiles,
-    command_line,
-)
+from suave_des.cli.options import Files, Overwrite, Quiet, command_line, grouped_options
 from suave_des.errors import InputError
 
 if TYPE_CHECKING:
@@ -35,6 +26,7 @@ class Format(StrEnum):
     SUAVE = "suave"
 
 
+@grouped_options
 def campaign(
     scenario: Annotated[
         str | None,
@@ -106,11 +98,8 @@ def campaign(
     overwrite: Overwrite = False,
     quiet: Quiet = False,
     yes: Annotated[bool, typer.Option("--yes", help="More than a million missions are meant.")] = False,
-    ontology: Ontologies = None,
-    rules: RuleFiles = None,
-    disable_rule: DisabledRules = None,
-    modes: Modes = None,
-    reasoner: Reasoner = None,
+    *,
+    files: Files,
 ) -> None:
     """Run many missions and write their results.
 
@@ -131,14 +120,10 @@ def campaign(
             "--record-knowledge": record_knowledge,
             "--overwrite": overwrite,
             "--yes": yes,
-            "--ontology": ontology,
-            "--modes": modes,
-            "--reasoner": reasoner,
-            "--rules": rules,
-            "--disable-rule": disable_rule,
+            **files.given,
         }
         for option, value in fixed.items():
-            if not (value is None or value is False or value == []):
+            if value is not None and value is not False:
                 raise InputError(
                     f"{option} has no use with --resume: the campaign goes on as it began",
                     remedy="leave it out, or start anew in another folder",
@@ -165,11 +150,7 @@ def campaign(
                 seed=seed,
                 workers=workers,
                 out=out,
-                ontologies=ontology,
-                modes_file=modes,
-                reasoner=reasoner,
-                rules=rules,
-                disabled_rules=disable_rule,
+                **files.replacements,
                 suave_format=also is Format.SUAVE,
                 record_knowledge=record_knowledge,
                 time_out_s=time_out,

@@ -22,10 +22,10 @@ from suave_des.cli.kb_options import (
     MaxFailed,
     Replayed,
     StateParts,
-    grouped_options,
     print_json,
     state_lines,
 )
+from suave_des.cli.options import grouped_options
 from suave_des.errors import InputError
 
 if TYPE_CHECKING:

@@ -1,24 +1,21 @@
-"""What the `kb` commands share: groups of options, and output as JSON or as lines of text."""
+"""Share options among the `kb` commands, and print states and results as JSON or as text."""
 
 from __future__ import annotations
 
 import dataclasses
-import functools
-import inspect
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from decimal import Decimal
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from suave_des.cli.options import DisabledRules, Ontologies, Reasoner, RuleFiles
+from suave_des.cli.options import KnowledgeFiles, Reasoner
 
 if TYPE_CHECKING:
     from suave_des.knowledge.state import KnowledgeState
-    from suave_des.scenario.loader import LoadedScenario
     from suave_des.workbench import KnowledgeBase
 
 
@@ -47,25 +44,10 @@ ScenarioOption = Annotated[
 
 
 @dataclasses.dataclass(frozen=True)
-class Sources:
-    """Options that name ontologies and rules."""
+class Sources(KnowledgeFiles):
+    """Options that name a scenario, ontologies and rules."""
 
-    ontology: Ontologies = None
-    rules: RuleFiles = None
-    disable_rule: DisabledRules = None
     scenario: ScenarioOption = "seams2023"
-
-    def load(self, modes: Path | None = None) -> LoadedScenario:
-        """Load the scenario with these ontologies and rules."""
-        from suave_des.scenario.loader import load_scenario
-
-        return load_scenario(
-            self.scenario,
-            ontologies=self.ontology or (),
-            modes_file=modes,
-            rules=self.rules or (),
-            disabled_rules=self.disable_rule or (),
-        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -96,12 +78,9 @@ class Asked(Sources):
 
 
 @dataclasses.dataclass(frozen=True)
-class Replayed:
+class Replayed(KnowledgeFiles):
     """Options that replace or add to the knowledge base of recorded missions."""
 
-    ontology: Ontologies = None
-    rules: RuleFiles = None
-    disable_rule: DisabledRules = None
     scenario: Annotated[
         str | None,
         typer.Option("--scenario", metavar="SCENARIO", help="In place of the scenario that was recorded."),
@@ -153,41 +132,6 @@ class StateParts:
         builder.add_words("groundings", "--ground", self.ground or ())
         builder.add_words("objectives", "--objective", self.objective or ())
         return builder.state()
-
-
-def grouped_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Turn each parameter of a command that is a dataclass into options, one for each field.
-
-    Example:
-        @app.command()
-        @grouped_options
-        def infer(knowledge: Asked, parts: StateParts, form: AsFormat = Format.TEXT) -> None: ...
-    """
-    hints = get_type_hints(command, include_extras=True)
-    groups: dict[str, Any] = {name: hint for name, hint in hints.items() if dataclasses.is_dataclass(hint)}
-    parameters = [
-        each.replace(annotation=hints[each.name], kind=inspect.Parameter.KEYWORD_ONLY)
-        for each in inspect.signature(command).parameters.values()
-        if each.name not in groups
-    ]
-    for group in groups.values():
-        fields = get_type_hints(group, include_extras=True)
-        parameters += [
-            inspect.Parameter(
-                each.name, inspect.Parameter.KEYWORD_ONLY, default=each.default, annotation=fields[each.name]
-            )
-            for each in dataclasses.fields(group)
-        ]
-
-    @functools.wraps(command)
-    def with_groups(**given: Any) -> None:
-        for name, group in groups.items():
-            given[name] = group(**{each.name: given.pop(each.name) for each in dataclasses.fields(group)})
-        command(**given)
-
-    vars(with_groups)["__signature__"] = inspect.Signature(parameters)
-    with_groups.__annotations__ = {each.name: each.annotation for each in parameters}
-    return with_groups
 
 
 def print_json(content: object) -> None:

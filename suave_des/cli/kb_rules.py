@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli.kb_options import AsFormat, Format, Sources, TimeLimitS, grouped_options, print_json
-from suave_des.cli.options import Modes
+from suave_des.cli.kb_options import AsFormat, Format, Sources, TimeLimitS, print_json
+from suave_des.cli.options import Modes, grouped_options
 
 if TYPE_CHECKING:
     from suave_des.knowledge.ontology import Ontology
@@ -55,11 +55,12 @@ def check(
     Exit status: 0 no findings of the level of --fail-on; 1 such findings; 2 something cannot be read.
     """
     from suave_des.domain import MISSION_FUNCTIONS
+    from suave_des.scenario.loader import load_scenario
     from suave_des.workbench.check import Subject
     from suave_des.workbench.check import check as run_checks
     from suave_des.workbench.findings import Level, has_level, summary
 
-    loaded = sources.load(modes)
+    loaded = load_scenario(sources.scenario, **(sources.replacements | {"modes_file": modes}))
     findings = run_checks(
         Subject(
             ontologies=loaded.ontologies,
@@ -90,9 +91,10 @@ def check(
 @grouped_options
 def rules(sources: Sources, form: AsFormat = Format.TEXT) -> None:
     """List all rules as text that --rules reads back."""
+    from suave_des.scenario.loader import load_scenario
     from suave_des.scenario_knowledge import open_base
 
-    base = open_base(sources.load())
+    base = open_base(load_scenario(sources.scenario, **sources.replacements))
     if form is Format.JSON:
         print_json([{"name": r.name, "enabled": r.enabled, "file": r.file, "text": r.text} for r in base.rules])
     else:

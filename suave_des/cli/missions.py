@@ -8,10 +8,10 @@ from typing import Annotated
 
 import typer
 
-from suave_des.cli.options import Overwrite, Replacements, Scenario, Seed, command_line, replaces_files
+from suave_des.cli.options import Files, Overwrite, Scenario, Seed, command_line, grouped_options
 
 
-@replaces_files
+@grouped_options
 def run(
     scenario: Scenario,
     manager: Annotated[
@@ -29,7 +29,7 @@ def run(
     ] = None,
     overwrite: Overwrite = False,
     *,
-    replacements: Replacements,
+    files: Files,
 ) -> None:
     """Run one mission and print its timeline."""
     from suave_des.campaign.single import run_mission
@@ -45,7 +45,7 @@ def run(
             overwrite=overwrite,
             command=command_line(),
             on_time=show,
-            **replacements,
+            **files.replacements,
         )
     console = output()
     print_timeline(console, result)

@@ -5,15 +5,14 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
 if TYPE_CHECKING:
-    from suave_des.scenario.loader import Replacements as Replacements
-else:
-    Replacements = dict  # the loader is not imported for --help
+    from suave_des.scenario.loader import Replacements
 
 Scenario = Annotated[str, typer.Argument(metavar="SCENARIO", help="A scenario file, or the name of a shipped one.")]
 Ontologies = Annotated[
@@ -46,44 +45,72 @@ Overwrite = Annotated[
 ]
 
 
-def replaces_files(command: Callable[..., None]) -> Callable[..., None]:
-    """Add the options --ontology, --rules, --disable-rule, --modes and --reasoner to a command.
+@dataclass(frozen=True)
+class KnowledgeFiles:
+    """Options that replace or add to a scenario's ontologies and rules."""
 
-    The command has a keyword parameter `replacements`, which gets what they give:
+    ontology: Ontologies = None
+    rules: RuleFiles = None
+    disable_rule: DisabledRules = None
 
-        @replaces_files
-        def show(scenario: Scenario, *, replacements: Replacements) -> None:
-            loaded = load_scenario(scenario, **replacements)
+    @property
+    def replacements(self) -> Replacements:
+        """What is given, as the loader takes it."""
+        return {"ontologies": self.ontology or (), "rules": self.rules or (), "disabled_rules": self.disable_rule or ()}
+
+
+@dataclass(frozen=True)
+class Files(KnowledgeFiles):
+    """Options that replace or add to a scenario's files and settings."""
+
+    modes: Modes = None
+    reasoner: Reasoner = None
+
+    @property
+    def replacements(self) -> Replacements:
+        """What is given, as the loader takes it."""
+        return super().replacements | {"modes_file": self.modes, "reasoner": self.reasoner}
+
+    @property
+    def given(self) -> dict[str, object]:
+        """The options that are given, by name."""
+        values = {f"--{each.name.replace('_', '-')}": getattr(self, each.name) for each in fields(self)}
+        return {option: value for option, value in values.items() if value}
+
+
+def grouped_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Turn each parameter of a command that is a dataclass into options, one for each field.
+
+    Example:
+        @grouped_options
+        def show(scenario: Scenario, *, files: Files) -> None:
+            loaded = load_scenario(scenario, **files.replacements)
     """
-    options: dict[str, Any] = {
-        "ontology": Ontologies,
-        "rules": RuleFiles,
-        "disable_rule": DisabledRules,
-        "modes": Modes,
-        "reasoner": Reasoner,
-    }
+    hints = get_type_hints(command, include_extras=True)
+    groups: dict[str, Any] = {name: hint for name, hint in hints.items() if is_dataclass(hint)}
+    parameters = [
+        each.replace(annotation=hints[each.name], kind=inspect.Parameter.KEYWORD_ONLY)
+        for each in inspect.signature(command).parameters.values()
+        if each.name not in groups
+    ]
+    for group in groups.values():
+        annotations = get_type_hints(group, include_extras=True)
+        parameters += [
+            inspect.Parameter(
+                each.name, inspect.Parameter.KEYWORD_ONLY, default=each.default, annotation=annotations[each.name]
+            )
+            for each in fields(group)
+        ]
 
     @functools.wraps(command)
-    def with_options(**given: Any) -> None:
-        ontology, rules, disable_rule, modes, reasoner = (given.pop(name) for name in options)
-        replacements = Replacements(
-            ontologies=ontology or (),
-            rules=rules or (),
-            disabled_rules=disable_rule or (),
-            modes_file=modes,
-            reasoner=reasoner,
-        )
-        command(**given, replacements=replacements)
+    def with_groups(**given: Any) -> None:
+        for name, group in groups.items():
+            given[name] = group(**{each.name: given.pop(each.name) for each in fields(group)})
+        command(**given)
 
-    own = inspect.signature(command, eval_str=True)
-    parameters = [each for each in own.parameters.values() if each.name != "replacements"]
-    parameters += [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=option)
-        for name, option in options.items()
-    ]
-    vars(with_options)["__signature__"] = own.replace(parameters=parameters)
-    with_options.__annotations__ = {each.name: each.annotation for each in parameters}
-    return with_options
+    vars(with_groups)["__signature__"] = inspect.Signature(parameters)
+    with_groups.__annotations__ = {each.name: each.annotation for each in parameters}
+    return with_groups
 
 
 _arguments: list[str] = []

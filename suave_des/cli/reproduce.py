@@ -9,15 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from suave_des.cli.campaign import exit_telling_failures
-from suave_des.cli.options import (
-    Overwrite,
-    Quiet,
-    Replacements,
-    Seed,
-    Workers,
-    command_line,
-    replaces_files,
-)
+from suave_des.cli.options import Files, Overwrite, Quiet, Seed, Workers, command_line, grouped_options
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,7 +23,7 @@ SCENARIO = "seams2023"
 _TEXT_WIDTH = 95
 
 
-@replaces_files
+@grouped_options
 def reproduce(
     runs: Annotated[int, typer.Option("--runs", help="Missions for each manager; the paper has 20.")] = 200,
     workers: Workers = 2,
@@ -42,7 +34,7 @@ def reproduce(
     overwrite: Overwrite = False,
     quiet: Quiet = False,
     *,
-    replacements: Replacements,
+    files: Files,
 ) -> None:
     """Run the paper's experiment and compare the results.
 
@@ -66,7 +58,7 @@ def reproduce(
             overwrite=overwrite,
             command=command_line(),
             on_progress=show,
-            **replacements,
+            **files.replacements,
         )
     comparison = compare(result.frame(), published)
     console = output()

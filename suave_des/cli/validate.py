@@ -8,15 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from suave_des.cli.campaign import exit_telling_failures
-from suave_des.cli.options import (
-    Overwrite,
-    Quiet,
-    Replacements,
-    Seed,
-    Workers,
-    command_line,
-    replaces_files,
-)
+from suave_des.cli.options import Files, Overwrite, Quiet, Seed, Workers, command_line, grouped_options
 
 if TYPE_CHECKING:
     import pandas
@@ -29,8 +21,6 @@ if TYPE_CHECKING:
 TARGETS_NOT_MET = 1
 """Exit status with --strict."""
 _SCENARIO, _DATA = "seams2023", "seams2023_runs.csv"
-_ONLY_SIMULATED = ("--ontology", "--rules", "--disable-rule", "--modes", "--reasoner")
-"""Options in the order of Replacements."""
 
 _Data = Annotated[
     str, typer.Option("--data", metavar="FILE", help="Real missions; left out, the 60 published with the SUAVE paper.")
@@ -40,7 +30,7 @@ _Managers = Annotated[
 ]
 
 
-@replaces_files
+@grouped_options
 def validate(
     scenario: Annotated[
         str | None,
@@ -72,7 +62,7 @@ def validate(
     overwrite: Overwrite = False,
     quiet: Quiet = False,
     *,
-    replacements: Replacements,
+    files: Files,
 ) -> None:
     """Compare simulated missions with real ones: distributions, clusters, conclusions."""
     from suave_des.cli.console import output, progress
@@ -91,9 +81,8 @@ def validate(
     campaign: CampaignResult | None = None
     sources: dict[str, object] = {"data": _named(published), "targets": _shown(targets_path), "seed": seed}
     if runs_file is not None:
-        for option, value in zip(_ONLY_SIMULATED, replacements.values(), strict=True):
-            if value:
-                raise InputError(f"{option} has no use with --runs-file", remedy="leave one of them out")
+        for option in files.given:
+            raise InputError(f"{option} has no use with --runs-file", remedy="leave one of them out")
         recorded = _recorded(runs_file, chosen, scenario, out, overwrite=overwrite)
         simulated = recorded.frame
         sources |= {"runs_file": _named(recorded)}
@@ -113,7 +102,7 @@ def validate(
                 overwrite=overwrite,
                 command=command_line(),
                 on_progress=show,
-                **replacements,
+                **files.replacements,
             )
         simulated = campaign.frame()
         sources |= {"scenario": campaign.loaded.scenario.name, "runs": runs}
@@ -197,7 +186,7 @@ def _shown(path: Path | None) -> str | None:
     return f"shipped/{path.name}" if path.is_relative_to(folder) else path.as_posix()
 
 
-@replaces_files
+@grouped_options
 def calibrate(
     scenario: Annotated[str, typer.Argument(help="A scenario file, or the name of a shipped one.")],
     data: _Data = _DATA,
@@ -213,7 +202,7 @@ def calibrate(
     out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for the fit.")] = None,
     overwrite: Overwrite = False,
     *,
-    replacements: Replacements,
+    files: Files,
 ) -> None:
     """Fit free parameters to real missions, and write the fitted scenario."""
     from suave_des.calibration import report
@@ -232,7 +221,7 @@ def calibrate(
     check_range("runs", runs, 2, RUNS_LIMIT)
     published = read_runs(find(data, "scenarios/published"))
     chosen = choose_managers(published, managers)
-    loaded = load_scenario(scenario, **replacements)
+    loaded = load_scenario(scenario, **files.replacements)
     form, free = read_parameters(find(parameters, "scenarios/calibration"), loaded)
     shares = published_shares(published.frame, chosen, published.path)
     problem = Problem(form, free, published_vectors(published.frame, chosen), runs, seed, shares)
