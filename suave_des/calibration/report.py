@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,6 +9,7 @@ import yaml
 
 from suave_des.calibration.fit import Profile
 from suave_des.calibration.loss import Evaluation, FreeParameter, Problem
+from suave_des.campaign.output import csv_text, json_text
 from suave_des.report import style
 from suave_des.scenario.loader import LoadedScenario, value_at, with_values
 
@@ -52,14 +50,12 @@ def _is_below_distribution(loaded: LoadedScenario, path: str) -> bool:
 
 def table(found: Sequence[Profile]) -> str:
     """The parameters as CSV: bounds, start, fitted value, and the interval that the data admit."""
-    buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(["path", "lower_bound", "upper_bound", "start", "fitted", "admitted_low", "admitted_high"])
+    rows = []
     for profile in found:
         free = profile.parameter
         numbers = (free.lower, free.upper, free.start, profile.best, profile.low, profile.high)
-        writer.writerow([free.path, *(f"{number:.4g}" for number in numbers)])
-    return buffer.getvalue()
+        rows.append([free.path, *(f"{number:.4g}" for number in numbers)])
+    return csv_text(("path", "lower_bound", "upper_bound", "start", "fitted", "admitted_low", "admitted_high"), rows)
 
 
 def record(
@@ -90,7 +86,7 @@ def record(
         },
         "history": [round(each.loss, 5) for each in tried],
     }
-    return json.dumps(content, indent=2) + "\n"
+    return json_text(content)
 
 
 def _evaluation(evaluation: Evaluation, managers: Sequence[str]) -> dict[str, Any]:

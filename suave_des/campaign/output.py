@@ -115,6 +115,23 @@ def check_output_folder(
         raise InputError("the output folder cannot be written", file=folder, remedy="give a folder that is yours")
 
 
+def check_output_file(file: Path, *, overwrite: bool) -> None:
+    """See that a file can be written, without changing anything.
+
+    Raises:
+        InputError: it is a folder, its folder does not exist or cannot be written, or it exists and `overwrite` is
+            false.
+    """
+    for is_wrong, problem, remedy in (
+        (not file.name or file.is_dir(), "is a folder", "name a file in it"),
+        (not file.parent.is_dir(), f"there is no folder {file.parent} to write it in", "make it first"),
+        (not os.access(file.parent, os.W_OK | os.X_OK), "its folder cannot be written", "give one that is yours"),
+        (file.exists() and not overwrite, "exists already", "give another name, or --overwrite to replace it"),
+    ):
+        if is_wrong:
+            raise InputError(problem, file=file, remedy=remedy)
+
+
 def make_output_folder(folder: Path) -> None:
     """Make the folder if it is not there yet.
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from suave_des.cli.options import command_line
-from suave_des.errors import InputError
 
 if TYPE_CHECKING:
     from suave_des.bench.bench import Bench
@@ -24,7 +22,7 @@ def bench(
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Write the figures to a file.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace that file if it is there already.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace that file if it exists already.")] = False,
 ) -> None:
     """Measure how fast missions are on this machine.
 
@@ -34,11 +32,11 @@ def bench(
     from dataclasses import asdict
 
     from suave_des.bench.bench import goal_rows, measure, programs
-    from suave_des.campaign.output import json_text, write_files
+    from suave_des.campaign.output import check_output_file, json_text, write_files
     from suave_des.cli.console import errors, output
 
     if json_file is not None:
-        _check_target(json_file, overwrite=overwrite)
+        check_output_file(json_file, overwrite=overwrite)
     progress = errors()
     found = measure(missions, large=large, report=lambda text: progress.print(f"measuring, {text}", markup=False))
     if json_file is not None:
@@ -59,15 +57,11 @@ def _print(found: Bench) -> None:
 
     console = output()
     console.print(f"{in_words(found.machine)}\n", soft_wrap=True, markup=False)
-    goals = plain_table()
-    for heading in ("what", "goal", "measured", "met"):
-        goals.add_column(heading, justify="right" if heading == "measured" else "left", no_wrap=True)
+    goals = plain_table(("what", "goal", "measured", "met"), right=("measured",), no_wrap=True)
     for row in goal_rows(found):
         goals.add_row(row.what, row.goal, row.measured, MET[row.met])
     print_table(console, "Speed and memory", goals)
-    others = plain_table()
-    for heading in ("program", "a mission", "times", "what it does"):
-        others.add_column(heading, justify="right" if heading in ("a mission", "times") else "left")
+    others = plain_table(("program", "a mission", "times", "what it does"), right=("a mission", "times"))
     for each in programs(found):
         mission = f"{each.mission_s:,.0f} s" if each.mission_s >= 1.0 else f"{each.mission_s * 1000:.2f} ms"
         times = f"{each.times_a_mission:,.0f}" if each.times_a_mission >= 100 else f"{each.times_a_mission:.2f}"
@@ -79,19 +73,3 @@ def _print(found: Bench) -> None:
     if found.missions < MISSIONS:
         console.print(f"\n-: the goal is for {MISSIONS:,} missions", soft_wrap=True)
     console.print(f"\nmeasured in {found.took_s:.0f} s", soft_wrap=True)
-
-
-def _check_target(target: Path, *, overwrite: bool) -> None:
-    """Check that the figures can be written, before the minutes that they take.
-
-    Raises:
-        InputError: they cannot.
-    """
-    for is_wrong, problem, remedy in (
-        (not target.name or target.is_dir(), "is a folder", "name a file in it"),
-        (not target.parent.is_dir(), f"there is no folder {target.parent} to write it in", "make it first"),
-        (not os.access(target.parent, os.W_OK | os.X_OK), "its folder cannot be written", "give one that is yours"),
-        (target.exists() and not overwrite, "is there already", "give another name, or --overwrite to replace it"),
-    ):
-        if is_wrong:
-            raise InputError(problem, file=target, remedy=remedy)

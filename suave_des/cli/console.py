@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from textwrap import fill
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.table import Table
@@ -75,9 +75,18 @@ def mission_status(scenario: str, console: Console) -> Iterator[Callable[[float,
         yield show
 
 
-def plain_table() -> Table:
-    """A table that reads well on a terminal and in a plain log."""
-    return Table(box=None, padding=(0, 1), pad_edge=False)
+def plain_table(headings: Iterable[str] = (), *, right: Container[str] = (), **look: Any) -> Table:
+    """Make a table that reads well on a terminal and in a plain log.
+
+    Args:
+        headings: of its columns.
+        right: headings of the columns that are aligned to the right.
+        look: further settings of every column, as rich's Table.add_column takes them.
+    """
+    table = Table(box=None, padding=(0, 1), pad_edge=False)
+    for heading in headings:
+        table.add_column(heading, justify="right" if heading in right else "left", **look)
+    return table
 
 
 def print_table(console: Console, title: str, table: Table) -> None:

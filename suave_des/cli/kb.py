@@ -152,14 +152,12 @@ def policy(
 
 
 def _print_function_table(table: FunctionTable) -> None:
-    shown = plain_table()
     others = [name for name in table.rows[0].groundings if name != table.function]
     with_components = any(row.components for row in table.rows)
     # The last attribute goes across, the others down.
     across = list(dict.fromkeys(column[-1:] for column in table.columns))
     headings = ["now", *others, *(["components"] if with_components else []), *table.attributes[:-1]]
-    for heading in [*headings, *(str(last[0]) if last else "then" for last in across)]:
-        shown.add_column(heading, overflow="fold")
+    shown = plain_table([*headings, *(str(last[0]) if last else "then" for last in across)], overflow="fold")
     for row in table.rows:
         components = [row.components] if with_components else []
         outcomes = dict(zip(table.columns, row.outcomes, strict=True))
@@ -276,9 +274,7 @@ def query(
     elif form is TableFormat.CSV:
         print(csv_text(found.columns, found.rows), end="")
     else:
-        table = plain_table()
-        for column in found.columns:
-            table.add_column(column, overflow="fold")
+        table = plain_table(found.columns, overflow="fold")
         for row in found.rows:
             table.add_row(*(cell or "" for cell in row))
         print_trimmed(output(), table)

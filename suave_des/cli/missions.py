@@ -74,9 +74,7 @@ def scenarios() -> None:
     from suave_des.scenario.loader import load_scenario
 
     folder = shipped_folder("scenarios")
-    table = plain_table()
-    for heading in ("name", "revision", "what it is"):
-        table.add_column(heading)
+    table = plain_table(("name", "revision", "what it is"))
     files = sorted(folder.glob("*.yaml"))
     modes = [path for path in files if path.stem.endswith("_modes")]
     for path in files:
@@ -129,7 +127,7 @@ def import_config(
 
     What has no counterpart is reported, a line each. Both revisions' files are read, with or without leading slashes.
     """
-    from suave_des.campaign.output import write_files
+    from suave_des.campaign.output import check_output_file, write_files
     from suave_des.errors import InputError
     from suave_des.registry import manager_names
     from suave_des.scenario.exemplar import import_config as imported_from
@@ -138,7 +136,9 @@ def import_config(
     if campaign is not None and campaign.resolve() == out.resolve():
         raise InputError("scenario and campaign cannot be one file", file=out, remedy="give --campaign another name")
     for target in targets:
-        _check_target(target, files, overwrite=overwrite)
+        if target.resolve() in [file.resolve() for file in files]:
+            raise InputError("is one of the files to import", file=target, remedy="give the output another name")
+        check_output_file(target, overwrite=overwrite)
     imported = imported_from(files, out, base=base, campaign=campaign, managers=manager_names())
     written: dict[Path, dict[str, str | bytes | Iterable[str]]] = {}
     for target, text in zip(targets, filter(None, (imported.scenario, imported.campaign)), strict=True):
@@ -150,21 +150,3 @@ def import_config(
     print(f"{out} is written, over the base {imported.base}: {imported.why}")
     if campaign is not None:
         print(f"{campaign} is written")
-
-
-def _check_target(target: Path, files: list[Path], *, overwrite: bool) -> None:
-    """Check that a file can be written, without changing anything.
-
-    Raises:
-        InputError: its folder does not exist, it is one of the files to import, or it exists already.
-    """
-    from suave_des.errors import InputError
-
-    if not target.name or target.is_dir():
-        raise InputError("is a folder", file=target, remedy="name a file in it")
-    if not target.parent.is_dir():
-        raise InputError(f"there is no folder {target.parent} to write it in", file=target, remedy="make it first")
-    if target.resolve() in [file.resolve() for file in files]:
-        raise InputError("is one of the files to import", file=target, remedy="give the output another name")
-    if target.exists() and not overwrite:
-        raise InputError("exists already", file=target, remedy="give another name, or --overwrite to replace it")

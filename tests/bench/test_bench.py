@@ -166,7 +166,7 @@ class TestCommand:
         [
             (["--json", "nowhere/figures.json"], "no folder nowhere"),
             (["--json", "."], "is a folder"),
-            (["--json", "there.json"], "is there already"),
+            (["--json", "there.json"], "exists already"),
             (["--missions", "1"], "--missions"),
             (["--missions", "many"], "valid integer"),
         ],
