@@ -58,22 +58,14 @@ def fit(
     """
     import cma
 
-    start = [parameter.start_unit for parameter in problem.parameters]
+    start = [(free.start - free.lower) / (free.upper - free.lower) for free in problem.parameters]
     settings = {"seed": seed % 2**32 or 2**32 - 1, "verbose": -9, "maxfevals": evaluations, "tolfun": 1e-9}
     search = cma.CMAEvolutionStrategy(start, FIRST_STEP, settings)
     tried: list[Evaluation] = []
     with evaluator(problem, workers) as evaluate_all:
         while len(tried) < evaluations:
             units = search.ask()
-            generation = evaluate_all(
-                [
-                    [
-                        parameter.value(float(unit))
-                        for parameter, unit in zip(problem.parameters, candidate, strict=True)
-                    ]
-                    for candidate in units
-                ]
-            )
+            generation = evaluate_all([problem.values_at(candidate) for candidate in units])
             search.tell(units, [each.loss for each in generation])
             tried.extend(generation)
             if on_generation is not None:

@@ -43,11 +43,6 @@ class FreeParameter:
         folded = abs(unit) % 2.0
         return self.lower + (self.upper - self.lower) * (2.0 - folded if folded > 1.0 else folded)
 
-    @property
-    def start_unit(self) -> float:
-        """Coordinate of the start value."""
-        return (self.start - self.lower) / (self.upper - self.lower)
-
 
 @dataclass(frozen=True, slots=True)
 class Problem:
@@ -69,6 +64,10 @@ class Problem:
     runs: int
     seed: int
     shares: tuple[tuple[Share, float], ...] = ()
+
+    def values_at(self, units: Sequence[float]) -> list[float]:
+        """Return the values of the parameters at coordinates, see FreeParameter.value."""
+        return [parameter.value(float(unit)) for parameter, unit in zip(self.parameters, units, strict=True)]
 
 
 @dataclass(frozen=True, slots=True)

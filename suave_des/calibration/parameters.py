@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from suave_des.calibration.loss import FreeParameter
 from suave_des.errors import InputError, shown
 from suave_des.scenario.layers import Layer
 from suave_des.scenario.loader import LoadedScenario, value_at, with_values
-from suave_des.scenario.problems import input_error
+from suave_des.scenario.problems import validated
 from suave_des.scenario.quantities import Number, Strict, ordered
 from suave_des.scenario.yamlfile import read_yaml
 
@@ -53,10 +53,7 @@ def read_parameters(path: Path, loaded: LoadedScenario) -> tuple[LoadedScenario,
         InputError: the file, or a path or value in it, cannot be used.
     """
     layer = Layer.of(read_yaml(path), 0)
-    try:
-        content = CalibrationFile.model_validate(layer.data)
-    except ValidationError as error:
-        raise input_error(error, layer, CalibrationFile) from None
+    content = validated(layer, CalibrationFile)
     scenario = with_values(loaded, content.form)
     parameters = tuple(_parameter(layer, index, entry, scenario) for index, entry in enumerate(content.free))
     return scenario, parameters

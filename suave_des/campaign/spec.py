@@ -8,14 +8,14 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from suave_des.campaign.progress import RUNS_LIMIT_DEFAULT, parse_until_ci
 from suave_des.errors import InputError, KeyPath, shown
 from suave_des.registry import manager_class
 from suave_des.resources import find
 from suave_des.scenario.layers import Files, Layer, find_named
-from suave_des.scenario.problems import input_error
+from suave_des.scenario.problems import validated
 from suave_des.scenario.quantities import Number, Strict
 
 FORMAT = 1
@@ -276,10 +276,7 @@ def read_campaign_file(name: str | Path) -> CampaignFile | None:
     if version != FORMAT or isinstance(version, bool):
         problem = f"a campaign file of version {shown(version)}, and this suave-des reads version {FORMAT}"
         raise layer.error(problem, ("campaign",), f"write campaign: {FORMAT}, and see docs/guides/sweeps.md")
-    try:
-        settings = CampaignSettings.model_validate(layer.data)
-    except ValidationError as error:
-        raise input_error(error, layer, CampaignSettings) from None
+    settings = validated(layer, CampaignSettings)
     scenario = find_named(layer, ("scenario",), settings.scenario, "scenarios")
     return CampaignFile(settings, scenario, files.inputs, layer)
 

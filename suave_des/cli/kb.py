@@ -20,7 +20,6 @@ from suave_des.cli.kb_options import (
     Asked,
     Format,
     MaxFailed,
-    Replayed,
     StateParts,
     print_json,
     state_lines,
@@ -147,8 +146,7 @@ def policy(
         return
     for table in tables:
         _print_function_table(table)
-    for line in _policy_summary(found):
-        print(line)
+    print(*_policy_summary(found), sep="\n")
 
 
 def _print_function_table(table: FunctionTable) -> None:
@@ -282,58 +280,7 @@ def query(
             print("no rows")
 
 
-@app.command("try")
-@grouped_options
-def try_rule(
-    knowledge: Replayed,
-    on: Annotated[
-        Path,
-        typer.Option(
-            "--on",
-            metavar="DIR",
-            help="Output folder of run, or of a campaign that recorded its knowledge, or a folder of such folders.",
-        ),
-    ],
-    rule: Annotated[str | None, typer.Argument(metavar="RULE", help='As "name: body -> head".')] = None,
-    disable: Annotated[str | None, typer.Option("--disable", metavar="NAME", help="Try to do without a rule.")] = None,
-    form: AsFormat = Format.TEXT,
-) -> None:
-    """Show when a rule would have fired in recorded missions, and which decisions would have been different.
-
-    No mission is run again: each recorded state is reasoned about with and without the rule. What another decision
-    would have led to, only a new run shows.
-    """
-    from suave_des.workbench.replay import RuleChange
-    from suave_des.workbench.replay import try_rule as replayed
-
-    change = RuleChange(
-        rule,
-        disable,
-        knowledge.ontology or (),
-        knowledge.scenario,
-        knowledge.rules or (),
-        knowledge.disable_rule or (),
-        knowledge.reasoner,
-        knowledge.time_limit,
-    )
-    missions = list(replayed(on, change))
-    if form is Format.JSON:
-        print_json(missions)
-        return
-    for mission in missions:
-        if mission.moments or len(missions) == 1:
-            print(*mission.lines(), sep="\n")
-    if len(missions) > 1:
-        moments = [mission.moments for mission in missions]
-        firing = sum(any(each.firings for each in one) for one in moments)
-        changed = [sum(len(each.decisions) for each in one) for one in moments]
-        contradictions = sum(any(each.contradiction for each in one) for one in moments)
-        print(
-            f"{len(missions)} missions: fires in {firing}, different decisions in {sum(map(bool, changed))} "
-            f"({sum(changed)} decisions), contradictions in {contradictions}"
-        )
-
-
+app.command("try")(kb_rules.try_rule)
 for _command in (
     *(kb_rules.check, kb_rules.rules, kb_rules.add_rule),
     *(kb_rules.remove_rule, kb_rules.enable_rule, kb_rules.disable_rule),

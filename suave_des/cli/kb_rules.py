@@ -1,4 +1,4 @@
-"""suave-des kb check, rules, add-rule, remove-rule, enable-rule, disable-rule: the rules of a knowledge base."""
+"""suave-des kb check, rules, add-rule, remove-rule, enable-rule, disable-rule, try: the rules of a knowledge base."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli.kb_options import AsFormat, Format, Sources, TimeLimitS, print_json
+from suave_des.cli.kb_options import AsFormat, Format, Replayed, Sources, TimeLimitS, print_json
 from suave_des.cli.options import Modes, grouped_options
 
 if TYPE_CHECKING:
@@ -82,8 +82,7 @@ def check(
             print(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
         print(f"\n{summary(findings)}")
     else:
-        for line in (*findings, summary(findings)):
-            print(line)
+        print(*findings, summary(findings), sep="\n")
     if has_level(findings, Level(fail_on.upper())):
         raise typer.Exit(FOUND)
 
@@ -157,3 +156,54 @@ def _switch(file: Path, name: str, *, enabled: bool) -> None:
         print(f"rule {name} is {word} in {file} now; {file}.bak is as it was")
     else:
         print(f"rule {name} is {word} in {file} already")
+
+
+@grouped_options
+def try_rule(
+    knowledge: Replayed,
+    on: Annotated[
+        Path,
+        typer.Option(
+            "--on",
+            metavar="DIR",
+            help="Output folder of run, or of a campaign that recorded its knowledge, or a folder of such folders.",
+        ),
+    ],
+    rule: Annotated[str | None, typer.Argument(metavar="RULE", help='As "name: body -> head".')] = None,
+    disable: Annotated[str | None, typer.Option("--disable", metavar="NAME", help="Try to do without a rule.")] = None,
+    form: AsFormat = Format.TEXT,
+) -> None:
+    """Show when a rule would have fired in recorded missions, and which decisions would have been different.
+
+    No mission is run again: each recorded state is reasoned about with and without the rule. What another decision
+    would have led to, only a new run shows.
+    """
+    from suave_des.workbench.replay import RuleChange
+    from suave_des.workbench.replay import try_rule as replayed
+
+    change = RuleChange(
+        rule,
+        disable,
+        knowledge.ontology or (),
+        knowledge.scenario,
+        knowledge.rules or (),
+        knowledge.disable_rule or (),
+        knowledge.reasoner,
+        knowledge.time_limit,
+    )
+    missions = list(replayed(on, change))
+    if form is Format.JSON:
+        print_json(missions)
+        return
+    for mission in missions:
+        if mission.moments or len(missions) == 1:
+            print(*mission.lines(), sep="\n")
+    if len(missions) > 1:
+        moments = [mission.moments for mission in missions]
+        firing = sum(any(each.firings for each in one) for one in moments)
+        changed = [sum(len(each.decisions) for each in one) for one in moments]
+        contradictions = sum(any(each.contradiction for each in one) for one in moments)
+        print(
+            f"{len(missions)} missions: fires in {firing}, different decisions in {sum(map(bool, changed))} "
+            f"({sum(changed)} decisions), contradictions in {contradictions}"
+        )

@@ -74,7 +74,7 @@ class Runs:
 
     def error(self, line: int, problem: str, remedy: str | None) -> InputError:
         """Make an error about a line of the file."""
-        return InputError(problem, file=self.path, place=f"line {line}", remedy=remedy)
+        return _error(self.path, line, problem, remedy)
 
     def check_simulated(self, managers: Sequence[str], scenario: str | None) -> None:
         """Check that these missions are of one scenario, and that there are some of each manager.
@@ -245,5 +245,5 @@ def _numbers_or_words(text: pandas.Series[str]) -> pandas.Series[float] | pandas
     return text if numbers.isna().any() else numbers
 
 
-def _error(path: Path, line: int, problem: str, remedy: str) -> InputError:
+def _error(path: Path, line: int, problem: str, remedy: str | None) -> InputError:
     return InputError(problem, file=path, place=f"line {line}", remedy=remedy)

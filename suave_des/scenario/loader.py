@@ -9,15 +9,13 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
-from pydantic import ValidationError
-
 from suave_des.domain import GENERATE_SEARCH_PATH, MISSION_FUNCTIONS
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown
 from suave_des.resources import find
 from suave_des.scenario.layers import Files, Layer, Location, find_named, scenario_layer
 from suave_des.scenario.models import REASONERS, ManagerSettings, Scenario
 from suave_des.scenario.modes import UNGROUND_MODE, ModeTable, modes_of
-from suave_des.scenario.problems import input_error
+from suave_des.scenario.problems import validated
 from suave_des.scenario.signal_kinds import SignalTable, TableSignal, read_table
 
 MANAGER_GROUP = "suave_des.managers"
@@ -125,7 +123,7 @@ def load_layer(files: Files, layer: Layer, path: Path, **replacements: Unpack[Re
         InputError: as load_scenario does.
     """
     layer = Layer({**layer.data, "name": _name(layer, path)}, layer.places)
-    scenario = _validated(layer)
+    scenario = validated(layer, Scenario)
     knowledge = scenario.knowledge
 
     def named(key_path: KeyPath, name: str, kind: str, remedy: str | None = None) -> Path:
@@ -163,13 +161,6 @@ def load_layer(files: Files, layer: Layer, path: Path, **replacements: Unpack[Re
 
     scenario = _replaced(scenario, replacements)
     return LoadedScenario(scenario, path, ontologies, modes, modes_path, tables, files.inputs, layer, rules)
-
-
-def _validated(layer: Layer) -> Scenario:
-    try:
-        return Scenario.model_validate(layer.data)
-    except ValidationError as error:
-        raise input_error(error, layer, Scenario) from None
 
 
 def _replaced(scenario: Scenario, replacements: Replacements) -> Scenario:
@@ -255,7 +246,7 @@ def with_values(loaded: LoadedScenario, values: Mapping[str, Any]) -> LoadedScen
     for path, value in values.items():
         set_value(data, path, value)
     layer = Layer(data, {(): Location(0, 1, loaded.path)})
-    scenario = _validated(layer)
+    scenario = validated(layer, Scenario)
     if _named_files(scenario) != _named_files(loaded.scenario):
         remedy = "write a scenario for each, with `base` and the files that differ"
         raise InputError("files were read with the scenario and stay as they are", remedy=remedy)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import typing
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -45,7 +45,20 @@ _UNION_KEYS = ("kind", "distribution", "type")
 _NAME, _INDEX = "NAME", "[]"
 """Stand for any name, and any number of an entry, in the location of a model."""
 ModelPath = tuple[str, ...]
+Model = TypeVar("Model", bound=BaseModel)
 Models = Sequence[tuple[ModelPath, type[BaseModel]]]
+
+
+def validated(layer: Layer, model: type[Model]) -> Model:
+    """Return the data of a layer as a model.
+
+    Raises:
+        InputError: they are not valid, see input_error.
+    """
+    try:
+        return model.model_validate(layer.data)
+    except ValidationError as error:
+        raise input_error(error, layer, model) from None
 
 
 def input_error(error: ValidationError, layer: Layer, model: Any) -> InputError:

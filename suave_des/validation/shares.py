@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from suave_des.estimates import Interval
 from suave_des.scenario.layers import Layer
-from suave_des.scenario.problems import input_error
+from suave_des.scenario.problems import validated
 from suave_des.scenario.quantities import Number, Strict, ordered, wrong
 from suave_des.scenario.yamlfile import read_yaml
 from suave_des.validation.statistics import share_interval
@@ -73,11 +73,7 @@ def read_shares(path: Path) -> tuple[Share, ...]:
     Raises:
         InputError: with file and line: it cannot be read, or is not valid.
     """
-    layer = Layer.of(read_yaml(path), 0)
-    try:
-        return ShareList.model_validate(layer.data).shares
-    except ValidationError as error:
-        raise input_error(error, layer, ShareList) from None
+    return validated(Layer.of(read_yaml(path), 0), ShareList).shares
 
 
 def shares_beside(data: Path) -> Path | None:
