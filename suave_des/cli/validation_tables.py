@@ -27,9 +27,7 @@ def print_validation(console: Console, validation: Validation) -> None:
         rows = list(make(validation))
         headings = [*left, *right] if left else _place_headings(validation)
         if rows:
-            table = plain_table()
-            for place, heading in enumerate(headings):
-                table.add_column(heading, justify="left" if place < len(left) or not heading else "right")
+            table = plain_table(headings, right={*headings} - {*left, ""})
             for row in rows:
                 table.add_row(*row)
             print_table(console, title, table)
