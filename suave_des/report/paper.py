@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from suave_des.campaign.output import csv_text
 from suave_des.errors import InputError
 from suave_des.estimates import Estimate, Interval, estimate
 from suave_des.report.runs import METRICS, read_runs
@@ -19,10 +18,7 @@ if TYPE_CHECKING:
 _PAPER_ORDER = {"none": 0, "random": 1, "metacontrol": 2}
 _CLAIMS = {"search_time_s": ("find the pipeline sooner", -1.0), "distance_inspected_m": ("inspect more of it", 1.0)}
 """What the paper says that metacontrol does on average, and the sign of what is better."""
-_COLUMNS = (
-    *("manager", "metric", "statistic", "published", "published_ci95_low", "published_ci95_high"),
-    *("ours", "ours_ci95_low", "ours_ci95_high", "difference", "inside_published_ci95"),
-)
+_DECIMALS = 6
 
 MARK = "*"
 """Marks figures outside the paper's interval."""
@@ -64,12 +60,6 @@ class PaperFigure:
         """Whether ours lies in the 95% interval of the published one; none if there are too few missions."""
         low, high = self.published_interval
         return None if self.ours is None else low <= self.ours <= high
-
-    def row(self) -> tuple[object, ...]:
-        """Return the row of the table's CSV file."""
-        paper = (self.published, *self.published_interval)
-        ours = (self.ours, *(self.ours_interval or (None, None)))
-        return self.manager, self.metric, self.statistic, *paper, *ours, self.difference, self.is_inside
 
     def cells(self) -> tuple[str, ...]:
         """Format the paper's figure and its interval, ours, the difference, and the mark of one outside."""
@@ -140,7 +130,23 @@ class PaperComparison:
 
     def csv(self) -> str:
         """Write the comparison as CSV, with six decimals; missing values are empty."""
-        return csv_text(_COLUMNS, map(PaperFigure.row, self.figures))
+        import pandas
+
+        rows = [
+            {
+                "manager": figure.manager,
+                "metric": figure.metric,
+                "statistic": figure.statistic,
+                "published": figure.published,
+                **_ends("published", figure.published_interval),
+                "ours": figure.ours,
+                **_ends("ours", figure.ours_interval),
+                "difference": figure.difference,
+                "inside_published_ci95": figure.is_inside,
+            }
+            for figure in self.figures
+        ]
+        return pandas.DataFrame(rows, dtype=object).map(_rounded).to_csv(index=False, lineterminator="\n")
 
 
 def published_runs() -> Path:
@@ -195,6 +201,15 @@ def _sizes(estimates: Estimates) -> str:
     if len(set(sizes.values())) == 1:
         return f"{next(iter(sizes.values()))} missions for each manager"
     return ", ".join(f"{n} {'mission' if n == 1 else 'missions'} of {manager}" for manager, n in sizes.items())
+
+
+def _ends(name: str, interval: Interval | None) -> dict[str, float | None]:
+    low, high = interval or (None, None)
+    return {f"{name}_ci95_low": low, f"{name}_ci95_high": high}
+
+
+def _rounded(value: object) -> object:
+    return round(value, _DECIMALS) if isinstance(value, float) else value
 
 
 def _interval(interval: Interval | None) -> str:
