@@ -168,9 +168,11 @@ def write_files(folder: Path, files: Mapping[str, str | bytes | Iterable[str]], 
     try:
         with _user_errors(folder):
             for content, temporary in zip(files.values(), written.values(), strict=True):
-                pieces = (content,) if isinstance(content, str | bytes) else content
+                if isinstance(content, str | bytes):
+                    temporary.write_bytes(content if isinstance(content, bytes) else content.encode())
+                    continue
                 with temporary.open("wb") as file:
-                    file.writelines(piece if isinstance(piece, bytes) else piece.encode() for piece in pieces)
+                    file.writelines(piece.encode() for piece in content)
             for final, temporary in written.items():
                 temporary.replace(final)
             for name in set(stale) - set(files):

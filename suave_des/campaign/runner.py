@@ -222,7 +222,7 @@ class _Campaign:
             store = self._store(resumed=resumed)
             try:
                 stopped = self._work(store, executor, on_progress)
-                is_empty = next(store.outcomes(), None) is None
+                is_empty = store.count() == 0
             finally:
                 if folder is not None:
                     store.close()

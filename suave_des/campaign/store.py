@@ -179,6 +179,12 @@ class Store:
             found = self._db.execute("SELECT run FROM outcomes WHERE point = ? AND manager = ?", group)
             return {run for (run,) in found}
 
+    def count(self) -> int:
+        """Return the number of outcomes."""
+        with _user_errors(self.path):
+            (number,) = self._db.execute("SELECT count(*) FROM outcomes").fetchone()
+        return int(number)
+
     def outcomes(self) -> Iterator[Finished]:
         """Yield all outcomes in the order of their keys, read as they are requested.
 
