@@ -17,8 +17,9 @@ from suave_des.managing.base import AdaptationProcess, ManagedSystem, ManagingSu
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, Kind
 from suave_des.scenario.modes import UNGROUND_MODE
 from suave_des.scenario.quantities import draw
+from suave_des.scenario.revision import MetacontrolRevision
 
-_memos: WeakKeyDictionary[Deliberation, dict[Hashable, Conclusion]] = WeakKeyDictionary()
+_memos: WeakKeyDictionary[Deliberation, dict[MetacontrolRevision, dict[Hashable, Conclusion]]] = WeakKeyDictionary()
 """Results of analyze and plan by symbolic state: missions of one scenario go through the same few states."""
 _MEMO_SIZE: Final = 16384
 
@@ -44,7 +45,7 @@ class Metacontrol(ManagingSubsystem):
         scenario, revision = system.scenario, system.scenario.revision.metacontrol
         self._revision = revision
         self._knowledge = system.knowledge()
-        self._memo = _memos.setdefault(self._knowledge, {})
+        self._memo = _memos.setdefault(self._knowledge, {}).setdefault(revision, {})
         self.objectives: dict[str, str | None] = {}
         self.groundings: dict[str, str] = {}
         self.components: dict[str, str] = {}
@@ -179,9 +180,8 @@ class Metacontrol(ManagingSubsystem):
             around = tuple(map(regions.around, self.measurements.values()))
             # Of two values in one gap between thresholds rules can tell which is the greater.
             values = around if len(set(around)) == len(around) else values
-        parts = self.objectives, self.groundings, self.components
-        revision = self._revision.search_always_improves, self._revision.search_improves_when_exceeded
-        return *(tuple(part.items()) for part in parts), tuple(self.measurements), values, revision
+        known = tuple(self.objectives.items()), tuple(self.groundings.items()), tuple(self.components.items())
+        return known, tuple(self.measurements), values
 
     def _is_in_force(self, conclusion: Conclusion) -> bool:
         """Whether executing a plan would change nothing."""
