@@ -122,12 +122,21 @@ def _read_bytes(path: Path) -> bytes:
     return content
 
 
+_PLAIN: Final = re.compile(
+    rb"(\xef\xbb\xbf)?\s*<(?!\?xml[^>]*\bencoding\s*=\s*[\"'](?!(utf-8|us-ascii|iso-8859-\d+|windows-125\d)[\"']))",
+    re.IGNORECASE,
+)
+
+
 def _parse_xml(path: Path, content: bytes) -> etree._Element:
     """Return the root element, once it is sure that nothing in the file reaches for others or expands too far."""
     if re.match(rb"\s*<!doctype\s+html", content, re.IGNORECASE):
         raise KnowledgeError("this is a web page, not an ontology", file=path, place="line 1", remedy=_SAVE_AS)
     # lxml-stubs knows neither "internal" nor what a DOCTYPE has.
-    options: Any = {"resolve_entities": "internal", "no_network": True, "load_dtd": False, "huge_tree": False}
+    options: Any = {"resolve_entities": "internal", "no_network": True, "load_dtd": False}
+    # Long rules are deeply nested: 256 levels, a hundred atoms, are too few. The larger limit takes the one on
+    # expansion away, so it is used only where no entity can be declared: in a plain encoding, without a DOCTYPE.
+    options["huge_tree"] = _PLAIN.match(content) is not None and b"<!DOCTYPE" not in content
     try:
         root = etree.fromstring(content, etree.XMLParser(**options))
     except etree.XMLSyntaxError as error:
