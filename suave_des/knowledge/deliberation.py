@@ -14,7 +14,7 @@ from suave_des.knowledge.regions import Regions
 from suave_des.knowledge.state import Inference, KnowledgeState, Plan
 
 #: Conclusions kept by a Deliberation; the least recently used are dropped.
-REMEMBERED: Final = 16384
+CACHED_CONCLUSIONS: Final = 16384
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Deliberation:
         self.base = base
         self.reasoner = reasoner
         self.regions: Regions | None = getattr(reasoner, "regions", None)
-        self._cached = lru_cache(maxsize=REMEMBERED)(self._analyze_and_plan)
+        self._cached = lru_cache(maxsize=CACHED_CONCLUSIONS)(self._analyze_and_plan)
 
     def analyze_and_plan(self, state: KnowledgeState, *, improve_exceeded: bool = False) -> Conclusion:
         """Analyze a state and plan on it.

@@ -1,4 +1,4 @@
-"""Whole missions: repeatable, the same sea for every manager, and the facts of the exemplar end to end."""
+"""Whole missions: repeatable, common random numbers for every manager, and the facts of the exemplar end to end."""
 
 import math
 from itertools import pairwise
