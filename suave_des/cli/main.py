@@ -13,7 +13,7 @@ import typer
 from typer.core import TyperGroup
 
 from suave_des import __version__
-from suave_des.cli import bench, campaign, kb, missions, reproduce, validate
+from suave_des.cli import bench, calibrate, campaign, kb, missions, reproduce, validate
 from suave_des.cli.options import remember_command_line
 from suave_des.errors import InputError, SuaveDesError
 from suave_des.interrupts import exit_status, signals_raised
@@ -57,7 +57,7 @@ app.command("reproduce")(reproduce.reproduce)
 app.command("run")(missions.run)
 app.command("campaign")(campaign.campaign)
 app.command("validate")(validate.validate)
-app.command("calibrate")(validate.calibrate)
+app.command("calibrate")(calibrate.calibrate)
 app.add_typer(kb.app, name="kb")
 app.command("figure")(missions.figure)
 app.command("import-config")(missions.import_config)

@@ -21,8 +21,12 @@ from suave_des.scenario.yamlfile import decode, read_bytes
 
 METRICS = {"search_time_s": "search time (s)", "distance_inspected_m": "distance inspected (m)"}
 """Metrics that are compared, with their titles in figures."""
-COLUMNS = ("manager", *METRICS, "detection_x_m")
-"""Columns of a frame of missions; detection_x_m is nan where it is not known or nothing was detected."""
+COLUMNS = ("manager", *METRICS, "detection_x_m", "pipeline_found", "mean_reaction_time_s")
+"""Columns of a frame of missions.
+
+detection_x_m is nan where it is not known or nothing was detected, pipeline_found a nullable boolean, missing where the
+file does not tell, and mean_reaction_time_s nan where nothing was reacted to or the file does not tell.
+"""
 _SIZE_LIMIT_BYTES = 500_000_000
 _WHOLE_LIMIT = 2**63
 
@@ -35,8 +39,11 @@ class _Layout(NamedTuple):
     distance_inspected_m: str
     detection_x_m: tuple[str, ...] = ()
     time_limit_s: str = ""
+    pipeline_found: str = ""
+    mean_reaction_time_s: str = ""
     scenario: str = ""
-    manager_is_last_word: bool = True
+    is_exemplars: bool = True
+    """The manager is the last word of its column, and rows of averages may follow the missions."""
 
 
 _LAYOUTS = (
@@ -45,13 +52,24 @@ _LAYOUTS = (
         "search_time_s",
         "distance_inspected_m",
         detection_x_m=("detection_x_m", "detection_x_m_inferred"),
+        time_limit_s="time_limit_s",
+        pipeline_found="pipeline_found",
+        mean_reaction_time_s="mean_reaction_time_s",
         scenario="scenario",
-        manager_is_last_word=False,
+        is_exemplars=False,
     ),
     # The exemplar's results files (kas-lab/suave): revision 2023, which writes -1 when nothing was found, and 1.5.
     _Layout("mission_name", "time search (s)", "distance inspected (m)", time_limit_s="time budget (s)"),
-    _Layout("mission name", "time searching pipeline (s)", "distance inspected (m)"),
+    _Layout(
+        "mission name",
+        "time searching pipeline (s)",
+        "distance inspected (m)",
+        pipeline_found="pipeline found",
+        mean_reaction_time_s="mean reaction time (s)",
+    ),
 )
+_AVERAGES = ("average", "std")
+"""First words of rows that sum up the missions of the exemplar's files."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +82,7 @@ class Runs:
         managers: in the order of their first missions, each with the line of that.
         scenarios: names of scenarios that the file gives, each with its first line.
         sha256: of the file's bytes, in hex.
+        averages: lines of rows that are no missions, but averages of them, and were left out.
     """
 
     path: Path
@@ -71,6 +90,7 @@ class Runs:
     managers: Mapping[str, int]
     scenarios: Mapping[str, int]
     sha256: str
+    averages: tuple[int, ...] = ()
 
     def error(self, line: int, problem: str, remedy: str | None) -> InputError:
         """Make an error about a line of the file."""
@@ -103,7 +123,8 @@ def read_runs(path: str | Path, *, further: Sequence[str] = (), are_simulated: b
     """Read missions from a runs.csv, a file like the published seams2023_runs.csv, or the exemplar's own results.
 
     Search times are taken as they stand, but for the -1 with which revision 2023 says that nothing was found: the time
-    limit stands for it, as in the published table.
+    limit stands for it, as in the published table. A file that has a time limit, but does not say which missions found
+    the pipeline, has found it in those whose search took less. A reaction time of 0 stands for no reaction.
 
     Args:
         path: of the file; it may have columns that are not read.
@@ -116,17 +137,21 @@ def read_runs(path: str | Path, *, further: Sequence[str] = (), are_simulated: b
     path = Path(path)
     content = read_bytes(path, _SIZE_LIMIT_BYTES)
     reader = csv.reader(io.StringIO(decode(path, content), newline=""), strict=True)
-    rows, lines = [], []
+    rows, lines, averages = [], [], []
     try:
         header = [name.strip() for name in next(reader, [])]
         layout = _layout(path, header, further)
         metrics = [field for field in fields(MissionMetrics) if are_simulated and field.name in header]
-        wanted = (*layout[:3], *layout.detection_x_m, layout.time_limit_s, layout.scenario, *further)
+        optional = (layout.time_limit_s, layout.pipeline_found, layout.mean_reaction_time_s, layout.scenario)
+        wanted = (*layout[:3], *layout.detection_x_m, *optional, *further)
         wanted += tuple(field.name for field in metrics)
         names = [name for name in dict.fromkeys(wanted) if name in header]
         places = [header.index(name) for name in names]
         for cells in reader:
             if any(map(str.strip, cells)):
+                if layout.is_exemplars and _first_word(cells) in _AVERAGES:
+                    averages.append(reader.line_num)
+                    continue
                 if len(cells) != len(header):
                     problem = f"has {len(cells)} values, but the header has {len(header)}"
                     raise _error(path, reader.line_num, problem, "give each column a value, if only an empty one")
@@ -145,7 +170,8 @@ def read_runs(path: str | Path, *, further: Sequence[str] = (), are_simulated: b
     managers = _first_lines(frame["manager"])
     scenarios = _first_lines(cells_by_name[layout.scenario]) if layout.scenario in names else {}
     frame = frame.assign(**{name: _numbers_or_words(cells_by_name[name]) for name in further})
-    return Runs(path, frame.reset_index(drop=True), managers, scenarios, hashlib.sha256(content).hexdigest())
+    digest = hashlib.sha256(content).hexdigest()
+    return Runs(path, frame.reset_index(drop=True), managers, scenarios, digest, tuple(averages))
 
 
 def choose_managers(published: Runs, wanted: str | None) -> tuple[str, ...]:
@@ -182,11 +208,12 @@ def _layout(path: Path, header: Sequence[str], further: Sequence[str]) -> _Layou
 def _missions(cells: _Cells, layout: _Layout) -> pandas.DataFrame:
     """Check and convert the cells; a frame with COLUMNS."""
     words = [name.split() for name in cells.text[layout.manager]]
-    are_names = [len(each) == 1 or bool(each and layout.manager_is_last_word) for each in words]
+    are_names = [len(each) == 1 or bool(each and layout.is_exemplars) for each in words]
     cells.check(layout.manager, are_names, "a manager's name")
     search_time_s = cells.numbers(layout.search_time_s, least=-math.inf)
-    if layout.time_limit_s in cells.text:
-        search_time_s = np.where(search_time_s == -1.0, cells.numbers(layout.time_limit_s), search_time_s)
+    limits = cells.numbers(layout.time_limit_s) if layout.time_limit_s in cells.text else None
+    if limits is not None and layout.is_exemplars:
+        search_time_s = np.where(search_time_s == -1.0, limits, search_time_s)
     cells.check(layout.search_time_s, search_time_s >= 0.0, "a finite number, at least 0")
     detection = next((name for name in layout.detection_x_m if name in cells.text), None)
     values = (
@@ -194,8 +221,32 @@ def _missions(cells: _Cells, layout: _Layout) -> pandas.DataFrame:
         search_time_s,
         cells.numbers(layout.distance_inspected_m),
         math.nan if detection is None else cells.numbers(detection, least=-math.inf, may_be_empty=True),
+        _found(cells, layout, search_time_s, limits),
+        _reactions(cells, layout.mean_reaction_time_s),
     )
     return pandas.DataFrame(dict(zip(COLUMNS, values, strict=True)), index=cells.text.index)
+
+
+def _found(
+    cells: _Cells, layout: _Layout, search_time_s: NDArray[np.float64], limits: NDArray[np.float64] | None
+) -> pandas.arrays.BooleanArray:
+    """Return whether each mission found the pipeline; missing where that is not known."""
+    if layout.pipeline_found in cells.text:
+        words = cells.text[layout.pipeline_found].str.lower()
+        cells.check(layout.pipeline_found, words.isin(("true", "false")), "True or False")
+        found = (words == "true").to_numpy()
+    elif limits is not None:
+        found = search_time_s < limits
+    else:
+        return pandas.array([pandas.NA] * len(cells.text), dtype="boolean")
+    return pandas.array(found, dtype="boolean")
+
+
+def _reactions(cells: _Cells, column: str) -> NDArray[np.float64] | float:
+    if column not in cells.text:
+        return math.nan
+    times_s = cells.numbers(column, may_be_empty=True)
+    return np.where(times_s > 0.0, times_s, math.nan)
 
 
 class _Cells(NamedTuple):
@@ -234,6 +285,10 @@ class _Cells(NamedTuple):
             if not right:
                 problem = f"{column}: expected {wanted}, got {shown(text)}"
                 raise _error(self.path, line, problem, "correct it, or leave the mission out")
+
+
+def _first_word(cells: Sequence[str]) -> str:
+    return next((word for cell in cells for word in cell.split()), "").rstrip(":").lower()
 
 
 def _first_lines(names: pandas.Series[str]) -> dict[str, int]:

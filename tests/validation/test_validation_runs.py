@@ -3,6 +3,7 @@
 import math
 from pathlib import Path
 
+import pandas
 import pytest
 
 from suave_des.errors import InputError
@@ -141,3 +142,47 @@ def test_further_columns_are_numbers_where_all_their_values_are(write):
     assert frame["mode"].tolist() == ["low", "7"]
     with pytest.raises(InputError, match="line 1: has no column 'speed'"):
         read_runs(path, further=["speed"])
+
+
+def test_rows_of_averages_in_the_exemplars_files_are_left_out_and_told(write):
+    header = "mission name,datetime,pipeline found,time searching pipeline (s),distance inspected (m)"
+    rows = ["suave bt,01-Jul-2025-00-43-53,True,87,40.25", "AVERAGE,,,87.0,40.25", "STD,,,0.0,0.0"]
+    runs = read_runs(write("results.csv", "\n".join([header, *rows])))
+    assert len(runs.frame) == 1
+    assert runs.averages == (3, 4)
+
+
+def test_rows_of_averages_may_be_shorter_than_the_header(write):
+    header = "mission name,datetime,time searching pipeline (s),distance inspected (m)"
+    runs = read_runs(write("results.csv", f"{header}\nsuave bt,today,87,40.25\n,AVERAGE\nstd:,1\n"))
+    assert (len(runs.frame), runs.averages) == (1, (3, 4))
+
+
+def test_a_manager_of_our_own_files_may_be_called_average(write):
+    runs = read_runs(write("runs.csv", f"{OWN}\naverage,120,3\n"))
+    assert runs.managers == {"average": 2}
+    assert runs.averages == ()
+
+
+@pytest.mark.parametrize(
+    ("header", "rows", "found"),
+    [
+        (f"{OWN},pipeline_found", ["none,251,0,False", "none,20,1,true"], [False, True]),
+        (f"{OWN},time_limit_s", ["none,300,0,300", "none,299,1,300"], [False, True]),
+        (OWN, ["none,300,0"], [None]),
+    ],
+)
+def test_whether_the_pipeline_was_found_is_read_or_follows_from_the_time_limit(write, header, rows, found):
+    frame = read_runs(write("runs.csv", "\n".join([header, *rows]))).frame
+    assert [None if value is pandas.NA else value for value in frame["pipeline_found"]] == found
+
+
+def test_a_reaction_time_of_zero_is_none(write):
+    rows = "none,20,1,0.0\nnone,20,1,1.5\nnone,20,1,\n"
+    times = read_runs(write("runs.csv", f"{OWN},mean_reaction_time_s\n{rows}")).frame["mean_reaction_time_s"]
+    assert times.notna().tolist() == [False, True, False]
+
+
+def test_a_word_that_is_neither_true_nor_false_is_named(write):
+    with pytest.raises(InputError, match="pipeline_found: expected True or False, got 'maybe'"):
+        read_runs(write("runs.csv", f"{OWN},pipeline_found\nnone,20,1,maybe\n"))
