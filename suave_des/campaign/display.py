@@ -173,15 +173,18 @@ def _as_lines(display: _Display, console: Console) -> Iterator[None]:
 @contextmanager
 def _in_notebook(display: _Display) -> Iterator[None]:
     """Replace one output, of plain HTML: it needs no widgets."""
-    from IPython.display import HTML
-    from IPython.display import display as show_output
+    import IPython.display
+
+    notebook: Any = IPython.display  # whose functions have no types
 
     def html() -> Any:
         console = Console(file=io.StringIO(), record=True, width=_NOTEBOOK_WIDTH, force_jupyter=False)
         console.print(display.get_renderable())
-        return HTML(console.export_html(inline_styles=True, code_format="<pre style='line-height: 1.2'>{code}</pre>"))
+        return notebook.HTML(
+            console.export_html(inline_styles=True, code_format="<pre style='line-height: 1.2'>{code}</pre>")
+        )
 
-    handle: Any = show_output(html(), display_id=True)
+    handle: Any = notebook.display(html(), display_id=True)
     display.on_update = lambda: handle.update(html())
     try:
         yield
