@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from typing import Any
 
 from rich.console import Console, RenderableType
@@ -173,9 +174,7 @@ def _as_lines(display: _Display, console: Console) -> Iterator[None]:
 @contextmanager
 def _in_notebook(display: _Display) -> Iterator[None]:
     """Replace one output, of plain HTML: it needs no widgets."""
-    import IPython.display
-
-    notebook: Any = IPython.display  # whose functions have no types
+    notebook: Any = import_module("IPython.display")  # its functions have no types
 
     def html() -> Any:
         console = Console(file=io.StringIO(), record=True, width=_NOTEBOOK_WIDTH, force_jupyter=False)
