@@ -36,6 +36,7 @@ class Measurements:
     A monitor that repeats an unchanged value reports nothing new: only values that differ from the one before are kept.
     """
 
+    is_tabulated: ClassVar[bool] = True
     key: str
     times_s: tuple[float, ...]
     values: tuple[float, ...]
@@ -144,6 +145,7 @@ class BatteryLevel:
     """
 
     key: ClassVar[str] = "battery_level"
+    is_tabulated: ClassVar[bool] = False
     is_at_station: Callable[[float], bool]
     discharge_time_s: float
     publishing: Publishing
@@ -176,4 +178,4 @@ class BatteryLevel:
 
 
 Measured = Measurements | BatteryLevel
-"""What a monitor measures of a quality attribute; times asked about must not lie in the future."""
+"""What a monitor measures of a quality attribute; times asked about may lie in the future if it is tabulated."""

@@ -61,6 +61,7 @@ class ManagerHost:
         self._is_event_triggered = thresholds is not None
         edges = thresholds or {}
         self._depends_on = [(each, edges[name]) for name, each in self.system.measurements.items() if name in edges]
+        self._is_tabulated = all([each.is_tabulated for each, _ in self._depends_on])
         if kind.diagnostic is not ManagingSubsystem.diagnostic:
             self.bus.subscribe(self._diagnostic, kind.subscribes_to)
         period_s = self.manager.period_s
@@ -119,18 +120,17 @@ class ManagerHost:
     def _wait_for_event(self, due_s: float, period_s: float) -> Generator[simpy.Event, Any, float]:
         """Wait until the first time of `adapt`, from `due_s` on, at which a call may change something; return it."""
         env = self.system.env
+        self._idle_regions.add(self._regions(env.now))
         self._is_waiting = True
         try:
             while True:
-                self._idle_regions.add(self._regions())
-                crossings_s = [each.next_crossing_s(env.now, edges) for each, edges in self._depends_on]
-                if (event_s := min(crossings_s, default=inf)) == inf:
+                tick_s = self._next_event_s(due_s, period_s)
+                if tick_s == inf:
                     yield env.event()  # until interrupted
-                tick_s = _tick_at_or_after(event_s, due_s, period_s)
                 if tick_s > 2.0 * env.now:
                     yield until(env, 0.75 * tick_s)  # from there on the delay is exact
                 yield until(env, tick_s)
-                if self._regions() not in self._idle_regions:
+                if self._regions(tick_s) not in self._idle_regions:
                     self._is_waiting = False
                     return tick_s
                 due_s = tick_s + period_s
@@ -139,9 +139,20 @@ class ManagerHost:
             yield until(env, tick_s)
             return tick_s
 
-    def _regions(self) -> tuple[int, ...]:
-        now_s = self.system.env.now
-        return tuple([measured.region(now_s, edges) for measured, edges in self._depends_on])
+    def _next_event_s(self, due_s: float, period_s: float) -> float:
+        """First of the times of `adapt` at which measured values will, or can, be where a call was not idle before."""
+        tick_s = self.system.env.now
+        while True:
+            event_s = min([each.next_crossing_s(tick_s, edges) for each, edges in self._depends_on], default=inf)
+            if event_s == inf:
+                return inf
+            tick_s = _tick_at_or_after(event_s, due_s, period_s)
+            if not self._is_tabulated or self._regions(tick_s) not in self._idle_regions:
+                return tick_s
+            due_s = tick_s + period_s
+
+    def _regions(self, t_s: float) -> tuple[int, ...]:
+        return tuple([measured.region(t_s, edges) for measured, edges in self._depends_on])
 
     def _guarded_steps(self, adaptation: AdaptationProcess) -> Process:
         value = None
