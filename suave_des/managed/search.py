@@ -121,9 +121,11 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         self._radius_m = self._present.item(3)
         self._step += count
 
-    def not_reached(self, x_y_reached: bool) -> None:
+    def not_reached(self) -> None:
         """Command a lower altitude if only z is not reached: the autopilot stops short of its altitude set-point."""
-        if x_y_reached:
+        x_m, y_m, _ = self.sender.vehicle.position(self.env.now)
+        waypoint = self.waypoints(1)
+        if max(abs(x_m - waypoint.item(0, 0)), abs(y_m - waypoint.item(0, 1))) <= REACHED_BOX_M:
             self._lowered_m += self.revision.workaround_step_m
 
     def _spiral(self, waypoints: Array) -> Array:

@@ -61,7 +61,7 @@ class ManagerHost:
         self._is_event_triggered = thresholds is not None
         edges = thresholds or {}
         self._depends_on = [(each, edges[name]) for name, each in self.system.measurements.items() if name in edges]
-        self._is_tabulated = all([each.is_tabulated for each, _ in self._depends_on])
+        self._is_tabulated = all(each.is_tabulated for each, _ in self._depends_on)
         if kind.diagnostic is not ManagingSubsystem.diagnostic:
             self.bus.subscribe(self._diagnostic, kind.subscribes_to)
         period_s = self.manager.period_s

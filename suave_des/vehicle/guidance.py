@@ -42,7 +42,7 @@ class WaypointSource(Protocol):
     def reached(self, count: int) -> None:
         """Go on by `count` way-points: the present one, and those after it, have been reached."""
 
-    def not_reached(self, x_y_reached: bool) -> None:
+    def not_reached(self) -> None:
         """React to a way-point that was not reached in time, and will be sent again. By default: nothing."""
         return
 
@@ -157,7 +157,7 @@ class Guidance:
         self.source.tick()
         while self._check is not None and self._act_at == tick:
             if self._is_planned and not self._is_due:
-                self.source.not_reached(self._are_x_and_y_reached(check))
+                self.source.not_reached()
                 self._is_due = True
             if self._is_due:
                 self._sent = tick
@@ -205,8 +205,3 @@ class Guidance:
     def _set_alarm(self, check: ArrivalCheck, tick: int) -> None:
         self._act_at = tick
         self._alarm.set(check.time_s(tick))
-
-    def _are_x_and_y_reached(self, check: ArrivalCheck) -> bool:
-        x_m, y_m, _ = self.sender.vehicle.position(self._alarm.now_s)
-        present = self.source.waypoints(1)
-        return max(abs(x_m - present.item(0, 0)), abs(y_m - present.item(0, 1))) <= check.half_width_m

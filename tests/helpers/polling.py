@@ -89,22 +89,21 @@ class PollingGuidance:
                 self._sent, self._is_due = tick, False
             if tick < self._sent + check.fewest_ticks:
                 break
-            near_x_y, near_z = self._is_near(check, tick)
-            if near_x_y and near_z:
+            if self._is_near(check, tick):
                 source.reached(1)
             elif tick >= self._sent + check.most_ticks:
-                source.not_reached(near_x_y)
+                source.not_reached()
             else:
                 break
             self._is_due = True
         self._next_tick = tick + 1
         self._alarm.set(check.time_s(self._next_tick))
 
-    def _is_near(self, check: ArrivalCheck, tick: int) -> tuple[bool, bool]:
+    def _is_near(self, check: ArrivalCheck, tick: int) -> bool:
         position = self._sender.vehicle.position(check.time_s(tick))
         waypoint = self._source.waypoints(1)[0]
         x_m, y_m, z_m = (abs(a - b) for a, b in zip(position, waypoint[:3].tolist(), strict=True))
-        return x_m <= check.half_width_m and y_m <= check.half_width_m, z_m <= check.half_height_m
+        return max(x_m, y_m) <= check.half_width_m and z_m <= check.half_height_m
 
 
 class PollingDetector:
