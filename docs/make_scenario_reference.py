@@ -18,6 +18,7 @@ from suave_des.scenario.quantities import LONGEST_S, Choice, Exponential, Normal
 from suave_des.scenario.revision import Revision
 from suave_des.scenario.schema import field_docs
 from suave_des.scenario.signal_kinds import ConstantSignal, SinusoidSignal, StepSignal, TableSignal
+from suave_des.scenario.vehicle import VehicleDescription
 
 PAGE = Path(__file__).parent / "reference" / "scenario.md"
 SIGNALS = (SinusoidSignal, ConstantSignal, StepSignal, TableSignal)
@@ -26,6 +27,12 @@ UNITS = (  # ending of a key: its unit; the first that fits
     ("_m_per_s", "m/s"),
     ("_per_s", "1/s"),
     ("_rad", "rad"),
+    ("_deg", "degrees"),
+    ("_kg_per_m3", "kg/m^3"),
+    ("_kg_m2", "kg m^2"),
+    ("_kg", "kg"),
+    ("_m3", "m^3"),
+    ("_n", "N"),
     ("_s", "s"),
     ("_m", "m"),
 )
@@ -37,13 +44,14 @@ def page() -> str:
     text = (Path(__file__).parent / "reference" / "scenario.md.in").read_text(encoding="utf-8")
     tables = {
         "scenario": table(Scenario),
-        "parts": parts(Scenario, "", {Revision, ManagerSettings, *SIGNALS, *DISTRIBUTIONS}),
+        "parts": parts(Scenario, "", {Revision, VehicleDescription, ManagerSettings, *SIGNALS, *DISTRIBUTIONS}),
         "signals": "\n".join(f"### kind: {kind(each, 'kind')}\n\n{lead(each)}\n\n{table(each)}" for each in SIGNALS),
         "distributions": "\n".join(
             f"### distribution: {kind(each, 'distribution')}\n\n{lead(each)}\n\n{table(each)}" for each in DISTRIBUTIONS
         ),
         "managers": parts(ManagerSettings, "managers.", set()),
         "revision": parts(Revision, "revision.", set(DISTRIBUTIONS)),
+        "vehicle": table(VehicleDescription) + "\n" + parts(VehicleDescription, "vehicle.", set()),
     }
     for name, content in tables.items():
         text = text.replace(f"<!-- {name} -->\n", content)

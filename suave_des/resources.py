@@ -14,13 +14,14 @@ _KINDS = {
     "ontology": ".owl",
     "scenarios": ".yaml",
     "scenarios/revisions": ".yaml",
+    "scenarios/vehicles": ".yaml",
     "scenarios/published": ".csv",
     "scenarios/calibration": ".yaml",
 }
 
 
 def shipped_folder(kind: str) -> Path:
-    """Folder of shipped files of one kind: "ontology", "scenarios", "scenarios/revisions" or "scenarios/published"."""
+    """Folder of shipped files of one kind, such as "ontology", "scenarios" or "scenarios/revisions"."""
     installed = _PACKAGE / "shipped" / kind
     return installed if installed.is_dir() else _PACKAGE.parent / kind
 

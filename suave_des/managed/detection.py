@@ -35,6 +35,7 @@ class PipelineDetector:
     Attributes:
         visibility_m: measured water visibility at each row of the vehicle's track.
         points: points as the detection places them, shape (n, 3), m.
+        view_tangent: tangent of half the camera's field of view.
         detected: the event of the first sight.
         first_point: index of the point seen, once detected.
         detected_s: mission time of the first sight; inf before.
@@ -44,6 +45,7 @@ class PipelineDetector:
     vehicle: Vehicle
     visibility_m: Array
     points: Array
+    view_tangent: float
     log: Log
     first_point: int | None = None
     detected_s: float = math.inf
@@ -63,7 +65,9 @@ class PipelineDetector:
             self._alarm.cancel()
             return
         self.vehicle.look_ahead(last)
-        seen_row, self._seen = first_detection(self.vehicle.track, row, last, self.visibility_m, self.points)
+        seen_row, self._seen = first_detection(
+            self.vehicle.track, row, last, self.visibility_m, self.points, self.view_tangent
+        )
         self._row = last if self._seen < 0 else seen_row
         self._alarm.set(self._row * STEP_S)
 

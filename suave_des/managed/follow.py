@@ -18,10 +18,6 @@ from suave_des.scenario.revision import FollowRevision
 from suave_des.vehicle.guidance import Guidance, SetPointSender, WaypointSource
 from suave_des.vehicle.vehicle import ArrivalCheck
 
-ALTITUDE_M = 1.25
-Z_M = SEA_BED_Z_M + ALTITUDE_M
-POLLS_BEFORE_RESENDING = 10
-
 
 class InspectionPath(NamedTuple):
     """A path to inspect.
@@ -35,11 +31,11 @@ class InspectionPath(NamedTuple):
     lengths_m: tuple[float, ...]
 
     @classmethod
-    def along(cls, points_m: Array) -> Self:
-        """The path along points: x and y in the first two columns, shape (points, at least 2)."""
+    def along(cls, points_m: Array, altitude_m: float) -> Self:
+        """The path above points: x and y in the first two columns, shape (points, at least 2)."""
         x_y_m = points_m[:, :2]
         lengths_m = (math.dist(a, b) for a, b in pairwise(x_y_m.tolist()))
-        return cls(np.insert(x_y_m, 2, Z_M, axis=1), (0.0, *lengths_m))
+        return cls(np.insert(x_y_m, 2, SEA_BED_Z_M + altitude_m, axis=1), (0.0, *lengths_m))
 
     def from_point(self, first: int) -> Self:
         """The rest of the path from a point on."""
@@ -99,7 +95,7 @@ class FollowPipeline(FunctionNode, WaypointSource):
 
     def _arrival_check(self, began_s: float) -> ArrivalCheck:
         period_s, width_m = self.revision.poll_period_s, self.revision.acceptance_m
-        return ArrivalCheck(began_s, period_s, width_m, math.inf, 0, POLLS_BEFORE_RESENDING)
+        return ArrivalCheck(began_s, period_s, width_m, math.inf, 0, self.revision.polls_before_resending)
 
     def waypoints(self, count: int) -> Array:
         """The present point and those after it; none when the end is reached."""
@@ -109,7 +105,7 @@ class FollowPipeline(FunctionNode, WaypointSource):
 
     def set_point_z_m(self) -> float:
         """The altitude of following above the sea bed."""
-        return Z_M
+        return SEA_BED_Z_M + self.revision.altitude_m
 
     def reached(self, count: int) -> None:
         """Add up the distance, from the first point on; it is published at each point after that."""

@@ -11,18 +11,21 @@ from suave_des.managed.node import FunctionNode
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, DiagnosticsBus, Kind
 from suave_des.scenario.revision import RecoveryRevision
 
-RECOVERY_TIME_S = 10.0
-THRUSTER_PERIOD_S = 0.25
 THRUSTERS = 6
 
 
 @dataclass(eq=False)
 class MaintainMotion(FunctionNode):
-    """The motion function: after 10 s restores thruster by thruster, and reports each on the diagnostics bus."""
+    """The motion function: after a while restores thruster by thruster, and reports each on the diagnostics bus.
+
+    Attributes:
+        delay_s: draws the time from the activation to the recovery of the first thruster.
+    """
 
     bus: DiagnosticsBus
     revision: RecoveryRevision
     set_health: Callable[[float, int, float], None]
+    delay_s: Callable[[], float]
     _recovery: simpy.Process | None = field(default=None, init=False)
 
     def activated(self) -> None:
@@ -38,12 +41,12 @@ class MaintainMotion(FunctionNode):
 
     def _recover(self) -> Process:
         try:
-            yield self.env.timeout(RECOVERY_TIME_S)
+            yield self.env.timeout(self.delay_s())
             for thruster in range(1, THRUSTERS + 1):
                 self.set_health(self.env.now, thruster, 1.0)
                 name = thruster_name(thruster)
                 self.bus.publish(Diagnostic(self.env.now, Kind.COMPONENT_STATUS, name, RECOVERED))
-                yield self.env.timeout(THRUSTER_PERIOD_S)
+                yield self.env.timeout(self.revision.thruster_period_s)
             self._recovery = None
         except simpy.Interrupt:
             return

@@ -5,20 +5,21 @@ from dataclasses import dataclass, field
 import simpy
 
 from suave_des.clock import Process
-from suave_des.domain import SEA_BED_Z_M
 from suave_des.managed.node import FunctionNode
 from suave_des.vehicle.guidance import SetPointSender
-
-ALTITUDE_M = 1.25
-RESEND_PERIOD_S = 10.0
 
 
 @dataclass(eq=False)
 class GenerateRechargePath(FunctionNode):
-    """The recharge function: while active, the station, at x and y in m, is the set-point."""
+    """The recharge function: while active, the station is the set-point, sent again once a period.
+
+    Attributes:
+        station_m: x, y and z of the place at which the vehicle is recharged.
+    """
 
     sender: SetPointSender
-    station_m: tuple[float, float]
+    station_m: tuple[float, float, float]
+    resend_period_s: float
     _going: simpy.Process | None = field(default=None, init=False)
 
     def activated(self) -> None:
@@ -33,7 +34,7 @@ class GenerateRechargePath(FunctionNode):
     def _go(self) -> Process:
         try:
             while True:
-                self.sender.send(*self.station_m, SEA_BED_Z_M + ALTITUDE_M)
-                yield self.env.timeout(RESEND_PERIOD_S)
+                self.sender.send(*self.station_m)
+                yield self.env.timeout(self.resend_period_s)
         except simpy.Interrupt:
             return

@@ -14,30 +14,32 @@ from suave_des.scenario.modes import Mode
 from suave_des.scenario.revision import SpiralRevision
 from suave_des.vehicle.guidance import Guidance, SetPointSender, WaypointSource
 from suave_des.vehicle.vehicle import ArrivalCheck
-from suave_des.world.pipeline import VIEW_TANGENT
-
-TICK_PERIOD_S = 1.0
-ANGLE_STEP_RAD = 0.1
-REACHED_BOX_M = 0.4
-TICKS_BEFORE_RESENDING = 10
-INITIAL_ALTITUDE_M = 2.0  # before any mode is set
 
 
 @compiled
-def spiral(step: int, radius_m: float, altitude_m: float, centre_m: tuple[float, float], waypoints: Array) -> None:
+def spiral(
+    step: int,
+    radius_m: float,
+    altitude_m: float,
+    form: tuple[float, float],
+    centre_m: tuple[float, float],
+    waypoints: Array,
+) -> None:
     """Way-points of the spiral.
 
     Args:
         step, radius_m: the spiral's step counter and its radius before the first of them.
         altitude_m: altitude above the sea bed; a turn widens the spiral by what the camera sees from there.
+        form: angle from one way-point to the next, rad, and the tangent of half the camera's field of view.
         centre_m: x and y of its centre.
         waypoints: shape (n, 4); x, y, z and the spiral's radius are written into it, in m.
     """
+    angle_step, view_tangent = form
     for n in range(waypoints.shape[0]):
         if step > 0:
-            turn_width = 2.0 * altitude_m * VIEW_TANGENT
-            radius_m += turn_width * ANGLE_STEP_RAD / (2.0 * math.pi)
-        angle = ANGLE_STEP_RAD * step
+            turn_width = 2.0 * altitude_m * view_tangent
+            radius_m += turn_width * angle_step / (2.0 * math.pi)
+        angle = angle_step * step
         waypoints[n, 0] = centre_m[0] + radius_m * math.cos(angle)
         waypoints[n, 1] = centre_m[1] + radius_m * math.sin(angle)
         waypoints[n, 2], waypoints[n, 3] = SEA_BED_Z_M + altitude_m, radius_m
@@ -50,6 +52,7 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
 
     Attributes:
         centre_m: x and y of the spiral's centre; in revision 2023 the local frame's origin.
+        view_tangent: tangent of half the camera's field of view.
         phase_s: mission time of a tick of the node's timer.
         ready_s: mission time before which the node does not tick, whatever its mode.
         altitude_m: the node's altitude parameter.
@@ -58,14 +61,16 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
     sender: SetPointSender
     revision: SpiralRevision
     centre_m: tuple[float, float]
+    view_tangent: float
     phase_s: float
     ready_s: float = 0.0
-    altitude_m: float = INITIAL_ALTITUDE_M
+    altitude_m: float = field(init=False)
     _lowered_m: float = field(default=0.0, init=False)
 
     def __post_init__(self) -> None:
+        self.altitude_m = self.revision.initial_altitude_m
         self._restart()
-        self._guidance = Guidance(self.sender, self, partial(Alarm, self.env), _arrival_check)
+        self._guidance = Guidance(self.sender, self, partial(Alarm, self.env), self._arrival_check)
 
     def _restart(self) -> None:
         self._step = 0
@@ -89,7 +94,7 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
             self._lowered_m = 0.0
         if self.revision.centre == "activation":
             self.centre_m = self.sender.vehicle.position(self.env.now)[:2]
-        first_s = tick_at_or_after(max(self.env.now, self.ready_s), self.phase_s, TICK_PERIOD_S)
+        first_s = tick_at_or_after(max(self.env.now, self.ready_s), self.phase_s, self.revision.tick_period_s)
         self._guidance.start_at(first_s, resumes=self._present is not None)
 
     def deactivated(self) -> None:
@@ -129,9 +134,10 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
             self._lowered_m += self.revision.workaround_step_m
 
     def _spiral(self, waypoints: Array) -> Array:
-        spiral(self._step, self._radius_m, self.altitude_m, self.centre_m, waypoints)
+        form = self.revision.angle_step_rad, self.view_tangent
+        spiral(self._step, self._radius_m, self.altitude_m, form, self.centre_m, waypoints)
         return waypoints
 
-
-def _arrival_check(began_s: float) -> ArrivalCheck:
-    return ArrivalCheck(began_s, TICK_PERIOD_S, REACHED_BOX_M, REACHED_BOX_M, 1, TICKS_BEFORE_RESENDING + 1)
+    def _arrival_check(self, began_s: float) -> ArrivalCheck:
+        period_s, box_m = self.revision.tick_period_s, self.revision.acceptance_m
+        return ArrivalCheck(began_s, period_s, box_m, box_m, 1, self.revision.ticks_before_resending + 1)

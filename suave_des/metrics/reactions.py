@@ -11,7 +11,6 @@ from typing import Any
 import simpy
 
 from suave_des.domain import GENERATE_RECHARGE_PATH, MAINTAIN_MOTION
-from suave_des.managed.search import INITIAL_ALTITUDE_M
 from suave_des.monitor.diagnostics import FAILED, Diagnostic
 from suave_des.monitor.measurements import Measured, Measurements
 from suave_des.scenario.models import ReactionMetric
@@ -32,6 +31,7 @@ class ReactionMeter:
     env: simpy.Environment
     settings: ReactionMetric
     visibility: Measurements
+    initial_altitude_m: float
     battery: Measured | None = None
     _noted: list[_Entry] = field(default_factory=list, init=False)
 
@@ -47,7 +47,7 @@ class ReactionMeter:
 
     def reactions_s(self) -> list[float]:
         """The reactions completed by now, in the order of their completion."""
-        open_events = _OpenEvents(self.visibility.next_message_s)
+        open_events = _OpenEvents(self.visibility.next_message_s, self.initial_altitude_m)
         entries = [*self._fitting_altitudes(), *self._low_battery(), *self._noted]
         for t_s, method, value in sorted(entries, key=itemgetter(0)):
             method(open_events, t_s, value)
@@ -86,11 +86,12 @@ class _OpenEvents:
 
     Args:
         next_message_s: gives the time of the next visibility message, changed or not.
+        altitude_m: the search's altitude before any mode is set.
     """
 
-    def __init__(self, next_message_s: Callable[[float], float]) -> None:
+    def __init__(self, next_message_s: Callable[[float], float], altitude_m: float) -> None:
         self._next_message_s = next_message_s
-        self._altitude_m = INITIAL_ALTITUDE_M
+        self._altitude_m = altitude_m
         self._expected_m: float | None = None
         self._battery_low = False
         self._since_s: dict[str, float] = {}  # when each kind of event began that is open

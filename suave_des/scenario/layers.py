@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 from suave_des.errors import InputError, KeyPath, did_you_mean, place_text, shown
 from suave_des.resources import find, shipped_folder
 from suave_des.scenario.revision import Revision
+from suave_des.scenario.vehicle import VehicleDescription
 from suave_des.scenario.yamlfile import YamlDocument, read_bytes, read_yaml
 
 _KIND_KEYS = ("kind", "distribution")
@@ -108,7 +109,22 @@ def _same_kind(base: dict[str, Any], over: dict[str, Any]) -> bool:
 
 _ONTOLOGY_LIMIT_BYTES = 100_000_000
 _CHAIN_LIMIT = 20
-_REVISIONS = "scenarios/revisions"
+_DEFAULT_VEHICLE = "bluerov2"
+
+
+class _NamedPart(NamedTuple):
+    """A part of a scenario that may be the name of a file, or differ from one that it names as its base."""
+
+    key: str
+    folder: str
+    fields: tuple[str, ...]
+    example: str
+
+
+_NAMED_PARTS = (
+    _NamedPart("revision", "scenarios/revisions", tuple(Revision.model_fields), '"2023"'),
+    _NamedPart("vehicle", "scenarios/vehicles", tuple(VehicleDescription.model_fields), _DEFAULT_VEHICLE),
+)
 
 
 class Files:
@@ -145,7 +161,7 @@ def _shown_name(path: Path) -> str:
 
 
 def scenario_layer(files: Files, path: Path, above: tuple[Path, ...] = ()) -> Layer:
-    """Merge a scenario file over its base, with its revision written out in full.
+    """Merge a scenario file over its base, with its revision and its vehicle written out in full.
 
     Args:
         files: reader.
@@ -160,12 +176,17 @@ def scenario_layer(files: Files, path: Path, above: tuple[Path, ...] = ()) -> La
     if "base" in layer.data:
         base = find_named(layer, ("base",), layer.data["base"], "scenarios")
         _check_chain(layer, ("base",), (*above, path, base))
-    layer = _with_whole_revision(files, layer.without("base"), len(above), inherited=base is not None)
+    layer = layer.without("base")
+    if base is None and "vehicle" not in layer.data:
+        layer = Layer({**layer.data, "vehicle": _DEFAULT_VEHICLE}, layer.places)
+    for part in _NAMED_PARTS:
+        layer = _with_whole_part(files, layer, part, len(above), inherited=base is not None)
     if base is None:
         return layer
     below = scenario_layer(files, base, (*above, path))
-    if "revision" in layer.data and set(Revision.model_fields) <= set(layer.data["revision"]):
-        below = below.without("revision")
+    for part in _NAMED_PARTS:
+        if set(part.fields) <= layer.data.get(part.key, {}).keys():
+            below = below.without(part.key)
     return merge(below, layer)
 
 
@@ -190,41 +211,47 @@ def _check_chain(layer: Layer, key_path: KeyPath, chain: tuple[Path, ...]) -> No
         raise layer.error(f"the bases never end: {names}", key_path, "a file must not be its own base")
 
 
-def _with_whole_revision(files: Files, layer: Layer, depth: int, *, inherited: bool) -> Layer:
-    """The layer with its revision written out; parts of an inherited one are left as they are."""
-    if "revision" not in layer.data:
+def _with_whole_part(files: Files, layer: Layer, part: _NamedPart, depth: int, *, inherited: bool) -> Layer:
+    """The layer with its revision or vehicle written out; what differs from an inherited one is left as it is."""
+    key = part.key
+    if key not in layer.data:
         return layer
-    value = layer.data["revision"]
+    value = layer.data[key]
     if not isinstance(value, dict):
-        return layer.replaced("revision", _revision_layer(files, layer, ("revision",), value, depth + 1))
+        return layer.replaced(key, _part_layer(files, layer, (key,), value, part, depth + 1))
     if "base" in value:
-        below = _revision_layer(files, layer, ("revision", "base"), value["base"], depth + 1)
-        return layer.replaced("revision", merge(below, layer.below("revision").without("base")))
-    missing = [key for key in Revision.model_fields if key not in value]
-    if missing and not inherited:
-        remedy = 'name the revision to start from, such as base: "2023", beside what differs from it'
-        raise layer.error(f"has no {missing[0]}", ("revision",), remedy)
+        below = _part_layer(files, layer, (key, "base"), value["base"], part, depth + 1)
+        return layer.replaced(key, merge(below, layer.below(key).without("base")))
+    if not inherited and (missing := [field for field in part.fields if field not in value]):
+        remedy = f"name the {key} to start from, such as base: {part.example}, beside what differs from it"
+        raise layer.error(f"has no {missing[0]}", (key,), remedy)
     return layer
 
 
-def _revision_layer(
-    files: Files, named: Layer, key_path: KeyPath, name: object, depth: int, above: tuple[Path, ...] = ()
+def _part_layer(
+    files: Files,
+    named: Layer,
+    key_path: KeyPath,
+    name: object,
+    part: _NamedPart,
+    depth: int,
+    above: tuple[Path, ...] = (),
 ) -> Layer:
-    """A revision by its name or path, merged over its own base."""
+    """A revision or vehicle by its name or path, merged over its own base."""
     if isinstance(name, int | float) and not isinstance(name, bool):
         name = f"{name:g}"  # 2023 and 1.5 need no quotes
-    shipped = sorted(path.stem for path in shipped_folder(_REVISIONS).glob("*.yaml"))
+    shipped = sorted(path.stem for path in shipped_folder(part.folder).glob("*.yaml"))
     if not isinstance(name, str) or not name:
-        remedy = f"one of {', '.join(shipped)}, the path of a revision file, or a mapping with base"
-        raise named.error(f"{shown(name)} is not a revision", key_path, remedy)
+        remedy = f"one of {', '.join(shipped)}, the path of a {part.key} file, or a mapping with base"
+        raise named.error(f"{shown(name)} is not a {part.key}", key_path, remedy)
     try:
-        path = find(name, _REVISIONS, beside=named.place(key_path).file.parent)
+        path = find(name, part.folder, beside=named.place(key_path).file.parent)
     except InputError:
-        remedy = f"{did_you_mean(name, shipped, 'shipped')}; or the path of a revision file"
-        raise named.error(f"there is no revision {shown(name)}", key_path, remedy) from None
+        remedy = f"{did_you_mean(name, shipped, 'shipped')}; or the path of a {part.key} file"
+        raise named.error(f"there is no {part.key} {shown(name)}", key_path, remedy) from None
     _check_chain(named, key_path, (*above, path))
     layer = Layer.of(files.yaml(path), depth)
     if "base" not in layer.data:
         return layer
-    below = _revision_layer(files, layer, ("base",), layer.data["base"], depth + 1, (*above, path))
+    below = _part_layer(files, layer, ("base",), layer.data["base"], part, depth + 1, (*above, path))
     return merge(below, layer.without("base"))

@@ -30,6 +30,7 @@ from suave_des.scenario.quantities import (
 )
 from suave_des.scenario.revision import Revision
 from suave_des.scenario.signal_kinds import Signal
+from suave_des.scenario.vehicle import VehicleDescription
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_.-]*$", max_length=100)]
 FileName = Annotated[str, Field(min_length=1)]
@@ -134,6 +135,10 @@ class Battery(Strict):
     """Recharge station, north."""
     station_radius_m: Length = 0.5
     """Half-width of the box in x and y within which the vehicle counts as docked."""
+    approach_altitude_m: Length = 1.25
+    """Altitude above the sea bed at which the station is approached."""
+    resend_period_s: Period = 10.0
+    """Period at which the station is sent to the autopilot again."""
 
 
 class Latencies(Strict):
@@ -271,6 +276,8 @@ class Scenario(Strict):
     """For people."""
     revision: Revision
     """How the exemplar's software of one revision behaves."""
+    vehicle: VehicleDescription
+    """Body, thrusters and camera; left out in a file: `bluerov2`."""
     mission: Mission = Mission()
     """The coordinator's limit."""
     start: Start = Start()

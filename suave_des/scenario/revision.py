@@ -8,6 +8,7 @@ from pydantic import Field, field_validator
 
 from suave_des.scenario.quantities import (
     FARTHEST_M,
+    DelayDistribution,
     Distribution,
     Length,
     NotNegative,
@@ -18,6 +19,8 @@ from suave_des.scenario.quantities import (
     support,
     wrong,
 )
+
+Count = Annotated[int, Field(strict=True), Within(1, 1_000_000)]
 
 
 class CoordinatorRevision(Strict):
@@ -40,6 +43,16 @@ class SpiralRevision(Strict):
     """Where the spiral is centred: the local frame's origin, or the position at each activation."""
     restarts_on_activation: bool
     """Whether each activation starts the spiral afresh (else it goes on from the same counter)."""
+    tick_period_s: Period
+    """Period of its timer; at most one way-point is reached a tick."""
+    angle_step_rad: Annotated[float, Field(strict=True), Within(gt=0, le=6.3, unit="rad")]
+    """Angle from one way-point to the next."""
+    acceptance_m: Length
+    """A way-point is reached when dx, dy and dz are all at most this."""
+    ticks_before_resending: Count
+    """A way-point that is not reached is sent again after more than this many ticks."""
+    initial_altitude_m: Length
+    """Altitude above the sea bed before any mode is set."""
     workaround_step_m: Length
     """How much the commanded altitude is lowered each time that z alone is not reached."""
     workaround_cleared_on_activation: bool
@@ -51,8 +64,12 @@ class FollowRevision(Strict):
 
     acceptance_m: Length
     """A point is reached when dx and dy are both at most this."""
+    altitude_m: Length
+    """Altitude above the sea bed."""
     poll_period_s: Period
     """Period at which it looks whether the point is reached."""
+    polls_before_resending: Count
+    """A point that is not reached is sent again after this many polls."""
     restarts_on_activation: bool
     """Whether the path starts again from its first point (else it goes on with those not yet reached)."""
     adds_remaining_way: bool
@@ -62,6 +79,10 @@ class FollowRevision(Strict):
 class RecoveryRevision(Strict):
     """Thruster recovery in maintain_motion."""
 
+    delay_s: DelayDistribution
+    """Time from the activation to the recovery of the first thruster, drawn anew each time."""
+    thruster_period_s: Period
+    """Time from one thruster to the next."""
     survives_deactivation: bool
     """Whether a recovery under way goes on when the function is deactivated."""
 
@@ -71,6 +92,8 @@ class MonitorsRevision(Strict):
 
     thruster_event_times: Literal["after_previous", "after_start"]
     """What the time of a thruster event counts from: the event before, or the start of the mission."""
+    thruster_check_period_s: Period
+    """Period at which it is checked whether a thruster event is due: at most one happens at a time."""
     visibility_publishing_period_s: Period
     """Period at which signals are measured that give none themselves."""
     detected_point_height_m: Annotated[float, Field(strict=True), Within(0, FARTHEST_M, unit="m")]

@@ -79,19 +79,18 @@ def _allow_removal(definitions: dict[str, Any]) -> None:
 
 
 def _allow_bases(definitions: dict[str, Any]) -> None:
-    """A scenario and a revision may name what they build on; a revision may be no more than its name."""
-    base = {"type": ["string", "number"], "description": "Name or path of the revision that this one differs from."}
-    over = {**definitions["PartialRevision"], "required": ["base"]}
-    over["properties"] = {"base": base, **over["properties"]}
-    definitions["RevisionOverBase"] = over
+    """A scenario, a revision and a vehicle may name what they build on; the last two may be no more than their name."""
     names = {"type": ["string", "number"]}
-    forms = [names, {"$ref": f"{_REFERENCE}RevisionOverBase"}, {"$ref": f"{_REFERENCE}Revision"}]
-    for scenario, extra in (("Scenario", []), ("PartialScenario", [{"$ref": f"{_REFERENCE}PartialRevision"}])):
-        revision = definitions[scenario]["properties"]["revision"]
-        definitions[scenario]["properties"]["revision"] = {
-            "anyOf": [*forms, *extra],
-            "description": revision["description"],
-        }
+    for key, model in (("revision", "Revision"), ("vehicle", "VehicleDescription")):
+        base = {**names, "description": f"Name or path of the {key} that this one differs from."}
+        over = {**definitions[_PARTIAL + model], "required": ["base"]}
+        over["properties"] = {"base": base, **over["properties"]}
+        definitions[f"{model}OverBase"] = over
+        forms = [names, {"$ref": f"{_REFERENCE}{model}OverBase"}, {"$ref": f"{_REFERENCE}{model}"}]
+        for scenario, extra in (("Scenario", []), ("PartialScenario", [{"$ref": f"{_REFERENCE}{_PARTIAL}{model}"}])):
+            properties = definitions[scenario]["properties"]
+            properties[key] = {"anyOf": [*forms, *extra], "description": properties[key]["description"]}
+    definitions["Scenario"]["required"].remove("vehicle")  # left out, it is the shipped one
     definitions["Scenario"]["required"].remove("name")  # left out, it is the file's name
     definitions["PartialScenario"]["properties"]["base"] = {
         "type": "string",

@@ -27,7 +27,6 @@ from suave_des.simulation.chance import Chance
 from suave_des.simulation.host import RAISED, ManagerHost
 from suave_des.simulation.simulator import MissionMemory, Simulator
 from suave_des.vehicle.autopilot import Autopilot
-from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.frames import Pose
 from suave_des.vehicle.guidance import SetPointSender
 from suave_des.vehicle.vehicle import Vehicle
@@ -53,12 +52,24 @@ class Mission:
         self._visibility = self._signals["water_visibility"]
         self._battery = None if self._scenario.battery is None else self._make_battery(self._scenario.battery)
         measured_at_rows(*self._visibility.arrays, memory.visibility_m)
-        points, log = simulator.detection_points, self._recorder.log
-        self._detector = PipelineDetector(self.env, self._vehicle, memory.visibility_m, points, log)
+        self._detector = PipelineDetector(
+            self.env,
+            self._vehicle,
+            memory.visibility_m,
+            simulator.detection_points,
+            simulator.view_tangent,
+            self._recorder.log,
+        )
         nodes = self._make_functions()
         latency_s = self._chance.sampler("latencies.mode_change_s", self._scenario.latencies.mode_change_s)
         self._modes = ModeManager(self.env, simulator.loaded.modes, nodes, latency_s, self._recorder.log)
-        self._reactions = ReactionMeter(self.env, self._scenario.reaction_metric, self._visibility, self._battery)
+        self._reactions = ReactionMeter(
+            self.env,
+            self._scenario.reaction_metric,
+            self._visibility,
+            self._revision.spiral.initial_altitude_m,
+            self._battery,
+        )
         self._bus.subscribe(self._reactions.diagnostic, (Kind.COMPONENT_STATUS,))
         if record:
             thresholds_m = self._scenario.reaction_metric.visibility_thresholds_m
@@ -119,7 +130,7 @@ class Mission:
         )
         start = Pose(*self._origin_m, z_m, 0.0, 0.0, heading_rad)
         return Vehicle(
-            BLUEROV2,
+            self._simulator.vehicle_model,
             autopilot,
             start,
             self._simulator.duration_s,
@@ -156,27 +167,32 @@ class Mission:
         for n, event in enumerate(self._scenario.thruster_events):
             time_s = self._chance.draw(f"thruster_events.{n}.time_s", event.time_s)
             faults.append(ThrusterFault(event.thruster, event.event == "failure", time_s))
-        phase_s, set_health = self._chance.phase("thruster_monitor", 1.0), self._vehicle.set_thruster_health
-        after_previous = self._revision.monitors.thruster_event_times == "after_previous"
-        self.env.process(thruster_monitor(self.env, self._bus, faults, set_health, phase_s, after_previous))
+        monitors, set_health = self._revision.monitors, self._vehicle.set_thruster_health
+        period_s, after_previous = monitors.thruster_check_period_s, monitors.thruster_event_times == "after_previous"
+        phase_s = self._chance.phase("thruster_monitor", period_s)
+        self.env.process(thruster_monitor(self.env, self._bus, faults, set_health, phase_s, after_previous, period_s))
 
     def _make_functions(self) -> dict[str, FunctionNode]:
         env, revision, chance = self.env, self._revision, self._chance
         loss_probability = chance.value("revision.set_points.loss_probability")
         follow, search, recharge = domain.FOLLOW_PIPELINE, domain.GENERATE_SEARCH_PATH, domain.GENERATE_RECHARGE_PATH
         make_sender = partial(self._make_sender, loss_probability)
-        phase_s, ready_s = chance.phase(search, 1.0), chance.value("latencies.guided_start_s")
+        phase_s = chance.phase(search, revision.spiral.tick_period_s)
+        ready_s, view_tangent = chance.value("latencies.guided_start_s"), self._simulator.view_tangent
+        recovery_s = chance.sampler("revision.recovery.delay_s", revision.recovery.delay_s)
         self._follow = FollowPipeline(env, make_sender(follow), revision.follow, self._path)
         nodes: dict[str, FunctionNode] = {
             domain.MAINTAIN_MOTION: MaintainMotion(
-                env, self._bus, revision.recovery, self._vehicle.set_thruster_health
+                env, self._bus, revision.recovery, self._vehicle.set_thruster_health, recovery_s
             ),
-            search: GenerateSearchPath(env, make_sender(search), revision.spiral, self._origin_m, phase_s, ready_s),
+            search: GenerateSearchPath(
+                env, make_sender(search), revision.spiral, self._origin_m, view_tangent, phase_s, ready_s
+            ),
             follow: self._follow,
         }
         if (battery := self._scenario.battery) is not None:
-            station_m = (battery.station_x_m, battery.station_y_m)
-            nodes[recharge] = GenerateRechargePath(env, make_sender(recharge), station_m)
+            station_m = battery.station_x_m, battery.station_y_m, domain.SEA_BED_Z_M + battery.approach_altitude_m
+            nodes[recharge] = GenerateRechargePath(env, make_sender(recharge), station_m, battery.resend_period_s)
         return nodes
 
     def _make_sender(self, loss_probability: float, node: str) -> SetPointSender:

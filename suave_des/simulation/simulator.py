@@ -13,6 +13,7 @@ from suave_des.compiling import Array
 from suave_des.managed.follow import InspectionPath
 from suave_des.metrics.result import MissionResult
 from suave_des.scenario.loader import LoadedScenario
+from suave_des.simulation.vehicles import vehicle_model
 from suave_des.vehicle.kernel import ROW
 from suave_des.vehicle.vehicle import track_rows
 from suave_des.world.pipeline import sample_points, there_and_back
@@ -48,9 +49,11 @@ class Simulator:
         self.runs_per_draw = dict(runs_per_draw)
         scenario = loaded.scenario
         self.points = sample_points(scenario.pipeline.vertices_m, scenario.pipeline.points_per_piece)
-        self.path = InspectionPath.along(there_and_back(self.points))
+        self.path = InspectionPath.along(there_and_back(self.points), scenario.revision.follow.altitude_m)
         self.detection_points = self.points + np.array([0.0, 0.0, scenario.revision.monitors.detected_point_height_m])
         self.duration_s = scenario.mission.time_limit_s + scenario.revision.coordinator.limit_check_period_s
+        self.vehicle_model = vehicle_model(scenario.vehicle)
+        self.view_tangent = scenario.vehicle.camera.tangent
         self._spare_memory: list[MissionMemory] = []
 
     @cached_property

@@ -84,7 +84,7 @@ class Vehicle:
         computed_row: last row of the track that is filled.
 
     Example:
-        >>> vehicle = Vehicle(BLUEROV2, autopilot, Pose(0, 0, -18, 0, 0, 0), duration_s=60.0)
+        >>> vehicle = Vehicle(model, autopilot, Pose(0, 0, -18, 0, 0, 0), duration_s=60.0)
         >>> vehicle.command(0.0, 1.0, 0.0, -18.0)
         >>> x_m, y_m, z_m = vehicle.position(10.0)
     """

@@ -1,14 +1,11 @@
 """The pipeline, and the mock-up of its detection: which of its points a downward camera sees (facts: kas-lab/suave)."""
 
-import math
 from functools import cache
 from itertools import pairwise
 
 import numpy as np
 
 from suave_des.compiling import Array, compiled
-
-VIEW_TANGENT = math.tan(math.radians(60.0) / 2.0)  # of half the camera's field of view
 
 
 @cache
@@ -32,22 +29,26 @@ def there_and_back(points: Array) -> Array:
 
 
 @compiled
-def first_point_in_view(x_m: float, y_m: float, z_m: float, visibility_m: float, points: Array) -> int:
+def first_point_in_view(
+    x_m: float, y_m: float, z_m: float, visibility_m: float, points: Array, view_tangent: float
+) -> int:
     """Lowest index of the points that a camera at (x, y, z) sees, -1 if none.
 
     With h the vertical distance to a point, the point is in view within h * tan(field of view / 2) in x and in y, and
-    visible if h is at most the water visibility.
+    visible if h is at most the water visibility. `view_tangent` is the tangent of half the field of view.
     """
     for index in range(points.shape[0]):
         h = abs(z_m - points[index, 2])
-        d = h * VIEW_TANGENT
+        d = h * view_tangent
         if abs(y_m - points[index, 1]) <= d and abs(x_m - points[index, 0]) <= d and h <= visibility_m:
             return index
     return -1
 
 
 @compiled
-def first_detection(track: Array, first_row: int, last_row: int, visibility_m: Array, points: Array) -> tuple[int, int]:
+def first_detection(
+    track: Array, first_row: int, last_row: int, visibility_m: Array, points: Array, view_tangent: float
+) -> tuple[int, int]:
     """First row of [first_row, last_row] from which a point is seen, and the point's index; (-1, -1) if none.
 
     Args:
@@ -56,16 +57,17 @@ def first_detection(track: Array, first_row: int, last_row: int, visibility_m: A
         last_row: the last row that counts.
         visibility_m: measured water visibility at each row, shape (rows,); nan while there is no measurement.
         points: points as the detection places them, shape (n, 3), m.
+        view_tangent: tangent of half the camera's field of view.
     """
     low_x, low_y, low_z = points[:, 0].min(), points[:, 1].min(), points[:, 2].min()
     high_x, high_y, high_z = points[:, 0].max(), points[:, 1].max(), points[:, 2].max()
     for row in range(first_row, last_row + 1):
         x, y, z = track[row, 0], track[row, 1], track[row, 2]
         # Far from the pipeline's bounding box no point can be in view: most rows of a search end here.
-        widest = max(abs(z - low_z), abs(z - high_z)) * VIEW_TANGENT
+        widest = max(abs(z - low_z), abs(z - high_z)) * view_tangent
         if x < low_x - widest or x > high_x + widest or y < low_y - widest or y > high_y + widest:
             continue
-        index = first_point_in_view(x, y, z, visibility_m[row], points)
+        index = first_point_in_view(x, y, z, visibility_m[row], points, view_tangent)
         if index >= 0:
             return row, index
     return -1, -1

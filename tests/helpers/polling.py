@@ -11,6 +11,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from typing import Final
 from unittest import mock
 
@@ -115,20 +116,29 @@ class PollingDetector:
         vehicle: Vehicle,
         visibility_m: NDArray[np.float64],
         points: NDArray[np.float64],
+        view_tangent: float,
         log: Log,
     ) -> None:
         self._log = log
         self.detected = env.event()
         self.first_point: int | None = None
         self.detected_s: float | None = None
-        env.process(self._look(env, vehicle, visibility_m, points))
+        env.process(
+            self._look(
+                env, vehicle, visibility_m, partial(first_point_in_view, points=points, view_tangent=view_tangent)
+            )
+        )
 
     def _look(
-        self, env: simpy.Environment, vehicle: Vehicle, visibility_m: NDArray[np.float64], points: NDArray[np.float64]
+        self,
+        env: simpy.Environment,
+        vehicle: Vehicle,
+        visibility_m: NDArray[np.float64],
+        in_view: Callable[[float, float, float, float], int],
     ) -> Process:
         for row in range(vehicle.last_row + 1):
             yield until(env, row * STEP_S)
-            seen = first_point_in_view(*vehicle.position(env.now), visibility_m[row], points)
+            seen = in_view(*vehicle.position(env.now), visibility_m[row])
             if seen >= 0:
                 self.first_point, self.detected_s = seen, float(env.now)
                 self._log("detection", "pipeline_detected", f"point {seen}")

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from suave_des.managed.detection import PipelineDetector, measured_at_rows
 from suave_des.scenario.models import Pipeline
 from suave_des.vehicle.autopilot import Autopilot
-from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.frames import Pose
 from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at
 from suave_des.world.pipeline import first_point_in_view, sample_points
 from tests.helpers.stand_ins import silent
+from tests.helpers.vehicles import BLUEROV2, VIEW_TANGENT
 
 POINTS = sample_points(Pipeline().vertices_m)
 DURATION_S = 120.0
@@ -36,6 +36,7 @@ class Sight:
             self.vehicle,
             self.visibility_m,
             POINTS,
+            VIEW_TANGENT,
             lambda source, event, detail: self.logged.append((self.env.now, event)),
         )
         for t_s, place in commands:
@@ -59,7 +60,7 @@ def first_sight(sight: Sight) -> tuple[float, int]:
     """The same found by looking at every row of the finished track."""
     track = sight.vehicle.track
     for row in range(sight.vehicle.computed_row + 1):
-        point = first_point_in_view(*track[row, :3], sight.visibility_m[row], POINTS)
+        point = first_point_in_view(*track[row, :3], sight.visibility_m[row], POINTS, VIEW_TANGENT)
         if point >= 0:
             return pytest.approx(row * STEP_S), point
     raise AssertionError("never in view")
@@ -79,7 +80,7 @@ def test_detection_is_recorded_at_its_own_time() -> None:
 def test_vehicle_that_starts_over_the_pipeline_sees_it_at_once() -> None:
     env = simpy.Environment()
     vehicle = Vehicle(BLUEROV2, Autopilot(0.48, 0.34, 0.36, 0.5), Pose(-17.0, 0.0, -18.0, 0, 0, 0), 10.0)
-    detector = PipelineDetector(env, vehicle, np.full(vehicle.last_row + 1, 3.0), POINTS, silent)
+    detector = PipelineDetector(env, vehicle, np.full(vehicle.last_row + 1, 3.0), POINTS, VIEW_TANGENT, silent)
     env.run(until=1.0)
     assert detector.detected_s == 0.0
 

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from suave_des.managed.follow import NO_PATH, FollowPipeline, InspectionPath
 from suave_des.vehicle.autopilot import Autopilot
-from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.frames import Pose
 from suave_des.vehicle.vehicle import Vehicle, row_at
 from tests.helpers.stand_ins import ACTIVE, INACTIVE, MovingVehicle, PlacedVehicle, revision, sender
+from tests.helpers.vehicles import BLUEROV2
 
 BOTH = pytest.mark.parametrize("name", ["2023", "1.5"])
 LINE = [(-0.5 * n, 0.0) for n in range(45)]  # more than are queued at a time
@@ -21,7 +21,7 @@ SPEED = 0.25
 
 
 def follow_of(env: simpy.Environment, name: str, vehicle: PlacedVehicle, path=LINE) -> FollowPipeline:
-    way = NO_PATH if path is None else InspectionPath.along(np.array(path))
+    way = NO_PATH if path is None else InspectionPath.along(np.array(path), 1.25)
     return FollowPipeline(env, sender(env, vehicle), revision(name).follow, lambda: way)
 
 

@@ -20,7 +20,11 @@ class Motion:
         self.restored: list[tuple[float, int]] = []
         bus.subscribe(self.published.append)
         self.node = MaintainMotion(
-            self.env, bus, revision(name).recovery, lambda t_s, thruster, health: self.restored.append((t_s, thruster))
+            self.env,
+            bus,
+            revision(name).recovery,
+            lambda t_s, thruster, health: self.restored.append((t_s, thruster)),
+            lambda: 10.0,
         )
 
 

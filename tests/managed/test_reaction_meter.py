@@ -53,7 +53,7 @@ class Timeline:
         """The meter after all entries."""
         visibility = _measurements("water_visibility", self._visibility, 0.2)
         battery = _measurements("battery_level", self._battery, 0.5) if self._battery else None
-        meter = ReactionMeter(self._env, ReactionMetric(), visibility, battery)
+        meter = ReactionMeter(self._env, ReactionMetric(), visibility, 2.0, battery)
         for t_s, note in self._noted:
             if t_s > self._env.now:
                 self._env.run(until=t_s)

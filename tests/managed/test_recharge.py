@@ -8,12 +8,12 @@ from tests.helpers.stand_ins import ACTIVE, INACTIVE, PlacedVehicle, sender
 
 def recharging() -> tuple[simpy.Environment, PlacedVehicle, GenerateRechargePath]:
     env, vehicle = simpy.Environment(), PlacedVehicle()
-    node = GenerateRechargePath(env, sender(env, vehicle), (-3.0, -2.0))
+    node = GenerateRechargePath(env, sender(env, vehicle), (-3.0, -2.0, -18.75), 10.0)
     node.apply(ACTIVE)
     return env, vehicle, node
 
 
-def test_active_it_sends_the_vehicle_to_the_station_at_altitude_1_25() -> None:
+def test_active_it_sends_the_vehicle_to_the_station() -> None:
     env, vehicle, _ = recharging()
     env.run(until=1.0)
     assert vehicle.commanded == [(-3.0, -2.0, -18.75)]

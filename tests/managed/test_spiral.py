@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from suave_des.managed.search import GenerateSearchPath
 from suave_des.vehicle.autopilot import Autopilot
-from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.frames import Pose
 from suave_des.vehicle.vehicle import Vehicle, row_at
 from tests.helpers.stand_ins import INACTIVE, START, PlacedVehicle, revision, sender, spiral_at
+from tests.helpers.vehicles import BLUEROV2, VIEW_TANGENT
 
 ORIGIN = (-17.0, 2.3)
 PHASE_S = 0.25
@@ -26,7 +26,9 @@ class Search:
     def __init__(self, name: str, vehicle: PlacedVehicle) -> None:
         self.env = simpy.Environment()
         self.vehicle = vehicle
-        self.node = GenerateSearchPath(self.env, sender(self.env, vehicle), revision(name).spiral, ORIGIN, PHASE_S)
+        self.node = GenerateSearchPath(
+            self.env, sender(self.env, vehicle), revision(name).spiral, ORIGIN, VIEW_TANGENT, PHASE_S
+        )
 
     def ticks(self, count: int) -> None:
         """Let a number of ticks pass."""
@@ -265,7 +267,7 @@ def real_search(happenings: list, *, plainly: bool) -> list:
     autopilot = Autopilot(0.48, 0.34, 0.36, 0.5, altitude_deadband_m=0.3)
     vehicle = Vehicle(BLUEROV2, autopilot, Pose(*ORIGIN, -18.75, 0.0, 0.0, 0.0), 80.0)
     plain = PlainSpiral(env, vehicle) if plainly else None
-    node = GenerateSearchPath(env, sender(env, vehicle), revision("2023").spiral, ORIGIN, PHASE_S)
+    node = GenerateSearchPath(env, sender(env, vehicle), revision("2023").spiral, ORIGIN, VIEW_TANGENT, PHASE_S)
 
     def happen(t_s: float, what: int):
         yield env.timeout(t_s + 0.013)  # never at the very time of a tick

@@ -61,7 +61,7 @@ def refused(write, content: str, **options: object) -> InputError:
         (HEAD + "reasoning_period_s: 1\n", "line 2, ", "unknown key", "it belongs under managers.metacontrol"),
         (HEAD + "mission: {signals: {}}\n", "line 2, mission.signals", "unknown key", "belongs at the top level"),
         (HEAD + "start: {time_limit_s: 3}\n", "line 2, start.time_limit_s", "unknown key", "belongs under mission"),
-        (HEAD + "acceptance_m: 3\n", "line 2, acceptance_m", "unknown key", "belongs under revision.follow"),
+        (HEAD + "acceptance_m: 3\n", "line 2, ", "unknown", "under revision.spiral or under revision.follow"),
         (HEAD + "period_s: 3\n", "line 2, period_s", "unknown key", "belongs under signals.NAME"),
         (HEAD + "thruster: 3\n", "line 2, thruster", "unknown key", "belongs under thruster_events[]"),
         (HEAD + "poll_period_s: 3\n", "line 2, ", "unknown", "under revision.coordinator or under revision.follow"),
@@ -271,6 +271,15 @@ def refused(write, content: str, **options: object) -> InputError:
             "origin, activation",
         ),
         (HEAD + "revision: {spiral: {restarts_on_activation: maybe}}\n", "line 2, ", "'maybe'", "true or false"),
+        (HEAD + "revision: {recovery: {delay_s: -1}}\n", "line 2, revision.recovery.delay_s", "-1", "at least 0"),
+        (HEAD + "revision: {follow: {polls_before_resending: 0}}\n", "line 2, revision.follow.", "0 is out", "least 1"),
+        # vehicles
+        (HEAD + "vehicle: bluerov3\n", "line 2, vehicle", "no vehicle 'bluerov3'", "did you mean 'bluerov2'?"),
+        (HEAD + "vehicle: [1]\n", "line 2, vehicle", "[1] is not a vehicle", "one of bluerov2"),
+        (HEAD + "vehicle: {thrust_limit_n: 0}\n", "line 2, vehicle.thrust_limit_n", "0 is out of", "greater than 0"),
+        (HEAD + "vehicle: {thrusters: []}\n", "line 2, vehicle.thrusters", "has 0 entries", "at least 6"),
+        (HEAD + "vehicle: {camera: {field_of_view_deg: 180}}\n", "line 2, vehicle.camera.", "180", "less than 180"),
+        (HEAD + "vehicle: {camera: {field_of_view: 60}}\n", "line 2, vehicle.", "unknown", "'field_of_view_deg'?"),
         # other files
         ("base: nowhere.yaml\n", "line 1, base", "no such file: 'nowhere.yaml'", "seams2023.yaml"),
         ("base: [a]\n", "line 1, base", "['a'] is not a file name", "a path"),
@@ -440,6 +449,14 @@ def test_a_wrong_revision_file_is_reported_there(write):
     assert (error.file, error.place) == ("own.yaml", "line 3, revision.follow.acceptance_m")
 
 
+def test_a_thruster_that_pushes_with_more_than_its_thrust_is_refused_with_its_line(write):
+    thruster = "  - {position_m: [0, 0, 0], direction: [1, 0, 0]}\n"
+    write("own.yaml", "base: bluerov2\nthrusters:\n" + 5 * thruster + thruster.replace("[1, 0", "[1, 1"))
+    error = refused(write, HEAD + "vehicle: own.yaml\n")
+    assert (error.file, error.place) == ("own.yaml", "line 8, vehicle.thrusters.5.direction")
+    assert "length 1.414" in error.problem
+
+
 def test_bases_in_a_circle_are_refused_with_the_circle(write):
     write("a.yaml", "base: b.yaml\n")
     write("b.yaml", "base: mine.yaml\n")
@@ -518,6 +535,7 @@ SHIPPED_FILES = [
         ("scenarios", "seams2023.yaml"),
         ("scenarios", "suave_modes.yaml"),
         ("scenarios/revisions", "2023.yaml"),
+        ("scenarios/vehicles", "bluerov2.yaml"),
     )
 ]
 ANYTHING = st.recursive(
@@ -544,10 +562,12 @@ def test_whatever_stands_anywhere_is_loaded_or_refused_in_one_line(tmp_path_fact
     scenario = (
         (folder / "seams2023.yaml")
         .read_text(encoding="utf-8")
-        .replace('revision: "2023"', "revision: own_revision.yaml")
+        .replace('revision: "2023"', "revision: own_revision.yaml\nvehicle: bluerov2.yaml")
     )
     (folder / "seams2023.yaml").write_text(scenario, encoding="utf-8")
-    path = folder / data.draw(st.sampled_from(["seams2023.yaml", "suave_modes.yaml", "own_revision.yaml"]))
+    path = folder / data.draw(
+        st.sampled_from(["seams2023.yaml", "suave_modes.yaml", "own_revision.yaml", "bluerov2.yaml"])
+    )
     content = read_yaml(path).data
     place = data.draw(st.sampled_from(_places(content)[1:]))
     part = content

@@ -235,6 +235,7 @@ def test_every_file_read_is_hashed_under_the_name_shown(write):
         "sea.csv",
         "shipped/scenarios/seams2023.yaml",
         "shipped/scenarios/revisions/2023.yaml",
+        "shipped/scenarios/vehicles/bluerov2.yaml",
         "shipped/scenarios/suave_modes.yaml",
         "shipped/ontology/suave.owl",
     }

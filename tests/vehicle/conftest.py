@@ -3,9 +3,9 @@ from collections.abc import Callable
 import pytest
 
 from suave_des.vehicle.autopilot import Autopilot
-from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.frames import Pose
 from suave_des.vehicle.vehicle import Vehicle
+from tests.helpers.vehicles import BLUEROV2
 
 START = Pose(0.0, 0.0, -18.0, 0.0, 0.0, 0.0)
 MakeVehicle = Callable[..., Vehicle]

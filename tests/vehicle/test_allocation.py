@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.vehicle import kernel
-from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.model import allocation_matrix, autopilot_allocation
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
+from tests.helpers.vehicles import BLUEROV2
 
 B = allocation_matrix(BLUEROV2)
 S = np.sqrt(0.5)

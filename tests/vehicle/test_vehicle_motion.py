@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from suave_des.vehicle import kernel
-from suave_des.vehicle.bluerov2 import BLUEROV2
 from suave_des.vehicle.frames import Pose
 from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at
+from tests.helpers.vehicles import BLUEROV2
 
 DIRECTIONS = pytest.mark.parametrize("direction_deg", [0, 45, 90, 180, 270])
 PLACE_M = (0.0, 0.0, -18.0)

@@ -55,28 +55,28 @@ def test_path_goes_on_from_the_point_seen_and_back_along_all_points() -> None:
 def test_view_is_a_square_of_half_width_h_tan_30(dx_m: float, dy_m: float, seen: bool) -> None:
     end = POINTS[:1]
     x, y, z = above(0, 2.0, 2.0 * HALF_WIDTH_AT_1_M * dx_m, 2.0 * HALF_WIDTH_AT_1_M * dy_m)
-    assert (first_point_in_view(x, y, z, 3.0, end) == 0) is seen
+    assert (first_point_in_view(x, y, z, 3.0, end, HALF_WIDTH_AT_1_M) == 0) is seen
 
 
 @pytest.mark.parametrize(("visibility_m", "seen"), [(1.999, False), (2.0, True), (2.001, True)])
 def test_point_is_visible_up_to_the_water_visibility(visibility_m: float, seen: bool) -> None:
-    assert (first_point_in_view(*above(30, 2.0), visibility_m, POINTS) >= 0) is seen
+    assert (first_point_in_view(*above(30, 2.0), visibility_m, POINTS, HALF_WIDTH_AT_1_M) >= 0) is seen
 
 
 def test_lowest_index_of_the_points_in_view_counts() -> None:
     # 2 m up the view reaches 1.15 m to each side: two points of the 0.5 m grid.
-    assert first_point_in_view(*above(10, 2.0), 3.0, POINTS) == 8
+    assert first_point_in_view(*above(10, 2.0), 3.0, POINTS, HALF_WIDTH_AT_1_M) == 8
 
 
 def test_without_a_measurement_nothing_is_seen() -> None:
-    assert first_point_in_view(*above(30, 1.0), math.nan, POINTS) == -1
+    assert first_point_in_view(*above(30, 1.0), math.nan, POINTS, HALF_WIDTH_AT_1_M) == -1
 
 
 def test_height_of_the_detected_points_narrows_the_view() -> None:
     raised = POINTS + np.array([0.0, 0.0, 0.75])  # revision 2023: 0.25 m below a vehicle at 1 m altitude
     camera = above(30, 1.0, dy_m=0.2)
-    assert first_point_in_view(*camera, 3.0, POINTS) >= 0
-    assert first_point_in_view(*camera, 3.0, raised) == -1
+    assert first_point_in_view(*camera, 3.0, POINTS, HALF_WIDTH_AT_1_M) >= 0
+    assert first_point_in_view(*camera, 3.0, raised, HALF_WIDTH_AT_1_M) == -1
 
 
 def line_of_positions(y_m: float) -> np.ndarray:
@@ -91,24 +91,24 @@ def test_first_detection_is_the_first_row_with_a_point_in_view() -> None:
     expected = next(
         (row, point)
         for row, position in enumerate(track)
-        if (point := first_point_in_view(*position, 3.0, POINTS)) >= 0
+        if (point := first_point_in_view(*position, 3.0, POINTS, HALF_WIDTH_AT_1_M)) >= 0
     )
-    assert first_detection(track, 0, len(track) - 1, visibility, POINTS) == expected
+    assert first_detection(track, 0, len(track) - 1, visibility, POINTS, HALF_WIDTH_AT_1_M) == expected
 
 
 def test_first_detection_looks_only_at_the_rows_asked_for() -> None:
     track = line_of_positions(0.5)
     visibility = np.full(len(track), 3.0)
-    row, _ = first_detection(track, 0, len(track) - 1, visibility, POINTS)
-    assert first_detection(track, 0, row - 1, visibility, POINTS) == (-1, -1)
+    row, _ = first_detection(track, 0, len(track) - 1, visibility, POINTS, HALF_WIDTH_AT_1_M)
+    assert first_detection(track, 0, row - 1, visibility, POINTS, HALF_WIDTH_AT_1_M) == (-1, -1)
 
 
 def test_first_detection_waits_for_the_visibility() -> None:
     track = line_of_positions(0.0)
     visibility = np.where(np.arange(len(track)) < 250, 1.0, 2.5)
-    assert first_detection(track, 0, len(track) - 1, visibility, POINTS)[0] == 250
+    assert first_detection(track, 0, len(track) - 1, visibility, POINTS, HALF_WIDTH_AT_1_M)[0] == 250
 
 
 def test_far_beside_the_pipeline_nothing_is_detected() -> None:
     track = line_of_positions(2.0)
-    assert first_detection(track, 0, len(track) - 1, np.full(len(track), 9.0), POINTS) == (-1, -1)
+    assert first_detection(track, 0, len(track) - 1, np.full(len(track), 9.0), POINTS, HALF_WIDTH_AT_1_M) == (-1, -1)
