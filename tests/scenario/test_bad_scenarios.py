@@ -453,7 +453,7 @@ def test_a_thruster_that_pushes_with_more_than_its_thrust_is_refused_with_its_li
     thruster = "  - {position_m: [0, 0, 0], direction: [1, 0, 0]}\n"
     write("own.yaml", "base: bluerov2\nthrusters:\n" + 5 * thruster + thruster.replace("[1, 0", "[1, 1"))
     error = refused(write, HEAD + "vehicle: own.yaml\n")
-    assert (error.file, error.place) == ("own.yaml", "line 8, vehicle.thrusters.5.direction")
+    assert (error.file, error.place) == ("own.yaml", "line 8, vehicle.thrusters[5].direction")
     assert "length 1.414" in error.problem
 
 

@@ -1,5 +1,7 @@
 """Constants of the exemplar that users may vary: data of the revision and of the vehicle, and felt in missions."""
 
+from itertools import pairwise
+
 import pytest
 
 from suave_des.domain import SEA_BED_Z_M
@@ -39,7 +41,7 @@ def test_weak_thrusters_limit_the_speed() -> None:
     weak = flown("none", vehicle__thrust_limit_n=0.2)
     strong = flown("none")
     fastest = [
-        max(abs(b.x_m - a.x_m) / (b.t_s - a.t_s) for a, b in zip(way, way[1:], strict=False))
+        max(abs(b.x_m - a.x_m) / (b.t_s - a.t_s) for a, b in pairwise(way))
         for way in (weak.trajectory, strong.trajectory)
     ]
     assert fastest[0] <= (4 * 0.2 * 0.5**0.5 / 33.732) ** 0.5 + 0.01 < 0.2 < fastest[1]
