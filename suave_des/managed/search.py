@@ -130,7 +130,7 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         """Command a lower altitude if only z is not reached: the autopilot stops short of its altitude set-point."""
         x_m, y_m, _ = self.sender.vehicle.position(self.env.now)
         waypoint = self.waypoints(1)
-        if max(abs(x_m - waypoint.item(0, 0)), abs(y_m - waypoint.item(0, 1))) <= REACHED_BOX_M:
+        if max(abs(x_m - waypoint.item(0, 0)), abs(y_m - waypoint.item(0, 1))) <= self.revision.acceptance_m:
             self._lowered_m += self.revision.workaround_step_m
 
     def _spiral(self, waypoints: Array) -> Array:
