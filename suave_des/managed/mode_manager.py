@@ -25,6 +25,7 @@ class ModeManager:
         adaptations: changes from one mode to another of functions in use; neither a task's first mode of a function nor
             the fd_unground at its end counts.
         requests: requests of another mode than the one before.
+        refused: how many requests were refused, by function and mode.
     """
 
     env: simpy.Environment
@@ -35,6 +36,7 @@ class ModeManager:
     listeners: list[Callable[[str, Mode], None]] = field(default_factory=list)
     adaptations: int = 0
     requests: int = 0
+    refused: dict[tuple[str, str], int] = field(default_factory=dict)
     _requested: dict[str, str] = field(default_factory=dict)
     _effect_due_s: dict[str, float] = field(default_factory=dict)
     _in_use: set[str] = field(default_factory=set)
@@ -51,12 +53,16 @@ class ModeManager:
         """Take the end of the functions' task: changes do not count as adaptations until they are active again."""
         self._in_use.difference_update(functions)
 
-    def change_mode(self, function: str, mode: str) -> bool:
-        """Request a mode; False for a function or mode that the modes file does not have, or that has no node here."""
+    def change_mode(self, function: str, mode: str, latency_s: float | None = None) -> bool:
+        """Request a mode; False for a function or mode that the modes file does not have, or that has no node here.
+
+        Its effect comes after `latency_s`; None: after a latency that is drawn.
+        """
         if self._requested.get(function) == mode:
             return True
         chosen = self.table.table.get(function, {}).get(mode)
         if chosen is None or function not in self.nodes:
+            self.refused[function, mode] = self.refused.get((function, mode), 0) + 1
             self.log("mode_manager", "refused", f"{function}: no mode {mode}")
             return False
         self._requested[function] = mode
@@ -66,7 +72,8 @@ class ModeManager:
         elif mode != UNGROUND_MODE:
             self._in_use.add(function)
         self.log("mode_manager", "mode_requested", f"{function} -> {mode}")
-        due_s = max(self.env.now + self.latency_s(), self._effect_due_s.get(function, 0.0))
+        delay_s = self.latency_s() if latency_s is None else latency_s
+        due_s = max(self.env.now + delay_s, self._effect_due_s.get(function, 0.0))
         self._effect_due_s[function] = due_s
         Alarm(self.env, partial(self._take_effect, function, chosen)).set(due_s)
         return True

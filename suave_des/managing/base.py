@@ -9,12 +9,14 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Collection, Generator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import simpy
 
 from suave_des.domain import Task
-from suave_des.monitor.diagnostics import Diagnostic, Kind
+from suave_des.errors import InputError
+from suave_des.monitor.diagnostics import MEASURED_AND_COMPONENTS, Diagnostic, Kind
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.modes import UNGROUND_MODE
 
@@ -22,11 +24,17 @@ if TYPE_CHECKING:  # or looking a manager up would load the vehicle, the compile
     from suave_des.knowledge.deliberation import Deliberation
     from suave_des.knowledge.state import KnowledgeState
     from suave_des.managed.mode_manager import ModeManager
+    from suave_des.metrics.result import MissionMetrics
     from suave_des.monitor.measurements import Measured
+    from suave_des.vehicle.frames import Pose
 
 AdaptationProcess = Generator[simpy.Event, Any, None]
 Thresholds = Mapping[str, tuple[float, ...]]
 """By quality attribute: the numbers, ascending, that its measured value is compared with."""
+
+
+def _unknown(*_: object) -> Any:
+    raise NotImplementedError("this system was made without a vehicle")
 
 
 @dataclass(frozen=True)
@@ -46,6 +54,14 @@ class ManagedSystem:
         state_changed: to be called when something that `adapt` depends on has changed of itself, not in a hook.
         measurements: what monitors have measured, by quality attribute; see `measured`.
         recorded: whether the mission is recorded.
+        pose: gives the vehicle's pose now.
+        distance_inspected_m: gives the distance inspected so far, as it was published last.
+        true_value: gives the value now of a quality attribute that has a signal: what would be measured without delay
+            and noise. For references such as `oracle`; no real manager could know it.
+        files: where the manager's input files are here, by their names as given; see `file`.
+        learned: what the manager has learned. In `suave-des train` a dict that is kept from mission to mission; else
+            the content of the file that the setting `learned` names, which cannot be changed, empty without one.
+        training: whether the mission is one of `suave-des train`.
     """
 
     env: simpy.Environment
@@ -60,6 +76,12 @@ class ManagedSystem:
     state_changed: Callable[[], None] = lambda: None
     measurements: Mapping[str, Measured] = field(default_factory=dict)
     recorded: bool = True
+    pose: Callable[[], Pose] = _unknown
+    distance_inspected_m: Callable[[], float] = _unknown
+    true_value: Callable[[str], float] = _unknown
+    files: Mapping[str, Path] = field(default_factory=dict)
+    learned: Mapping[str, Any] = field(default_factory=dict)
+    training: bool = False
 
     @property
     def now_s(self) -> float:
@@ -76,9 +98,30 @@ class ManagedSystem:
             return None
         return measurements.values[published - 1] if measurements.times_s[published - 1] >= since_s else None
 
-    def change_mode(self, function: str, mode: str) -> bool:
-        """Request a mode of a function; the effect comes later. False if there is no such mode."""
-        return self.modes.change_mode(function, mode)
+    def change_mode(self, function: str, mode: str, latency_s: float | None = None) -> bool:
+        """Request a mode of a function; the effect comes later. False if there is no such mode.
+
+        Args:
+            function, mode: names, as in the modes file.
+            latency_s: time to the effect, for references such as `oracle`; None: as the scenario says.
+        """
+        if latency_s is None:
+            return self.modes.change_mode(function, mode)
+        return self.modes.change_mode(function, mode, latency_s)
+
+    def file(self, name: str) -> Path:
+        """Where an input file of the manager's is on this machine.
+
+        Args:
+            name: as `ManagingSubsystem.input_files` gave it.
+
+        Raises:
+            InputError: it was not given there.
+        """
+        if name not in self.files:
+            remedy = "have the class method input_files return it, so that it is hashed, compared and sent to workers"
+            raise InputError(f"file {name!r} is not declared", remedy=remedy)
+        return self.files[name]
 
 
 class ManagingSubsystem:
@@ -92,7 +135,8 @@ class ManagingSubsystem:
         starts_s: mission time of the first call of `adapt`.
         needs_knowledge: whether missions need the knowledge base, so that it is checked before the first one.
         subscribes_to: kinds of diagnostics that `diagnostic` is called with. A manager that reads `system.measured`
-            when it adapts need not subscribe to measured values; publishing each of them takes time.
+            when it adapts need not subscribe to measured values; publishing each of them takes time. Pose and distance
+            come once a second, to those who name their kinds.
 
     A manager that adapts every `period_s` is time-triggered. One whose `adapt` depends only on what its hooks were
     called with, and on how measured values compare with fixed thresholds, is event-triggered, and declares it by
@@ -115,7 +159,15 @@ class ManagingSubsystem:
     """
 
     needs_knowledge: ClassVar[bool] = False
-    subscribes_to: ClassVar[Collection[Kind]] = tuple(Kind)
+    subscribes_to: ClassVar[Collection[Kind]] = MEASURED_AND_COMPONENTS
+
+    @classmethod
+    def input_files(cls, settings: Mapping[str, Any]) -> Collection[str]:
+        """Name the files that the manager reads, with its settings; it finds them by `system.file(name)`.
+
+        They are hashed into manifest.json, compared when a campaign is resumed, and sent to the workers of a cluster.
+        """
+        return (str(settings["learned"]),) if "learned" in settings else ()
 
     def __init__(self, system: ManagedSystem) -> None:
         self.system = system
@@ -129,6 +181,12 @@ class ManagingSubsystem:
         Only the class that defines it is asked: one derived from it may depend on more.
         """
         return None
+
+    def mission_started(self) -> None:
+        """Take the beginning of the mission, at t = 0, before anything else happens."""
+
+    def mission_ended(self, metrics: MissionMetrics) -> None:
+        """Take the end of the mission and its metrics, after everything else; no request has an effect any more."""
 
     def task_requested(self, task: Task) -> None:
         """Take a task that begins, and needs its functions."""

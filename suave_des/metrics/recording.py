@@ -52,7 +52,8 @@ class Recorder:
             if diagnostic.kind == Kind.COMPONENT_STATUS:
                 self.log("thruster_monitor", "component_status", f"{diagnostic.key} {diagnostic.value}")
             elif diagnostic.key == "water_visibility":
-                value = float(diagnostic.value)
+                value = diagnostic.value
+                assert isinstance(value, float)
                 now_in = bisect_right(rising, value)
                 if band is None:
                     self.log("visibility_monitor", "first_measurement", f"{value:.2f} m")

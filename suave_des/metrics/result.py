@@ -89,3 +89,5 @@ class MissionResult:
     knowledge: tuple[KnowledgeRecord, ...] = ()
     drawn: dict[str, float] = field(default_factory=dict)
     """Values drawn for the scenario's distributions in this run, by key path."""
+    refused: dict[tuple[str, str], int] = field(default_factory=dict)
+    """How many requests of a mode were refused, by function and mode."""

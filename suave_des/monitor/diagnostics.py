@@ -1,8 +1,14 @@
 """The /diagnostics topic: what monitors publish, and who subscribes to it."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # or looking a manager up would load the compiler
+    from suave_des.vehicle.frames import Pose
 
 
 class Kind(StrEnum):
@@ -10,6 +16,14 @@ class Kind(StrEnum):
 
     QA_STATUS = "QA status"
     COMPONENT_STATUS = "Component status"
+    POSE = "Pose"
+    """Key pose, a `Pose`; not a diagnostic of the exemplar's, so nobody gets it without asking. Likewise the next."""
+    DISTANCE = "Distance inspected"
+    """Key distance_inspected_m."""
+
+
+MEASURED_AND_COMPONENTS = (Kind.QA_STATUS, Kind.COMPONENT_STATUS)
+"""The kinds that the exemplar's monitors publish."""
 
 
 FAILED = "FALSE"
@@ -18,12 +32,12 @@ RECOVERED = "RECOVERED"
 
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
-    """One message: the measured value of a quality attribute, or the status of a component."""
+    """One message: the measured value of a quality attribute, the status of a component, a pose, or a distance in m."""
 
     time_s: float
     kind: Kind
     key: str
-    value: float | str
+    value: float | str | Pose
 
 
 Subscriber = Callable[[Diagnostic], None]
@@ -35,7 +49,7 @@ class DiagnosticsBus:
     def __init__(self) -> None:
         self._subscribers: dict[Kind, list[Subscriber]] = {kind: [] for kind in Kind}
 
-    def subscribe(self, subscriber: Subscriber, kinds: Iterable[Kind] = Kind) -> None:
+    def subscribe(self, subscriber: Subscriber, kinds: Iterable[Kind] = MEASURED_AND_COMPONENTS) -> None:
         """Pass every later diagnostic of some kinds to `subscriber`."""
         for kind in kinds:
             self._subscribers[kind].append(subscriber)

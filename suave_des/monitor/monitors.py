@@ -9,6 +9,7 @@ from suave_des.clock import Process, tick_at_or_after, until
 from suave_des.domain import thruster_name
 from suave_des.monitor.diagnostics import FAILED, RECOVERED, Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.measurements import BatteryLevel, Measurements
+from suave_des.vehicle.frames import Pose
 
 
 def signal_monitor(env: simpy.Environment, bus: DiagnosticsBus, measurements: Measurements) -> Process:
@@ -68,3 +69,21 @@ def thruster_monitor(
         earliest = tick + period_s
         if after_previous:
             counted_from = tick
+
+
+def pose_monitor(
+    env: simpy.Environment, bus: DiagnosticsBus, pose: Callable[[], Pose], period_s: float = 1.0
+) -> Process:
+    """Publish the vehicle's pose, from t = 0 on."""
+    while True:
+        bus.publish(Diagnostic(env.now, Kind.POSE, "pose", pose()))
+        yield env.timeout(period_s)
+
+
+def distance_monitor(
+    env: simpy.Environment, bus: DiagnosticsBus, distance_m: Callable[[], float], period_s: float = 1.0
+) -> Process:
+    """Publish the distance inspected so far, from t = 0 on."""
+    while True:
+        bus.publish(Diagnostic(env.now, Kind.DISTANCE, "distance_inspected_m", distance_m()))
+        yield env.timeout(period_s)

@@ -38,6 +38,7 @@ class LoadedScenario:
         inputs: SHA-256 of each file read, by its name as shown to the user.
         layer: content of the scenario's files, with its lines.
         rules: files of rules as text, in the order in which they count.
+        manager_files: where the files are that managers read, by their names as given.
     """
 
     scenario: Scenario
@@ -49,6 +50,12 @@ class LoadedScenario:
     inputs: Mapping[str, str]
     layer: Layer = field(repr=False)
     rules: tuple[Path, ...] = ()
+    manager_files: Mapping[str, Path] = field(default_factory=dict)
+
+    def manager_settings(self, manager: str) -> Mapping[str, Any]:
+        """Settings of a manager that is not built in."""
+        settings = (self.scenario.managers.model_extra or {}).get(manager)
+        return settings if isinstance(settings, dict) else {}
 
     def located(self, error: InputError) -> InputError:
         """Add file and line to an error about a name that only the ontology could check.

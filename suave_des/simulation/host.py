@@ -11,6 +11,7 @@ from suave_des.clock import Process, until
 from suave_des.domain import Task
 from suave_des.errors import InputError, MissionError, SuaveDesError
 from suave_des.managing.base import AdaptationProcess, ManagedSystem, ManagingSubsystem
+from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus
 from suave_des.registry import manager_class
 
@@ -18,6 +19,8 @@ RAISED = (Exception, SystemExit)
 """What a manager may raise: one that calls sys.exit must end neither a campaign nor, without an error, its mission."""
 
 _T = TypeVar("_T")
+_STEPS_AT_ONE_TIME = 10_000
+"""So often `adapt` may yield without mission time passing."""
 
 
 @dataclass(eq=False)
@@ -33,6 +36,7 @@ class ManagerHost:
         system: the manager's view of the managed subsystem.
         bus: where the diagnostics come from that the manager subscribes to.
         skips_idle_calls: whether calls are left out at all.
+        kind: the manager's class; None: the one that its name leads to.
 
     Raises:
         MissionError: the manager raised; here, or in any hook later.
@@ -44,14 +48,17 @@ class ManagerHost:
     system: ManagedSystem
     bus: DiagnosticsBus
     skips_idle_calls: bool
+    kind: type[ManagingSubsystem] | None = None
     manager: ManagingSubsystem = field(init=False)
     _is_waiting: bool = False  # for an event
     _idle_regions: set[tuple[int, ...]] = field(default_factory=set)  # of measured values: there, calls change nothing
 
     def __post_init__(self) -> None:
-        kind = manager_class(self.name)
+        kind = self.kind or manager_class(self.name)
         try:
             self.manager = kind(self.system)
+            if not hasattr(self.manager, "system"):
+                raise TypeError(f"{kind.__name__}.__init__ does not begin with super().__init__(system)")
             own = "depends_on" in vars(kind)  # a derived class may depend on more
             thresholds = self.manager.depends_on if own and self.skips_idle_calls else None
         except InputError:
@@ -69,6 +76,14 @@ class ManagerHost:
             if not period_s > 0.0:
                 raise self.mission_error(ValueError(f"period_s is {period_s}; it must be above 0, or None"))
             self._process = self.system.env.process(self._adapt_periodically(period_s))
+
+    def start(self) -> None:
+        """Tell the manager that the mission begins."""
+        self._guarded(self.manager.mission_started)
+
+    def end(self, metrics: MissionMetrics) -> None:
+        """Tell the manager how the mission ended."""
+        self._guarded(self.manager.mission_ended, metrics)
 
     def request(self, task: Task) -> None:
         """Pass on to the manager a task that begins."""
@@ -155,9 +170,12 @@ class ManagerHost:
         return tuple([measured.region(t_s, edges) for measured, edges in self._depends_on])
 
     def _guarded_steps(self, adaptation: AdaptationProcess) -> Process:
-        value = None
+        value, steps, since_s = None, 0, self.system.env.now
         while True:
+            steps, since_s = (steps + 1, since_s) if self.system.env.now == since_s else (0, self.system.env.now)
             try:
+                if steps > _STEPS_AT_ONE_TIME:
+                    raise RuntimeError(f"adapt yielded {_STEPS_AT_ONE_TIME} events, and no mission time passed")
                 event = adaptation.send(value)
                 if not isinstance(event, simpy.Event):
                     raise TypeError(f"adapt yielded {event!r}; it may yield events, such as system.env.timeout(1.0)")

@@ -1,9 +1,10 @@
 """One mission: scenario, manager, run and seed, wired into a SimPy environment."""
 
-from collections.abc import Mapping
 from functools import partial
+from math import inf
 
 import simpy
+from simpy.core import StopSimulation
 
 from suave_des import domain
 from suave_des.errors import SuaveDesError
@@ -15,13 +16,20 @@ from suave_des.managed.motion import MaintainMotion
 from suave_des.managed.node import FunctionNode
 from suave_des.managed.recharge import GenerateRechargePath
 from suave_des.managed.search import GenerateSearchPath
-from suave_des.managing.base import ManagedSystem
+from suave_des.managing.base import ManagedSystem, ManagingSubsystem
 from suave_des.metrics.reactions import ReactionMeter
 from suave_des.metrics.recording import Recorder
 from suave_des.metrics.result import MissionMetrics, MissionResult
 from suave_des.monitor.diagnostics import DiagnosticsBus, Kind
 from suave_des.monitor.measurements import BatteryLevel, Measured, Measurements, Publishing, measure
-from suave_des.monitor.monitors import ThrusterFault, battery_monitor, signal_monitor, thruster_monitor
+from suave_des.monitor.monitors import (
+    ThrusterFault,
+    battery_monitor,
+    distance_monitor,
+    pose_monitor,
+    signal_monitor,
+    thruster_monitor,
+)
 from suave_des.scenario.models import Battery
 from suave_des.simulation.chance import Chance
 from suave_des.simulation.host import RAISED, ManagerHost
@@ -30,24 +38,35 @@ from suave_des.vehicle.autopilot import Autopilot
 from suave_des.vehicle.frames import Pose
 from suave_des.vehicle.guidance import SetPointSender
 from suave_des.vehicle.vehicle import Vehicle
+from suave_des.world.signals import Signal
 
 
-class Mission:
-    """The parts of one mission, made and connected; see `Simulator.run` for the arguments."""
+class MissionRun:
+    """The parts of one mission, made and connected; see `Simulator.start` for the arguments."""
 
     def __init__(
-        self, simulator: Simulator, manager: str, run: int, seed: int, memory: MissionMemory, *, record: bool
+        self,
+        simulator: Simulator,
+        manager: str,
+        run: int,
+        seed: int,
+        memory: MissionMemory,
+        *,
+        record: bool,
+        kind: type[ManagingSubsystem] | None = None,
     ) -> None:
         self._simulator = simulator
         self._scenario = simulator.loaded.scenario
         self._revision = self._scenario.revision
-        self._manager, self._run, self._seed = manager, run, seed
+        self._manager, self._run_number, self._seed = manager, run, seed
+        self.memory = memory
         self._chance = Chance(self._scenario, seed, run, simulator.runs_per_draw)
         self.env = simpy.Environment()
         self._recorder = Recorder(self.env, enabled=record)
         self._bus = DiagnosticsBus()
 
         self._vehicle = self._make_vehicle(memory)
+        self._true_signals: dict[str, Signal] = {}
         self._signals = {name: self._measure(name) for name in sorted(self._scenario.signals)}
         self._visibility = self._signals["water_visibility"]
         self._battery = None if self._scenario.battery is None else self._make_battery(self._scenario.battery)
@@ -62,7 +81,7 @@ class Mission:
         )
         nodes = self._make_functions()
         latency_s = self._chance.sampler("latencies.mode_change_s", self._scenario.latencies.mode_change_s)
-        self._modes = ModeManager(self.env, simulator.loaded.modes, nodes, latency_s, self._recorder.log)
+        self.modes = ModeManager(self.env, simulator.loaded.modes, nodes, latency_s, self._recorder.log)
         self._reactions = ReactionMeter(
             self.env,
             self._scenario.reaction_metric,
@@ -74,33 +93,61 @@ class Mission:
         if record:
             thresholds_m = self._scenario.reaction_metric.visibility_thresholds_m
             self._bus.subscribe(self._recorder.diagnostic_of(thresholds_m))
-            self._modes.listeners.append(self._recorder.mode_effect)
-        self._modes.listeners.append(self._reactions.mode_effect)
+            self.modes.listeners.append(self._recorder.mode_effect)
+        self.modes.listeners.append(self._reactions.mode_effect)
         self._coordinator = self._make_coordinator()
-        self._host = self._make_host()
+        self._host = self._make_host(kind)
         self._coordinator.start(self._host.request, self._host.cancel)
         self._start_monitors()
+        self._coordinator.ended.callbacks.append(StopSimulation.callback)  # or `advance` would run past it
+        self._host.start()
+
+    @property
+    def manager(self) -> ManagingSubsystem:
+        """The managing subsystem."""
+        return self._host.manager
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the mission has ended."""
+        return self._coordinator.ended.triggered
+
+    def advance(self, until_s: float) -> None:
+        """Let mission time pass until `until_s`, what happens then excluded, or until the mission's end.
+
+        Raises:
+            MissionError: the manager raised.
+        """
+        if until_s > self.env.now and not self.is_over:
+            self._run(until_s)
 
     def result(self) -> MissionResult:
-        """Run to the end and read the metrics."""
+        """Run to the end, and read the metrics."""
+        if not self.is_over:
+            self._run(inf)
+        recorder, drawn, metrics = self._recorder, self._chance.drawn, self.metrics()
+        self._host.end(metrics)
+        trajectory = recorder.trajectory(self._vehicle, self._visibility)
+        events, knowledge = tuple(recorder.events), tuple(recorder.knowledge)
+        return MissionResult(metrics, events, trajectory, knowledge, drawn, self.modes.refused)
+
+    def _run(self, until_s: float) -> None:
         try:
-            self.env.run(until=self._coordinator.ended)
+            self.env.run(until=self._coordinator.ended if until_s == inf else until_s)
         except SuaveDesError:
             raise
         except RAISED as error:  # in a process that the manager started by itself
             raise self._host.mission_error(error) from error
-        recorder, drawn = self._recorder, self._chance.drawn
-        trajectory = recorder.trajectory(self._vehicle, self._visibility)
-        return MissionResult(self._metrics(), tuple(recorder.events), trajectory, tuple(recorder.knowledge), drawn)
 
-    def _metrics(self) -> MissionMetrics:
+    def metrics(self) -> MissionMetrics:
+        """The metrics, as of now if the mission is not over."""
         coordinator, detector, drawn = self._coordinator, self._detector, self._chance.drawn
         found = coordinator.search_time_s is not None
         x_m, y_m = self._simulator.points[detector.first_point, :2].tolist() if found else (None, None)
         return MissionMetrics(
             scenario=self._scenario.name,
             manager=self._manager,
-            run=self._run,
+            run=self._run_number,
             seed=self._seed,
             initial_x_m=drawn["start.x_m"],
             initial_y_m=drawn["start.y_m"],
@@ -109,7 +156,7 @@ class Mission:
             search_time_s=coordinator.search_time_or_limit_s(),
             distance_inspected_m=coordinator.distance_inspected_m,
             mean_reaction_time_s=self._reactions.mean_s(),
-            adaptations=self._modes.adaptations,
+            adaptations=self.modes.adaptations,
             detection_time_s=detector.detected_s if found else None,
             detection_x_m=x_m,
             detection_y_m=y_m,
@@ -145,7 +192,7 @@ class Mission:
         period_s = signal.publishing_period_s or self._revision.monitors.visibility_publishing_period_s
         publishing = Publishing(period_s, chance.phase(f"signals.{name}", period_s), signal.time_step_s)
         noise = chance.sampler(f"signals.{name}.noise", signal.noise) if signal.noise != 0.0 else None
-        described = chance.signal(name, signal, self._simulator.loaded.tables)
+        described = self._true_signals[name] = chance.signal(name, signal, self._simulator.loaded.tables)
         return measure(name, described, self._simulator.duration_s, publishing, noise)
 
     def _make_battery(self, battery: Battery) -> BatteryLevel:
@@ -163,6 +210,10 @@ class Mission:
                 self.env.process(signal_monitor(self.env, self._bus, measurements))
             if self._battery is not None:
                 self.env.process(battery_monitor(self.env, self._bus, self._battery))
+        if self._bus.has_subscribers(Kind.POSE):
+            self.env.process(pose_monitor(self.env, self._bus, lambda: self._vehicle.pose(self.env.now)))
+        if self._bus.has_subscribers(Kind.DISTANCE):
+            self.env.process(distance_monitor(self.env, self._bus, lambda: self._follow.distance_m))
         faults = []
         for n, event in enumerate(self._scenario.thruster_events):
             time_s = self._chance.draw(f"thruster_events.{n}.time_s", event.time_s)
@@ -215,17 +266,16 @@ class Mission:
         )
         return MissionCoordinator(self.env, settings, timing, self._detector, self._follow, self._recorder.log)
 
-    def _make_host(self) -> ManagerHost:
+    def _make_host(self, kind: type[ManagingSubsystem] | None) -> ManagerHost:
         name = self._manager
-        settings = (self._scenario.managers.model_extra or {}).get(name)
         measurements: dict[str, Measured] = {**self._signals}
         if self._battery is not None:
             measurements[self._battery.key] = self._battery
         system = ManagedSystem(
             env=self.env,
             scenario=self._scenario,
-            settings=settings if isinstance(settings, Mapping) else {},
-            modes=self._modes,
+            settings=self._simulator.loaded.manager_settings(name),
+            modes=self.modes,
             lasting_functions=self._coordinator.lasting_functions,
             stream=lambda stream: self._chance.stream(f"manager/{stream}"),
             log=partial(self._recorder.log, name),
@@ -234,5 +284,13 @@ class Mission:
             state_changed=lambda: self._host.state_changed(),
             measurements=measurements,
             recorded=self._recorder.enabled,
+            pose=lambda: self._vehicle.pose(self.env.now),
+            distance_inspected_m=lambda: self._follow.distance_m,
+            true_value=lambda attribute: self._true_signals[attribute](self.env.now),
+            files=self._simulator.loaded.manager_files,
+            learned=self._simulator.learned(name),
+            training=self._simulator.training is not None,
         )
-        return ManagerHost(name, self._run, system, self._bus, skips_idle_calls=not self._recorder.enabled)
+        return ManagerHost(
+            name, self._run_number, system, self._bus, skips_idle_calls=not self._recorder.enabled, kind=kind
+        )

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import simpy
@@ -11,6 +11,7 @@ import simpy
 from suave_des.clock import Process
 from suave_des.compiling import Array
 from suave_des.managed.follow import InspectionPath
+from suave_des.managing.learned import read_learned
 from suave_des.metrics.result import MissionResult
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.simulation.vehicles import vehicle_model
@@ -20,6 +21,8 @@ from suave_des.world.pipeline import sample_points, there_and_back
 
 if TYPE_CHECKING:
     from suave_des.knowledge.deliberation import Deliberation
+    from suave_des.managing.base import ManagingSubsystem
+    from suave_des.simulation.mission import MissionRun
 
 OnTime = Callable[[float, float], None]
 
@@ -37,6 +40,8 @@ class Simulator:
     Args:
         loaded: the scenario with its files.
         runs_per_draw: how many runs in a row share the value drawn for a key path; one, if the path is not in it.
+        training: what each manager has learned, by its name, kept from mission to mission; None: missions are no
+            training.
 
     Example:
         >>> simulator = Simulator(load_scenario("seams2023"))
@@ -44,8 +49,13 @@ class Simulator:
         119.0
     """
 
-    def __init__(self, loaded: LoadedScenario, runs_per_draw: Mapping[str, int] = MappingProxyType({})) -> None:
-        self.loaded = loaded
+    def __init__(
+        self,
+        loaded: LoadedScenario,
+        runs_per_draw: Mapping[str, int] = MappingProxyType({}),
+        training: dict[str, dict[str, Any]] | None = None,
+    ) -> None:
+        self.loaded, self.training = loaded, training
         self.runs_per_draw = dict(runs_per_draw)
         scenario = loaded.scenario
         self.points = sample_points(scenario.pipeline.vertices_m, scenario.pipeline.points_per_piece)
@@ -55,6 +65,7 @@ class Simulator:
         self.vehicle_model = vehicle_model(scenario.vehicle)
         self.view_tangent = scenario.vehicle.camera.tangent
         self._spare_memory: list[MissionMemory] = []
+        self._learned: dict[str, Mapping[str, Any]] = {}
 
     @cached_property
     def knowledge(self) -> "Deliberation":
@@ -62,6 +73,50 @@ class Simulator:
         from suave_des.scenario_knowledge import open_knowledge  # owlready2 is loaded only when it is needed
 
         return open_knowledge(self.loaded)
+
+    def learned(self, manager: str) -> Mapping[str, Any]:
+        """What a manager has learned: in training what it may change, else the content of its file, if it has one.
+
+        Raises:
+            InputError: the file cannot be read, or has something else in it.
+        """
+        if self.training is not None:
+            return self.training.setdefault(manager, {})
+        if manager not in self._learned:
+            name = self.loaded.manager_settings(manager).get("learned")
+            self._learned[manager] = {} if name is None else read_learned(self.loaded.manager_files[str(name)])
+        return self._learned[manager]
+
+    def start(
+        self, manager: str, run: int, seed: int, *, record: bool = False, kind: "type[ManagingSubsystem] | None" = None
+    ) -> "MissionRun":
+        """Make a mission, at t = 0; `give_back` is to be called when it is no longer needed.
+
+        Args:
+            manager: name of the managing subsystem, or module:Class.
+            run: number of the run in its campaign.
+            seed: seed of the campaign.
+            record: whether to keep events and trajectory.
+            kind: the manager's class; None: the one that its name leads to.
+
+        Raises:
+            MissionError, InputError: as `run`.
+        """
+        from suave_des.simulation.mission import MissionRun
+
+        rows = track_rows(self.duration_s)
+        memory = (
+            self._spare_memory.pop() if self._spare_memory else MissionMemory(np.empty((rows, ROW)), np.empty(rows))
+        )
+        try:
+            return MissionRun(self, manager, run, seed, memory, record=record, kind=kind)
+        except BaseException:
+            self._spare_memory.append(memory)
+            raise
+
+    def give_back(self, mission: "MissionRun") -> None:
+        """Keep the memory of a mission that is no longer needed for the next one."""
+        self._spare_memory.append(mission.memory)
 
     def run(
         self, manager: str, run: int, seed: int, *, record: bool = False, on_time: OnTime | None = None
@@ -79,19 +134,13 @@ class Simulator:
             MissionError: the manager raised; the error names it, the run and the mission time.
             InputError: the manager or the knowledge base cannot be used.
         """
-        from suave_des.simulation.mission import Mission
-
-        rows = track_rows(self.duration_s)
-        memory = (
-            self._spare_memory.pop() if self._spare_memory else MissionMemory(np.empty((rows, ROW)), np.empty(rows))
-        )
+        mission = self.start(manager, run, seed, record=record)
         try:
-            mission = Mission(self, manager, run, seed, memory, record=record)
             if on_time is not None:
                 mission.env.process(_report_time(mission.env, on_time, self.loaded.scenario.mission.time_limit_s))
             return mission.result()
         finally:
-            self._spare_memory.append(memory)
+            self.give_back(mission)
 
 
 def _report_time(env: simpy.Environment, on_time: OnTime, limit_s: float) -> Process:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from suave_des.clock import Alarm, Process, until
 from suave_des.managed.mode_manager import ModeManager
 from suave_des.managed.node import Log
+from suave_des.managing.base import ManagingSubsystem
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import Diagnostic, Kind
 from suave_des.monitor.measurements import Thresholds
@@ -169,15 +170,15 @@ class Published:
         raise AssertionError("what will be published is not known")
 
 
-class PlainMission(mission.Mission):
+class PlainMission(mission.MissionRun):
     """A mission whose managers read what monitors have published."""
 
-    def _make_host(self) -> ManagerHost:
+    def _make_host(self, kind: type[ManagingSubsystem] | None) -> ManagerHost:
         tables = self._signals, self._battery
         self._signals = {name: self._published(name) for name in self._signals}  # type: ignore[assignment]
         self._battery = None if self._battery is None else self._published(self._battery.key)  # type: ignore[assignment]
         try:
-            return super()._make_host()
+            return super()._make_host(kind)
         finally:
             self._signals, self._battery = tables
 
@@ -187,7 +188,7 @@ class PlainMission(mission.Mission):
         return published
 
 
-def time_triggered(*arguments: object, skips_idle_calls: bool) -> ManagerHost:
+def time_triggered(*arguments: object, skips_idle_calls: bool, kind: object = None) -> ManagerHost:
     """A host that calls its manager at each of its times."""
     return ManagerHost(*arguments, skips_idle_calls=False)  # type: ignore[arg-type]
 
@@ -199,7 +200,7 @@ PARTS: Final = {
     },
     "detector": {"suave_des.simulation.mission.PipelineDetector": PollingDetector},
     "calls": {"suave_des.simulation.mission.ManagerHost": time_triggered},
-    "monitors": {"suave_des.simulation.mission.Mission": PlainMission},  # needs "calls"
+    "monitors": {"suave_des.simulation.mission.MissionRun": PlainMission},  # needs "calls"
 }
 
 

@@ -1,0 +1,87 @@
+"""What managers have learned: the file that training writes, and managers read."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from suave_des.errors import InputError
+
+FORMAT = 1
+_KEY = "suave_des_learned"
+_LIMIT_BYTES = 100_000_000
+_REMEDY = "give a file that suave-des train has written"
+
+
+@dataclass(frozen=True)
+class Learned:
+    """A file of what a manager has learned.
+
+    Attributes:
+        manager: its name, or module:Class.
+        scenario: name of the scenario that it was trained on.
+        seed: seed of the training.
+        missions: number of missions, runs 1 to that.
+        inputs_sha256: SHA-256 of each file that training read, by its name as given, the manager's code among them.
+        learned: what the manager keeps as `system.learned`.
+    """
+
+    manager: str
+    scenario: str
+    seed: int
+    missions: int
+    inputs_sha256: dict[str, str]
+    learned: dict[str, Any]
+
+    def text(self) -> str:
+        """The file.
+
+        Raises:
+            InputError: what was learned cannot be written as JSON.
+        """
+        try:
+            return json.dumps({_KEY: FORMAT, **asdict(self)}, indent=1, allow_nan=False) + "\n"
+        except (TypeError, ValueError) as error:
+            raise InputError(
+                f"what {self.manager} has learned cannot be written: {error}",
+                remedy="system.learned may have text, finite numbers, True, False, None, lists, and dicts by text",
+            ) from None
+
+
+def read_file(path: Path) -> Learned:
+    """Read the file that training wrote.
+
+    Raises:
+        InputError: it cannot be read, or is something else.
+    """
+    try:
+        if path.stat().st_size > _LIMIT_BYTES:
+            raise InputError("is too large", file=path, remedy=f"at most {_LIMIT_BYTES:,} bytes")
+        content = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        raise InputError(f"cannot be read: {why}", file=path, remedy=_REMEDY) from None
+    if isinstance(content, dict) and content.pop(_KEY, None) == FORMAT and isinstance(content.get("learned"), dict):
+        with suppress(TypeError):
+            return Learned(**content)
+    raise InputError("is not a file of what a manager has learned", file=path, remedy=_REMEDY)
+
+
+def read_learned(path: Path) -> Mapping[str, Any]:
+    """Read what a manager has learned, as something that cannot be changed: each mission finds the same.
+
+    Raises:
+        InputError: as read_file.
+    """
+    return MappingProxyType({key: _frozen(value) for key, value in read_file(path).learned.items()})
+
+
+def _frozen(value: Any) -> Any:
+    if isinstance(value, dict):
+        return MappingProxyType({key: _frozen(each) for key, each in value.items()})
+    return tuple(map(_frozen, value)) if isinstance(value, list) else value
