@@ -77,14 +77,16 @@ def scenarios() -> None:
     table = plain_table(("name", "revision", "what it is"))
     files = sorted(folder.glob("*.yaml"))
     modes = [path for path in files if path.stem.endswith("_modes")]
+    campaigns = [path for path in files if path.stem.endswith("_campaign")]
     for path in files:
-        if path not in modes:
+        if path not in (*modes, *campaigns):
             scenario = load_scenario(path).scenario
             table.add_row(path.stem, scenario.revision.name, scenario.description)
     console = output()
     print_table(console, "Scenarios", table)
     ontologies = sorted(shipped_folder("ontology").glob("*.owl"))
-    console.print(f"\nModes files: {', '.join(path.name for path in modes)}", soft_wrap=True)
+    console.print(f"\nCampaign files: {', '.join(path.name for path in campaigns)}", soft_wrap=True)
+    console.print(f"Modes files: {', '.join(path.name for path in modes)}", soft_wrap=True)
     console.print(f"Ontologies: {', '.join(path.name for path in ontologies)}", soft_wrap=True)
     console.print(f"They are in {folder.parent}: copy what you want to change.", soft_wrap=True)
 

@@ -95,7 +95,10 @@ class FollowPipeline(FunctionNode, WaypointSource):
 
     def _arrival_check(self, began_s: float) -> ArrivalCheck:
         period_s, width_m = self.revision.poll_period_s, self.revision.acceptance_m
-        return ArrivalCheck(began_s, period_s, width_m, math.inf, 0, self.revision.polls_before_resending)
+        # Without it the counter of polls starts anew by sending again; with it, it is above the limit from then on.
+        polls = self.revision.polls_before_resending
+        waits = (polls + 1, 1) if self.revision.resends_at_each_poll else (polls, polls)
+        return ArrivalCheck(began_s, period_s, width_m, math.inf, 0, *waits)
 
     def waypoints(self, count: int) -> Array:
         """The present point and those after it; none when the end is reached."""

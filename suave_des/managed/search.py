@@ -139,5 +139,11 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         return waypoints
 
     def _arrival_check(self, began_s: float) -> ArrivalCheck:
-        period_s, box_m = self.revision.tick_period_s, self.revision.acceptance_m
-        return ArrivalCheck(began_s, period_s, box_m, box_m, 1, self.revision.ticks_before_resending + 1)
+        # The exemplar sends again when its counter of waits is above 10. It sets the counter to 0 by sending; by sending
+        # again, it counts in the same tick.
+        period_s, box_m, ticks = (
+            self.revision.tick_period_s,
+            self.revision.acceptance_m,
+            self.revision.ticks_before_resending,
+        )
+        return ArrivalCheck(began_s, period_s, box_m, box_m, 1, ticks + 2, ticks + 1)

@@ -57,7 +57,8 @@ class Metacontrol(ManagingSubsystem):
         self._latency = scenario.latencies.inference_s
         self._latency_stream = None if isinstance(self._latency, float) else system.stream("metacontrol/inference")
         self.period_s: float = scenario.managers.metacontrol.reasoning_period_s
-        self.starts_s = system.stream("metacontrol/phase").uniform(0.0, self.period_s)
+        in_step = "metacontrol" in scenario.revision.timers_in_step
+        self.starts_s = self.period_s if in_step else system.stream("metacontrol/phase").uniform(0.0, self.period_s)
         self._adapter = Adapter(system)
         bridge_s = revision.task_bridge_period_s
         phase_s = system.stream("metacontrol/bridge").uniform(0.0, bridge_s) if bridge_s > 0.0 else 0.0

@@ -74,6 +74,8 @@ class FollowRevision(Strict):
     """Whether the path starts again from its first point (else it goes on with those not yet reached)."""
     adds_remaining_way: bool
     """Whether a deactivation adds the way from the last point to the present position to the distance."""
+    resends_at_each_poll: bool
+    """Whether a point that is not reached after the tenth poll is sent again at each poll (else after ten more)."""
 
 
 class RecoveryRevision(Strict):
@@ -144,11 +146,17 @@ class MetacontrolRevision(Strict):
     """Whether diagnostics are ignored while there is no objective."""
 
 
+Timer = Literal["monitors", "metacontrol"]
+"""Periodic timers of nodes."""
+
+
 class Revision(Strict):
     """One revision of the exemplar's software."""
 
     name: str
     """Name in result files."""
+    timers_in_step: tuple[Timer, ...]
+    """Timers that the message starts which says that guided mode has begun; each other one has a phase of its own."""
     coordinator: CoordinatorRevision
     """The mission node."""
     spiral: SpiralRevision

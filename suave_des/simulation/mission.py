@@ -40,6 +40,9 @@ from suave_des.vehicle.guidance import SetPointSender
 from suave_des.vehicle.vehicle import Vehicle
 from suave_des.world.signals import Signal
 
+_DELIVERY_S = 0.01
+"""From a timer's tick to the arrival of what it publishes: too late for a tick of another timer at the same time."""
+
 
 class MissionRun:
     """The parts of one mission, made and connected; see `Simulator.start` for the arguments."""
@@ -190,10 +193,16 @@ class MissionRun:
     def _measure(self, name: str) -> Measurements:
         signal, chance = self._scenario.signals[name], self._chance
         period_s = signal.publishing_period_s or self._revision.monitors.visibility_publishing_period_s
-        publishing = Publishing(period_s, chance.phase(f"signals.{name}", period_s), signal.time_step_s)
+        publishing = Publishing(period_s, self._monitor_phase_s(f"signals.{name}", period_s), signal.time_step_s)
         noise = chance.sampler(f"signals.{name}.noise", signal.noise) if signal.noise != 0.0 else None
         described = self._true_signals[name] = chance.signal(name, signal, self._simulator.loaded.tables)
         return measure(name, described, self._simulator.duration_s, publishing, noise)
+
+    def _monitor_phase_s(self, monitor: str, period_s: float) -> float:
+        """Mission time of a monitor's first message."""
+        if "monitors" in self._revision.timers_in_step:
+            return period_s + _DELIVERY_S
+        return self._chance.phase(monitor, period_s)
 
     def _make_battery(self, battery: Battery) -> BatteryLevel:
         def is_at_station(t_s: float) -> bool:
@@ -201,7 +210,7 @@ class MissionRun:
             return max(abs(x_m - battery.station_x_m), abs(y_m - battery.station_y_m)) <= battery.station_radius_m
 
         period_s = battery.publishing_period_s
-        publishing = Publishing(period_s, self._chance.phase("battery_monitor", period_s))
+        publishing = Publishing(period_s, self._monitor_phase_s("battery_monitor", period_s))
         return BatteryLevel(is_at_station, battery.discharge_time_s, publishing)
 
     def _start_monitors(self) -> None:
@@ -220,7 +229,7 @@ class MissionRun:
             faults.append(ThrusterFault(event.thruster, event.event == "failure", time_s))
         monitors, set_health = self._revision.monitors, self._vehicle.set_thruster_health
         period_s, after_previous = monitors.thruster_check_period_s, monitors.thruster_event_times == "after_previous"
-        phase_s = self._chance.phase("thruster_monitor", period_s)
+        phase_s = self._monitor_phase_s("thruster_monitor", period_s)
         self.env.process(thruster_monitor(self.env, self._bus, faults, set_health, phase_s, after_previous, period_s))
 
     def _make_functions(self) -> dict[str, FunctionNode]:

@@ -108,6 +108,7 @@ class Guidance:
     _is_planned: bool = False  # until that tick
     _is_due: bool = False  # whether a way-point is to be sent then
     _is_acting: bool = False
+    _is_repeated: bool = False  # whether the present way-point was sent again
 
     def __post_init__(self) -> None:
         self._alarm = self.make_alarm(self._act)
@@ -116,7 +117,7 @@ class Guidance:
 
     def start_at(self, t_s: float, *, resumes: bool = False) -> None:
         """Tick from mission time t on, and send the present way-point, unless the one sent last before is resumed."""
-        self._is_due = not resumes
+        self._is_due, self._is_repeated = not resumes, self._is_repeated and resumes
         self._arrivals, self._act_at, self._is_planned = [], 0, False
         if t_s > self._alarm.now_s:
             self._alarm.set(t_s)
@@ -158,7 +159,7 @@ class Guidance:
         while self._check is not None and self._act_at == tick:
             if self._is_planned and not self._is_due:
                 self.source.not_reached()
-                self._is_due = True
+                self._is_due = self._is_repeated = True
             if self._is_due:
                 self._sent = tick
             self._plan(check, tick, first=tick + check.fewest_ticks if self._is_due else tick)
@@ -169,7 +170,8 @@ class Guidance:
         if len(waypoints) == 0:
             self._check = None
             return
-        last, z_m = self._sent + check.most_ticks, self.source.set_point_z_m()
+        last = self._sent + (check.ticks_again if self._is_repeated else check.most_ticks)
+        z_m = self.source.set_point_z_m()
         self._is_acting = True
         self._arrivals, act_at = self.sender.queue(waypoints, z_m, check, first=first, last=last, send=self._is_due)
         self._is_acting = False
@@ -197,6 +199,7 @@ class Guidance:
         if reached:
             self._sent = self._arrivals[reached - 1]
             del self._arrivals[:reached]
+            self._is_repeated = False
             self.source.reached(reached)
 
     def _last_tick(self, check: ArrivalCheck) -> int:

@@ -28,7 +28,8 @@ class ArrivalCheck:
         half_width_m: greatest difference in x and in y.
         half_height_m: greatest difference in z.
         fewest_ticks: from the tick that finds a way-point reached to the first check of the next one.
-        most_ticks: from there to the last check of it.
+        most_ticks: from the tick that sends a way-point's set-point to the one that sends it again.
+        ticks_again: the same, once it has been sent again.
     """
 
     began_s: float
@@ -37,6 +38,7 @@ class ArrivalCheck:
     half_height_m: float
     fewest_ticks: int
     most_ticks: int
+    ticks_again: int
 
     def time_s(self, tick: int) -> float:
         """Time of a tick."""

@@ -53,9 +53,11 @@ class PollingGuidance:
         self._next_tick = 0
         self._sent = 0
         self._is_due = True
+        self._is_repeated = False
 
     def start_at(self, t_s: float, *, resumes: bool = False) -> None:
         self._is_due = not resumes
+        self._is_repeated = self._is_repeated and resumes
         self._next_tick = 0
         if t_s <= self._alarm.now_s:
             self._tick()
@@ -93,8 +95,10 @@ class PollingGuidance:
                 break
             if self._is_near(check, tick):
                 source.reached(1)
-            elif tick >= self._sent + check.most_ticks:
+                self._is_repeated = False
+            elif tick >= self._sent + (check.ticks_again if self._is_repeated else check.most_ticks):
                 source.not_reached()
+                self._is_repeated = True
             else:
                 break
             self._is_due = True

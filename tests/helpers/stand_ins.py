@@ -96,8 +96,8 @@ class MovingVehicle(PlacedVehicle):
 
 @cache
 def revision(name: str) -> Revision:
-    """The shipped revision "2023" or "1.5"."""
-    return load_scenario({"2023": "seams2023", "1.5": "release15"}[name]).scenario.revision
+    """The shipped revision "2023", "2025" or "1.5"."""
+    return load_scenario({"2023": "seams2023", "2025": "planta_exp1", "1.5": "release15"}[name]).scenario.revision
 
 
 def sender(env: simpy.Environment, vehicle: PlacedVehicle) -> SetPointSender:

@@ -110,6 +110,13 @@ def test_a_point_not_reached_is_sent_again_after_10_polls(env: simpy.Environment
     assert vehicle.commands == [(pytest.approx(n * again_s), (0.0, 0.0, -18.75)) for n in range(3)]
 
 
+def test_revision_2025_sends_a_point_again_at_each_poll_after_the_tenth(env: simpy.Environment) -> None:
+    vehicle = PlacedVehicle((50.0, 50.0, -18.75))
+    follow_of(env, "2025", vehicle).apply(ACTIVE)
+    env.run(until=27.0)
+    assert vehicle.times_s == [0.0, 22.0, 24.0, 26.0]
+
+
 def test_a_point_reached_at_the_tenth_poll_is_not_sent_again(env: simpy.Environment) -> None:
     vehicle = MovingVehicle(lambda t_s: (0.0 if t_s > 1.9 else 50.0, 0.0, -18.75))
     follow_of(env, "2023", vehicle, [(0.0, 0.0), (9.0, 9.0)]).apply(ACTIVE)

@@ -118,26 +118,26 @@ def test_reached_means_within_0_4_m_in_x_y_and_z(name: str, error_m: tuple[float
 
 
 @BOTH
-def test_a_set_point_not_reached_is_sent_again_after_more_than_10_ticks(name: str) -> None:
+def test_a_set_point_not_reached_is_sent_again_at_ticks_12_and_23(name: str) -> None:
     search = searching(name)
     search.ticks(1)
     search.vehicle.place = (0.0, 0.0, -19.0)
     search.ticks(30)
-    assert search.vehicle.commands[1:] == [(11.25, search.last), (22.25, search.last)]
+    assert search.vehicle.commands[1:] == [(12.25, search.last), (23.25, search.last)]
 
 
 @pytest.mark.parametrize(("name", "step_m"), [("2023", 0.5), ("1.5", 0.25)])
 def test_when_only_z_is_missed_each_resending_asks_for_less_altitude(name: str, step_m: float) -> None:
     search = searching(name, rise_m=0.5, obeys=True)
     search.vehicle.rise_m = 5.0  # whatever is commanded, z is not reached
-    search.ticks(34)
+    search.ticks(35)
     assert [z for _, _, z in search.vehicle.commanded] == pytest.approx([-19.0 - step_m * times for times in range(4)])
 
 
 def test_the_work_around_frees_a_vehicle_that_stops_half_a_metre_short() -> None:
     search = searching("2023", obeys=True, rise_m=0.5)
-    search.ticks(13)
-    assert search.vehicle.times_s == [0.25, 11.25, 12.25]
+    search.ticks(14)
+    assert search.vehicle.times_s == [0.25, 12.25, 13.25]
 
 
 def test_later_set_points_keep_the_lowered_command() -> None:
@@ -245,7 +245,6 @@ class PlainSpiral:
         near = [True] * 3
         if self.place is not None:
             near = [abs(a - b) <= 0.4 for a, b in zip(self.vehicle.position(self.env.now), self.place, strict=True)]
-        self.waited += 1
         if all(near):
             self.waited = 0
             self.radius_m += TURN_WIDTH_PER_M * self.altitude_m * 0.1 / (2.0 * math.pi) if self.count else 0.0
@@ -254,9 +253,10 @@ class PlainSpiral:
             self.place = (x_m, y_m, -20.0 + self.altitude_m)
             self.count += 1
         elif self.waited <= 10:
+            self.waited += 1
             return
         else:
-            self.waited = 0
+            self.waited = 1  # set to 0 by sending, counted up in the same tick
             self.lowered_m += 0.5 if near[0] and near[1] else 0.0
         self.vehicle.command(self.env.now, *self.place[:2], -20.0 + self.altitude_m - self.lowered_m)
 

@@ -11,7 +11,7 @@ from suave_des.simulation.simulator import Simulator
 from tests.helpers.polling import polled, unrecorded
 
 MANAGERS = ("none", "random", "bt", "bt_extended", "metacontrol")
-LOADED = {name: load_scenario(name) for name in ("seams2023", "release15")}
+LOADED = {name: load_scenario(name) for name in ("seams2023", "planta_exp1", "release15")}
 
 
 def uniform(minimum: float, maximum: float) -> dict[str, object]:
@@ -86,7 +86,7 @@ def test_looking_ahead_changes_nothing(name: str, condition: str, manager: str) 
 
 
 @given(
-    name=st.sampled_from(sorted(LOADED)),
+    name=st.sampled_from(["release15", "seams2023"]),  # their visibility has a period
     manager=st.sampled_from(MANAGERS),
     run=st.integers(1, 10**6),
     loss=st.sampled_from([0.0, 0.0, 0.1, 0.6]),
