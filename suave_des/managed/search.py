@@ -139,11 +139,8 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         return waypoints
 
     def _arrival_check(self, began_s: float) -> ArrivalCheck:
-        # The exemplar sends again when its counter of waits is above 10. It sets the counter to 0 by sending; by sending
-        # again, it counts in the same tick.
-        period_s, box_m, ticks = (
-            self.revision.tick_period_s,
-            self.revision.acceptance_m,
-            self.revision.ticks_before_resending,
-        )
-        return ArrivalCheck(began_s, period_s, box_m, box_m, 1, ticks + 2, ticks + 1)
+        # The exemplar sends again when its counter of waits is above 10. It sets the counter to 0 by sending; by
+        # sending again, it counts in the same tick.
+        node = self.revision
+        first, again = node.ticks_before_resending + 2, node.ticks_before_resending + 1
+        return ArrivalCheck(began_s, node.tick_period_s, node.acceptance_m, node.acceptance_m, 1, first, again)
