@@ -18,7 +18,7 @@ from pydantic import TypeAdapter, ValidationError
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.scenario.loader import LoadedScenario, value_at, with_values
 from suave_des.scenario.models import Mission
-from suave_des.scenario.quantities import Distribution, stated
+from suave_des.scenario.quantities import Distribution
 from suave_des.streams import Streams
 
 METHODS = ("latin_hypercube", "sobol")
@@ -212,7 +212,7 @@ def _full_path(loaded: LoadedScenario, place: str, name: str) -> str:
 
 def _perturbed(loaded: LoadedScenario, place: str, path: str, distribution: Any) -> LoadedScenario:
     try:
-        stated_values = stated(_DISTRIBUTION.validate_python(distribution))
+        _DISTRIBUTION.validate_python(distribution)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         inside = ".".join(str(part) for part in first["loc"][1:])
@@ -225,8 +225,6 @@ def _perturbed(loaded: LoadedScenario, place: str, path: str, distribution: Any)
             "such as {distribution: normal, mean: 1, std: 2}",
         )
     try:
-        for value in stated_values:
-            with_values(loaded, {path: value})
         return with_values(loaded, {path: dict(distribution)})
     except InputError as error:
         raise _wrong(place, f"{path} cannot have such a distribution: {error.problem}", error.remedy) from None

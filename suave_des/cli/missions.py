@@ -120,18 +120,33 @@ def import_config(
         typer.Option(
             "--base",
             metavar="SCENARIO",
-            help="Scenario to build on; left out, the shipped one of the revision that the files look like.",
+            help="Scenario to build on; left out, the shipped one of the files' revision.",
+        ),
+    ] = None,
+    revision: Annotated[
+        str | None,
+        typer.Option(
+            "--revision", metavar="NAME", help="Revision of the exemplar that the files are of, if they fit several."
+        ),
+    ] = None,
+    runner_seed: Annotated[
+        int | None,
+        typer.Option(
+            "--runner-seed",
+            metavar="SEED",
+            help="Write what the exemplar's runner draws from this seed (its random_seed), in place of draws anew.",
         ),
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
     """Import the exemplar's configuration files.
 
-    What has no counterpart is reported, a line each. Both revisions' files are read, with or without leading slashes.
+    What has no counterpart is reported, a line each. Files of any revision are read, with or without leading slashes.
     """
     from suave_des.campaign.output import check_output_file, write_files
     from suave_des.errors import InputError
     from suave_des.registry import manager_names
+    from suave_des.scenario.exemplar import ImportOptions
     from suave_des.scenario.exemplar import import_config as imported_from
 
     targets = [out] if campaign is None else [out, campaign]
@@ -141,7 +156,8 @@ def import_config(
         if target.resolve() in [file.resolve() for file in files]:
             raise InputError("is one of the files to import", file=target, remedy="give the output another name")
         check_output_file(target, overwrite=overwrite)
-    imported = imported_from(files, out, base=base, campaign=campaign, managers=manager_names())
+    options = ImportOptions(base, revision, campaign, runner_seed, manager_names())
+    imported = imported_from(files, out, options)
     written: dict[Path, dict[str, str | bytes | Iterable[str]]] = {}
     for target, text in zip(targets, filter(None, (imported.scenario, imported.campaign)), strict=True):
         written.setdefault(target.parent, {})[target.name] = text

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import random
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
@@ -11,7 +11,8 @@ from typing import Annotated, Any
 from pydantic import BaseModel, BeforeValidator, Field, TypeAdapter, ValidationError
 
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown
-from suave_des.scenario.exemplar_nodes import NODES, RUNNER, Parameter, no_counterpart
+from suave_des.scenario.exemplar_experiments import Count, Experiment, Experiments, json_object
+from suave_des.scenario.exemplar_nodes import NODES, NOT_NEEDED, RUNNER, Parameter, unknown_key
 from suave_des.scenario.exemplar_text import commented, flow, heading, one_line
 from suave_des.scenario.layers import Layer, Location
 from suave_des.scenario.loader import LoadedScenario, value_at
@@ -21,12 +22,10 @@ from suave_des.scenario.quantities import LONGEST_S, Within, wrong
 _INTERVAL = "_random_interval"
 _NOMINAL = {"initial_pos_x": -17.0, "initial_pos_y": 2.0}
 """Where the exemplar starts unless it is configured otherwise."""
-_LIKE_THIS = 'as in {"adaptation_manager": "metacontrol", "num_runs": 20}'
-_EXPERIMENT_KEYS: Mapping[str, str] = {
-    "mission_name": "no counterpart: result files have the scenario's name",
-    "experiment_launch": "no counterpart: nothing is launched here",
-}
-"""Keys of an experiment without a counterpart, and why."""
+_DRAWN_IN_ORDER = ("initial_pos_x", "initial_pos_y", "", "water_visibility_sec_shift", "thruster_events")
+"""What the exemplar's runner draws, one after the other; the third is always zero."""
+_EVENTS_SHIFT = "thruster_events_shift"
+"""Name of the draw that all thruster events share."""
 
 
 def _interval(value: Any) -> Any:
@@ -35,35 +34,17 @@ def _interval(value: Any) -> Any:
     return value
 
 
-def _json_object(value: Any) -> Any:
-    content = value
-    if isinstance(value, str):
-        try:
-            content = json.loads(value)
-        except (ValueError, RecursionError):
-            content = None
-    if not isinstance(content, dict):
-        raise wrong(f"{shown(value)} is not a JSON object", _LIKE_THIS)
-    return content
-
-
 _Limit = Annotated[float, Field(strict=True), Within(-LONGEST_S, LONGEST_S)]
 _Interval = Annotated[tuple[_Limit, _Limit], BeforeValidator(_interval)]
-_Count = Annotated[int, Field(strict=True), Within(ge=1)]
-
-
-class _Experiment(BaseModel):
-    adaptation_manager: Annotated[str, Field(min_length=1)]
-    num_runs: _Count
 
 
 class _Runner(BaseModel):
     """Parameters of the node that only a campaign has."""
 
-    experiments: Annotated[tuple[Annotated[_Experiment, BeforeValidator(_json_object)], ...], Field(min_length=1)]
+    experiments: Annotated[Experiments, Field(min_length=1)]
     mission_config_file: Any = None
-    random_interval: _Count | None = None
-    random_seed: Annotated[int, Field(strict=True)] | None = None
+    random_interval: Count = 5
+    random_seed: Annotated[int, Field(strict=True), Within(0, 2**63 - 1)] = 100
     water_visibility_sec_shift_random_interval: _Interval | None = None
     initial_pos_x_random_interval: _Interval | None = None
     initial_pos_y_random_interval: _Interval | None = None
@@ -75,67 +56,137 @@ _NODES = TypeAdapter(dict[str, _Runner])
 
 @dataclass(frozen=True)
 class _Perturbation:
-    """A value that is drawn uniformly, once for each draw."""
+    """A value that is drawn uniformly, once for each draw.
 
+    Attributes:
+        key: of the runner, without the ending of its interval.
+        path: key path of the scenario.
+        around: what the draw is added to.
+        low, high: ends of the interval.
+        comment: where they come from.
+    """
+
+    key: str
     path: str
-    minimum: float
-    maximum: float
+    around: float
+    low: float
+    high: float
     comment: str
+
+    def line(self) -> str:
+        """Return it as a line of a campaign file."""
+        drawn: dict[str, Any] = {"distribution": "uniform"}
+        drawn |= {"minimum": self.around + self.low, "maximum": self.around + self.high}
+        if self.key == "thruster_events":
+            drawn["shared"] = _EVENTS_SHIFT
+        return f"  {self.path}: {flow(drawn)}"
+
+
+@dataclass(frozen=True)
+class RunnerImport:
+    """What is to become of the runner's configuration.
+
+    Attributes:
+        scenario: how the campaign file names the imported scenario.
+        managers: names of the managers that can be run.
+        files: names of the files given.
+        extended: whether the mission's configuration asks for the extended mission.
+        seed: of the exemplar's own draws, which are written out; None: values are drawn anew.
+    """
+
+    scenario: str
+    managers: Collection[str]
+    files: Sequence[str]
+    extended: bool = False
+    seed: int | None = None
 
 
 def campaign_text(
-    runner: Mapping[str, Parameter],
-    loaded: LoadedScenario,
-    scenario: str,
-    managers: Collection[str],
-    files: Sequence[str],
-    notes: list[str],
+    runner: Mapping[str, Parameter], loaded: LoadedScenario, wanted: RunnerImport, notes: list[str]
 ) -> str:
     """The campaign file for the runner's parameters.
 
     Args:
         runner: its parameters by key.
         loaded: the imported scenario.
-        scenario: how the campaign file names it.
-        managers: names of the managers that can be run.
-        files: names of the files given.
+        wanted: what is to become of them.
         notes: gets a line for each key without a counterpart.
 
     Raises:
         InputError: a value cannot be right, or there is nothing to run.
     """
-    known = (*NODES[RUNNER].parameters, *_Runner.model_fields)
-    notes += [no_counterpart(parameter, known) for key, parameter in runner.items() if key not in known]
+    known = (*NODES[RUNNER], *_Runner.model_fields)
+    notes += [unknown_key(parameter, known) for key, parameter in runner.items() if key not in (*known, *NOT_NEEDED)]
     if "experiments" not in runner:
         raise InputError(f"{RUNNER} has no experiments", remedy="add them: they name the managers to run")
     settings = _checked(runner)
     mission = runner.get("mission_config_file")
-    if mission is not None and PurePath(str(mission.value)).name not in files:
+    if mission is not None and PurePath(str(mission.value)).name not in wanted.files:
         notes.append(f"{mission.place}: not taken over: {shown(mission.value)} is none of the files given")
-    names, runs = _experiments(runner["experiments"], settings.experiments, managers, notes)
+    names, runs = _experiments(runner["experiments"], settings.experiments, wanted, notes)
     perturbations = list(_perturbations(runner, settings, loaded, notes))
+    if not perturbations and "random_interval" in runner:
+        notes.append(f"{runner['random_interval'].place}: no counterpart: nothing is drawn at random")
+    if wanted.seed is not None:
+        varied = _conditions(perturbations, settings, runs, wanted.seed, notes)
+        runs = min(runs, settings.random_interval) if perturbations else runs
+    else:
+        varied = _drawn_anew(perturbations, _said("random_interval", settings.random_interval, runner))
     where = _source(runner["experiments"])
     lines = [
-        *heading(files),
+        *heading(wanted.files),
         commented(0, "campaign: 1", "version of this file's form"),
-        f"scenario: {flow(scenario)}",
+        f"scenario: {flow(wanted.scenario)}",
         commented(0, f"managers: {flow(names)}", where),
-        commented(0, f"runs: {runs}", where),
+        commented(0, f"runs: {runs}", f"{where}; at each of the conditions" if wanted.seed is not None else where),
+        commented(0, f"seed: {settings.random_seed}", _said("random_seed", "", runner)[1]),
+        *varied,
     ]
-    if settings.random_seed is not None:
-        lines.append(commented(0, f"seed: {settings.random_seed}", _source(runner["random_seed"])))
-    if settings.random_interval is not None:
-        interval = runner["random_interval"]
-        if perturbations:
-            lines.append(commented(0, f"runs_per_draw: {settings.random_interval}", _source(interval)))
-        else:
-            notes.append(f"{interval.place}: no counterpart: nothing is drawn at random")
-    if perturbations:
-        lines.append(commented(0, "perturbations:", "drawn at random, the same for every manager"))
-    for each in perturbations:
-        drawn = {"distribution": "uniform", "minimum": each.minimum, "maximum": each.maximum}
-        lines += [f"  # {one_line(each.comment)}", f"  {each.path}: {flow(drawn)}"]
     return "\n".join(lines) + "\n"
+
+
+def _said(key: str, value: Any, runner: Mapping[str, Parameter]) -> tuple[Any, str]:
+    """A value with a comment: where it stands, or that it is the runner's default."""
+    return value, _source(runner[key]) if key in runner else f"default of {RUNNER}.{key}"
+
+
+def _drawn_anew(perturbations: Sequence[_Perturbation], interval: tuple[int, str]) -> Iterator[str]:
+    if perturbations:
+        yield commented(0, f"runs_per_draw: {interval[0]}", interval[1])
+        yield commented(0, "perturbations:", "drawn at random, the same for every manager")
+    for each in perturbations:
+        yield f"  # {one_line(each.comment)}"
+        yield each.line()
+
+
+def _conditions(
+    perturbations: Sequence[_Perturbation], settings: _Runner, runs: int, seed: int, notes: list[str]
+) -> Iterator[str]:
+    """The very values that the exemplar's runner draws, as lines of a campaign file.
+
+    Every `random_interval` runs it draws all of _DRAWN_IN_ORDER, from an empty interval, too; alike for all managers.
+    """
+    stream = random.Random(seed)
+    blocks = -(-runs // settings.random_interval)
+    draws = [[stream.random() for _ in _DRAWN_IN_ORDER] for _ in range(blocks)]
+    if not perturbations:
+        notes.append(f"--runner-seed: nothing is drawn at random: {RUNNER} has no {_INTERVAL.lstrip('_')} with a width")
+        return iter(())
+    if rest := runs % settings.random_interval:
+        notes.append(
+            f"--runner-seed: the last of {blocks} conditions has {rest} runs in the exemplar, and"
+            f" {settings.random_interval} here, like the others"
+        )
+    lines = [
+        commented(0, "sweep:", f"as Python's random draws them from seed {seed}: {blocks} conditions,"),
+        commented(1, "zip:", "the first values together, then the second"),
+    ]
+    for each in perturbations:
+        place = _DRAWN_IN_ORDER.index(each.key)
+        values = [each.around + (each.low + (each.high - each.low) * draw[place]) for draw in draws]
+        values = [max(0.0, value) for value in values] if each.key == "thruster_events" else values
+        lines += [f"    # {one_line(each.comment)}", f"    {each.path}: {flow(values)}"]
+    return iter(lines)
 
 
 def _source(parameter: Parameter) -> str:
@@ -157,20 +208,19 @@ def _checked(runner: Mapping[str, Parameter]) -> _Runner:
 
 
 def _experiments(
-    parameter: Parameter, experiments: Sequence[_Experiment], known: Collection[str], notes: list[str]
+    parameter: Parameter, experiments: Sequence[Experiment], wanted: RunnerImport, notes: list[str]
 ) -> tuple[list[str], int]:
     """Managers, and runs for each."""
     runs: dict[str, int] = {}
     for index, experiment in enumerate(experiments):
         line = parameter.document.line((*parameter.key_path, index))
         place = f"{parameter.document.path}: line {line}, {parameter.keys}[{index}]"
-        for key in _json_object(parameter.value[index]):
-            if key not in _Experiment.model_fields:
-                reason = _EXPERIMENT_KEYS.get(key, "not taken over: unknown key")
-                notes.append(f"{place}.{' '.join(key.split())}: {reason}")
-        manager, number = experiment.adaptation_manager, experiment.num_runs
-        if manager not in known:
-            hint = did_you_mean(manager, known)
+        for key in json_object(parameter.value[index]):
+            if key not in Experiment.model_fields:
+                notes.append(f"{place}.{' '.join(key.split())}: not taken over: unknown key")
+        manager, number = experiment.manager(extended=wanted.extended), experiment.num_runs
+        if manager not in wanted.managers:
+            hint = did_you_mean(manager, wanted.managers)
             notes.append(f"{place}: not taken over: there is no manager {shown(manager)} ({hint})")
             continue
         if manager in runs:
@@ -178,7 +228,7 @@ def _experiments(
             notes.append(f"{place}: not taken over: {manager} {reason}")
         runs[manager] = max(runs.get(manager, 0), number)
     if not runs:
-        raise parameter.error("none of its managers can be run", f"known: {', '.join(known)}")
+        raise parameter.error("none of its managers can be run", f"known: {', '.join(wanted.managers)}")
     most = max(runs.values())
     if fewer := [f"{manager} {number}" for manager, number in runs.items() if number < most]:
         notes.append(
@@ -192,7 +242,7 @@ def _perturbations(
     runner: Mapping[str, Parameter], settings: _Runner, loaded: LoadedScenario, notes: list[str]
 ) -> Iterator[_Perturbation]:
     """What is drawn at random: a value with its interval added."""
-    for key, path in NODES[RUNNER].parameters.items():
+    for key, path in NODES[RUNNER].items():
         given: tuple[float, float] | None = getattr(settings, key + _INTERVAL)
         if given is None:
             continue
@@ -211,4 +261,4 @@ def _perturbations(
                 raise interval.error(problem, f"give {key} a value beside it")
             if low < high:
                 comment = f"{_source(interval)} [{low:g}, {high:g}] added to {around:g}"
-                yield _Perturbation(each, around + low, around + high, comment)
+                yield _Perturbation(key, each, around, low, high, comment)

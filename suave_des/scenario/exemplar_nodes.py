@@ -1,39 +1,25 @@
 """The exemplar's configuration files (ROS 2 parameters): which key of a scenario each of their parameters is.
 
-Source of the names: the exemplar's repository kas-lab/suave, revisions 2023 and 1.5.
+Source of the names: the exemplar's repository kas-lab/suave, revisions 2023 to 1.5.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH
+from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOTION
 from suave_des.errors import InputError, KeyPath, did_you_mean, place_text
 from suave_des.scenario.modes import modes_of
 from suave_des.scenario.yamlfile import YamlDocument, read_yaml
 
-
-@dataclass(frozen=True)
-class Node:
-    """A node of the exemplar.
-
-    Attributes:
-        parameters: key path of a scenario for each parameter that has one.
-        shipped: the shipped scenario of the only revision that has the node under this name; None: both have it.
-    """
-
-    parameters: Mapping[str, str]
-    shipped: str | None = None
-
-
-_MISSION = {
-    "time_limit": "mission.time_limit_s",
-    "f_generate_search_path_mode": f"default_modes.{GENERATE_SEARCH_PATH}",
-    "f_follow_pipeline_mode": f"default_modes.{FOLLOW_PIPELINE}",
+_FUNCTION_MODES = {
+    f"{function}_mode": f"default_modes.{function}"
+    for function in (MAINTAIN_MOTION, GENERATE_SEARCH_PATH, FOLLOW_PIPELINE)
 }
+_MISSION = {"time_limit": "mission.time_limit_s", **_FUNCTION_MODES}
 _WATER_VISIBILITY = {
     "qa_publishing_period": "signals.water_visibility.publishing_period_s",
     "water_visibility_period": "signals.water_visibility.period_s",
@@ -42,10 +28,8 @@ _WATER_VISIBILITY = {
     "water_visibility_sec_shift": "signals.water_visibility.shift_s",
 }
 _THRUSTER_MONITOR = {"thruster_events": "thruster_events"}
-_TASK_BRIDGE = {
-    "adapt_period": "managers.random.adaptation_period_s",
-    "f_generate_search_path_mode": f"default_modes.{GENERATE_SEARCH_PATH}",
-}
+_PERIOD = "managers.random.adaptation_period_s"
+_TASK_BRIDGE = {"adapt_period": _PERIOD, "adaptation_period": _PERIOD, **_FUNCTION_MODES}
 _BATTERY_MONITOR = {
     "discharge_time": "battery.discharge_time_s",
     "qa_publishing_period": "battery.publishing_period_s",
@@ -64,28 +48,27 @@ _RUNNER = {
 }
 RUNNER = "suave_runner_node"
 """Node of a campaign configuration; every other node is a mission's."""
-NODES: Mapping[str, Node] = {
-    "mission_node": Node(_MISSION),
-    "parent_mission_node": Node(_MISSION),
-    "water_visibility_observer_node": Node(_WATER_VISIBILITY),
-    "thruster_monitor": Node(_THRUSTER_MONITOR),
-    "random_reasoner_node": Node(_TASK_BRIDGE, "seams2023"),
-    "task_bridge": Node(_TASK_BRIDGE, "release15"),
-    "battery_monitor": Node(_BATTERY_MONITOR, "release15"),
-    "mission_metrics": Node(_MISSION_METRICS, "release15"),
-    RUNNER: Node(_RUNNER, "release15"),
+REASONER = "reasoner"
+"""Stands for the reasoner's node, whatever its name: the one with a reasoning_period."""
+NODES: Mapping[str, Mapping[str, str]] = {
+    "mission_node": _MISSION,
+    "parent_mission_node": _MISSION,
+    "water_visibility_observer_node": _WATER_VISIBILITY,
+    "thruster_monitor": _THRUSTER_MONITOR,
+    "random_reasoner_node": _TASK_BRIDGE,
+    "task_bridge": _TASK_BRIDGE,
+    "battery_monitor": _BATTERY_MONITOR,
+    "mission_metrics": _MISSION_METRICS,
+    REASONER: {"reasoning_period": "managers.metacontrol.reasoning_period_s"},
+    RUNNER: _RUNNER,
 }
-NOT_NEEDED: Mapping[str, str] = {
-    "result_path": "campaign --out DIR names the folder for results",
-    "run_duration": "a mission ends by itself here, and no real time is waited for",
-    "use_sim_time": "there is one clock here, mission time",
-}
-"""Parameters of any node without a counterpart, and why."""
-NOT_READ: Mapping[tuple[str, str], str] = {
-    ("2023", "managers.random.adaptation_period_s"): "revision 2023 reads another parameter and acts on that one's"
-    " default of 15 s, which the base has; for this value, set managers.random.adaptation_period_s"
-}
-"""Values that the code of a revision, by its name, does not read, and what it does instead."""
+"""The scenario's key path of each parameter that has one, by node."""
+NOT_NEEDED = (
+    *("result_path", "use_sim_time", "run_duration", "gui", "experiment_logging", "mission_config_pkg"),
+    *("mission_name", "adaptation_manager", "experiment_launch"),
+)
+"""Parameters of any node, and keys of experiments, that say nothing about a mission here."""
+_WILDCARDS = ("**", "*")
 _PARAMETERS = "ros__parameters"
 
 
@@ -98,12 +81,14 @@ class Parameter:
         entry: the node as it is written there.
         key: of the parameter.
         value: plain data.
+        kind: the entry of NODES that the node is.
     """
 
     document: YamlDocument
     entry: str
     key: str
     value: Any
+    kind: str = ""
 
     @property
     def node(self) -> str:
@@ -147,7 +132,7 @@ class Configuration:
     Attributes:
         parameters: of known nodes, file by file.
         modes: System Modes files, each read and checked.
-        nodes: known nodes in the files.
+        nodes: the entries of NODES that are in the files.
         notes: what is not understood, a line each.
     """
 
@@ -172,17 +157,40 @@ def read_configuration(files: Sequence[Path]) -> Configuration:
             modes_of(document)
             modes.append(document)
             continue
+        kinds: list[str] = []
         for entry, content in document.data.items():
             found = list(_parameters(document, entry, content, notes))
-            name = entry.removeprefix("/")
-            if name in NODES:
-                nodes.append(name)
-                parameters += found
-            else:
-                places = [each.place for each in found] or [_place(document, (entry,), name)]
-                unknown = f"not taken over: the node is not known ({did_you_mean(name, NODES)})"
-                notes += [f"{place}: {unknown}" for place in places]
-    return Configuration(tuple(parameters), tuple(modes), tuple(nodes), tuple(notes))
+            kinds += [each.kind for each in found] or [_kind(entry, ())]
+            parameters += [each for each in found if each.kind]
+            places = [each.place for each in found if not each.kind]
+            if not found and not kinds[-1]:
+                places = [_place(document, (entry,), _name(entry))]
+            unknown = f"not taken over: the node is not known ({did_you_mean(_name(entry), _NAMES)})"
+            notes += [f"{place}: {unknown}" for place in places]
+        if not any(kinds):
+            first = next(iter(document.data), "")
+            raise document.error(
+                "has nothing of SUAVE in it", (first,), did_you_mean(_name(first), _NAMES, "its nodes")
+            )
+        nodes += filter(None, kinds)
+    return Configuration(tuple(parameters), tuple(modes), tuple(dict.fromkeys(nodes)), tuple(notes))
+
+
+_NAMES = tuple(name for name in NODES if name != REASONER)
+
+
+def _name(entry: str) -> str:
+    return entry.removeprefix("/")
+
+
+def _kind(entry: str, keys: Collection[str], key: str = "") -> str:
+    """The entry of NODES that a node of the files with these keys is, for one of them; empty if it is none."""
+    name = _name(entry)
+    if name in _WILDCARDS:  # the parameter is given to every node
+        return next((kind for kind, known in NODES.items() if key in known), "")
+    if name in _NAMES:
+        return name
+    return "" if NODES[REASONER].keys().isdisjoint(keys) else REASONER
 
 
 def _place(document: YamlDocument, key_path: KeyPath, *keys: str) -> str:
@@ -215,11 +223,10 @@ def _parameters(document: YamlDocument, entry: str, content: Any, notes: list[st
             (entry, _PARAMETERS),
             "write `key: value` lines under it",
         )
-    yield from (Parameter(document, entry, str(key), value) for key, value in parameters.items())
+    for key, value in parameters.items():
+        yield Parameter(document, entry, str(key), value, _kind(entry, parameters, str(key)))
 
 
-def no_counterpart(parameter: Parameter, known: Iterable[str]) -> str:
+def unknown_key(parameter: Parameter, known: Iterable[str]) -> str:
     """The note about a parameter that a scenario or campaign has no use for; `known` are those that have one."""
-    if (reason := NOT_NEEDED.get(parameter.key)) is not None:
-        return f"{parameter.place}: no counterpart: {reason}"
     return f"{parameter.place}: not taken over: unknown key ({did_you_mean(parameter.key, known)})"

@@ -291,7 +291,7 @@ def _holder(data: dict[str, Any], path: str) -> tuple[Any, Any]:
     here, parts = data, path.split(".")
     for depth, part in enumerate(parts):
         if isinstance(here, list):
-            if not part.isdigit() or int(part) >= len(here):
+            if not (part.isascii() and part.isdigit() and len(part) < 10) or int(part) >= len(here):
                 raise InputError(f"{path}: there is no entry {part}", remedy=f"entries are 0 to {len(here) - 1}")
         elif not isinstance(here, dict):
             raise InputError(f"{path}: {'.'.join(parts[:depth])} is a plain value", remedy="leave out what follows it")

@@ -102,7 +102,7 @@ class ThrusterEvent(Strict):
     event: Literal["failure", "recovery"]
     """What happens to it."""
     time_s: TimeDistribution
-    """When, drawn once a run; the revision decides whether after the start or after the event before."""
+    """When, drawn once a run; the revision decides whether after the start or after the event before. Below 0 is 0."""
 
     @model_validator(mode="before")
     @classmethod

@@ -64,6 +64,7 @@ class Within:
         lt: value that must not be reached.
         unit: for the message.
         is_floor: whether a distribution must not be able to give values below `ge` either.
+        draws_are_cut: whether values that are drawn below `ge` count as `ge`, so that they may be stated.
     """
 
     ge: float | None = None
@@ -72,6 +73,7 @@ class Within:
     lt: float | None = None
     unit: str = ""
     is_floor: bool = False
+    draws_are_cut: bool = False
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Check what the type's own checks have passed."""
@@ -92,7 +94,8 @@ class Within:
         high = min((bound for bound in (self.le, self.lt) if bound is not None), default=math.inf)
         for key, part in _stated(value):
             # A normal distribution that is cut at the floor may have its mean below.
-            least = -high if self.is_floor and key == "mean" else low
+            reaches_below = self.draws_are_cut and bool(key)
+            least = -high if reaches_below or (self.is_floor and key == "mean") else low
             if not least <= part <= high or part in (self.gt, self.lt):
                 raise wrong(f"{part:.12g} is out of range", f"must be {self.text(part)}", key)
         widest = high - (low if math.isfinite(low) else 0.0)
@@ -100,6 +103,8 @@ class Within:
             raise wrong(f"{value.std:g} is out of range", f"must be at most {widest:g} {self.unit}".rstrip(), "std")
         if self.is_floor and support(value)[0] < low:
             raise wrong(f"values below {low:g} can be drawn", f"give a minimum that is at least {low:g}")
+        if self.draws_are_cut and support(value)[1] < low:
+            raise wrong(f"only values below {low:g} can be drawn", f"give a greatest value that is at least {low:g}")
         return value
 
     def text(self, part: float | None = None) -> str:
@@ -125,7 +130,17 @@ Period = Annotated[_Float, Within(0.001, LONGEST_S, unit="s")]
 Speed = Annotated[_Float, Within(gt=0, le=100, unit="m/s")]
 
 
-class Normal(Strict):
+_StreamName = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_.-]*$", max_length=100)]
+
+
+class Drawn(Strict):
+    """Base of distributions."""
+
+    shared: _StreamName | None = None
+    """Name of a draw that several keys share: distributions of the same kind and width are then shifted alike."""
+
+
+class Normal(Drawn):
     """Normal distribution, optionally cut to [minimum, maximum] (values outside are drawn again)."""
 
     distribution: Literal["normal"]
@@ -162,7 +177,7 @@ class Normal(Strict):
                 return value
 
 
-class Uniform(Strict):
+class Uniform(Drawn):
     """Uniform distribution over [minimum, maximum]."""
 
     distribution: Literal["uniform"]
@@ -182,7 +197,7 @@ class Uniform(Strict):
         return stream.uniform(self.minimum, self.maximum)
 
 
-class Exponential(Strict):
+class Exponential(Drawn):
     """Exponential distribution: `minimum` plus a time of the given mean."""
 
     distribution: Literal["exponential"]
@@ -197,7 +212,7 @@ class Exponential(Strict):
         return self.minimum + (stream.expovariate(1.0 / self.mean) if self.mean > 0 else 0.0)
 
 
-class Choice(Strict):
+class Choice(Drawn):
     """One of the given values, each with equal chance; a value given twice counts twice."""
 
     distribution: Literal["choice"]
@@ -228,12 +243,14 @@ Distribution = Annotated[
     | Annotated[Choice, Tag("choice")],
     Discriminator(_tag),
 ]
+
 CoordinateDistribution = Annotated[Distribution, Within(-FARTHEST_M, FARTHEST_M, unit="m")]
 HeadingDistribution = Annotated[Distribution, Within(-6.3, 6.3, unit="rad")]
 CurrentDistribution = Annotated[Distribution, Within(-10.0, 10.0, unit="m/s")]
 OffsetDistribution = Annotated[Distribution, Within(-100.0, 100.0, unit="m")]
-TimeDistribution = Annotated[Distribution, Within(0.0, LONGEST_S, unit="s")]
 DelayDistribution = Annotated[Distribution, Within(0.0, LONGEST_S, unit="s", is_floor=True)]
+TimeDistribution = Annotated[Distribution, Within(0.0, LONGEST_S, unit="s", draws_are_cut=True)]
+"""A time; one that is drawn below 0 counts as 0."""
 ShiftDistribution = Annotated[Distribution, Within(-LONGEST_S, LONGEST_S, unit="s")]
 ValueDistribution = Annotated[Distribution, Within(-LARGEST, LARGEST)]
 

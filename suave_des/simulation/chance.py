@@ -1,10 +1,11 @@
 """Everything that is random in one mission: each use has a stream of its own, named after the scenario's key."""
 
+import math
 from collections.abc import Callable, Mapping
 from operator import attrgetter
 
 from suave_des.scenario.models import Scenario
-from suave_des.scenario.quantities import Distribution, draw
+from suave_des.scenario.quantities import Distribution, Drawn, draw
 from suave_des.scenario.signal_kinds import ConstantSignal, Signal, SignalTable, SinusoidSignal, StepSignal, TableSignal
 from suave_des.streams import Streams
 from suave_des.world import signals
@@ -33,20 +34,20 @@ class Chance(Streams):
         distribution: Distribution = attrgetter(path)(self._scenario)
         return self.draw(f"{path}/{node}" if node else path, distribution)
 
-    def draw(self, key: str, distribution: Distribution) -> float:
-        """The run's value of a distribution; a plain number is its own."""
+    def draw(self, key: str, distribution: Distribution, least: float = -math.inf) -> float:
+        """The run's value of a distribution, at least `least`; a plain number is its own."""
         if not isinstance(distribution, float):
             shared_by = self._runs_per_draw.get(key, 1)
             first = (self._run - 1) // shared_by * shared_by + 1  # of the runs that share the value
-            distribution = draw(distribution, Streams(self._seed, first).stream(key))
-        self.drawn[key] = distribution
-        return distribution
+            distribution = draw(distribution, Streams(self._seed, first).stream(_stream_name(key, distribution)))
+        self.drawn[key] = max(least, distribution)
+        return self.drawn[key]
 
     def sampler(self, key: str, distribution: Distribution) -> Callable[[], float]:
         """A function that draws a new value at each call."""
         if isinstance(distribution, float):
             return lambda: distribution
-        stream = self.stream(key)
+        stream = self.stream(_stream_name(key, distribution))
         return lambda: draw(distribution, stream)
 
     def phase(self, timer: str, period_s: float) -> float:
@@ -67,3 +68,8 @@ class Chance(Streams):
             case TableSignal():
                 times_s, values = tables[name]
                 return signals.table(times_s, values, linear=description.interpolation == "linear")
+
+
+def _stream_name(key: str, distribution: Drawn) -> str:
+    """Name of the stream that a key's values are drawn from: its own, or that of a draw that several keys share."""
+    return key if distribution.shared is None else f"shared/{distribution.shared}"

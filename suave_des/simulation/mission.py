@@ -225,7 +225,7 @@ class MissionRun:
             self.env.process(distance_monitor(self.env, self._bus, lambda: self._follow.distance_m))
         faults = []
         for n, event in enumerate(self._scenario.thruster_events):
-            time_s = self._chance.draw(f"thruster_events.{n}.time_s", event.time_s)
+            time_s = self._chance.draw(f"thruster_events.{n}.time_s", event.time_s, least=0.0)
             faults.append(ThrusterFault(event.thruster, event.event == "failure", time_s))
         monitors, set_health = self._revision.monitors, self._vehicle.set_thruster_health
         period_s, after_previous = monitors.thruster_check_period_s, monitors.thruster_event_times == "after_previous"

@@ -2,13 +2,18 @@
 
 import random
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
+from suave_des.errors import InputError
+from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.scenario.quantities import Distribution, draw, stated, support
+from suave_des.simulation.simulator import Simulator
 
 ADAPTER: TypeAdapter[Distribution] = TypeAdapter(Distribution)
+SCENARIO = load_scenario("seams2023")
 NUMBERS = st.floats(-1e6, 1e6)
 
 
@@ -56,3 +61,42 @@ def test_a_narrow_interval_far_out_is_refused_rather_than_searched_for_ever():
         except ValidationError:
             continue
         raise AssertionError(f"{raw} was accepted")
+
+
+def drawn_in_run(run: int, values: dict) -> dict[str, float]:
+    return Simulator(with_values(SCENARIO, values)).run("none", run, seed=5).drawn
+
+
+def test_keys_of_a_shared_draw_are_shifted_alike_and_others_are_not():
+    def events(**more):
+        uniform = {"distribution": "uniform", **more}
+        first, second = {**uniform, "minimum": 30, "maximum": 50}, {**uniform, "minimum": 55, "maximum": 75}
+        times = [{"thruster": n + 1, "event": "failure", "time_s": time} for n, time in enumerate((first, second))]
+        return {"thruster_events": times}
+
+    for run in range(1, 6):
+        shared, own = (drawn_in_run(run, events(**more)) for more in ({"shared": "all_events"}, {}))
+        first, second = ("thruster_events.0.time_s", "thruster_events.1.time_s")
+        assert shared[second] - shared[first] == pytest.approx(25, abs=1e-9)
+        assert abs(own[second] - own[first] - 25) > 1e-3
+        assert 30 <= shared[first] <= 50
+
+
+def test_a_shared_draw_is_another_one_in_each_run_and_under_another_name():
+    def first_time(run, name):
+        time = {"distribution": "uniform", "minimum": 0, "maximum": 200, "shared": name}
+        values = {"thruster_events": [{"thruster": 1, "event": "failure", "time_s": time}]}
+        return drawn_in_run(run, values)["thruster_events.0.time_s"]
+
+    assert len({first_time(run, name) for run in (1, 2, 3) for name in ("a", "b")}) == 6
+
+
+def test_an_event_that_is_drawn_before_the_start_is_at_the_start():
+    times = []
+    for run in range(1, 9):
+        time = {"distribution": "uniform", "minimum": -50, "maximum": 50}
+        values = {"thruster_events": [{"thruster": 1, "event": "failure", "time_s": time}]}
+        times.append(drawn_in_run(run, values)["thruster_events.0.time_s"])
+    assert min(times) == 0 and max(times) > 0
+    with pytest.raises(InputError, match="only values below 0 can be drawn"):
+        drawn_in_run(1, {"thruster_events.0.time_s": {"distribution": "uniform", "minimum": -9, "maximum": -1}})
