@@ -63,15 +63,20 @@ class Regions:
 
         Floats keep the order of the decimals that they denote, though not always their difference.
         """
-        floats = self._floats
+        floats = self._bounds
         place = bisect_left(floats, value, 1)
         if self.reasons or floats[place] == value:
             return value, value
         return floats[place - 1], floats[place]
 
     @cached_property
-    def _floats(self) -> tuple[float, ...]:
-        return (-inf, *map(float, self.thresholds), inf)
+    def thresholds_as_floats(self) -> tuple[float, ...]:
+        """The thresholds, as measured values are: floats."""
+        return tuple(map(float, self.thresholds))
+
+    @cached_property
+    def _bounds(self) -> tuple[float, ...]:
+        return -inf, *self.thresholds_as_floats, inf
 
     def key(self, state: KnowledgeState) -> Key:
         """Return what the rules can distinguish of a state: states with equal keys entail the same."""

@@ -46,8 +46,10 @@ class Adapter:
     def is_in_force(self, plan: Plan) -> bool:
         """Whether carrying a plan out would neither change a mode nor record anything."""
         current_mode = self._system.modes.current_mode
-        are_set = (each.design is None or current_mode(each.function) == each.design for each in plan.decisions)
-        return _without_design(plan) == self._without_design and all(are_set)
+        for decision in plan.decisions:
+            if decision.design is not None and current_mode(decision.function) != decision.design:
+                return False
+        return _without_design(plan) == self._without_design
 
     def carry_out(self, plan: Plan, present: dict[str, str], functions: Collection[str]) -> dict[str, str]:
         """Request the modes of a plan.

@@ -171,7 +171,7 @@ class Metacontrol(ManagingSubsystem):
         regions = self._knowledge.regions
         if regions is None or not regions.is_sound:
             return None
-        return dict.fromkeys(self.system.measurements, tuple(map(float, regions.thresholds)))
+        return dict.fromkeys(self.system.measurements, regions.thresholds_as_floats)
 
     def _symbolic_state(self) -> Hashable:
         """The state, with regions in place of measured values, unless the mission is recorded: then with the values."""
@@ -180,13 +180,14 @@ class Metacontrol(ManagingSubsystem):
         if regions is not None and all(map(isfinite, self.measurements.values())):
             around = tuple(map(regions.around, self.measurements.values()))
             # Of two values in one gap between thresholds rules can tell which is the greater.
-            values = around if len(set(around)) == len(around) else values
+            values = around if len(around) == 1 or len(set(around)) == len(around) else values
         known = tuple(self.objectives.items()), tuple(self.groundings.items()), tuple(self.components.items())
         return known, tuple(self.measurements), values
 
     def _is_in_force(self, conclusion: Conclusion) -> bool:
         """Whether executing a plan would change nothing."""
-        if self._recovered() or (self.system.recorded and conclusion.statuses - self._recorded_statuses):
+        adds_statuses = self.system.recorded and conclusion.statuses - self._recorded_statuses
+        if adds_statuses or RECOVERED in self.components.values():
             return False
         for decision in conclusion.plan.decisions:
             function, design = decision.function, decision.design

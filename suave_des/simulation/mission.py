@@ -31,7 +31,7 @@ from suave_des.monitor.monitors import (
     thruster_monitor,
 )
 from suave_des.scenario.models import Battery
-from suave_des.simulation.chance import Chance
+from suave_des.chance import Chance
 from suave_des.simulation.host import RAISED, ManagerHost
 from suave_des.simulation.simulator import MissionMemory, Simulator
 from suave_des.vehicle.autopilot import Autopilot
