@@ -7,6 +7,7 @@ import simpy
 from simpy.core import StopSimulation
 
 from suave_des import domain
+from suave_des.chance import Chance
 from suave_des.errors import SuaveDesError
 from suave_des.managed.coordinator import MissionCoordinator, MissionTiming
 from suave_des.managed.detection import PipelineDetector, measured_at_rows
@@ -31,7 +32,6 @@ from suave_des.monitor.monitors import (
     thruster_monitor,
 )
 from suave_des.scenario.models import Battery
-from suave_des.chance import Chance
 from suave_des.simulation.host import RAISED, ManagerHost
 from suave_des.simulation.simulator import MissionMemory, Simulator
 from suave_des.vehicle.autopilot import Autopilot
