@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,14 +16,25 @@ if TYPE_CHECKING:
 
     from suave_des.campaign.campaign import CampaignResult
     from suave_des.report.runs import Runs
+    from suave_des.validation.conditions import Conditions
+    from suave_des.validation.real import RealRuns
+    from suave_des.validation.shares import ConditionLimits, Share
     from suave_des.validation.validation import Validation
 
 TARGETS_NOT_MET = 1
 """Exit status with --strict."""
 _SCENARIO, _DATA = "seams2023", "seams2023_runs.csv"
+_RUNS = 2000
 
 _Data = Annotated[
-    str, typer.Option("--data", metavar="FILE", help="Real missions; left out, the 60 published with the SUAVE paper.")
+    list[str] | None,
+    typer.Option(
+        "--data",
+        metavar="FILE",
+        help="Real missions; repeat it for several files. Left out, those published for the scenario, or else the 60 of"
+        " the SUAVE paper.",
+        show_default=False,
+    ),
 ]
 _Managers = Annotated[
     str | None, typer.Option("--managers", metavar="NAME,...", help="Of those in the data; left out: all.")
@@ -34,10 +46,12 @@ def validate(
     scenario: Annotated[
         str | None,
         typer.Argument(
-            metavar="[SCENARIO]", help="A scenario file, or the name of a shipped one.", show_default=_SCENARIO
+            metavar="[SCENARIO]",
+            help="A scenario or campaign file, or the name of a shipped scenario.",
+            show_default=_SCENARIO,
         ),
     ] = None,
-    data: _Data = _DATA,
+    data: _Data = None,
     runs_file: Annotated[
         Path | None,
         typer.Option("--runs-file", metavar="FILE", help="Compare this campaign's runs.csv; nothing is simulated."),
@@ -49,7 +63,14 @@ def validate(
             "--targets", metavar="FILE", help="Shares to compare; left out, NAME.targets.yaml beside NAME.csv."
         ),
     ] = None,
-    runs: Annotated[int, typer.Option("--runs", help="Missions for each manager.")] = 2000,
+    runs: Annotated[
+        int | None,
+        typer.Option(
+            "--runs",
+            help="Missions for each manager, and under each condition of a campaign file.",
+            show_default=f"{_RUNS}, among all conditions",
+        ),
+    ] = None,
     workers: Workers = 2,
     seed: Seed = 1,
     out: Annotated[
@@ -63,33 +84,42 @@ def validate(
     *,
     files: Files,
 ) -> None:
-    """Compare simulated missions with real ones: distributions, clusters, conclusions."""
+    """Compare simulated missions with real ones: distributions, clusters, conclusions.
+
+    With a campaign file that sweeps the conditions of the real missions, each is compared with those of its own.
+    """
     from suave_des.cli.console import output, progress
     from suave_des.cli.validation_tables import print_validation
     from suave_des.errors import InputError
-    from suave_des.report.runs import choose_managers, read_runs
-    from suave_des.resources import find
-    from suave_des.validation.shares import read_shares, shares_beside
+    from suave_des.validation.conditions import CONDITION
+    from suave_des.validation.real import read_real
     from suave_des.validation.validation import validate as compare
 
-    published = read_runs(find(data, "scenarios/published"))
-    chosen = choose_managers(published, managers)
-    targets_path = targets or shares_beside(published.path)
-    shares = () if targets_path is None else read_shares(targets_path)
-
-    campaign: CampaignResult | None = None
-    sources: dict[str, object] = {"data": _named(published), "targets": _shown(targets_path), "seed": seed}
+    name = scenario or _SCENARIO
     if runs_file is not None:
         for option in files.given:
             raise InputError(f"{option} has no use with --runs-file", remedy="leave one of them out")
-        recorded = _recorded(runs_file, chosen, scenario, out, overwrite=overwrite)
+    conditions = _conditions(name, files) if runs_file is None or scenario is not None else None
+    real = read_real(_data_files(name, data), conditions)
+    chosen = real.choose(managers)
+    shares, limits, targets_paths = _targets(real, targets)
+    word = "published" if all(_is_shipped(file.path) for file in real.files) else "real"
+
+    campaign: CampaignResult | None = None
+    sources: dict[str, object] = {
+        "data": _one_or_all([_named(file) for file in real.files]),
+        "targets": _one_or_all([_shown(path) for path in targets_paths]),
+        "seed": seed,
+    }
+    if runs_file is not None:
+        recorded = _recorded(runs_file, chosen, scenario, out, conditions, overwrite=overwrite)
         simulated = recorded.frame
         sources |= {"runs_file": _named(recorded)}
     else:
         from suave_des.campaign.campaign import run_campaign
 
-        _check_known(published, chosen)
-        name = scenario or _SCENARIO
+        _check_known(real, chosen)
+        runs = runs if runs is not None else -(-_RUNS // len(conditions or "1"))
         with progress(name, quiet=quiet) as show:
             campaign = run_campaign(
                 name,
@@ -107,13 +137,20 @@ def validate(
         sources |= {"scenario": campaign.loaded.scenario.name, "runs": runs}
         if not set(campaign.managers) <= set(simulated["manager"]):  # one has no mission to compare
             exit_telling_failures(campaign)
-    validation = compare(published.frame, simulated, chosen, shares=shares, seed=seed)
+    if conditions is not None:
+        simulated = simulated.assign(**{CONDITION: conditions.numbers(simulated)})
+    validation = compare(real.frame, simulated, chosen, shares=shares, limits=limits, seed=seed)
     console = output()
-    print_validation(console, validation)
+    notes = [*real.notes, *(conditions.listing() if conditions is not None else ())]
+    for note in notes:
+        console.print(note, soft_wrap=True, markup=False)
+    if notes:
+        console.print()
+    print_validation(console, validation, word)
     if out is None:
         console.print("\nNo files were written; --out DIR keeps tables and figures.", soft_wrap=True)
     else:
-        _write(out, validation, published.frame, simulated, sources)
+        _write(out, validation, real.frame, simulated, sources, word)
         console.print(f"\nTables, figures and validation.json are in {out}", soft_wrap=True)
     if campaign is not None:
         exit_telling_failures(campaign)
@@ -121,21 +158,79 @@ def validate(
         raise typer.Exit(TARGETS_NOT_MET)
 
 
-def _recorded(path: Path, chosen: tuple[str, ...], scenario: str | None, out: Path | None, *, overwrite: bool) -> Runs:
+def _data_files(scenario: str, given: list[str] | None) -> list[Path]:
+    """Return the files of real missions: those given, or those published for the scenario, or the paper's."""
+    from suave_des.resources import find, shipped_folder
+
+    if given:
+        return [find(each, "scenarios/published") for each in given]
+    own = shipped_folder("scenarios/published") / f"{Path(scenario).stem.removesuffix('_campaign')}_runs.csv"
+    return [own if own.is_file() else find(_DATA, "scenarios/published")]
+
+
+def _conditions(scenario: str, files: Files) -> Conditions | None:
+    """Return the conditions of a campaign file that sweeps some; none of another file."""
+    from suave_des.campaign.spec import read_campaign_file
+    from suave_des.campaign.variation import vary
+    from suave_des.errors import InputError
+    from suave_des.scenario.loader import load_scenario
+    from suave_des.validation.conditions import Conditions
+
+    file = read_campaign_file(scenario)
+    if file is None or not file.settings.sweep:
+        return None
+    settings = file.settings
+    try:
+        _, variation = vary(load_scenario(file.scenario, **files.replacements), settings.sweep, {}, 1, settings.seed)
+    except InputError as error:
+        raise file.located(error) from None
+    return Conditions.of(variation.sweep)
+
+
+def _targets(
+    real: RealRuns, given: Path | None
+) -> tuple[tuple[Share, ...], Mapping[str, ConditionLimits], tuple[Path, ...]]:
+    """Read the shares and limits of the file given, or of those beside the data."""
+    from suave_des.validation.shares import read_targets, shares_beside
+
+    paths = (given,) if given else tuple(path for file in real.files if (path := shares_beside(file.path)))
+    lists = [read_targets(path) for path in paths]
+    shares: list[Share] = []
+    for each in lists:
+        shares += [share for share in each.shares if share not in shares]
+    limits: dict[str, ConditionLimits] = {metric: limit for each in lists for metric, limit in each.conditions.items()}
+    return tuple(shares), limits, paths
+
+
+def _recorded(
+    path: Path,
+    chosen: tuple[str, ...],
+    scenario: str | None,
+    out: Path | None,
+    conditions: Conditions | None,
+    *,
+    overwrite: bool,
+) -> Runs:
     """Read the missions of an earlier campaign, and make the output folder."""
     from suave_des.campaign.output import check_output_folder, make_output_folder
+    from suave_des.campaign.spec import read_campaign_file
     from suave_des.report.runs import read_runs
     from suave_des.scenario.loader import load_scenario
 
-    recorded = read_runs(path)
-    recorded.check_simulated(chosen, None if scenario is None else load_scenario(scenario).scenario.name)
+    recorded = read_runs(path, further=() if conditions is None else conditions.names)
+    if scenario is None:
+        name = None
+    else:
+        file = read_campaign_file(scenario)
+        name = load_scenario(scenario if file is None else file.scenario).scenario.name
+    recorded.check_simulated(chosen, name)
     if out is not None:
         check_output_folder(out, "campaign", overwrite=overwrite)
         make_output_folder(out)
     return recorded
 
 
-def _check_known(published: Runs, chosen: tuple[str, ...]) -> None:
+def _check_known(real: RealRuns, chosen: tuple[str, ...]) -> None:
     """Check that every manager of the data can be run.
 
     Raises:
@@ -149,7 +244,8 @@ def _check_known(published: Runs, chosen: tuple[str, ...]) -> None:
             manager_class(name)
         except InputError as error:
             remedy = f"{error.remedy}; or choose others with --managers" if error.remedy else None
-            raise published.error(published.managers[name], error.problem, remedy) from None
+            file = real.managers[name]
+            raise file.error(file.managers[name], error.problem, remedy) from None
 
 
 def _write(
@@ -158,6 +254,7 @@ def _write(
     published: pandas.DataFrame,
     simulated: pandas.DataFrame,
     sources: dict[str, object],
+    real: str,
 ) -> None:
     from suave_des import __version__
     from suave_des.campaign.output import write_files
@@ -166,8 +263,8 @@ def _write(
 
     provenance = {"version": __version__, "command": command_line(), **sources}
     contents: dict[str, str | bytes] = {**files.texts(validation, provenance)}
-    contents[files.DISTRIBUTIONS_FIGURE] = distributions_png(validation, published, simulated)
-    contents[files.DETECTIONS_FIGURE] = detections_png(validation, published, simulated)
+    contents[files.DISTRIBUTIONS_FIGURE] = distributions_png(validation, published, simulated, real)
+    contents[files.DETECTIONS_FIGURE] = detections_png(validation, published, simulated, real)
     write_files(out, contents, stale=files.FILES)
 
 
@@ -175,11 +272,17 @@ def _named(runs: Runs) -> dict[str, str | None]:
     return {"file": _shown(runs.path), "sha256": runs.sha256}
 
 
-def _shown(path: Path | None) -> str | None:
+def _one_or_all(found: Sequence[object]) -> object:
+    """Return what there is one of as it is, and several or none as they are listed in JSON."""
+    return found[0] if len(found) == 1 else list(found) or None
+
+
+def _shown(path: Path) -> str:
     """Name a file as it goes into a result: a shipped one without where it is installed."""
+    return f"shipped/{path.name}" if _is_shipped(path) else path.as_posix()
+
+
+def _is_shipped(path: Path) -> bool:
     from suave_des.resources import shipped_folder
 
-    if path is None:
-        return None
-    folder = shipped_folder("scenarios/published")
-    return f"shipped/{path.name}" if path.is_relative_to(folder) else path.as_posix()
+    return path.is_relative_to(shipped_folder("scenarios/published"))

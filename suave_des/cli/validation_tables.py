@@ -16,29 +16,47 @@ if TYPE_CHECKING:
     from suave_des.validation.validation import Target, Validation
 
 _VERDICTS = {True: "met", False: "[bold red]NOT MET[/]", None: "not judged"}
-_KINDS = {"mean": "mean", "std": "std", "ks": "KS p", "conclusion": "agreeing conclusions"}
+_KINDS = {
+    "mean": "mean",
+    "std": "std",
+    "ks": "KS p",
+    "conclusion": "agreeing conclusions",
+    "condition_median": "difference within conditions",
+    "condition_std": "std ratio within conditions",
+}
+_TITLES = {**METRIC_TITLES, "mean_reaction_time_s": "reaction, s"}
 
 _Rows = Iterable[Sequence[str]]
 
 
-def print_validation(console: Console, validation: Validation) -> None:
-    """Print every table that has rows, then how many targets are met."""
+def print_validation(console: Console, validation: Validation, real: str = "published") -> None:
+    """Print every table that has rows, then how many targets are met.
+
+    Args:
+        console: to print on.
+        validation: what was found.
+        real: what the real missions are called: "published" or "real".
+    """
     for title, (left, right, make) in _TABLES.items():
         rows = list(make(validation))
-        headings = [*left, *right] if left else _place_headings(validation)
+        title = title.format(real=real, runs="real runs" if real == "real" else real)
+        headings = [*left, *(each.replace("published", real) for each in right)]
+        headings = headings if left else _place_headings(validation)
         if rows:
             table = plain_table(headings, right={*headings} - {*left, ""})
             for row in rows:
                 table.add_row(*row)
             print_table(console, title, table)
             console.print()
-    for line in _remarks(validation):
+    for line in _remarks(validation, real):
         console.print(line, soft_wrap=True)
 
 
-def _remarks(validation: Validation) -> Iterator[str]:
+def _remarks(validation: Validation, real: str) -> Iterator[str]:
+    if validation.not_found_s is not None:
+        yield f"Missions that never found the pipeline count as {validation.not_found_s:g} s, on both sides."
     yield (
-        "Means must lie in the published mean's 95% t interval, standard deviations in the published one's"
+        f"Means must lie in the {real} mean's 95% t interval, standard deviations in the {real} one's"
         " 95% chi-square interval."
     )
     met = [target.met for target in validation.targets]
@@ -46,7 +64,7 @@ def _remarks(validation: Validation) -> Iterator[str]:
     if None in met:
         yield (
             f"{met.count(None)} cannot be judged: too few missions. For conclusions the simulation needs at least as"
-            " many of each manager as are published."
+            f" many of each manager as there are {real} ones."
         )
 
 
@@ -57,7 +75,7 @@ def _are(count: int, of: int | None = None) -> str:
 
 def _samples(validation: Validation) -> _Rows:
     for each in validation.samples:
-        yield METRIC_TITLES[each.metric], each.manager, *_figures(each.published), *_figures(each.simulated)
+        yield _TITLES[each.metric], each.manager, *_figures(each.published), *_figures(each.simulated)
 
 
 def _figures(found: Estimate) -> tuple[str, ...]:
@@ -67,7 +85,7 @@ def _figures(found: Estimate) -> tuple[str, ...]:
 def _differences(validation: Validation) -> _Rows:
     for each in validation.samples:
         yield (
-            METRIC_TITLES[each.metric],
+            _TITLES[each.metric],
             each.manager,
             f"{each.difference:+.2f}",
             _interval(each.difference_interval, "+.1f"),
@@ -81,7 +99,7 @@ def _differences(validation: Validation) -> _Rows:
 def _pairs(validation: Validation) -> _Rows:
     for pair in validation.pairs:
         yield (
-            METRIC_TITLES[pair.metric],
+            _TITLES[pair.metric],
             f"{pair.first}, {pair.second}",
             number(pair.published_superiority),
             number(pair.simulated_superiority),
@@ -117,9 +135,27 @@ def _place_headings(validation: Validation) -> list[str]:
     return ["x, m", *(heading for manager in validation.managers for heading in (manager, "simulated"))]
 
 
+def _conditions(validation: Validation) -> _Rows:
+    for each in validation.conditions:
+        if each.metric in METRIC_TITLES:
+            yield (
+                _TITLES[each.metric],
+                each.manager,
+                *(str(each.condition), str(each.real.n)),
+                *map(number, (each.real.median, each.real.std, each.simulated.median, each.simulated.std)),
+                f"{each.difference:+.2f}",
+            )
+
+
+def _condition_summaries(validation: Validation) -> _Rows:
+    for each in validation.condition_summaries:
+        figures = map(number, (each.difference, each.real_std, each.simulated_std, each.std_ratio))
+        yield _TITLES[each.metric], each.manager, *figures
+
+
 def _targets(validation: Validation) -> _Rows:
     for target in validation.targets:
-        what = f"{METRIC_TITLES[target.what]}: {_KINDS[target.kind]}" if target.kind in _KINDS else target.what
+        what = f"{_TITLES[target.what]}: {_KINDS[target.kind]}" if target.kind in _KINDS else target.what
         yield target.subject, what, *_value(target), _VERDICTS[target.met]
 
 
@@ -147,23 +183,33 @@ def _p(test: SampleTest | None) -> str:
 
 _SIDE = ("n", "mean", "std", "median")
 _TABLES: Mapping[str, tuple[tuple[str, ...], tuple[str, ...], Callable[[Validation], _Rows]]] = {
-    "Samples: published, then simulated": (("metric", "manager"), (*_SIDE, *_SIDE), _samples),
-    "Simulated compared with published (difference = simulated - published)": (
+    "Samples: {runs}, then simulated": (("metric", "manager"), (*_SIDE, *_SIDE), _samples),
+    "Simulated compared with {runs} (difference = simulated - {real})": (
         ("metric", "manager"),
         ("difference of means", "95% interval", "std ratio", "95% interval", "KS p", "AD p"),
         _differences,
     ),
-    "Pairs: probability that the first is better; Mann-Whitney tests of samples of the published size": (
+    "Pairs: probability that the first is better; Mann-Whitney tests of samples of the {real} size": (
         ("metric", "first, second"),
         ("published", "simulated", "published: better", "simulated agrees"),
         _pairs,
     ),
-    "Shares of missions (* the simulated one is outside the published one's 95% interval)": (
+    "Shares of missions (* the simulated one is outside the {real} one's 95% interval)": (
         ("manager", "share"),
         ("published", "95% interval", "simulated", ""),
         _shares,
     ),
-    "Places of detection, by x of the point seen first: published number, simulated share": ((), (), _places),
+    "Condition by condition: {runs}, then simulated": (
+        ("metric", "manager"),
+        ("condition", "n", "median", "std", "median", "std", "difference"),
+        _conditions,
+    ),
+    "Within conditions: medians over the conditions": (
+        ("metric", "manager"),
+        ("|difference|", "std: published", "simulated", "ratio"),
+        _condition_summaries,
+    ),
+    "Places of detection, by x of the point seen first: {real} number, simulated share": ((), (), _places),
     "Targets": (("of", "what"), ("simulated", "must be", ""), _targets),
 }
 """Tables by title: headings of the columns that are left- and right-aligned, and the rows."""

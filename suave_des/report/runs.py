@@ -83,6 +83,7 @@ class Runs:
         scenarios: names of scenarios that the file gives, each with its first line.
         sha256: of the file's bytes, in hex.
         averages: lines of rows that are no missions, but averages of them, and were left out.
+        lines: of the missions.
     """
 
     path: Path
@@ -91,6 +92,7 @@ class Runs:
     scenarios: Mapping[str, int]
     sha256: str
     averages: tuple[int, ...] = ()
+    lines: tuple[int, ...] = ()
 
     def error(self, line: int, problem: str, remedy: str | None) -> InputError:
         """Make an error about a line of the file."""
@@ -119,7 +121,13 @@ class Runs:
                 raise InputError(f"has no mission of manager {manager!r}", file=self.path, remedy=remedy)
 
 
-def read_runs(path: str | Path, *, further: Sequence[str] = (), are_simulated: bool = False) -> Runs:
+def read_runs(
+    path: str | Path,
+    *,
+    further: Sequence[str] = (),
+    where_present: Sequence[str] = (),
+    are_simulated: bool = False,
+) -> Runs:
     """Read missions from a runs.csv, a file like the published seams2023_runs.csv, or the exemplar's own results.
 
     Search times are taken as they stand, but for the -1 with which revision 2023 says that nothing was found: the time
@@ -129,6 +137,7 @@ def read_runs(path: str | Path, *, further: Sequence[str] = (), are_simulated: b
     Args:
         path: of the file; it may have columns that are not read.
         further: columns to read too, such as those of a sweep; numbers where all their values are.
+        where_present: further columns that a file need not have.
         are_simulated: whether the missions are a campaign's: all columns of its runs.csv that are there are checked.
 
     Raises:
@@ -143,6 +152,7 @@ def read_runs(path: str | Path, *, further: Sequence[str] = (), are_simulated: b
         layout = _layout(path, header, further)
         metrics = [field for field in fields(MissionMetrics) if are_simulated and field.name in header]
         optional = (layout.time_limit_s, layout.pipeline_found, layout.mean_reaction_time_s, layout.scenario)
+        further = (*further, *(name for name in where_present if name in header))
         wanted = (*layout[:3], *layout.detection_x_m, *optional, *further)
         wanted += tuple(field.name for field in metrics)
         names = [name for name in dict.fromkeys(wanted) if name in header]
@@ -171,7 +181,7 @@ def read_runs(path: str | Path, *, further: Sequence[str] = (), are_simulated: b
     scenarios = _first_lines(cells_by_name[layout.scenario]) if layout.scenario in names else {}
     frame = frame.assign(**{name: _numbers_or_words(cells_by_name[name]) for name in further})
     digest = hashlib.sha256(content).hexdigest()
-    return Runs(path, frame.reset_index(drop=True), managers, scenarios, digest, tuple(averages))
+    return Runs(path, frame.reset_index(drop=True), managers, scenarios, digest, tuple(averages), tuple(lines))
 
 
 def choose_managers(published: Runs, wanted: str | None) -> tuple[str, ...]:
@@ -180,17 +190,27 @@ def choose_managers(published: Runs, wanted: str | None) -> tuple[str, ...]:
     Raises:
         InputError: one is named twice, or has no published mission.
     """
+    return choose_names(wanted, published.managers, str(published.path))
+
+
+def choose_names(wanted: str | None, managers: Iterable[str], source: str) -> tuple[str, ...]:
+    """Choose among the managers of a source: those named, separated by commas, or all.
+
+    Raises:
+        InputError: one is named twice, or has no mission in the source.
+    """
+    known = tuple(managers)
     if wanted is None:
-        return tuple(published.managers)
+        return known
     names = [name.strip() for name in wanted.split(",") if name.strip()]
     if not names:
-        raise InputError("no managers are given", remedy=f"of {published.path}: {', '.join(published.managers)}")
+        raise InputError("no managers are given", remedy=f"of {source}: {', '.join(known)}")
     for place, manager in enumerate(names):
         if manager in names[:place]:
             raise InputError(f"manager {manager!r} is given twice", remedy="name each manager once")
-        if manager not in published.managers:
-            remedy = did_you_mean(manager, published.managers, "its managers")
-            raise InputError(f"has no mission of manager {manager!r}", file=published.path, remedy=remedy)
+        if manager not in known:
+            remedy = did_you_mean(manager, known, "its managers")
+            raise InputError(f"has no mission of manager {manager!r}", file=source, remedy=remedy)
     return tuple(names)
 
 

@@ -15,9 +15,8 @@ from scipy.stats import binom
 
 from suave_des.estimates import CONFIDENCE
 from suave_des.report import style
-from suave_des.report.runs import METRICS
 from suave_des.validation.statistics import Sample
-from suave_des.validation.validation import SampleComparison, Validation, sample
+from suave_des.validation.validation import COMPARED, SampleComparison, Validation, sample, with_limit
 
 _SIMULATED, _PUBLISHED = style.BLUE, style.BLACK
 _PANEL_INCHES = (style.WIDTH_IN / 3.0, 2.0)
@@ -34,18 +33,33 @@ _MARKERS: Mapping[str, Mapping[str, Any]] = {
 _TICK: Mapping[str, Any] = {"linestyle": "", "marker": "|", "color": _PUBLISHED, "markersize": 7, "clip_on": False}
 
 
-def distributions_png(validation: Validation, published: pandas.DataFrame, simulated: pandas.DataFrame) -> bytes:
+def distributions_png(
+    validation: Validation, published: pandas.DataFrame, simulated: pandas.DataFrame, real: str = "published"
+) -> bytes:
     """Draw empirical distribution functions, one panel for each metric and manager.
 
     The shaded band is where, point by point, 95 in 100 samples of the published size would lie if they came from the
     simulation.
+
+    Args:
+        validation: of these missions.
+        published: real missions.
+        simulated: simulated missions.
+        real: what the real ones are called: "published" or "real".
     """
     managers = validation.managers
+    metrics = list(dict.fromkeys(each.metric for each in validation.samples))
+    sides = [with_limit(runs, validation.not_found_s) for runs in (published, simulated)]
     with style.publication():
-        figure, axes = _panels(len(METRICS), len(managers), share_x=False)
+        figure, axes = _panels(len(metrics), len(managers), share_x=False)
+        without = {(row, column) for row in range(len(metrics)) for column in range(len(managers))}
         for each in validation.samples:
-            axis = axes[list(METRICS).index(each.metric), managers.index(each.manager)]
-            _distribution(axis, each, *(sample(runs, each.manager, each.metric) for runs in (published, simulated)))
+            place = metrics.index(each.metric), managers.index(each.manager)
+            without.discard(place)
+            theirs, ours = (sample(runs, each.manager, each.metric) for runs in sides)
+            _distribution(axes[place], each, theirs, ours, real)
+        for place in without:
+            axes[place].text(0.5, 0.5, "not known", transform=axes[place].transAxes, ha="center", va="center")
         for axis, manager in zip(axes[0], managers, strict=True):
             axis.set_title(manager)
         for axis in axes[:, 0]:
@@ -54,27 +68,27 @@ def distributions_png(validation: Validation, published: pandas.DataFrame, simul
         return style.png(figure)
 
 
-def _distribution(axis: Axes, compared: SampleComparison, published: Sample, simulated: Sample) -> None:
+def _distribution(axis: Axes, compared: SampleComparison, published: Sample, simulated: Sample, real: str) -> None:
     top = float(max(published.max(), simulated.max())) * 1.04 or 1.0
     values, shares = _steps(simulated, top)
     tail = (1.0 - CONFIDENCE) / 2.0
     # The parts of a sample at or below a value are binomially distributed.
     low, high = (binom.ppf(quantile, len(published), shares) / len(published) for quantile in (tail, 1.0 - tail))
-    band = "95% of samples of the published size from the simulation"
+    band = f"95% of samples of the {real} size from the simulation"
     look: Mapping[str, Any] = {"step": "post", "color": _SIMULATED, "alpha": 0.15, "linewidth": 0}
     axis.fill_between(values, np.maximum(low, 0.0), high, label=band, **look)
     axis.step(values, shares, where="post", color=_SIMULATED, linewidth=1.5, label="simulated")
-    axis.step(*_steps(published, top), where="post", color=_PUBLISHED, linewidth=0.9, label="published")
+    axis.step(*_steps(published, top), where="post", color=_PUBLISHED, linewidth=0.9, label=real)
     axis.set_ylim(-0.015, 1.02)
     axis.set_xlim(0.0, top)
-    axis.set_xlabel(METRICS[compared.metric])
+    axis.set_xlabel(COMPARED[compared.metric])
     # A distribution function leaves the corner opposite to its bulk free.
     x, y, across, up = (
         (0.03, 0.97, "left", "top") if np.median(simulated) > top / 2.0 else (0.98, 0.05, "right", "bottom")
     )
     p = compared.kolmogorov_smirnov.p
     text = (
-        f"published n = {compared.published.n}\nsimulated n = {compared.simulated.n:,}\n"
+        f"{real} n = {compared.published.n}\nsimulated n = {compared.simulated.n:,}\n"
         f"KS p = {p:.{'2f' if p >= 0.01 else '0e'}}"
     )
     axis.text(x, y, text, transform=axis.transAxes, ha=across, va=up, fontsize=7.0, linespacing=1.3)
@@ -87,10 +101,13 @@ def _steps(values: Sample, top: float) -> tuple[Sample, Sample]:
     return np.concatenate([[0.0], distinct, [top]]), np.concatenate([[0.0], shares, [1.0]])
 
 
-def detections_png(validation: Validation, published: pandas.DataFrame, simulated: pandas.DataFrame) -> bytes:
+def detections_png(
+    validation: Validation, published: pandas.DataFrame, simulated: pandas.DataFrame, real: str = "published"
+) -> bytes:
     """Draw search times against the x of the pipeline point seen first, one panel for each manager.
 
     Areas are shares of the manager's runs. Published missions whose place is not known are ticks on the upper edge.
+    Arguments as of distributions_png.
     """
     with style.publication():
         figure, axes = _panels(1, len(validation.managers), share_x=True)
@@ -102,7 +119,7 @@ def detections_png(validation: Validation, published: pandas.DataFrame, simulate
             axis.plot(unplaced, np.ones(len(unplaced)), transform=axis.get_xaxis_transform(), **_TICK)
             axis.set_title(manager, pad=9)
             without = f"simulated without detection: {ours['detection_x_m'].isna().mean():.1%}"
-            axis.set_xlabel(f"{METRICS['search_time_s']}\n{without}")
+            axis.set_xlabel(f"{COMPARED['search_time_s']}\n{without}")
         axes[0, 0].set_ylabel("x of the point seen first (m)")
         axes[0, 0].margins(0.06, 0.12)
         circle: dict[str, Any] = {
@@ -116,7 +133,7 @@ def detections_png(validation: Validation, published: pandas.DataFrame, simulate
             Line2D([], [], **_TICK),
         ]
         size = f"this area: {_LEGEND_SHARE:.0%} of the manager's runs"
-        labels = [f"simulated ({size})", "published", "published, place not known or no detection"]
+        labels = [f"simulated ({size})", real, f"{real}, place not known or no detection"]
         _legend(figure, handles, labels)
         return style.png(figure)
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 
 from suave_des.estimates import Estimate, Interval
+from suave_des.validation.conditions import ConditionComparison
 from suave_des.validation.shares import DetectionPlace, ShareComparison
 from suave_des.validation.validation import ManagerComparison, SampleComparison, Validation
 
@@ -16,6 +17,7 @@ TABLES = {
     "pairs": "validation_pairs.csv",
     "shares": "validation_shares.csv",
     "positions": "validation_positions.csv",
+    "conditions": "validation_conditions.csv",
     "targets": "validation_targets.csv",
 }
 """Names of the tables in the JSON file, and their files."""
@@ -41,10 +43,16 @@ def texts(validation: Validation, provenance: Mapping[str, object]) -> dict[str,
     tables = {name: [_rounded(row) for row in rows] for name, rows in _tables(validation).items()}
     met = [target.met for target in validation.targets]
     summary = {"met": met.count(True), "not_met": met.count(False), "not_judged": met.count(None)}
-    content = {"provenance": dict(provenance), "targets_summary": summary, **tables}
+    content = {
+        "provenance": dict(provenance),
+        "targets_summary": summary,
+        "not_found_counts_as_s": validation.not_found_s,
+        **tables,
+    }
     files = {
         file: pandas.DataFrame(tables[name]).to_csv(index=False, lineterminator="\n") if tables[name] else ""
         for name, file in TABLES.items()
+        if tables[name] or name != "conditions"
     }
     return {**files, JSON_FILE: json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"}
 
@@ -63,6 +71,7 @@ def _tables(validation: Validation) -> dict[str, list[Record]]:
             {"manager": each.manager, "detection_x_m": each.detection_x_m} | _proportions(each)
             for each in validation.places
         ],
+        "conditions": [_condition(each) for each in validation.conditions],
         "targets": [asdict(target) | {"met": target.met} for target in validation.targets],
     }
 
@@ -85,6 +94,13 @@ def _sample(compared: SampleComparison) -> Record:
         "ad_statistic": ad and ad.statistic,
         "ad_p": ad and ad.p,
     }
+
+
+def _condition(compared: ConditionComparison) -> Record:
+    row: Record = {name: getattr(compared, name) for name in ("manager", "metric", "condition")}
+    for side, found in (("real", compared.real), ("simulated", compared.simulated)):
+        row |= {f"{side}_{name}": getattr(found, name) for name in ("n", "mean", "std", "median")}
+    return {**row, "difference_of_medians": compared.difference}
 
 
 def _estimate(side: str, found: Estimate) -> Record:

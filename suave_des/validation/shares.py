@@ -25,7 +25,7 @@ POSITION_STEP_M = 0.5
 _TOLERANCE = 1e-6
 """Places come from sums of steps; an interval must contain the values that it names."""
 
-Column = Literal["search_time_s", "distance_inspected_m", "detection_x_m"]
+Column = Literal["search_time_s", "distance_inspected_m", "detection_x_m", "pipeline_found", "mean_reaction_time_s"]
 Bounds = tuple[Number, Number]
 Region = dict[Column, Annotated[tuple[Bounds, ...], Field(min_length=1)]]
 """By column the intervals, ends included, one of which must contain the value; an unknown place is in none."""
@@ -60,20 +60,42 @@ class Share(Strict):
         return self
 
 
+class ConditionLimits(Strict):
+    """How near a metric must come where the conditions of the real missions are known."""
+
+    median_difference: Number | None = None
+    """Greatest median over the conditions of |simulated - real median|, in the metric's unit; left out: any."""
+    std_ratio: Number | None = None
+    """Greatest simulated / real standard deviation within a condition, each a median over the conditions."""
+
+
 class ShareList(Strict):
-    """A file of shares."""
+    """A file of shares and of other targets."""
 
-    shares: tuple[Share, ...]
+    shares: tuple[Share, ...] = ()
     """In the order in which they are printed."""
+    conditions: dict[Literal["search_time_s", "distance_inspected_m", "mean_reaction_time_s"], ConditionLimits] = Field(
+        default_factory=dict
+    )
+    """By metric, over all managers."""
 
 
-def read_shares(path: Path) -> tuple[Share, ...]:
-    """Read a file of shares.
+def read_targets(path: Path) -> ShareList:
+    """Read a file of shares and of targets by condition.
 
     Raises:
         InputError: with file and line: it cannot be read, or is not valid.
     """
-    return validated(Layer.of(read_yaml(path), 0), ShareList).shares
+    return validated(Layer.of(read_yaml(path), 0), ShareList)
+
+
+def read_shares(path: Path) -> tuple[Share, ...]:
+    """Read the shares of such a file.
+
+    Raises:
+        InputError: with file and line: it cannot be read, or is not valid.
+    """
+    return read_targets(path).shares
 
 
 def shares_beside(data: Path) -> Path | None:
@@ -114,6 +136,22 @@ class ShareComparison:
     simulated: Proportion
 
 
+def found_shares(
+    published: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequence[str]
+) -> tuple[ShareComparison, ...]:
+    """Compare the share of missions that found the pipeline, of the managers for which both sides tell it."""
+    found = []
+    for manager in managers:
+        share = Share(manager=manager, name="pipeline found", where={"pipeline_found": ((1.0, 1.0),)})
+        sides = []
+        for runs in (published, simulated):
+            told = runs[runs["pipeline_found"].notna()] if "pipeline_found" in runs else runs[:0]
+            sides.append(count(share, told) if len(told) else Proportion(0, 0))
+        if all(side.n for side in sides):
+            found.append(ShareComparison(share, *sides))
+    return tuple(found)
+
+
 def compare_shares(
     shares: Sequence[Share], published: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequence[str]
 ) -> tuple[ShareComparison, ...]:
@@ -144,7 +182,8 @@ def _inside(runs: pandas.DataFrame, region: Region) -> pandas.Series[bool]:
 
     inside = pandas.Series(True, index=runs.index)
     for column, intervals in region.items():
-        in_one = [runs[column].between(low - _TOLERANCE, high + _TOLERANCE) for low, high in intervals]
+        values = runs[column].astype(float)
+        in_one = [values.between(low - _TOLERANCE, high + _TOLERANCE) for low, high in intervals]
         inside &= pandas.concat(in_one, axis=1).any(axis=1)
     return inside
 

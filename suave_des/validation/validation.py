@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,23 @@ import numpy as np
 from suave_des.estimates import Estimate, Interval, estimate
 from suave_des.report.runs import METRICS
 from suave_des.streams import Streams
-from suave_des.validation.shares import DetectionPlace, Share, ShareComparison, compare_places, compare_shares
+from suave_des.validation.conditions import (
+    CONDITION,
+    ConditionComparison,
+    ConditionSummary,
+    balanced,
+    compare_conditions,
+    summarise,
+)
+from suave_des.validation.shares import (
+    ConditionLimits,
+    DetectionPlace,
+    Share,
+    ShareComparison,
+    compare_places,
+    compare_shares,
+    found_shares,
+)
 from suave_des.validation.statistics import (
     SIGNIFICANCE,
     OneSidedTests,
@@ -30,7 +47,9 @@ from suave_des.validation.statistics import (
 if TYPE_CHECKING:
     import pandas
 
-LOWER_IS_BETTER = {"search_time_s": True, "distance_inspected_m": False}
+COMPARED = {**METRICS, "mean_reaction_time_s": "mean reaction time (s)"}
+"""Metrics that are compared where both sides have values, with their titles in figures."""
+LOWER_IS_BETTER = {"search_time_s": True, "distance_inspected_m": False, "mean_reaction_time_s": True}
 """Which of two values of a metric is better, as the exemplar's own one-sided tests have it."""
 _LEAST_AGREEMENT = 0.5
 
@@ -44,7 +63,7 @@ class SampleComparison:
 
     Attributes:
         manager: managing subsystem.
-        metric: one of METRICS.
+        metric: one of COMPARED.
         published: estimates from the published sample, with 95% intervals.
         simulated: estimates from the simulated sample.
         difference: simulated - published mean, in the metric's unit.
@@ -74,7 +93,7 @@ class ManagerComparison:
     Attributes:
         first: the one manager.
         second: the other.
-        metric: one of METRICS.
+        metric: one of COMPARED.
         published_superiority: probability that a published mission of the first is better than one of the second.
         simulated_superiority: the same of simulated missions.
         published: tests of the published runs, which lead to a conclusion.
@@ -103,8 +122,8 @@ class Target:
     """A requirement on the simulation.
 
     Attributes:
-        kind: mean, std, ks, conclusion or share.
-        subject: the manager, or the pair as "first, second".
+        kind: mean, std, ks, conclusion, share, condition_median or condition_std.
+        subject: the manager, the pair as "first, second", or "all" managers.
         what: metric, or name of the share.
         value: what the simulation has; none if there are too few missions for it.
         low: least value that is good enough; none: no limit.
@@ -137,6 +156,9 @@ class Validation:
         shares: clusters and other regions.
         places: places of detection.
         targets: requirements, and whether they are met.
+        conditions: every metric, manager and condition, where conditions are known; else empty.
+        condition_summaries: of those, by metric and manager.
+        not_found_s: search time that counts for missions that never found the pipeline; none if there are none.
     """
 
     managers: tuple[str, ...]
@@ -145,6 +167,9 @@ class Validation:
     shares: tuple[ShareComparison, ...]
     places: tuple[DetectionPlace, ...]
     targets: tuple[Target, ...]
+    conditions: tuple[ConditionComparison, ...] = ()
+    condition_summaries: tuple[ConditionSummary, ...] = ()
+    not_found_s: float | None = None
 
     @property
     def all_met(self) -> bool:
@@ -158,9 +183,13 @@ def validate(
     managers: Sequence[str],
     *,
     shares: Sequence[Share] = (),
+    limits: Mapping[str, ConditionLimits] = MappingProxyType({}),
     seed: int = 1,
 ) -> Validation:
     """Compare simulated missions with published ones; the result depends on nothing but the arguments.
+
+    Where both have a column `condition`, a manager's missions are compared condition by condition, too, and simulated
+    ones are left out as needed for the conditions to have the same proportions on both sides.
 
     Example:
         real = read_runs("my_real_runs.csv")
@@ -172,27 +201,80 @@ def validate(
         simulated: the same, in any number; further columns do not matter.
         managers: those to compare; each must have missions on both sides.
         shares: regions to count.
+        limits: targets by metric for what is compared condition by condition.
         seed: of bootstrap, permutations and subsamples.
+
+    Raises:
+        InputError: a condition has real missions of a manager, and no simulated one.
     """
     streams = Streams(seed, 0)
 
     def generators(name: str) -> np.random.Generator:
         return np.random.default_rng(streams.stream(f"validation/{name}").getrandbits(128))
 
-    sides = published, simulated
-    samples = tuple(_compare_samples(manager, metric, sides, generators) for metric in METRICS for manager in managers)
+    if CONDITION in published and CONDITION in simulated:
+        simulated = balanced(published, simulated, managers)
+    sides = published, simulated = tuple(side[side["manager"].isin(managers)] for side in (published, simulated))
+    not_found_s = common_limit(*sides)
+    sides = published, simulated = tuple(with_limit(side, not_found_s) for side in sides)
+    cells = [(metric, manager) for metric in COMPARED for manager in managers if _has_values(sides, manager, metric)]
+    samples = tuple(_compare_samples(manager, metric, sides, generators) for metric, manager in cells)
     pairs = tuple(
-        _compare_managers(pair, metric, sides, generators) for metric in METRICS for pair in combinations(managers, 2)
+        _compare_managers(pair, metric, sides, generators)
+        for metric in COMPARED
+        for pair in combinations([manager for each, manager in cells if each == metric], 2)
     )
     counted = compare_shares(shares, published, simulated, managers)
-    targets = (*_sample_targets(samples), *_pair_targets(pairs), *_share_targets(counted))
+    conditions = compare_conditions(published, simulated, managers, tuple(COMPARED))
+    summaries = tuple(summarise(conditions))
+    targets = (
+        *_sample_targets(samples),
+        *_pair_targets(pairs),
+        *_share_targets(counted),
+        *_condition_targets(summaries, limits),
+    )
     places = compare_places(published, simulated, managers)
-    return Validation(tuple(managers), samples, pairs, counted, places, targets)
+    counted += found_shares(published, simulated, managers)
+    return Validation(tuple(managers), samples, pairs, counted, places, targets, conditions, summaries, not_found_s)
+
+
+def common_limit(*sides: pandas.DataFrame) -> float | None:
+    """Return one search time for all missions that are known not to have found the pipeline; none if there are none.
+
+    Programs write different numbers for them, such as 250 and 251 s with a limit of 250 s, which a test of
+    distributions would take for a difference. It is the median of those numbers on the last side that has some, but
+    at least as great as every search time with success.
+    """
+    not_found = [side.loc[~_found(side), "search_time_s"] for side in sides]
+    numbers = next((each for each in reversed(not_found) if len(each)), None)
+    if numbers is None:
+        return None
+    return max(float(numbers.median()), *(float(side.loc[_found(side), "search_time_s"].max()) for side in sides))
+
+
+def with_limit(runs: pandas.DataFrame, limit_s: float | None) -> pandas.DataFrame:
+    """Return missions with the same search time for all that are known not to have found the pipeline."""
+    if limit_s is None:
+        return runs
+    return runs.assign(search_time_s=runs["search_time_s"].where(_found(runs), limit_s))
+
+
+def _found(runs: pandas.DataFrame) -> pandas.Series[bool]:
+    """Whether missions found the pipeline, or may have."""
+    import pandas
+
+    if "pipeline_found" not in runs:
+        return pandas.Series(True, index=runs.index)
+    return runs["pipeline_found"].astype("boolean").fillna(True).astype(bool)
+
+
+def _has_values(sides: Sequence[pandas.DataFrame], manager: str, metric: str) -> bool:
+    return all(metric in side and len(sample(side, manager, metric)) for side in sides)
 
 
 def sample(runs: pandas.DataFrame, manager: str, metric: str) -> Sample:
-    """A manager's values of a metric, shape (n,)."""
-    return runs.loc[runs["manager"] == manager, metric].to_numpy(dtype=float)
+    """Return a manager's values of a metric, shape (n,); missions without one are left out."""
+    return runs.loc[runs["manager"] == manager, metric].dropna().to_numpy(dtype=float)
 
 
 def _compare_samples(
@@ -258,3 +340,17 @@ def _share_targets(shares: Sequence[ShareComparison]) -> Iterator[Target]:
     for each in shares:
         if each.share.target is not None:
             yield Target("share", each.share.manager, each.share.name, each.simulated.share, *each.share.target)
+
+
+def _condition_targets(
+    summaries: Sequence[ConditionSummary], limits: Mapping[str, ConditionLimits]
+) -> Iterator[Target]:
+    for each in summaries:
+        limit = limits.get(each.metric)
+        if each.manager == "all" and limit is not None:
+            for kind, value, high in (
+                ("condition_median", each.difference, limit.median_difference),
+                ("condition_std", each.std_ratio, limit.std_ratio),
+            ):
+                if high is not None:
+                    yield Target(kind, each.manager, each.metric, value, None, high)

@@ -165,3 +165,58 @@ def test_overwrite_replaces_the_validation_and_keeps_what_is_not_its_own(validat
     assert validate("--runs-file", str(DATA), "--out", "out", "--overwrite").status == 0
     assert (tmp_path / "out" / "notes.txt").read_text(encoding="utf-8") == "mine"
     assert len(rows(tmp_path / "out" / "validation.csv")) == 6
+
+
+CAMPAIGN = """campaign: 1
+scenario: seams2023
+sweep: {zip: {start.y_m: [2.5, 2.9], thruster_events.0.time_s: [35, 90]}}
+"""
+
+
+def test_a_campaign_file_compares_each_real_run_with_those_of_its_condition(validate, tmp_path):
+    (tmp_path / "two.yaml").write_text(CAMPAIGN, encoding="utf-8")
+    (tmp_path / "real.csv").write_text(
+        f"{HEADER},pipeline_found,block\nnone,180,30,True,1\nnone,190,31,True,1\nnone,251,0,False,2\n", encoding="utf-8"
+    )
+    ended = validate("two.yaml", "--data", "real.csv", "--runs", "2", "--workers", "1", "--out", "out", "--quiet")
+    assert ended.status == 0
+    assert "Condition 2: start.y_m=2.9, thruster_events.0.time_s=90" in ended.out
+    conditions = rows(tmp_path / "out" / "validation_conditions.csv")
+    assert [(row["metric"], row["condition"], row["real_n"], row["simulated_n"]) for row in conditions] == [
+        ("search_time_s", "1", "2", "2"),
+        ("search_time_s", "2", "1", "1"),
+        ("distance_inspected_m", "1", "2", "2"),
+        ("distance_inspected_m", "2", "1", "1"),
+    ]
+    again = validate("two.yaml", "--data", "real.csv", "--runs-file", "out/runs.csv", "--out", "again")
+    assert again.status == 0
+    same = "validation_conditions.csv"
+    assert (tmp_path / "again" / same).read_bytes() == (tmp_path / "out" / same).read_bytes()
+
+
+def test_runs_of_the_users_own_are_called_real_and_the_papers_published(validate, tmp_path):
+    (tmp_path / "real.csv").write_text(DATA.read_text(encoding="utf-8"), encoding="utf-8")
+    own = validate("--data", "real.csv", "--runs-file", "real.csv").out
+    assert "real runs, then simulated" in own
+    assert "published" not in own
+    assert "published, then simulated" in validate("--runs-file", str(DATA)).out
+
+
+def test_several_files_are_compared_as_one_data_set(validate, tmp_path):
+    header, *lines = DATA.read_text(encoding="utf-8").splitlines()
+    names = []
+    for manager in ("none", "random", "metacontrol"):
+        own = [line for line in lines if line.startswith(f"{manager},")]
+        (tmp_path / f"{manager}.csv").write_text("\n".join([header, *own]), encoding="utf-8")
+        names += ["--data", f"{manager}.csv"]
+    ended = validate(*names, "--runs-file", str(DATA), "--out", "out")
+    assert "24 of 24 targets are met" in ended.out
+    data = json.loads((tmp_path / "out" / "validation.json").read_text())["provenance"]["data"]
+    assert [each["file"] for each in data] == ["none.csv", "random.csv", "metacontrol.csv"]
+
+
+def test_averages_in_the_exemplars_files_are_left_out_with_a_note(validate, tmp_path):
+    text = "mission name,time searching pipeline (s),distance inspected (m)\nsuave none,180,30\nAVERAGE,180,30\n"
+    (tmp_path / "none.csv").write_text(text, encoding="utf-8")
+    ended = validate("--data", "none.csv", "--runs-file", str(DATA))
+    assert ended.out.startswith("none.csv: line 3 left out: averages, not missions.\n")
