@@ -1,4 +1,4 @@
-"""Managers by name: the built-in ones, those that other packages register, and any class given as module:Class."""
+"""Managers, and functions of one's own, by name: built in, registered by another package, or given as module:Class."""
 
 from __future__ import annotations
 
@@ -8,11 +8,18 @@ from difflib import get_close_matches
 from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
 
-from suave_des.errors import InputError
+from suave_des.errors import InputError, did_you_mean
 from suave_des.managing.base import ManagingSubsystem
 
+if TYPE_CHECKING:
+    from suave_des.managed.own import OwnFunction
+
+_Base = TypeVar("_Base")
+
 ENTRY_POINT_GROUP = "suave_des.managers"
+FUNCTION_GROUP = "suave_des.functions"
 _BUILT_IN = {
     "none": "suave_des.managing.simple:NoManager",
     "random": "suave_des.managing.simple:RandomManager",
@@ -43,15 +50,39 @@ def manager_class(name: str) -> type[ManagingSubsystem]:
         close = get_close_matches(name, manager_names(), n=1)
         hint = f"did you mean {close[0]}?" if close else f"known: {', '.join(manager_names())}"
         raise InputError(f"there is no manager {name!r}", remedy=f"{hint}; your own is given as package.module:Class")
-    return _load(name, target)
+    return _load(f"manager {name!r}", target, ManagingSubsystem)
+
+
+def registered_functions() -> tuple[str, ...]:
+    """Names of the functions that other packages register, in alphabetical order."""
+    return tuple(sorted(_registered(FUNCTION_GROUP)))
+
+
+def function_class(function: str, name: str) -> type[OwnFunction]:
+    """The class of a function of one's own.
+
+    Args:
+        function: name of the function, for errors.
+        name: module:Class, or a registered name.
+
+    Raises:
+        InputError: there is no such class, or it is no subclass of OwnFunction.
+    """
+    from suave_des.managed.own import OwnFunction  # loads the vehicle
+
+    target = name if ":" in name else _registered(FUNCTION_GROUP).get(name)
+    if target is None:
+        hint = did_you_mean(name, registered_functions(), "registered")
+        raise InputError(f"function {function}: no package registers {name!r}", remedy=f"{hint}; or give module:Class")
+    return _load(f"function {function}, {name!r}", target, OwnFunction)
 
 
 @cache
-def _registered() -> dict[str, str]:
-    return {point.name: point.value for point in entry_points(group=ENTRY_POINT_GROUP)}
+def _registered(group: str = ENTRY_POINT_GROUP) -> dict[str, str]:
+    return {point.name: point.value for point in entry_points(group=group)}
 
 
-def _load(name: str, target: str) -> type[ManagingSubsystem]:
+def _load(what: str, target: str, base: type[_Base]) -> type[_Base]:
     module_name, _, attribute = target.partition(":")
     try:
         if module_name not in sys.modules:
@@ -61,14 +92,14 @@ def _load(name: str, target: str) -> type[ManagingSubsystem]:
         if isinstance(error.__cause__, KeyboardInterrupt):  # Python 3.11 wraps it while a class is made
             raise error.__cause__ from None
         raise InputError(
-            f"manager {name!r}: {type(error).__name__}: {error}",
+            f"{what}: {type(error).__name__}: {error}",
             remedy="module must be importable: installed, or in the current folder or one on PYTHONPATH",
         ) from error
     found = getattr(module, attribute, None)
-    if not (isinstance(found, type) and issubclass(found, ManagingSubsystem)):
+    if not (isinstance(found, type) and issubclass(found, base)):
         raise InputError(
-            f"manager {name!r}: {module_name} has no subclass of ManagingSubsystem named {attribute!r}",
-            remedy="derive your class from suave_des.managing.base.ManagingSubsystem",
+            f"{what}: {module_name} has no subclass of {base.__name__} named {attribute!r}",
+            remedy=f"derive your class from {base.__module__}.{base.__name__}",
         )
     return found
 

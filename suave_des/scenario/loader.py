@@ -9,7 +9,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
-from suave_des.domain import GENERATE_SEARCH_PATH, MISSION_FUNCTIONS
+from suave_des.domain import GENERATE_SEARCH_PATH
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown
 from suave_des.resources import find
 from suave_des.scenario.layers import Files, Layer, Location, find_named, scenario_layer
@@ -195,7 +195,7 @@ def _name(layer: Layer, path: Path) -> object:
 
 def _check_modes(layer: Layer, scenario: Scenario, modes: ModeTable) -> None:
     """Check that the modes file has the functions and modes that the mission and the scenario use."""
-    for function in MISSION_FUNCTIONS:
+    for function in scenario.needed_functions():
         if function not in modes.functions:
             remedy = did_you_mean(function, modes.functions, "its functions")
             problem = f"defines no function {function}, which the mission needs"
@@ -209,6 +209,11 @@ def _check_modes(layer: Layer, scenario: Scenario, modes: ModeTable) -> None:
         if mode not in known:
             remedy = did_you_mean(mode, known, f"its modes in {modes.source}")
             raise layer.error(f"function {function} has no mode {shown(mode)}", key_path, remedy)
+
+    for function in scenario.functions:
+        if function not in modes.functions:
+            remedy = did_you_mean(function, modes.functions, f"functions in {modes.source}")
+            raise layer.error(f"the modes file has no function {shown(function)}", ("functions", function), remedy)
 
     for function, mode in scenario.default_modes.items():
         if function not in modes.functions:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
-from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, SEA_BED_Z_M, SURFACE_Z_M
+from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MISSION_FUNCTIONS, SEA_BED_Z_M, SURFACE_Z_M
 from suave_des.errors import shown
 from suave_des.scenario.quantities import (
     Coordinate,
@@ -42,11 +42,33 @@ THRUSTERS = 6
 _LONGEST_MISSION_S = 100_000.0
 
 
+class MissionFunctions(Strict):
+    """Functions that the mission needs besides the exemplar's."""
+
+    lasting: tuple[Name, ...] = ()
+    """Needed from launch to the end."""
+    search_pipeline: tuple[Name, ...] = ()
+    """Needed by the first task."""
+    inspect_pipeline: tuple[Name, ...] = ()
+    """Needed by the second task."""
+
+
 class Mission(Strict):
-    """The coordinator's limit."""
+    """The coordinator's limit, and what its tasks need."""
 
     time_limit_s: Annotated[float, Field(strict=True), Within(gt=0, le=_LONGEST_MISSION_S, unit="s")] = 300.0
     """When the current task is cancelled and the metrics are taken."""
+    functions: MissionFunctions = MissionFunctions()
+    """Functions that are needed besides the exemplar's."""
+
+
+class FunctionSettings(Strict):
+    """A function of one's own: its class, and whatever settings that has."""
+
+    model_config = ConfigDict(extra="allow")
+
+    node: Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*(:[A-Za-z_]\w*)?$")]
+    """Class of the function's node, as module:Class, or the name under which a package registers it."""
 
 
 class Start(Strict):
@@ -279,7 +301,7 @@ class Scenario(Strict):
     vehicle: VehicleDescription
     """Body, thrusters and camera; left out in a file: `bluerov2`."""
     mission: Mission = Mission()
-    """The coordinator's limit."""
+    """The coordinator's limit, and what its tasks need."""
     start: Start = Start()
     """Pose at t = 0, each part drawn once a run."""
     pipeline: Pipeline = Pipeline()
@@ -300,6 +322,8 @@ class Scenario(Strict):
     """System Modes file."""
     default_modes: dict[Name, str] = Field(default_factory=lambda: dict(_DEFAULT_MODES))
     """Mode that the manager none sets for each function; functions left out keep their default."""
+    functions: dict[Name, FunctionSettings] = Field(default_factory=dict)
+    """Functions of one's own, by the name that they have in the modes file."""
     knowledge: Knowledge = Knowledge()
     """The knowledge base."""
     managers: ManagerSettings = ManagerSettings()
@@ -318,6 +342,11 @@ class Scenario(Strict):
     @classmethod
     def _over_the_defaults(cls, value: dict[str, str]) -> dict[str, str]:
         return {**_DEFAULT_MODES, **value}
+
+    def needed_functions(self) -> tuple[str, ...]:
+        """The functions that the mission needs."""
+        own = self.mission.functions
+        return tuple(dict.fromkeys((*MISSION_FUNCTIONS, *own.lasting, *own.search_pipeline, *own.inspect_pipeline)))
 
     @model_validator(mode="after")
     def _one_battery(self) -> Self:

@@ -15,6 +15,7 @@ from suave_des.managed.follow import NO_PATH, FollowPipeline, InspectionPath
 from suave_des.managed.mode_manager import ModeManager
 from suave_des.managed.motion import MaintainMotion
 from suave_des.managed.node import FunctionNode
+from suave_des.managed.own import FunctionContext, OwnFunction
 from suave_des.managed.recharge import GenerateRechargePath
 from suave_des.managed.search import GenerateSearchPath
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
@@ -253,7 +254,22 @@ class MissionRun:
         if (battery := self._scenario.battery) is not None:
             station_m = battery.station_x_m, battery.station_y_m, domain.SEA_BED_Z_M + battery.approach_altitude_m
             nodes[recharge] = GenerateRechargePath(env, make_sender(recharge), station_m, battery.resend_period_s)
+        for name, kind in self._simulator.own_functions.items():
+            nodes[name] = self._make_own_function(name, kind, make_sender(name))
         return nodes
+
+    def _make_own_function(self, name: str, kind: type[OwnFunction], sender: SetPointSender) -> OwnFunction:
+        settings = self._scenario.functions.get(name)
+        context = FunctionContext(
+            name=name,
+            env=self.env,
+            settings=(settings.model_extra or {}) if settings is not None else {},
+            sender=sender,
+            bus=self._bus,
+            stream=lambda stream: self._chance.stream(f"functions/{name}/{stream}"),
+            log=partial(self._recorder.log, name),
+        )
+        return kind(context)
 
     def _make_sender(self, loss_probability: float, node: str) -> SetPointSender:
         value, offset = self._chance.value, "revision.set_points.node_frame_offset_"
@@ -273,7 +289,10 @@ class MissionRun:
             poll_phase_s=phase("coordinator", settings.poll_period_s),
             limit_phase_s=phase("limit", settings.limit_check_period_s),
         )
-        return MissionCoordinator(self.env, settings, timing, self._detector, self._follow, self._recorder.log)
+        functions = self._scenario.mission.functions
+        return MissionCoordinator(
+            self.env, settings, timing, functions, self._detector, self._follow, self._recorder.log
+        )
 
     def _make_host(self, kind: type[ManagingSubsystem] | None) -> ManagerHost:
         name = self._manager

@@ -14,6 +14,7 @@ from suave_des.managed.follow import InspectionPath
 from suave_des.managing.learned import read_learned
 from suave_des.metrics.result import MissionResult
 from suave_des.scenario.loader import LoadedScenario
+from suave_des.simulation.functions import own_functions
 from suave_des.simulation.vehicles import vehicle_model
 from suave_des.vehicle.kernel import ROW
 from suave_des.vehicle.vehicle import track_rows
@@ -62,6 +63,7 @@ class Simulator:
         self.path = InspectionPath.along(there_and_back(self.points), scenario.revision.follow.altitude_m)
         self.detection_points = self.points + np.array([0.0, 0.0, scenario.revision.monitors.detected_point_height_m])
         self.duration_s = scenario.mission.time_limit_s + scenario.revision.coordinator.limit_check_period_s
+        self.own_functions = own_functions(loaded)
         self.vehicle_model = vehicle_model(scenario.vehicle)
         self.view_tangent = scenario.vehicle.camera.tangent
         self._spare_memory: list[MissionMemory] = []

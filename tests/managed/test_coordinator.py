@@ -8,6 +8,7 @@ import simpy
 
 from suave_des.domain import Task
 from suave_des.managed.coordinator import MissionCoordinator, MissionTiming
+from suave_des.scenario.models import MissionFunctions
 from tests.helpers.stand_ins import revision
 
 BOTH = pytest.mark.parametrize("name", ["2023", "1.5"])
@@ -41,6 +42,7 @@ class Mission:
             self.env,
             revision(name).coordinator,
             MissionTiming(time_limit_s, start_delay_s, POLL_PHASE_S if name == "2023" else 0.035, LIMIT_PHASE_S),
+            MissionFunctions(),
             self.detector,
             self.follow,
             lambda source, event, detail: self.logged.append((self.env.now, event, detail)),

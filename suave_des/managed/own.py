@@ -1,0 +1,90 @@
+"""Functions of one's own: a node for a function that the exemplar does not have."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import simpy
+
+from suave_des.managed.node import FunctionNode
+from suave_des.monitor.diagnostics import DiagnosticsBus
+from suave_des.scenario.modes import Mode
+from suave_des.vehicle.guidance import SetPointSender
+from suave_des.vehicle.vehicle import Point
+
+
+@dataclass(frozen=True)
+class FunctionContext:
+    """What a function of one's own can see and do.
+
+    Attributes:
+        name: of the function.
+        env: the mission's clock.
+        settings: the scenario's entry under functions: for this function.
+        sender: the function's connection to the autopilot.
+        bus: where diagnostics are published, and can be subscribed to.
+        stream: makes a named random stream of this run.
+        log: adds an event and its detail to the mission's record.
+    """
+
+    name: str
+    env: simpy.Environment
+    settings: Mapping[str, Any]
+    sender: SetPointSender
+    bus: DiagnosticsBus
+    stream: Callable[[str], random.Random]
+    log: Callable[[str, str], None]
+
+    def position(self) -> Point:
+        """Where the vehicle is now: x, y, z in m, world frame."""
+        return self.sender.vehicle.position(self.env.now)
+
+
+class FunctionError(Exception):
+    """What a hook of a function of one's own raised, with the function's name."""
+
+
+class OwnFunction(FunctionNode):
+    """Base of functions of one's own: override what happens on activation, deactivation and a change of parameters.
+
+    The hooks are called at the mission time at which a mode takes effect. They must not block; what goes on over time
+    is a process: `self.env.process(...)`.
+
+    Attributes:
+        context: what can be seen and done.
+
+    Example:
+        >>> class Lights(OwnFunction):
+        ...     def configure(self, mode):
+        ...         self.power_w = mode.parameters["power_w"]
+        ...
+        ...     def activated(self):
+        ...         self.context.log("lights_on", f"{self.power_w:g} W")
+    """
+
+    def __init__(self, context: FunctionContext) -> None:
+        super().__init__(context.env)
+        self.context = context
+
+    def apply(self, mode: Mode) -> None:
+        """Change to a mode.
+
+        Raises:
+            FunctionError: a hook raised.
+        """
+        try:
+            super().apply(mode)
+        except Exception as error:
+            raise FunctionError(f"function {self.context.name}: {type(error).__name__}: {error}") from error
+
+    def configure(self, mode: Mode) -> None:
+        """Take the mode's parameters, `mode.parameters`; called before the activation that the mode brings, too."""
+
+    def activated(self) -> None:
+        """Start the function's activity."""
+
+    def deactivated(self) -> None:
+        """End the function's activity."""

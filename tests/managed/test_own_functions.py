@@ -1,0 +1,147 @@
+"""Functions of one's own: named in the scenario or registered by a package, needed by tasks, switched by modes."""
+
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import pytest
+
+from suave_des import registry
+from suave_des.errors import InputError, MissionError
+from suave_des.managed.own import OwnFunction
+from suave_des.metrics.result import Event, MissionResult
+from suave_des.scenario.loader import load_scenario
+from suave_des.simulation.simulator import Simulator
+
+MODES = """
+f_lights:
+  ros__parameters:
+    type: system
+    parts: f_lights_node
+    modes:
+      fd_unground: {f_lights_node: inactive}
+      fd_dim: {f_lights_node: active.fd_dim}
+f_lights_node:
+  ros__parameters:
+    type: node
+    modes:
+      fd_dim: {ros__parameters: {power_w: 15.0}}
+"""
+NEEDED = """
+base: seams2023.yaml
+modes_file: modes.yaml
+mission: {functions: {search_pipeline: [f_lights]}}
+default_modes: {f_lights: fd_dim}
+"""
+NAMED = NEEDED + "functions: {f_lights: {node: 'tests.managed.test_own_functions:Lights', lamps: 2}}\n"
+
+
+class Lights(OwnFunction):
+    """Notes what happens to it."""
+
+    def configure(self, mode):
+        self.power_w = mode.parameters["power_w"] * self.context.settings.get("lamps", 1)
+
+    def activated(self):
+        self.context.log("lights_on", f"{self.power_w:g} W at {self.context.position()[2]:.1f} m")
+
+    def deactivated(self):
+        self.context.log("lights_off", "")
+
+
+class Broken(Lights):
+    """Raises when it is activated."""
+
+    def activated(self):
+        raise ZeroDivisionError("no lamp")
+
+
+@pytest.fixture
+def fly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Flies a mission of a scenario given as text, under the manager none."""
+    monkeypatch.chdir(tmp_path)
+    shipped = load_scenario("seams2023").modes_path.read_text(encoding="utf-8")
+    (tmp_path / "modes.yaml").write_text(shipped + MODES, encoding="utf-8")
+
+    def run(text: str) -> MissionResult:
+        (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
+        return Simulator(load_scenario("mine.yaml")).run("none", run=1, seed=1, record=True)
+
+    return run
+
+
+def of_lights(result: MissionResult) -> list[Event]:
+    return [event for event in result.events if event.source == "f_lights"]
+
+
+def test_a_function_is_active_while_the_task_lasts_that_needs_it(fly) -> None:
+    result = fly(NAMED)
+    on, off = of_lights(result)
+    assert (on.event, on.detail) == ("lights_on", "30 W at -18.5 m")
+    over_s = next(event.t_s for event in result.events if event.event == "task_done")
+    assert (off.event, off.t_s) == ("lights_off", over_s + 0.5)
+
+
+def test_a_function_that_is_needed_all_the_time_belongs_to_no_task(fly) -> None:
+    assert of_lights(fly(NAMED.replace("search_pipeline", "lasting"))) == []  # none sets modes of tasks only
+
+
+def test_the_mission_itself_stays_the_same(fly) -> None:
+    plain = fly("base: seams2023.yaml\nname: mine\n").metrics
+    assert fly(NAMED).metrics == plain
+
+
+def test_a_package_registers_a_function_under_its_name(fly, monkeypatch: pytest.MonkeyPatch) -> None:
+    point = EntryPoint("f_lights", "tests.managed.test_own_functions:Lights", registry.FUNCTION_GROUP)
+    monkeypatch.setattr(registry, "entry_points", lambda group: [point] if group == registry.FUNCTION_GROUP else [])
+    registry._registered.cache_clear()
+    try:
+        assert [event.event for event in of_lights(fly(NEEDED))] == ["lights_on", "lights_off"]
+    finally:
+        registry._registered.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("text", "problem", "remedy"),
+    [
+        (NEEDED, "function f_lights has no node", "name its class: functions: {f_lights: {node: module:Class}}"),
+        (NEEDED.replace("[f_lights]", "[f_light]"), "no function f_light, which the mission", "did you mean"),
+        (NAMED.replace("Lights'", "Lamps'"), "no subclass of OwnFunction named 'Lamps'", "suave_des.managed.own"),
+        (
+            NAMED.replace("tests.managed.test_own_functions:Lights", "lights"),
+            "no package registers 'lights'",
+            "module:",
+        ),
+        (NAMED.replace("tests.managed", "nowhere.at_all"), "No module named 'nowhere'", "must be importable"),
+        (NAMED.replace("node: 'tests", "node: '1tests"), "is not a valid name", "letters"),
+        (NAMED.replace("node:", "nod:"), "is missing", "add it"),
+        (
+            NAMED.replace("{f_lights: {node", "{f_lihgts: {node"),
+            "no function 'f_lihgts'",
+            "f_lig",
+        ),
+        (
+            NEEDED.replace("[f_lights]", "[generate_recharge_path]"),
+            "generate_recharge_path needs a battery",
+            "add battery",
+        ),
+    ],
+)
+def test_what_is_missing_is_said(fly, text: str, problem: str, remedy: str) -> None:
+    with pytest.raises(InputError) as caught:
+        fly(text)
+    assert problem in caught.value.problem
+    assert remedy in str(caught.value.remedy)
+
+
+def test_a_hook_that_raises_fails_its_mission_and_names_the_function(fly) -> None:
+    with pytest.raises(MissionError, match="function f_lights: ZeroDivisionError: no lamp"):
+        fly(NAMED.replace("Lights'", "Broken'"))
+
+
+def test_a_mode_of_a_function_without_node_is_neither_offered_nor_set(fly) -> None:
+    fly("base: seams2023.yaml\nmodes_file: modes.yaml\n")
+    started = Simulator(load_scenario("mine.yaml")).start("none", 1, 1, record=True)
+    modes = started.modes
+    assert modes.available_modes("f_lights") == ()
+    assert modes.change_mode("f_lights", "fd_dim") is False
+    assert any("name its class under functions:" in event.detail for event in started.result().events)
