@@ -21,8 +21,9 @@ DERIVED = (
     *("paper_table.md", "paper_table.csv"),
     *("validation.csv", "validation_pairs.csv", "validation_shares.csv", "validation_positions.csv"),
     *("validation_targets.csv", "validation.json", "distributions.png", "detections.png"),
+    *("replay.html", "report.html"),
 )
-"""Files that reproduce and validate make of a campaign's, beside them."""
+"""Files that reproduce, validate, report and replay make of a campaign's, beside them."""
 FAMILIES: Mapping[str, tuple[str, ...]] = {
     "mission": ("mission.json", "events.csv", "trajectory.csv", "knowledge.jsonl"),
     "campaign": (

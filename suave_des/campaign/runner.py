@@ -158,7 +158,7 @@ class _Campaign:
             raise error if file is None or "until_ci" not in spec.from_file else file.located(error) from None
         self._stack = stack
         self._local = self._start_workers()
-        self.loaded, self.variation, self.inputs = _read(spec, file)
+        self.loaded, self.variation, self.inputs = read_inputs(spec, file)
         self.job = JobSpec(
             self.loaded, self.variation, spec.managers, spec.seed, spec.time_out_s, spec.record_knowledge
         )
@@ -330,7 +330,12 @@ class _Campaign:
         return f"; what was kept before is safe: suave-des campaign --resume {self.spec.out} does the rest"
 
 
-def _read(spec: CampaignSpec, file: CampaignFile | None) -> tuple[LoadedScenario, Variation, dict[str, str]]:
+def read_inputs(spec: CampaignSpec, file: CampaignFile | None) -> tuple[LoadedScenario, Variation, dict[str, str]]:
+    """Read what a campaign is made of: the scenario, what varies, and the SHA-256 of each input file.
+
+    Raises:
+        InputError: something cannot be used.
+    """
     loaded = load_scenario(
         spec.scenario if file is None else file.scenario,
         ontologies=spec.ontologies,

@@ -1,0 +1,94 @@
+"""Runs missions of a campaign again, with their whole record: the same missions, as all that decides them is kept."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from suave_des.campaign.runner import read_inputs
+from suave_des.campaign.spec import CampaignSpec, read_campaign_file
+from suave_des.campaign.store import STORE_FILE, Store
+from suave_des.campaign.variation import Variation
+from suave_des.errors import InputError, did_you_mean
+from suave_des.metrics.result import MissionResult
+from suave_des.scenario.loader import LoadedScenario
+from suave_des.simulation.simulator import Simulator
+
+
+@dataclass(frozen=True)
+class OpenedCampaign:
+    """A campaign whose missions can be run again.
+
+    Attributes:
+        spec: what it was asked to do.
+        loaded: its scenario.
+        variation: what differs between its missions besides manager and run.
+    """
+
+    spec: CampaignSpec
+    loaded: LoadedScenario
+    variation: Variation
+
+    def at_point(self, point: int) -> LoadedScenario:
+        """Return the scenario at a point of the sweep; 0 without one.
+
+        Raises:
+            InputError: there is no such point.
+        """
+        if not 0 <= point < self.variation.sweep.points:
+            remedy = f"its sweep has the points 0 to {self.variation.sweep.points - 1}"
+            raise InputError(f"the campaign has no point {point}", remedy=remedy)
+        return self.variation.scenario(self.loaded, point)
+
+    def simulator(self, point: int = 0) -> Simulator:
+        """Make what runs the missions of a point."""
+        return Simulator(self.at_point(point), dict.fromkeys(self.variation.drawn, self.spec.runs_per_draw))
+
+    def run(self, manager: str, run: int, point: int = 0, *, simulator: Simulator | None = None) -> MissionResult:
+        """Run a mission of the campaign again, with its record.
+
+        Raises:
+            InputError: the campaign has no such manager, run or point.
+            MissionError: the manager raised.
+        """
+        if manager not in self.spec.managers:
+            remedy = did_you_mean(manager, self.spec.managers, "its managers")
+            raise InputError(f"the campaign has no manager {manager!r}", remedy=remedy)
+        if not 1 <= run <= self.spec.runs:
+            raise InputError(f"the campaign has no run {run}", remedy=f"it has runs 1 to {self.spec.runs}")
+        return (simulator or self.simulator(point)).run(manager, run, self.spec.seed, record=True)
+
+
+@contextmanager
+def opened_campaign(folder: Path) -> Iterator[OpenedCampaign]:
+    """Open a campaign, to run missions of it again; what it names is looked up where it was started.
+
+    Raises:
+        InputError: there is no campaign in the folder, or what it was made of is not there any more.
+    """
+    path = (folder / STORE_FILE).absolute()
+    if not path.is_file():
+        remedy = "give the --out folder of suave-des run or campaign"
+        raise InputError("has no campaign whose missions could be run again", file=folder, remedy=remedy)
+    with closing(Store(path)) as store:
+        spec = CampaignSpec.of_stored(store.about("request"))
+    with _where_started(spec.folder):
+        file = read_campaign_file(spec.scenario)
+        spec = spec.with_file(file)
+        spec.check()
+        loaded, variation, _ = read_inputs(spec, file)
+        yield OpenedCampaign(spec, loaded, variation)
+
+
+@contextmanager
+def _where_started(folder: str) -> Iterator[None]:
+    before = Path.cwd()
+    if folder and Path(folder).is_dir():
+        os.chdir(folder)
+    try:
+        yield
+    finally:
+        os.chdir(before)

@@ -1,0 +1,189 @@
+// The MAPE-K panel: what the manager knows, what followed by which rule, and what it decided.
+
+const HELD_S = 9; // after this the panel shows what happened last as something past
+const STATUS = /^(fg_status|o_status|o_updatable|fd_realisability|c_status|fd_error_log)\((.*)\)$/;
+
+function makePanel(play) {
+  const phase = (name, title) => {
+    const time = element('time');
+    const body = element('div');
+    const box = element('section', { class: `phase ${name}` }, element('h3', {}, title, time), body);
+    return { box, body, time, show: (...children) => body.replaceChildren(...children.flat()) };
+  };
+  const phases = {
+    monitor: phase('monitor', 'Monitor'), analyze: phase('analyze', 'Analyze'), plan: phase('plan', 'Plan'),
+    execute: phase('execute', 'Execute'), knowledge: phase('knowledge', 'Knowledge'),
+  };
+  const { note } = play.mission.cycles;
+  const box = element('aside', { class: 'mind', 'aria-label': `MAPE-K of ${play.manager}` },
+    ...Object.values(phases).map((each) => each.box));
+  if (note) box.append(element('section', { class: 'phase' }, element('p', { class: 'note' }, note)));
+  const gauges = new Map();
+  const shown = {};
+
+  /** Show a part only when it has changed, so that what a reader has opened stays open. */
+  function once(name, key, make) {
+    if (shown[name] === key) return;
+    shown[name] = key;
+    phases[name].show(...make());
+  }
+
+  function update(moment) {
+    const { cycles } = play.mission.cycles;
+    const place = lastAt(cycles, moment.t, (each) => each.t_s);
+    const cycle = place < 0 ? null : cycles[place];
+    const event = lastOf(play.happenings, place);
+    showMonitor(moment, cycle);
+    if (!cycles.length) showWithout(moment);
+    else showReasoning(moment, cycle, event);
+    showExecute(moment);
+    const age = (t) => (t === null || t === undefined ? Infinity : moment.t - t);
+    const done = play.requests[lastAt(play.requests, moment.t, (each) => each.t)];
+    phases.monitor.box.classList.toggle('active', age(cycle?.t_s) < 1 || age(lastTime(play.mission.thrusters, moment.t)) < 2);
+    phases.analyze.box.classList.toggle('active', event && age(event.t_s) < 2.5 && event.inferred >= 0);
+    phases.plan.box.classList.toggle('active', event && age(event.t_s) < 3);
+    phases.execute.box.classList.toggle('active', age(done?.t) < 2);
+  }
+
+  function showMonitor(moment, cycle) {
+    const measured = { ...(cycle?.measured ?? {}) };
+    if (moment.visibility !== null) measured.water_visibility = moment.visibility;
+    const names = Object.keys(measured);
+    const lamps = moment.thrusters.map((works) => (works === false ? 0 : 1)).join('');
+    once('monitor', names.join() + lamps, () => {
+      gauges.clear();
+      const rows = names.map((name) => {
+        const isVisibility = name === 'water_visibility';
+        const most = isVisibility ? play.top : Math.max(1, measured[name]);
+        const ticks = isVisibility ? DATA.scenario.thresholds_m : [];
+        const gauge = { fill: element('div', { class: 'fill' }), text: element('b'), most, isVisibility };
+        gauges.set(name, gauge);
+        return element('div', { class: 'gauge' }, element('span', {}, name.replaceAll('_', ' ')),
+          element('div', { class: 'rail' }, gauge.fill, ...ticks.map((tick) => element('span', {
+            class: 'tick', style: `left:${(100 * tick) / most}%`, title: `${tick} m`,
+          }))), gauge.text);
+      });
+      const failed = moment.thrusters.flatMap((works, number) => (works === false ? [number + 1] : []));
+      rows.push(element('p', { class: failed.length ? '' : 'quiet' }, failed.length
+        ? `thruster ${failed.join(', ')} reported as failed` : 'all thrusters reported as working'));
+      return rows;
+    });
+    for (const [name, gauge] of gauges) {
+      gauge.fill.style.width = `${clamp((100 * measured[name]) / gauge.most, 0, 100)}%`;
+      gauge.text.textContent = `${measured[name].toFixed(2)}${gauge.isVisibility ? ' m' : ''}`;
+    }
+    phases.monitor.time.textContent = cycle ? `cycle at ${cycle.t_s.toFixed(1)} s` : '';
+  }
+
+  function showReasoning(moment, cycle, event) {
+    if (!cycle) {
+      for (const name of ['analyze', 'plan', 'knowledge']) once(name, 'none', () => [element('p', { class: 'quiet' }, 'no cycle yet')]);
+      return;
+    }
+    const show = event ?? cycle;
+    const isHeld = moment.t - show.t_s > HELD_S;
+    for (const name of ['analyze', 'plan']) {
+      phases[name].body.classList.toggle('held', isHeld);
+      phases[name].time.textContent = event ? `at ${show.t_s.toFixed(1)} s` : '';
+    }
+    const inferred = play.mission.cycles.inferences[show.inferred];
+    once('analyze', `${show.t_s}`, () => (inferred
+      ? inferred.facts.slice().sort((a, b) => weight(b) - weight(a)).map((fact) => showFact(fact, inferred.t_s, show.t_s))
+      : [element('p', { class: 'quiet' }, 'no rule adds anything: all objectives are met')]));
+    once('plan', `${show.t_s}`, () => (show.decided.length
+      ? show.decided.toSorted((a, b) => stays(a) - stays(b)).map(showDecision) : [element('p', { class: 'quiet' }, 'nothing calls for adaptation')]));
+    const rows = Object.entries(cycle.objectives).map(([name, status]) => [name, cycle.groundings[name] ?? 'not grounded', status]);
+    const parts = Object.entries(cycle.components).map(([name, status]) => [name, status]);
+    once('knowledge', JSON.stringify([rows, parts]), () => [element('div', { class: 'known' },
+      ...rows.flatMap(([name, design, status]) => [element('span', {}, name), element('span', {}, design),
+        element('span', { class: status ? 'error' : 'quiet' }, status ?? 'met')]),
+      ...parts.flatMap(([name, status]) => [element('span', {}, name),
+        element('span', { class: status === 'FALSE' ? 'error' : '' }, status), element('span')]))]);
+  }
+
+  const weight = (fact) => (/^(o_status|fg_status)/.test(fact.fact) ? 2 : STATUS.test(fact.fact) ? 1 : 0);
+
+  function showFact(fact, tracedAt, t) {
+    const rule = play.mission.cycles.rules[fact.rule];
+    const told = element('div', { class: 'says' }, ...wordsOf(fact.fact));
+    const by = fact.rule
+      ? [element('div', { class: 'by' }, 'by rule ', element('b', {}, fact.rule)),
+        element('div', { class: 'bindings' }, ...fact.bindings.map(([name, value]) => element('span', {}, `?${name} = ${value}`)))]
+      : [element('div', { class: 'by' }, 'by the schema of the ontology')];
+    const because = element('details', {}, element('summary', {}, rule ? 'rule and facts' : 'facts'),
+      rule ? element('div', { class: 'rule' }, rule) : null, ...fact.because.map(showStep),
+      tracedAt !== t ? element('p', {}, `numbers as at ${tracedAt.toFixed(1)} s, the first such cycle`) : null);
+    return element('div', { class: 'fact' }, told, ...by, because);
+  }
+
+  function showStep(step) {
+    const how = { rule: `by rule ${step.rule}`, state: 'known', ontology: 'in the ontology', axioms: 'by the schema' }[step.source];
+    return element('div', { class: 'because' }, element('code', {}, step.fact), ` ${how}`, ...step.because.map(showStep));
+  }
+
+  function wordsOf(fact) {
+    const found = STATUS.exec(fact);
+    if (!found) return [element('code', {}, fact)];
+    const [subject, value] = found[2].split(', ');
+    const plain = {
+      fg_status: ['grounding of ', subject.replace(/^fg_/, 'fd_'), ' is ', element('em', {}, value)],
+      o_status: ['objective of ', subject.replace(/^o_/, ''), ' is ', element('em', {}, value)],
+      o_updatable: ['objective of ', subject.replace(/^o_/, ''), ' is ', element('em', {}, value === 'true' ? 'updatable' : 'not updatable')],
+      fd_realisability: [subject, ' is ', element('em', {}, value === 'false' ? 'not realisable' : 'realisable')],
+      c_status: [subject, ' is ', element('em', {}, value)],
+      fd_error_log: [subject, ' has an error for ', element('em', {}, value)],
+    };
+    return plain[found[1]];
+  }
+
+  const stays = (decided) => Number(decided.chosen === decided.before);
+
+  function showDecision(decided) {
+    const answer = decided.chosen === null ? 'no design is left' : stays(decided) ? `${decided.chosen} stays` : null;
+    return element('div', { class: 'function' },
+      element('p', {}, `${decided.function}: `, answer ?? decided.reason.split(': ')[0]),
+      element('ul', { class: 'designs' }, ...decided.designs.map((design) => element('li', {
+        class: { chosen: 'chosen', 'left out': 'out' }[design.verdict] ?? '',
+      }, element('span', { class: 'name' }, design.name), element('span', { class: 'why' },
+        design.verdict === 'left out' ? `left out: ${design.reason}` : `performance ${design.performance}${design.verdict === 'chosen' ? ', chosen' : ''}`)))));
+  }
+
+  function showWithout(moment) {
+    const own = play.mission.events.filter(([, source]) => source === play.manager);
+    const until = lastAt(own, moment.t, (each) => each[0]);
+    once('analyze', `own${until}`, () => (own.length
+      ? own.slice(Math.max(0, until - 3), until + 1).map(([t, , name, detail]) => element('p', {}, `${t.toFixed(1)} s  ${name.replaceAll('_', ' ')}: ${detail}`))
+      : [element('p', { class: 'quiet' }, `${play.manager} keeps no knowledge that is recorded: it decides in its own code`)]));
+    once('plan', 'own', () => [element('p', { class: 'quiet' }, 'see what it requests, below')]);
+    once('knowledge', 'own', () => [element('p', { class: 'quiet' }, 'no knowledge base')]);
+  }
+
+  function showExecute(moment) {
+    const until = lastAt(play.requests, moment.t, (each) => each.t);
+    const recent = play.requests.slice(Math.max(0, until - 2), until + 1).reverse();
+    const key = recent.map((each) => [each.t, each.set !== null && each.set <= moment.t]).join();
+    once('execute', key || 'none', () => (recent.length ? recent.map((each) => {
+      const isSet = each.set !== null && each.set <= moment.t;
+      return element('p', {}, element('code', {}, `${each.function} → ${each.mode}`), ' ',
+        element('span', { class: 'quiet' }, `${each.t.toFixed(1)} s${isSet ? `, in effect ${each.set.toFixed(1)} s` : ', under way'}`));
+    }) : [element('p', { class: 'quiet' }, 'no mode requested yet')]));
+  }
+
+  return { box, update };
+}
+
+/** Index of the last entry at or before a time, -1 if there is none. */
+function lastAt(entries, t, timeOf) {
+  let [low, high] = [0, entries.length];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (timeOf(entries[middle]) <= t + 1e-6) low = middle + 1;
+    else high = middle;
+  }
+  return low - 1;
+}
+const lastTime = (entries, t) => entries[lastAt(entries, t, (each) => each[0])]?.[0] ?? null;
+const lastOf = (happenings, place) => {
+  for (let n = place; n >= 0; n--) if (happenings[n]) return happenings[n];
+  return null;
+};

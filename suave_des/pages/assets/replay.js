@@ -1,0 +1,274 @@
+// Plays the missions: the time, the controls, and what is drawn when.
+
+const SPEEDS = [1, 2, 4, 8, 16];
+const VIEWS = [['3d', '3-D'], ['above', 'Above'], ['side', 'Side']];
+const PRESETS = {
+  '3d': { azimuth: 0.62, pitch: 0.5, distance: 6.6 },
+  above: { azimuth: Math.PI / 2, pitch: 1.5, distance: 11 },
+  side: { azimuth: Math.PI / 2, pitch: 0.1, distance: 7 },
+};
+
+function prepare(mission) {
+  const { track: given } = mission;
+  const track = {
+    t: given.t_s, x: given.x_m, y: given.y_m, z: given.z_m, roll: given.roll_rad, pitch: given.pitch_rad,
+    yaw: given.yaw_rad, mode: given.mode, visibility: given.visibility_m,
+  };
+  const play = { mission, track, manager: String(mission.metrics.manager), duration: track.t.at(-1) };
+  play.indexAt = (t) => Math.max(0, lastAt(track.t, t, (each) => each));
+  const measured = track.visibility.filter((each) => each !== null);
+  const clearest = measured.reduce((most, each) => Math.max(most, each), 0.1);
+  play.murkiest = measured.reduce((least, each) => Math.min(least, each), clearest);
+  play.clearest = clearest;
+  const highest = track.z.reduce((most, each) => Math.max(most, each), BED) - BED;
+  play.top = Math.max(1, clearest, highest) * 1.1;
+  play.swath = [];
+  for (let i = 0; i < track.t.length; i += 4) {
+    const altitude = track.z[i] - BED;
+    if (track.visibility[i] !== null && altitude <= track.visibility[i]) {
+      play.swath.push({ x: track.x[i], y: track.y[i], half: altitude * TANGENT, t: track.t[i] });
+    }
+  }
+  const xs = [...track.x, ...PIPELINE.map((each) => each[0])];
+  const ys = [...track.y, ...PIPELINE.map((each) => each[1])];
+  const ends = (values) => values.reduce(([low, high], each) => [Math.min(low, each), Math.max(high, each)], [Infinity, -Infinity]);
+  const [[x0, x1], [y0, y1]] = [ends(xs), ends(ys)];
+  play.bounds = { x0: x0 - 1, x1: x1 + 1, y0: y0 - 1, y1: y1 + 1 };
+  const lengths = mission.way.map(([x, y]) => lengthAlong(x, y));
+  let [from, to] = [Infinity, -Infinity];
+  play.inspected = mission.inspected.map(([t, point, distance]) => {
+    [from, to] = [Math.min(from, lengths[point]), Math.max(to, lengths[point])];
+    return { t, from, to, distance };
+  });
+  const { cycles } = mission.cycles;
+  const factsOf = (cycle) => (mission.cycles.inferences[cycle?.inferred ?? -1]?.facts ?? []).map((each) => each.fact);
+  play.happenings = cycles.map((cycle, n) => {
+    const changes = cycle.decided.some((each) => each.chosen !== null && each.chosen !== each.before);
+    const isNew = factsOf(cycle).some((fact) => !factsOf(cycles[n - 1]).includes(fact));
+    return changes || isNew ? cycle : null;
+  });
+  play.requests = [];
+  for (const [t, , event, detail] of mission.events) {
+    if (event === 'mode_requested') {
+      const [name, mode] = detail.split(' -> ');
+      play.requests.push({ t, function: name, mode, set: null });
+    } else if (event === 'mode_set') {
+      const [name, mode] = detail.split(' = ');
+      const open = play.requests.findLast((each) => each.function === name && each.mode === mode && each.set === null);
+      if (open) open.set = t;
+    }
+  }
+  play.marks = [
+    ...play.requests.map((each) => ({ t: each.t, kind: 'adaptation', text: `${each.function} → ${each.mode}` })),
+    ...mission.thrusters.filter(([, , works]) => !works).map(([t, number]) => ({ t, kind: 'failure', text: `thruster ${number} failed` })),
+    ...(mission.seen ? [{ t: mission.seen[0], kind: 'seen', text: 'pipeline seen' }] : []),
+  ];
+  play.view = { ...PRESETS['3d'], target: null };
+  return play;
+}
+
+function momentOf(play, asked) {
+  const { track, mission } = play;
+  const t = clamp(asked, 0, play.duration);
+  const index = play.indexAt(t);
+  const next = Math.min(index + 1, track.t.length - 1);
+  const share = next > index ? clamp((t - track.t[index]) / (track.t[next] - track.t[index]), 0, 1) : 0;
+  const between = (values) => mix(values[index], values[next], share);
+  const turn = Math.atan2(Math.sin(track.yaw[next] - track.yaw[index]), Math.cos(track.yaw[next] - track.yaw[index]));
+  const pose = {
+    x: between(track.x), y: between(track.y), z: between(track.z),
+    roll: between(track.roll), pitch: between(track.pitch), yaw: track.yaw[index] + share * turn,
+  };
+  const visibility = track.visibility[index];
+  const thrusters = Array(DATA.scenario.thrusters).fill(null);
+  for (const [time, number, works] of mission.thrusters) if (time <= t) thrusters[number - 1] = works;
+  const inspected = play.inspected[lastAt(play.inspected, t, (each) => each.t)];
+  const spread = play.clearest - play.murkiest;
+  const atEnd = t >= play.duration - 0.3;
+  return {
+    t, index, pose, visibility, thrusters, altitude: Math.max(0, pose.z - BED), mode: track.mode[index],
+    clarity: visibility === null || spread < 0.05 ? 1 : clamp((visibility - play.murkiest) / spread, 0, 1),
+    inspectedFrom: inspected?.from ?? Infinity, inspectedTo: inspected?.to ?? -Infinity,
+    distance: atEnd ? mission.metrics.distance_inspected_m : (inspected?.distance ?? 0),
+    isSeen: mission.seen !== null && t >= mission.seen[0], isOver: asked > play.duration,
+  };
+}
+
+function makePane(play) {
+  const canvas = (name, label) => element('canvas', { class: name, role: 'img', 'aria-label': label });
+  const parts = {
+    scene: canvas('scene', `The vehicle of ${play.manager} over the sea bed`), map: canvas('map', 'The mission from above'),
+    side: canvas('profile', 'The vehicle from the side'), state: element('div', { class: 'state' }),
+    altitude: element('b'), visibility: element('b'), mode: element('span', { class: 'mode' }),
+    distance: element('b'), lamps: element('span', { class: 'lamps' }), seeing: element('span', { class: 'figure' }),
+  };
+  for (let n = 1; n <= DATA.scenario.thrusters; n++) parts.lamps.append(element('i', { title: `thruster ${n}` }, String(n)));
+  const figure = (label, ...values) => element('span', { class: 'figure' }, element('small', {}, label), ...values);
+  parts.seeing.append(element('small', {}, 'visibility'), parts.visibility);
+  const stage = element('div', { class: 'stage' }, parts.scene, parts.map,
+    element('div', { class: 'hud top' }, element('div', { class: 'manager' }, play.manager), parts.state),
+    element('div', { class: 'hud bottom' }, figure('altitude', parts.altitude), parts.seeing,
+      figure('inspected', parts.distance), figure('thrusters', parts.lamps), figure('mode', parts.mode)));
+  const panel = makePanel(play);
+  const box = element('article', { class: 'pane', 'aria-label': play.mission.name },
+    element('div', { class: 'world' }, stage, element('div', { class: 'side' }, parts.side)), panel.box);
+  lookAround(stage, play);
+  return { play, box, parts, panel };
+}
+
+function lookAround(stage, play) {
+  let from = null;
+  stage.addEventListener('pointerdown', (event) => {
+    from = [event.clientX, event.clientY];
+    stage.setPointerCapture(event.pointerId);
+  });
+  stage.addEventListener('pointermove', (event) => {
+    if (!from) return;
+    play.view.azimuth -= (event.clientX - from[0]) * 0.007;
+    play.view.pitch = clamp(play.view.pitch + (event.clientY - from[1]) * 0.006, 0.04, 1.5);
+    from = [event.clientX, event.clientY];
+    requestDraw();
+  });
+  for (const end of ['pointerup', 'pointercancel']) stage.addEventListener(end, () => { from = null; });
+  stage.addEventListener('wheel', (event) => {
+    event.preventDefault();
+    play.view.distance = clamp(play.view.distance * Math.exp(event.deltaY * 0.001), 2.5, 40);
+    requestDraw();
+  }, { passive: false });
+}
+
+function drawPane({ play, box, parts, panel }, t) {
+  const moment = momentOf(play, t);
+  const { pose } = moment;
+  play.view.target = [pose.x, pose.y, mix(BED + 0.8, pose.z, 0.55)];
+  const surfaces = [[parts.scene, drawScene, play.view], [parts.map, drawMap], [parts.side, drawSide]];
+  for (const [canvas, draw, view] of surfaces) {
+    const surface = fitted(canvas);
+    if (surface) draw(surface, play, moment, view);
+  }
+  parts.altitude.textContent = `${moment.altitude.toFixed(1)} m`;
+  parts.visibility.textContent = moment.visibility === null ? '–' : `${moment.visibility.toFixed(1)} m`;
+  parts.seeing.classList.toggle('blind', moment.visibility !== null && moment.altitude > moment.visibility);
+  parts.distance.textContent = `${moment.distance.toFixed(1)} m`;
+  parts.mode.replaceChildren(element('i'), moment.mode || 'no mode yet');
+  parts.mode.firstChild.style.color = seaColour(moment.mode);
+  [...parts.lamps.children].forEach((lamp, n) => lamp.classList.toggle('dead', moment.thrusters[n] === false));
+  const { metrics, seen } = play.mission;
+  parts.state.textContent = moment.isOver ? 'mission is over'
+    : moment.isSeen ? `pipeline found after ${seen[0].toFixed(1)} s` : metrics.pipeline_found ? 'searching' : 'searching, until the time limit';
+  Object.assign(box.dataset, { x: pose.x.toFixed(3), y: pose.y.toFixed(3), z: pose.z.toFixed(3) });
+  panel.update(moment);
+}
+
+const plays = DATA.missions.map(prepare);
+const panes = plays.map(makePane);
+const span = Math.max(...plays.map((play) => play.duration));
+const state = { t: 0, speed: 4, isPlaying: false, drawnAt: null, requested: false };
+let modeColour = null;
+
+byId('panes').dataset.count = String(panes.length);
+byId('panes').append(...panes.map((pane) => pane.box));
+describe();
+
+function describe() {
+  const { scenario } = DATA;
+  const metrics = plays.map((play) => play.mission.metrics);
+  const same = (name) => metrics.every((each) => each[name] === metrics[0][name]);
+  const shared = ['run', 'seed'].filter(same).map((name) => `${name} ${metrics[0][name]}`);
+  byId('title').textContent = plays.map((play) => play.manager).join(' and ');
+  const sameDraws = plays.length > 1 && shared.length === 2 ? ', the same random numbers' : '';
+  const results = metrics.map((each) => `${plays.length > 1 ? `${each.manager}: ` : ''}${each.pipeline_found
+    ? `found after ${Number(each.search_time_s).toFixed(0)} s` : 'not found'}, ${Number(each.distance_inspected_m).toFixed(1)} m inspected`);
+  byId('subtitle').textContent = [`${scenario.name}, ${shared.join(', ')}${sameDraws}`, ...results].join('  ·  ');
+}
+
+function draw() {
+  state.requested = false;
+  for (const pane of panes) drawPane(pane, state.t);
+  const surface = fitted(byId('timeline'), plays.length > 1 ? 104 : 84);
+  modeColour ??= themeModes();
+  if (surface) drawTimeline(surface, plays, state.t, span, modeColour);
+  byId('clock').replaceChildren(`${state.t.toFixed(1)} s`, element('small', {}, ` of ${span.toFixed(0)} s`));
+  const scrub = byId('scrub');
+  scrub.value = String(state.t);
+  scrub.setAttribute('aria-valuetext', `${state.t.toFixed(1)} seconds`);
+  document.body.dataset.time = state.t.toFixed(2);
+}
+
+function requestDraw() {
+  if (state.requested || state.isPlaying) return;
+  state.requested = true;
+  requestAnimationFrame(draw);
+}
+
+function goTo(t) {
+  state.t = clamp(t, 0, span);
+  requestDraw();
+}
+
+function setPlaying(isPlaying) {
+  if (isPlaying && state.t >= span) state.t = 0;
+  state.isPlaying = isPlaying;
+  state.drawnAt = null;
+  document.body.classList.toggle('playing', isPlaying);
+  byId('play').setAttribute('aria-label', isPlaying ? 'Pause' : 'Play');
+  if (isPlaying) requestAnimationFrame(advance);
+  else requestDraw();
+}
+
+function advance(now) {
+  if (!state.isPlaying) return;
+  const passed = state.drawnAt === null ? 0 : Math.min(0.25, (now - state.drawnAt) / 1000) * state.speed;
+  state.drawnAt = now;
+  const stop = byId('stops').checked ? nextStop(state.t, 1) : Infinity;
+  state.t = Math.min(state.t + passed, stop, span);
+  draw();
+  if (state.t >= span || state.t >= stop) setPlaying(false);
+  else requestAnimationFrame(advance);
+}
+
+/** Times that one wants to look at: adaptations, failures, the first sight. */
+const STOPS = [...new Set(plays.flatMap((play) => play.marks.map((mark) => mark.t)))].sort((a, b) => a - b);
+function nextStop(t, direction) {
+  return direction > 0 ? (STOPS.find((each) => each > t + 0.05) ?? span) : (STOPS.findLast((each) => each < t - 0.05) ?? 0);
+}
+
+const setView = choice(byId('views'), VIEWS.map(([value, label], n) => [value, label, `Key ${n + 1}`]), '3d', (name) => {
+  for (const play of plays) Object.assign(play.view, PRESETS[name]);
+  requestDraw();
+});
+const chooseSpeed = choice(byId('speeds'), SPEEDS.map((each) => [each, `${each}×`, `${each} times as fast as the mission`]),
+  state.speed, (speed) => { state.speed = speed; });
+
+const changeSpeed = (by) => chooseSpeed(SPEEDS[clamp(SPEEDS.indexOf(state.speed) + by, 0, SPEEDS.length - 1)]);
+const KEYS = {
+  ' ': () => setPlaying(!state.isPlaying), k: () => setPlaying(!state.isPlaying),
+  ArrowLeft: (event) => goTo(state.t - (event.shiftKey ? 10 : 1)), ArrowRight: (event) => goTo(state.t + (event.shiftKey ? 10 : 1)),
+  Home: () => goTo(0), End: () => goTo(span), n: () => goTo(nextStop(state.t, 1)), p: () => goTo(nextStop(state.t, -1)),
+  '+': () => changeSpeed(1), '=': () => changeSpeed(1), '-': () => changeSpeed(-1), l: toggleTheme,
+  1: () => setView('3d'), 2: () => setView('above'), 3: () => setView('side'), '?': () => byId('help').showModal(),
+};
+addEventListener('keydown', (event) => {
+  const action = KEYS[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+  if (!action || event.ctrlKey || event.metaKey || event.altKey || byId('help').open) return;
+  if (event.key === ' ' && event.target.matches('button, summary, input[type=checkbox]') && event.target.id !== 'play') return;
+  event.preventDefault();
+  action(event);
+});
+byId('play').addEventListener('click', () => setPlaying(!state.isPlaying));
+byId('play').addEventListener('keyup', (event) => { if (event.key === ' ') event.preventDefault(); });
+byId('before').addEventListener('click', () => goTo(nextStop(state.t, -1)));
+byId('after').addEventListener('click', () => goTo(nextStop(state.t, 1)));
+byId('help-button').addEventListener('click', () => byId('help').showModal());
+byId('scrub').max = String(span);
+byId('scrub').addEventListener('input', (event) => goTo(Number(event.target.value)));
+addEventListener('resize', requestDraw);
+themeListeners.push(() => { modeColour = null; requestDraw(); });
+startTheme(byId('theme'));
+
+const asked = new URLSearchParams(location.hash.slice(1));
+if (asked.has('view') && asked.get('view') in PRESETS) setView(asked.get('view'));
+if (SPEEDS.includes(Number(asked.get('speed')))) chooseSpeed(Number(asked.get('speed')));
+goTo(Number(asked.get('t')) || 0);
+draw();
+if (asked.get('play')) setPlaying(true);

@@ -1,0 +1,239 @@
+// The small map from above, the view from the side, and the timeline.
+
+function lengthAlong(x, y) {
+  let best = [Infinity, 0];
+  for (const { from, to, start } of PIECES) {
+    const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+    const whole = Math.hypot(dx, dy);
+    const share = clamp(((x - from[0]) * dx + (y - from[1]) * dy) / (whole * whole), 0, 1);
+    const away = Math.hypot(x - from[0] - share * dx, y - from[1] - share * dy);
+    if (away < best[0]) best = [away, start + share * whole];
+  }
+  return best[1];
+}
+
+/** The whole mission from above. */
+function drawMap({ drawing: d, width, height }, play, moment) {
+  d.clearRect(0, 0, width, height);
+  const { bounds, track } = play;
+  const margin = 11;
+  const scale = Math.min((width - 2 * margin) / (bounds.x1 - bounds.x0), (height - 2 * margin) / (bounds.y1 - bounds.y0));
+  const at = (x, y) => [
+    width / 2 + (x - (bounds.x0 + bounds.x1) / 2) * scale,
+    height / 2 - (y - (bounds.y0 + bounds.y1) / 2) * scale,
+  ];
+  d.fillStyle = 'rgba(190,246,255,0.16)';
+  d.beginPath();
+  for (const { x, y, half, t } of play.swath) {
+    if (t > moment.t) break;
+    const [px, py] = at(x - half, y + half);
+    d.rect(px, py, 2 * half * scale, 2 * half * scale);
+  }
+  d.fill('nonzero');
+  d.lineCap = d.lineJoin = 'round';
+  for (const seen of [false, true]) {
+    d.strokeStyle = seen ? '#ffb22e' : '#8fa3a6';
+    d.lineWidth = seen ? 3.4 : 2.6;
+    d.beginPath();
+    for (const piece of PIECES) {
+      if (seen && !isInspected(piece, moment)) continue;
+      d.moveTo(...at(piece.from[0], piece.from[1]));
+      d.lineTo(...at(piece.to[0], piece.to[1]));
+    }
+    d.stroke();
+  }
+  d.lineWidth = 1.3;
+  for (let i = 4; i <= moment.index; i += 4) {
+    d.strokeStyle = seaColour(track.mode[i]);
+    d.beginPath();
+    d.moveTo(...at(track.x[i - 4], track.y[i - 4]));
+    d.lineTo(...at(track.x[i], track.y[i]));
+    d.stroke();
+  }
+  const { pose, altitude } = moment;
+  const [x, y] = at(pose.x, pose.y);
+  const half = altitude * TANGENT * scale;
+  d.strokeStyle = 'rgba(255,250,224,0.9)';
+  d.lineWidth = 1;
+  d.strokeRect(x - half, y - half, 2 * half, 2 * half);
+  d.fillStyle = '#fff';
+  d.beginPath();
+  for (const [turn, far] of [[0, 6], [2.5, 4.6], [-2.5, 4.6]]) {
+    d.lineTo(x + far * Math.cos(pose.yaw + turn), y - far * Math.sin(pose.yaw + turn));
+  }
+  d.fill();
+  d.font = '10px system-ui, sans-serif';
+  d.fillStyle = 'rgba(234,250,255,0.75)';
+  d.fillText('from above', 8, height - 8);
+  const five = 5 * scale;
+  d.fillRect(width - 10 - five, height - 9, five, 1.5);
+  d.textAlign = 'right';
+  d.fillText('5 m', width - 10, height - 13);
+  d.textAlign = 'left';
+}
+
+/** From the side: altitude over the last seconds, and how high the vehicle may be to see the sea bed. */
+function drawSide({ drawing: d, width, height }, play, moment) {
+  const { track } = play;
+  const [before, after] = [34, 12];
+  const floor = height - 16;
+  const metre = (floor - 14) / play.top;
+  const across = (t) => ((t - moment.t + before) / (before + after)) * width;
+  const up = (metres) => floor - metres * metre;
+  const water = d.createLinearGradient(0, 0, 0, floor);
+  water.addColorStop(0, '#0e5a73');
+  water.addColorStop(1, '#0b4156');
+  d.fillStyle = water;
+  d.fillRect(0, 0, width, floor);
+  const first = Math.max(0, play.indexAt(moment.t - before) - 1);
+  const last = Math.min(track.t.length - 1, play.indexAt(moment.t + after) + 1);
+  d.beginPath(); // where the water hides the sea bed
+  d.moveTo(across(track.t[first]), 0);
+  for (let i = first; i <= last; i++) {
+    const limit = track.visibility[i];
+    d.lineTo(across(track.t[i]), limit === null ? up(play.top) : up(limit));
+  }
+  d.lineTo(across(track.t[last]), 0);
+  d.closePath();
+  const murk = d.createLinearGradient(0, 0, 0, floor);
+  murk.addColorStop(0, 'rgba(96,112,84,0.95)');
+  murk.addColorStop(1, 'rgba(96,112,84,0.72)');
+  d.fillStyle = murk;
+  d.fill();
+  d.strokeStyle = 'rgba(226,238,200,0.65)';
+  d.lineWidth = 1;
+  d.setLineDash([4, 4]);
+  d.stroke();
+  d.setLineDash([]);
+  d.fillStyle = '#c7b58a';
+  d.fillRect(0, floor, width, height - floor);
+  d.fillStyle = 'rgba(60,50,20,0.28)';
+  for (let n = Math.floor(moment.t - before) - 1; n < moment.t + after + 1; n++) {
+    d.fillRect(across(n + hash(n, 21)), floor + 3 + 9 * hash(n, 22), 2 + 9 * hash(n, 23), 1.4);
+  }
+  d.lineWidth = 2.4;
+  d.lineCap = 'round';
+  for (let i = first + 1; i <= moment.index; i++) {
+    d.strokeStyle = seaColour(track.mode[i]);
+    d.beginPath();
+    d.moveTo(across(track.t[i - 1]), up(track.z[i - 1] - BED));
+    d.lineTo(across(track.t[i]), up(track.z[i] - BED));
+    d.stroke();
+  }
+  const { altitude, visibility } = moment;
+  const [x, y] = [across(moment.t), up(altitude)];
+  const sees = visibility !== null && altitude <= visibility;
+  const deep = sees || visibility === null ? altitude : visibility;
+  const cone = d.createLinearGradient(0, y, 0, up(altitude - deep) + 1);
+  cone.addColorStop(0, sees ? 'rgba(255,248,210,0.75)' : 'rgba(255,236,210,0.6)');
+  cone.addColorStop(1, sees ? 'rgba(255,248,210,0.22)' : 'rgba(255,236,210,0)');
+  d.fillStyle = cone;
+  d.beginPath();
+  d.moveTo(x, y);
+  d.lineTo(x - deep * TANGENT * metre, up(altitude - deep));
+  d.lineTo(x + deep * TANGENT * metre, up(altitude - deep));
+  d.fill();
+  d.fillStyle = sees ? '#fff3c0' : '#ff9c7a';
+  d.fillRect(x - altitude * TANGENT * metre, floor - 1.5, 2 * altitude * TANGENT * metre, 3);
+  d.fillStyle = '#2f8fe8';
+  d.beginPath();
+  d.roundRect(x - 12, y - 7, 24, 6, 2.5);
+  d.fill();
+  d.fillStyle = '#20303a';
+  d.fillRect(x - 12, y - 1, 24, 5);
+  d.fillStyle = '#9ee8ff';
+  d.fillRect(x + 9, y - 1, 4, 4);
+  d.font = '10px system-ui, sans-serif';
+  d.fillStyle = 'rgba(234,250,255,0.85)';
+  d.fillText('from the side', 8, 14);
+  for (let metres = 1; metres <= play.top; metres++) {
+    d.fillRect(width - 6, up(metres), 6, 1);
+    if (metre > 13) d.fillText(`${metres} m`, width - 27, up(metres) + 3.5);
+  }
+  const limit = visibility === null ? null : up(visibility);
+  if (limit !== null) {
+    d.textAlign = 'right';
+    d.fillStyle = 'rgba(240,246,220,0.95)';
+    const words = sees ? 'above the dashed line the sea bed is out of sight' : 'too high: the sea bed is out of sight';
+    d.fillStyle = sees ? 'rgba(240,246,220,0.85)' : '#ffc4b0';
+    if (width > 420) d.fillText(words, width - 40, 14);
+    d.textAlign = 'left';
+  }
+}
+
+const themeModes = () => {
+  const named = {
+    fd_spiral_low: colour('--mode-low'), fd_spiral_medium: colour('--mode-medium'), fd_spiral_high: colour('--mode-high'),
+    fd_follow_pipeline: colour('--mode-follow'), fd_unground: colour('--mode-idle'), '': colour('--mode-idle'),
+  };
+  return (mode) => named[mode] ?? colour('--mode-other');
+};
+
+/** Altitude and visibility of every mission over the whole time, with what happened. */
+function drawTimeline(surface, plays, t, span, modeColour) {
+  const { drawing: d, width, height } = surface;
+  d.clearRect(0, 0, width, height);
+  const axis = height - 17;
+  const lane = axis / plays.length;
+  const across = (time) => (time / span) * width;
+  d.font = '10.5px system-ui, sans-serif';
+  plays.forEach((play, number) => {
+    const { track } = play;
+    const [top, bottom] = [number * lane + 13, (number + 1) * lane - 7];
+    const up = (metres) => bottom - (metres / play.top) * (bottom - top);
+    d.fillStyle = colour('--line');
+    d.globalAlpha = 0.62;
+    d.beginPath();
+    d.moveTo(0, bottom);
+    for (let i = 0; i < track.t.length; i += 4) d.lineTo(across(track.t[i]), up(track.visibility[i] ?? 0));
+    d.lineTo(across(track.t.at(-1)), bottom);
+    d.fill();
+    d.globalAlpha = 1;
+    for (let i = 4; i < track.t.length; i += 4) {
+      d.strokeStyle = modeColour(track.mode[i]);
+      d.globalAlpha = track.t[i] <= t ? 1 : 0.42;
+      d.lineWidth = 1.9;
+      d.beginPath();
+      d.moveTo(across(track.t[i - 4]), up(track.z[i - 4] - BED));
+      d.lineTo(across(track.t[i]), up(track.z[i] - BED));
+      d.stroke();
+      d.fillStyle = modeColour(track.mode[i]);
+      d.fillRect(across(track.t[i - 4]), bottom + 1.5, across(track.t[i]) - across(track.t[i - 4]) + 0.4, 3);
+    }
+    d.globalAlpha = 1;
+    for (const mark of play.marks) {
+      const x = across(mark.t);
+      d.fillStyle = mark.kind === 'failure' ? colour('--bad') : mark.kind === 'seen' ? colour('--good') : colour('--ink');
+      d.beginPath();
+      if (mark.kind === 'adaptation') {
+        d.moveTo(x, top - 2);
+        d.lineTo(x - 4, top - 9);
+        d.lineTo(x + 4, top - 9);
+        d.fill();
+      } else {
+        d.arc(x, top - 5, 4, 0, 7);
+        d.fill();
+        d.fillRect(x - 0.5, top - 4, 1, bottom - top + 4);
+      }
+    }
+    if (plays.length > 1) {
+      d.fillStyle = colour('--soft');
+      d.textAlign = 'right';
+      d.fillText(play.manager, width - 4, bottom - 5);
+      d.textAlign = 'left';
+    }
+  });
+  d.fillStyle = colour('--soft');
+  const step = [5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600].find((each) => across(each) > 52) ?? span;
+  for (let time = 0; time <= span; time += step) {
+    d.fillRect(across(time), axis - 2, 1, 4);
+    d.textAlign = time === 0 ? 'left' : across(time) > width - 18 ? 'right' : 'center';
+    d.fillText(time === 0 ? '0 s' : String(time), across(time), height - 3);
+  }
+  d.textAlign = 'left';
+  d.fillStyle = colour('--accent');
+  d.fillRect(across(t) - 1, 0, 2, axis);
+  d.beginPath();
+  d.arc(across(t), axis, 5, 0, 7);
+  d.fill();
+}

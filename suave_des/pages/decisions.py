@@ -1,0 +1,229 @@
+"""A mission's MAPE-K cycles for its replay: what was known, what followed by which rule, and what was decided."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from decimal import Decimal
+from pathlib import Path
+
+from suave_des.errors import InputError, KnowledgeError
+from suave_des.knowledge.deliberation import Conclusion
+from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.planning import performance
+from suave_des.knowledge.rules.writer import write_rule
+from suave_des.knowledge.state import KnowledgeState
+from suave_des.knowledge.vocabulary import local_name
+from suave_des.pages.recorded import Recorded
+from suave_des.resources import find
+from suave_des.scenario.layers import Files
+from suave_des.scenario_knowledge import open_base
+from suave_des.workbench.derivations import Derivation
+from suave_des.workbench.knowledge_base import KnowledgeBase
+from suave_des.workbench.state_input import ManagingSettings
+
+_FEWEST_DIGITS = 2
+
+
+@dataclass(frozen=True)
+class Step:
+    """How a fact follows, as the page shows it; see Derivation."""
+
+    fact: str
+    source: str
+    rule: str | None = None
+    bindings: tuple[tuple[str, str], ...] = ()
+    because: tuple[Step, ...] = ()
+
+
+@dataclass(frozen=True)
+class Design:
+    """A function design in a decision.
+
+    Attributes:
+        name: of the design.
+        verdict: "chosen", "left out" or "not the best".
+        performance: that the knowledge base expects of it.
+        reason: why it is left out; empty for the others.
+    """
+
+    name: str
+    verdict: str
+    performance: float
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Decided:
+    """A decision about a function: the design grounded before and the one chosen, why, and all designs."""
+
+    function: str
+    before: str | None
+    chosen: str | None
+    reason: str
+    designs: tuple[Design, ...]
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """A reasoning cycle.
+
+    Attributes:
+        t_s: mission time at which it began.
+        objectives: status of each function's objective; None while all is well.
+        groundings: design in use, by function.
+        components: status of each component that has reported one.
+        measured: value of each quality attribute.
+        inferred: index in `Cycles.inferences` of what followed; -1: nothing.
+        decided: what was decided.
+    """
+
+    t_s: float
+    objectives: Mapping[str, str | None]
+    groundings: Mapping[str, str]
+    components: Mapping[str, str]
+    measured: Mapping[str, float]
+    inferred: int
+    decided: tuple[Decided, ...]
+
+
+@dataclass(frozen=True)
+class Inferred:
+    """What followed in a state, with its derivations as they were at one time."""
+
+    t_s: float
+    facts: tuple[Step, ...]
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """All reasoning cycles of a mission.
+
+    Attributes:
+        cycles: in order of time.
+        inferences: what followed in them, each kind of situation once.
+        rules: text of each rule that took part.
+        note: why some of it is missing or may differ from what the mission saw; empty: nothing is.
+    """
+
+    cycles: tuple[Cycle, ...] = ()
+    inferences: tuple[Inferred, ...] = ()
+    rules: Mapping[str, str] = field(default_factory=dict)
+    note: str = ""
+
+
+def explained(mission: Recorded) -> Cycles:
+    """Reason about the recorded states again, and explain what follows and what is decided.
+
+    Where the ontologies are not there any more, only the states are given, with a note.
+    """
+    if not mission.knowledge:
+        return Cycles()
+    try:
+        base, note = _base(mission)
+        settings, reasoner = ManagingSettings.of(mission.scenario), mission.scenario.knowledge.reasoner
+        knowledge = KnowledgeBase.of(base, settings, reasoner, TimeLimit(TIME_LIMIT_S, "the reasoner"))
+    except InputError as error:
+        cycles = tuple(_cycle(record.t_s, record.state, -1, ()) for record in mission.knowledge)
+        return Cycles(cycles, note=f"Decisions are not explained: {error}")
+    return _Explainer(knowledge).cycles(mission, note)
+
+
+def _base(mission: Recorded) -> tuple[Ontology, str]:
+    """Open the mission's ontologies, with a note where one of them has changed since."""
+    if mission.loaded is not None:
+        return open_base(mission.loaded), ""
+    used = mission.scenario.knowledge
+    paths = [find(each, "ontology") for each in used.ontologies]
+    rules = [find(each, "ontology") for each in used.rules]
+    values = {name: Decimal(repr(value)) for name, value in used.values.items()}
+    base = Ontology.load(paths, values=values, rules=rules, disabled_rules=used.disabled_rules)
+    files = Files()
+    for path in (*paths, *rules):
+        files.ontology(path)
+    before = {Path(name).name: digest for name, digest in mission.inputs.items()}
+    changed = [
+        Path(name).name for name, digest in files.inputs.items() if before.get(Path(name).name, digest) != digest
+    ]
+    note = f"{', '.join(changed)} changed since the mission: decisions are explained with today's." if changed else ""
+    return base, note
+
+
+class _Explainer:
+    """Explains states, the facts of each kind of situation once."""
+
+    def __init__(self, knowledge: KnowledgeBase) -> None:
+        self.knowledge = knowledge
+        self.inferences: list[Inferred] = []
+        self.index: dict[object, int] = {}
+        self.rules: set[str] = set()
+
+    def cycles(self, mission: Recorded, note: str) -> Cycles:
+        cycles = []
+        for record in mission.knowledge:
+            try:
+                conclusion = self.knowledge.infer(record.state)
+                inferred, decided = self._inferred(record.t_s, conclusion), tuple(self._decided(conclusion))
+            except KnowledgeError as error:
+                note = note or f"At {record.t_s:.1f} s the knowledge base gives no conclusion: {error.problem}"
+                inferred, decided = -1, ()
+            cycles.append(_cycle(record.t_s, record.state, inferred, decided))
+        base = self.knowledge.base
+        texts = {
+            rule.name: write_rule(rule.name, rule.body, rule.head, local_name).strip()
+            for rule in base.content.enabled_rules
+            if rule.name in self.rules
+        }
+        return Cycles(tuple(cycles), tuple(self.inferences), texts, note)
+
+    def _inferred(self, t_s: float, conclusion: Conclusion) -> int:
+        """The index of what follows; the numbers in its derivations are those of the first such cycle."""
+        facts, state = conclusion.inference.facts, conclusion.inference.state
+        if not facts:
+            return -1
+        key = facts, state.objectives, state.groundings, state.components
+        if key not in self.index:
+            self.index[key] = len(self.inferences)
+            derived = self.knowledge.explain(state).facts
+            for derivation in derived:
+                self.rules |= derivation.rules()
+            self.inferences.append(Inferred(t_s, tuple(map(_step, derived))))
+        return self.index[key]
+
+    def _decided(self, conclusion: Conclusion) -> Iterator[Decided]:
+        base, inference = self.knowledge.base, conclusion.inference
+        for decision in conclusion.plan.decisions:
+            rejected = {each.design: each.reason for each in decision.rejected}
+            designs = []
+            for name in base.designs(decision.function):
+                is_chosen = name == decision.design
+                verdict = "chosen" if is_chosen else "left out" if name in rejected else "not the best"
+                expected = float(performance(base, inference, name))
+                designs.append(Design(name, verdict, expected, rejected.get(name, "")))
+            designs.sort(key=lambda each: (-each.performance, each.name))
+            before = inference.state.grounded(decision.function)
+            yield Decided(decision.function, before, decision.design, decision.reason, tuple(designs))
+
+
+def _cycle(t_s: float, state: KnowledgeState, inferred: int, decided: Sequence[Decided]) -> Cycle:
+    return Cycle(
+        t_s=round(t_s, _FEWEST_DIGITS),
+        objectives={each.function: each.status for each in state.objectives},
+        groundings=dict(state.groundings),
+        components=dict(state.components),
+        measured={name: round(float(value), 3) for name, value in state.measurements},
+        inferred=inferred,
+        decided=tuple(decided),
+    )
+
+
+def _step(derivation: Derivation) -> Step:
+    bindings = tuple((name, _shown(value)) for name, value in derivation.bindings)
+    because = tuple(map(_step, derivation.premises))
+    return Step(str(derivation.fact), derivation.source, derivation.rule, bindings, because)
+
+
+def _shown(value: object) -> str:
+    """A bound value, a number with three decimals at most."""
+    return f"{float(value):.3f}".rstrip("0").rstrip(".") if isinstance(value, Decimal) else str(value)

@@ -1,0 +1,80 @@
+"""Puts a page together: its HTML, styles, scripts and data in one file that loads nothing from elsewhere."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import html
+import json
+import webbrowser
+from collections.abc import Sequence
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from suave_des.campaign.output import check_output_file, write_files
+
+_COMPRESSION = 6
+
+
+@cache
+def asset(name: str) -> str:
+    """Read a file of the pages, such as "replay.css"."""
+    return files("suave_des.pages").joinpath("assets", name).read_text(encoding="utf-8")
+
+
+def script_text(text: str) -> str:
+    """Make text safe inside a script element, whatever names it contains: nothing in it can end the element."""
+    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+
+
+def data_text(content: Any) -> str:
+    """Write plain data as JSON that may stand inside a script element."""
+    return script_text(json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False))
+
+
+def compressed(text: str) -> str:
+    """Compress text for a page, which expands it with the browser's own DecompressionStream."""
+    return base64.b64encode(gzip.compress(text.encode(), _COMPRESSION, mtime=0)).decode()
+
+
+def page(name: str, title: str, content: Any, styles: Sequence[str], scripts: Sequence[str], **blocks: str) -> str:
+    """Put a page together.
+
+    Args:
+        name: of its HTML among the assets.
+        title: of the page, as plain text.
+        content: its data, plain.
+        styles: names of CSS files among the assets.
+        scripts: names of JavaScript files among the assets; they share one scope, in this order.
+        blocks: further text that its HTML has a place for.
+    """
+    return Template(asset(name)).substitute(
+        title=html.escape(title),
+        style="\n".join(map(asset, styles)),
+        data=data_text(content),
+        script="(() => {\n'use strict';\n" + "\n".join(map(asset, scripts)) + "\n})();",
+        **blocks,
+    )
+
+
+def check_page_file(file: Path) -> None:
+    """See that a page can be written; an earlier page of that name is replaced.
+
+    Raises:
+        InputError: the path is a folder, or its folder does not exist or cannot be written.
+    """
+    check_output_file(file, overwrite=True)
+
+
+def write_page(file: Path, text: str, *, show: bool) -> None:
+    """Write a page, and open it in the user's browser if that is wanted.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    write_files(file.parent, {file.name: text})
+    if show:
+        webbrowser.open(file.resolve().as_uri())

@@ -1,0 +1,162 @@
+"""The replay: a page that plays missions, with the reasoning behind each adaptation."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import accumulate
+from typing import Any, Final
+
+from suave_des import __version__
+from suave_des.domain import FOLLOW_PIPELINE, SEA_BED_Z_M
+from suave_des.managed.follow import InspectionPath
+from suave_des.pages.decisions import Cycles, explained
+from suave_des.pages.page import page
+from suave_des.pages.recorded import Recorded
+from suave_des.scenario.models import THRUSTERS, Scenario
+from suave_des.scenario.modes import UNGROUND_MODE
+from suave_des.world.pipeline import VIEW_TANGENT, sample_points, there_and_back
+
+_DECIMALS: Final = 3
+STYLES: Final = ("common.css", "replay.css")
+SCRIPTS: Final = ("common.js", "scene_geometry.js", "scene.js", "views.js", "panel.js", "replay.js")
+
+
+@dataclass(frozen=True)
+class MissionOnPage:
+    """A mission as the replay plays it; times in s, lengths in m.
+
+    Attributes:
+        name: scenario, manager, run and seed.
+        metrics: its row of runs.csv.
+        track: columns of trajectory.csv.
+        modes: by function: times at which modes took effect, with their names.
+        thrusters: times at which thrusters were reported, with their number from 1 and whether they work.
+        events: time, source, event and detail.
+        inspected: times at which points of the way along the pipeline were reached, with the point's number and the
+            distance until then.
+        way: that way, from the point seen first: x and y of each point.
+        seen: time of the first sight, x and y of the point; None: the pipeline was not found.
+        cycles: reasoning cycles.
+    """
+
+    name: str
+    metrics: Mapping[str, Any]
+    track: Mapping[str, Sequence[Any]]
+    modes: Mapping[str, Sequence[tuple[float, str]]]
+    thrusters: Sequence[tuple[float, int, bool]]
+    events: Sequence[tuple[float, str, str, str]]
+    inspected: Sequence[tuple[float, int, float]]
+    way: Sequence[tuple[float, float]]
+    seen: tuple[float, float, float] | None
+    cycles: Cycles
+
+
+def replay_page(missions: Sequence[Recorded]) -> str:
+    """Make the page that plays missions side by side, all at the same mission time.
+
+    Args:
+        missions: of scenarios with the same pipeline; two of the same seed and run had the same random numbers.
+    """
+    first = missions[0]
+    scenario = first.scenario
+    content = {
+        "version": __version__,
+        "scenario": {
+            "name": scenario.name,
+            "description": scenario.description,
+            "revision": scenario.revision.name,
+            "time_limit_s": scenario.mission.time_limit_s,
+            "thresholds_m": list(scenario.reaction_metric.visibility_thresholds_m),
+            "pipeline": [list(vertex) for vertex in scenario.pipeline.vertices_m],
+            "sea_bed_z_m": SEA_BED_Z_M,
+            "view_tangent": VIEW_TANGENT,
+            "thrusters": THRUSTERS,
+            "station": _station(scenario),
+        },
+        "missions": [asdict(mission_on_page(each)) for each in missions],
+    }
+    title = " and ".join(dict.fromkeys(each.name for each in missions))
+    return page("replay.html", f"Replay: {title}", content, STYLES, SCRIPTS)
+
+
+def mission_on_page(mission: Recorded) -> MissionOnPage:
+    """Prepare a mission for the page."""
+    modes: dict[str, list[tuple[float, str]]] = {}
+    thrusters: list[tuple[float, int, bool]] = []
+    for event in mission.events:
+        if event.event == "mode_set":
+            function, _, mode = event.detail.partition(" = ")
+            modes.setdefault(function, []).append((event.t_s, mode))
+        elif event.event == "component_status":
+            component, _, status = event.detail.partition(" ")
+            number = component.rpartition("_")[2]
+            if number.isdecimal():
+                thrusters.append((event.t_s, int(number), status != "FALSE"))
+    metrics = mission.metrics
+    way = _way(mission)
+    x_m, y_m, seen_s = (metrics.get(name) for name in ("detection_x_m", "detection_y_m", "detection_time_s"))
+    is_seen = isinstance(seen_s, float) and isinstance(x_m, float | int) and isinstance(y_m, float | int)
+    return MissionOnPage(
+        name=mission.name,
+        metrics=metrics,
+        track={name: _rounded(values) for name, values in mission.track.items()},
+        modes=modes,
+        thrusters=thrusters,
+        events=[(round(each.t_s, 2), each.source, each.event, each.detail) for each in mission.events],
+        inspected=_inspected(mission, way, modes.get(FOLLOW_PIPELINE, ())),
+        way=[] if way is None else [(round(x, _DECIMALS), round(y, _DECIMALS)) for x, y, _ in way.points_m.tolist()],
+        seen=(seen_s, x_m, y_m) if is_seen else None,  # type: ignore[arg-type]
+        cycles=explained(mission),
+    )
+
+
+def _station(scenario: Scenario) -> list[float] | None:
+    battery = scenario.battery
+    return None if battery is None else [battery.station_x_m, battery.station_y_m, battery.station_radius_m]
+
+
+def _rounded(values: Sequence[Any]) -> list[Any]:
+    return [round(value, _DECIMALS) if isinstance(value, float) else value for value in values]
+
+
+def _way(mission: Recorded) -> InspectionPath | None:
+    """The way along the pipeline from the point that was seen first."""
+    for event in mission.events:
+        if event.event == "pipeline_detected":
+            pipeline = mission.scenario.pipeline
+            points = sample_points(pipeline.vertices_m, pipeline.points_per_piece)
+            number = event.detail.rpartition(" ")[2]
+            if number.isdecimal() and int(number) < len(points):
+                return InspectionPath.along(there_and_back(points)).from_point(int(number))
+    return None
+
+
+def _inspected(
+    mission: Recorded, way: InspectionPath | None, modes: Sequence[tuple[float, str]]
+) -> list[tuple[float, int, float]]:
+    """The points of the way that the vehicle reached while it followed the pipeline, each after the one before."""
+    if way is None:
+        return []
+    follow = mission.scenario.revision.follow
+    mode_times = [t_s for t_s, _ in modes]
+    lengths_m = list(accumulate(way.lengths_m))
+    points = way.points_m[:, :2].tolist()
+    track = mission.track
+    found: list[tuple[float, int, float]] = []
+    next_point, was_following, start_m = 0, False, 0.0
+    for t_s, x_m, y_m in zip(track["t_s"], track["x_m"], track["y_m"], strict=True):
+        place = bisect_right(mode_times, t_s) - 1
+        is_following = place >= 0 and modes[place][1] != UNGROUND_MODE
+        if is_following and not was_following:
+            next_point = 0 if follow.restarts_on_activation else next_point
+            start_m = lengths_m[min(next_point, len(points) - 1)]
+        was_following = is_following
+        while is_following and next_point < len(points):
+            goal_x_m, goal_y_m = points[next_point]
+            if max(abs(x_m - goal_x_m), abs(y_m - goal_y_m)) > follow.acceptance_m:
+                break
+            found.append((round(t_s, 2), next_point, round(lengths_m[next_point] - start_m, 2)))
+            next_point += 1
+    return found
