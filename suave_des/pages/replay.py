@@ -16,7 +16,7 @@ from suave_des.pages.page import page
 from suave_des.pages.recorded import Recorded
 from suave_des.scenario.models import THRUSTERS, Scenario
 from suave_des.scenario.modes import UNGROUND_MODE
-from suave_des.world.pipeline import VIEW_TANGENT, sample_points, there_and_back
+from suave_des.world.pipeline import sample_points, there_and_back
 
 _DECIMALS: Final = 3
 STYLES: Final = ("common.css", "replay.css")
@@ -71,7 +71,7 @@ def replay_page(missions: Sequence[Recorded]) -> str:
             "thresholds_m": list(scenario.reaction_metric.visibility_thresholds_m),
             "pipeline": [list(vertex) for vertex in scenario.pipeline.vertices_m],
             "sea_bed_z_m": SEA_BED_Z_M,
-            "view_tangent": VIEW_TANGENT,
+            "view_tangent": scenario.vehicle.camera.tangent,
             "thrusters": THRUSTERS,
             "station": _station(scenario),
         },
@@ -126,10 +126,11 @@ def _way(mission: Recorded) -> InspectionPath | None:
     for event in mission.events:
         if event.event == "pipeline_detected":
             pipeline = mission.scenario.pipeline
+            altitude_m = mission.scenario.revision.follow.altitude_m
             points = sample_points(pipeline.vertices_m, pipeline.points_per_piece)
             number = event.detail.rpartition(" ")[2]
             if number.isdecimal() and int(number) < len(points):
-                return InspectionPath.along(there_and_back(points)).from_point(int(number))
+                return InspectionPath.along(there_and_back(points), altitude_m).from_point(int(number))
     return None
 
 
