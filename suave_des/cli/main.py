@@ -13,7 +13,7 @@ import typer
 from typer.core import TyperGroup
 
 from suave_des import __version__
-from suave_des.cli import bench, calibrate, campaign, kb, missions, pages, reproduce, validate
+from suave_des.cli import bench, calibrate, campaign, compare, kb, missions, pages, reproduce, validate
 from suave_des.cli.options import remember_command_line
 from suave_des.errors import InputError, SuaveDesError
 from suave_des.interrupts import exit_status, signals_raised
@@ -59,6 +59,7 @@ app.command("campaign")(campaign.campaign)
 app.command("validate")(validate.validate)
 app.command("calibrate")(calibrate.calibrate)
 app.add_typer(kb.app, name="kb")
+app.command("compare")(compare.compare)
 app.command("figure")(missions.figure)
 app.command("replay")(pages.replay)
 app.command("import-config")(missions.import_config)

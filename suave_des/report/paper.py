@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 from suave_des.errors import InputError
 from suave_des.estimates import Estimate, Interval, estimate
+from suave_des.report.result_files import PAPER_ORDER
 from suave_des.report.runs import METRICS, read_runs
 from suave_des.resources import shipped_folder
 
 if TYPE_CHECKING:
     import pandas
 
-_PAPER_ORDER = {"none": 0, "random": 1, "metacontrol": 2}
 _CLAIMS = {"search_time_s": ("find the pipeline sooner", -1.0), "distance_inspected_m": ("inspect more of it", 1.0)}
 """What the paper says that metacontrol does on average, and the sign of what is better."""
 _DECIMALS = 6
@@ -164,7 +164,7 @@ def published_estimates(path: Path | None = None) -> Estimates:
         InputError: the file cannot be read, or lacks a column.
     """
     runs = read_runs(path or published_runs())
-    names = sorted(runs.managers, key=lambda name: (_PAPER_ORDER.get(name, len(_PAPER_ORDER)), name))
+    names = sorted(runs.managers, key=lambda name: (PAPER_ORDER.get(name, len(PAPER_ORDER)), name))
     return _estimates(runs.frame, [(name, metric) for name in names for metric in METRICS])
 
 

@@ -21,11 +21,12 @@ from suave_des.scenario.yamlfile import decode, read_bytes
 
 METRICS = {"search_time_s": "search time (s)", "distance_inspected_m": "distance inspected (m)"}
 """Metrics that are compared, with their titles in figures."""
-COLUMNS = ("manager", *METRICS, "detection_x_m", "pipeline_found", "mean_reaction_time_s")
+COLUMNS = ("manager", *METRICS, "detection_x_m", "pipeline_found", "mean_reaction_time_s", "run", "seed")
 """Columns of a frame of missions.
 
 detection_x_m is nan where it is not known or nothing was detected, pipeline_found a nullable boolean, missing where the
-file does not tell, and mean_reaction_time_s nan where nothing was reacted to or the file does not tell.
+file does not tell, and mean_reaction_time_s nan where nothing was reacted to or the file does not tell. run is nan and
+seed, which is text, empty where the file does not tell.
 """
 _SIZE_LIMIT_BYTES = 500_000_000
 _WHOLE_LIMIT = 2**63
@@ -42,6 +43,8 @@ class _Layout(NamedTuple):
     pipeline_found: str = ""
     mean_reaction_time_s: str = ""
     scenario: str = ""
+    run: str = ""
+    seed: str = ""
     is_exemplars: bool = True
     """The manager is the last word of its column, and rows of averages may follow the missions."""
 
@@ -56,6 +59,8 @@ _LAYOUTS = (
         pipeline_found="pipeline_found",
         mean_reaction_time_s="mean_reaction_time_s",
         scenario="scenario",
+        run="run",
+        seed="seed",
         is_exemplars=False,
     ),
     # The exemplar's results files (kas-lab/suave): revision 2023, which writes -1 when nothing was found, and 1.5.
@@ -153,7 +158,7 @@ def read_runs(
         metrics = [field for field in fields(MissionMetrics) if are_simulated and field.name in header]
         optional = (layout.time_limit_s, layout.pipeline_found, layout.mean_reaction_time_s, layout.scenario)
         further = (*further, *(name for name in where_present if name in header))
-        wanted = (*layout[:3], *layout.detection_x_m, *optional, *further)
+        wanted = (*layout[:3], *layout.detection_x_m, *optional, layout.run, layout.seed, *further)
         wanted += tuple(field.name for field in metrics)
         names = [name for name in dict.fromkeys(wanted) if name in header]
         places = [header.index(name) for name in names]
@@ -243,6 +248,8 @@ def _missions(cells: _Cells, layout: _Layout) -> pandas.DataFrame:
         math.nan if detection is None else cells.numbers(detection, least=-math.inf, may_be_empty=True),
         _found(cells, layout, search_time_s, limits),
         _reactions(cells, layout.mean_reaction_time_s),
+        cells.numbers(layout.run, may_be_empty=True) if layout.run in cells.text else math.nan,
+        cells.text.get(layout.seed, ""),
     )
     return pandas.DataFrame(dict(zip(COLUMNS, values, strict=True)), index=cells.text.index)
 

@@ -1,0 +1,174 @@
+"""suave-des compare: estimates of each manager, and differences of each pair."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from rich.console import Console
+
+    from suave_des.report.compare import Comparison
+    from suave_des.report.compare_files import Table
+
+_TEXT_WIDTH = 95
+
+
+class Format(StrEnum):
+    """How a comparison is printed."""
+
+    TABLE = "table"
+    CSV = "csv"
+    JSON = "json"
+    MARKDOWN = "markdown"
+    LATEX = "latex"
+
+
+def compare(
+    results: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="DIR...", help="Folders of campaign or reproduce, the exemplar's CSV files, or folders of these."
+        ),
+    ],
+    managers: Annotated[
+        str | None,
+        typer.Option("--managers", metavar="NAME,...", help="Only these, in this order.", show_default="all"),
+    ] = None,
+    against: Annotated[
+        str | None,
+        typer.Option(
+            "--against", metavar="NAME", help="Compare all others with this one only.", show_default="each with each"
+        ),
+    ] = None,
+    metrics: Annotated[
+        str | None,
+        typer.Option(
+            "--metrics",
+            metavar="COLUMN,...",
+            help="Columns of runs.csv.",
+            show_default="search time, distance, found, reaction time",
+        ),
+    ] = None,
+    by: Annotated[
+        str | None,
+        typer.Option("--by", metavar="KEY,...", help="Compare the values of these swept parameters, too."),
+    ] = None,
+    half_width: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--half-width",
+            metavar="METRIC:VALUE",
+            help="Give the runs needed for an interval this narrow; repeat it for several.",
+        ),
+    ] = None,
+    unpaired: Annotated[
+        bool, typer.Option("--unpaired", help="Take runs as independent though they share random numbers.")
+    ] = False,
+    as_format: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TABLE,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="Write .csv, .json, .md or .tex instead of printing.")
+    ] = None,
+) -> None:
+    """Compare managers by their results.
+
+    Runs that share their random numbers are compared in pairs, which takes fewer missions.
+    """
+    from suave_des.cli.console import output
+    from suave_des.report.compare import Choices, compare_folders
+    from suave_des.report.compare_files import ENDINGS, WRITERS
+
+    if out is not None:
+        _check_out(out, ENDINGS)
+    choices = Choices(
+        managers=_split(managers),
+        metrics=_split(metrics),
+        by=_split(by),
+        against=against,
+        half_widths=tuple(half_width or ()),
+        unpaired=unpaired,
+    )
+    comparison = compare_folders(results, choices)
+    if out is not None:
+        from suave_des.campaign.output import write_files
+
+        write_files(out.parent, {out.name: WRITERS[ENDINGS[out.suffix.lower()]](comparison)})
+        print(f"compared in {out}")
+    elif as_format is Format.TABLE:
+        print_comparison(output(), comparison)
+    else:
+        print(WRITERS[as_format.value](comparison), end="")
+
+
+def _split(names: str | None) -> tuple[str, ...]:
+    return tuple(name.strip() for name in (names or "").split(",") if name.strip())
+
+
+def _check_out(out: Path, endings: Iterable[str]) -> None:
+    from suave_des.campaign.output import check_output_file
+    from suave_des.errors import InputError
+
+    if out.suffix.lower() not in endings:
+        problem = f"expected a table, got {out.suffix or 'a file without an ending'}"
+        raise InputError(problem, file=out, remedy=f"one of {', '.join(endings)}")
+    check_output_file(out, overwrite=True)
+
+
+def print_comparison(console: Console, comparison: Comparison) -> None:
+    """Print what follows, then the tables, then how it was compared."""
+    from suave_des.report import compare_files as tables
+
+    width = min(console.width, _TEXT_WIDTH)
+    _say(console, comparison.conclusion, width)
+    for metric in comparison.metrics:
+        summaries, differences = comparison.of_metric(metric.name)
+        _print(console, metric.heading, tables.summary_table(metric, summaries))
+        if censored := tables.search_table(summaries):
+            _print(console, f"{metric.heading}, missions that never found it as censored (Kaplan-Meier)", censored)
+        if differences:
+            has_effects = _width(tables.difference_table(metric, differences)) <= console.width
+            _print(console, "", tables.difference_table(metric, differences, has_effects=has_effects))
+            console.print()
+            for each in differences:
+                _say(console, f"- {each.conclusion}", width)
+    if comparison.differences:
+        title = "runs of each manager that an interval of the difference needs"
+        _print(console, title, tables.runs_table(comparison))
+    console.print()
+    for line in tables.remarks(comparison):
+        _say(console, line, width)
+
+
+def _width(table: Table) -> int:
+    headings, rows = table
+    return sum(max(map(len, column)) + 2 for column in zip(headings, *rows, strict=True)) - 2
+
+
+def _say(console: Console, text: str, width: int) -> None:
+    indent = "  " if text.startswith("- ") else ""
+    lines = fill(text, width, subsequent_indent=indent, break_on_hyphens=False)
+    console.print(lines, markup=False, soft_wrap=True)
+
+
+def _print(console: Console, title: str, content: Table) -> None:
+    from rich.text import Text
+
+    from suave_des.cli.console import plain_table, print_table, print_trimmed
+
+    headings, rows = content
+    table = plain_table()
+    for place, heading in enumerate(headings):
+        table.add_column(heading, justify="right" if place else "left", overflow="fold", no_wrap=bool(place))
+    for row in rows:
+        table.add_row(*map(Text, row))
+    console.print()
+    if title:
+        print_table(console, title, table)
+    else:
+        print_trimmed(console, table)

@@ -1,0 +1,325 @@
+"""Write a comparison as CSV, JSON, Markdown, or LaTeX in the paper's layout."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+from suave_des.estimates import Interval
+from suave_des.report.compare import Comparison, Difference, Summary
+from suave_des.report.compared_metrics import FOUND, ComparedMetric
+from suave_des.report.statistics import Tested
+
+PAPER_METRICS = ("search_time_s", "distance_inspected_m")
+_SUMMARY_HEADINGS = ("manager", "n", "mean", "95% interval", "std", "median", "quartiles")
+_DIFFERENCE_HEADINGS = ("difference", "n", "mean", "95% interval", "p", "p (Holm)", "effect")
+_RUNS_HEADINGS = ("difference", "for ±", "paired", "not paired", "variance ratio")
+
+
+def csv_text(comparison: Comparison) -> str:
+    """Write all figures as one table: a row for each group and metric, then one for each pair and metric."""
+    import pandas
+
+    summaries, differences = comparison.summary_frame(), comparison.difference_frame()
+    columns = [*summaries.columns, *(name for name in differences.columns if name not in summaries.columns)]
+    rows = [*comparison.summary_rows(), *comparison.difference_rows()]
+    if "other" in columns:
+        columns.insert(1, columns.pop(columns.index("other")))
+    return pandas.DataFrame(rows, columns=columns, dtype=object).to_csv(index=False, lineterminator="\n")
+
+
+def json_text(comparison: Comparison) -> str:
+    """Write all of the comparison; numbers with all their digits, null where there is none."""
+    content = {
+        "conclusion": comparison.conclusion,
+        "notes": list(comparison.notes),
+        "summaries": comparison.summary_rows(),
+        "differences": comparison.difference_rows(),
+    }
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def markdown_text(comparison: Comparison) -> str:
+    """Write the tables and what follows from them, for a page."""
+    parts = [_markdown(comparison.conclusion)]
+    for metric in comparison.metrics:
+        summaries, differences = comparison.of_metric(metric.name)
+        parts.append(f"### {metric.heading[0].upper()}{metric.heading[1:]}")
+        parts.append(_markdown_table(summary_table(metric, summaries)))
+        if censored := search_table(summaries):
+            parts.append("Missions that never found it as censored (Kaplan-Meier):")
+            parts.append(_markdown_table(censored))
+        if differences:
+            parts.append(_markdown_table(difference_table(metric, differences)))
+            parts.append("\n".join(f"- {_markdown(each.conclusion)}" for each in differences))
+    if comparison.differences:
+        parts.append("### Runs needed")
+        parts.append(_markdown_table(runs_table(comparison)))
+    parts.extend(_markdown(line) for line in remarks(comparison))
+    return "\n\n".join(parts) + "\n"
+
+
+def latex_text(comparison: Comparison) -> str:
+    """Write two tables for LaTeX with booktabs: means and standard deviations as in the paper, and differences."""
+    metrics = [each for each in comparison.metrics if each.name in PAPER_METRICS] or list(comparison.metrics)
+    lines = [
+        r"% needs \usepackage{booktabs}",
+        r"\begin{table}",
+        r"  \centering",
+        rf"  \caption{{{_latex(_sizes(comparison))}}}",
+        rf"  \begin{{tabular}}{{l{'rr' * len(metrics)}}}",
+        r"    \toprule",
+        "    "
+        + "".join(rf" & \multicolumn{{2}}{{c}}{{{_latex(_capital(each.heading))}}}" for each in metrics)
+        + r" \\",
+        "    " + " ".join(rf"\cmidrule(lr){{{2 * place + 2}-{2 * place + 3}}}" for place in range(len(metrics))),
+        "    Manager" + " & Mean & Std" * len(metrics) + r" \\",
+        r"    \midrule",
+    ]
+    by_group: dict[str, list[str]] = {}
+    for metric in metrics:
+        for each in comparison.of_metric(metric.name)[0]:
+            mean, std = (None if each.mean is None else each.mean.value), each.std
+            by_group.setdefault(each.group, []).extend(number(value, metric) for value in (mean, std))
+    lines += [rf"    {_latex(name)} & {' & '.join(map(_latex, cells))} \\" for name, cells in by_group.items()]
+    lines += [r"    \bottomrule", r"  \end{tabular}", r"\end{table}"]
+    if comparison.differences:
+        lines += _latex_differences(comparison)
+    return "\n".join(lines) + "\n"
+
+
+def _latex_differences(comparison: Comparison) -> list[str]:
+    lines = [
+        r"\begin{table}",
+        r"  \centering",
+        rf"  \caption{{{_latex(' '.join(_methods(comparison)))}}}",
+        r"  \begin{tabular}{lrrrr}",
+        r"    \toprule",
+        r"    Difference & Mean & 95\% interval & Effect & $p$ (Holm) \\",
+    ]
+    for metric in comparison.metrics:
+        lines += [r"    \midrule", rf"    \multicolumn{{5}}{{l}}{{{_latex(_capital(metric.heading))}}} \\"]
+        for each in comparison.of_metric(metric.name)[1]:
+            name, _, mean, interval, _, p, effect = _difference_cells(each, metric)
+            cells = [_latex(name), *(_latex_number(cell) for cell in (mean, interval, effect, p))]
+            lines.append(rf"    {' & '.join(cells)} \\")
+    return [*lines, r"    \bottomrule", r"  \end{tabular}", r"\end{table}"]
+
+
+# Tables as headings and cells of text, which all formats but CSV and JSON share.
+
+Cells = tuple[str, ...]
+Table = tuple[Cells, list[Cells]]
+"""Headings and rows."""
+
+
+def summary_table(metric: ComparedMetric, summaries: Sequence[Summary]) -> Table:
+    """Return the estimates of each group; a share has neither spread nor quartiles."""
+    width = 4 if metric.name == FOUND else len(_SUMMARY_HEADINGS)
+    return _SUMMARY_HEADINGS[:width], [_summary_cells(each, metric)[:width] for each in summaries]
+
+
+def search_table(summaries: Sequence[Summary]) -> Table | None:
+    """Return search times with missions that never found the pipeline as censored; None for other metrics."""
+    horizons_s = {each.search.horizon_s for each in summaries if each.search is not None}
+    if not horizons_s:
+        return None
+    headings = ("manager", f"mean to {min(horizons_s):.0f} s", "95% interval", "half found by", "95% interval")
+    return headings, [_search_cells(each) for each in summaries]
+
+
+def difference_table(metric: ComparedMetric, differences: Sequence[Difference], *, has_effects: bool = True) -> Table:
+    """Return the difference of each pair; that of shares has no effect size besides."""
+    width = 6 if metric.name == FOUND or not has_effects else len(_DIFFERENCE_HEADINGS)
+    return _DIFFERENCE_HEADINGS[:width], [_difference_cells(each, metric)[:width] for each in differences]
+
+
+def runs_table(comparison: Comparison) -> Table:
+    """Return how many runs an interval needs, of each pair and metric."""
+    rows = (_runs_cells(each, comparison.metric(each.metric)) for each in comparison.differences if each.runs_needed)
+    return _RUNS_HEADINGS, list(rows)
+
+
+def _summary_cells(each: Summary, metric: ComparedMetric) -> Cells:
+    """Write a row of summary_table."""
+    low, median, high = each.quartiles or (None, None, None)
+    mean, interval = (None, None) if each.mean is None else (each.mean.value, each.mean.interval)
+    spread = (number(each.std, metric), number(median, metric), interval_cell(_both(low, high), metric))
+    return each.group, f"{each.n:,}", number(mean, metric), interval_cell(interval, metric), *spread
+
+
+def _search_cells(each: Summary) -> Cells:
+    """Write a row of search_table."""
+    search = each.search
+    if search is None:
+        return each.group, "", "", "", ""
+    mean = search.restricted_mean_s
+    low, high = search.median_interval_s
+    interval = f"{_seconds(low)} to {_seconds(high)}"
+    return (
+        each.group,
+        f"{mean.value:.2f}",
+        "" if mean.interval is None else f"{mean.interval[0]:.1f} to {mean.interval[1]:.1f}",
+        _seconds(search.median_s),
+        interval,
+    )
+
+
+def _seconds(value: float | None) -> str:
+    return "not reached" if value is None else f"{value:.0f}"
+
+
+def _difference_cells(each: Difference, metric: ComparedMetric) -> Cells:
+    """Write a row of difference_table."""
+    name = f"{each.first} - {each.second}"
+    n = f"{each.n[0]:,}" if each.pairing.is_paired or each.n[0] == each.n[-1] else f"{each.n[0]:,}, {each.n[-1]:,}"
+    if each.difference is None or each.tested is None:
+        return name, n, "", "", "", "", ""
+    mean, interval = number(each.difference.value, metric), interval_cell(each.difference.interval, metric)
+    return name, n, mean, interval, p_cell(each.tested.p), p_cell(each.p_holm), _effect(each.tested)
+
+
+def _effect(tested: Tested) -> str:
+    if tested.effect is None:
+        return ""
+    if tested.effect_interval is None:
+        return f"{tested.effect:.2f}"
+    low, high = tested.effect_interval
+    return f"{tested.effect:.2f} ({low:.2f} to {high:.2f})"
+
+
+def _runs_cells(each: Difference, metric: ComparedMetric) -> Cells:
+    """Write a row of runs_table."""
+    needed = each.runs_needed
+    if needed is None:
+        return f"{each.first} - {each.second}", "", "", "", ""
+    ratio = "" if each.variance_ratio is None else f"{each.variance_ratio:.1f}"
+    paired = f"{needed.paired:,}" if needed.paired else ""
+    unpaired = f"{needed.unpaired:,}" if needed.unpaired else "over 10,000,000"
+    half_width = f"{100 * needed.half_width:g}%" if metric.name == FOUND else f"{needed.half_width:.4g} {metric.unit}"
+    return f"{each.first} - {each.second}", half_width.strip(), paired, unpaired, ratio
+
+
+def number(value: float | None, metric: ComparedMetric) -> str:
+    """Write a value of a metric: a share in per cent, others with the paper's decimals; empty for None."""
+    if value is None:
+        return ""
+    return f"{100.0 * value:.1f}%" if metric.name == FOUND else f"{value:.{metric.decimals}f}"
+
+
+def interval_cell(interval: Interval | None, metric: ComparedMetric) -> str:
+    """Write an interval; empty for None."""
+    if interval is None:
+        return ""
+    low, high = interval
+    if metric.name == FOUND:
+        return f"{100 * low:.1f} to {100 * high:.1f}%"
+    return f"{low:.{metric.interval_decimals}f} to {high:.{metric.interval_decimals}f}"
+
+
+def p_cell(p: float | None) -> str:
+    """Write a p-value with two digits that say something."""
+    if p is None:
+        return ""
+    return f"{p:.3f}" if p >= 0.001 else f"{p:.0e}"
+
+
+def _both(low: float | None, high: float | None) -> Interval | None:
+    return None if low is None or high is None else (low, high)
+
+
+def remarks(comparison: Comparison) -> list[str]:
+    """Say how it was compared, why so, and what to know of the data."""
+    return [*_methods(comparison), *(f"Note: {note}." for note in comparison.notes)]
+
+
+def _methods(comparison: Comparison) -> list[str]:
+    """Say which differences are paired and why, and by what they are tested and estimated."""
+    tested = [each for each in comparison.differences if each.tested is not None]
+    whys: dict[str, dict[str, None]] = {}
+    for each in tested:
+        whys.setdefault(each.pairing.why, {})[f"{each.first} - {each.second}"] = None
+    lines = [f"{_capital(why)}{'' if len(whys) == 1 else f' ({_listed(pairs)})'}." for why, pairs in whys.items()]
+    tests = dict.fromkeys(each.tested.name for each in tested if each.tested is not None)
+    if tests:
+        counted = f", Holm's correction over all {len(tested)}" if len(tested) > 1 else ""
+        lines.append(f"Tests: {', '.join(tests)}; two-sided{counted}.")
+    effects = dict.fromkeys(each.tested.effect_name for each in tested if each.tested is not None)
+    lines.extend(_EFFECTS[name] for name in effects if name)
+    methods = [each.mean.method for each in comparison.summaries if each.mean and each.mean.interval]
+    methods += [each.difference.method for each in tested if each.difference and each.difference.interval]
+    if methods:
+        lines.append(f"95% intervals: {', '.join(dict.fromkeys(methods))}.")
+    return lines
+
+
+_EFFECTS = {
+    "rank-biserial": "Effect: rank-biserial correlation, 1 if the first has the greater value in all pairs.",
+    "A12": "Effect: A12, the probability that a mission of the first has the greater value.",
+}
+
+
+def _listed(names: Iterable[str], most: int = 4) -> str:
+    known = list(names)
+    return ", ".join(known[:most]) + (f" and {len(known) - most} more" if len(known) > most else "")
+
+
+def _sizes(comparison: Comparison) -> str:
+    sizes = {each.group: each.n for each in comparison.of_metric(comparison.metrics[0].name)[0]}
+    if len(set(sizes.values())) == 1:
+        return f"{next(iter(sizes.values()))} missions for each manager."
+    return "; ".join(f"{name}: {n} missions" for name, n in sizes.items()) + "."
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+_LATEX = str.maketrans(
+    {
+        **{character: f"\\{character}" for character in "&%$#_{}"},
+        "\\": r"\textbackslash{}",
+        "~": r"\textasciitilde{}",
+        "^": r"\textasciicircum{}",
+        "<": r"\textless{}",
+        ">": r"\textgreater{}",
+        "|": r"\textbar{}",
+    }
+)
+
+
+def _latex(text: str) -> str:
+    return text.translate(_LATEX)
+
+
+def _latex_number(cell: str) -> str:
+    """Write a cell of numbers: with a minus, and powers of ten."""
+    mantissa, is_power, exponent = cell.partition("e-")
+    if is_power:
+        return rf"${mantissa} \cdot 10^{{-{int(exponent)}}}$"
+    return " to ".join(f"${_latex(part)}$" if part.startswith("-") else _latex(part) for part in cell.split(" to "))
+
+
+_MARKDOWN = str.maketrans({**{character: f"\\{character}" for character in r"\`*_[]|"}, "<": "&lt;", ">": "&gt;"})
+
+
+def _markdown(text: str) -> str:
+    return text.translate(_MARKDOWN)
+
+
+def _markdown_table(table: Table) -> str:
+    headings, rows = table
+    lines = ["| " + " | ".join(headings) + " |", "| --- |" + " ---: |" * (len(headings) - 1)]
+    lines += ["| " + " | ".join(map(_markdown, row)) + " |" for row in rows]
+    return "\n".join(lines)
+
+
+WRITERS: Mapping[str, Callable[[Comparison], str]] = {
+    "csv": csv_text,
+    "json": json_text,
+    "markdown": markdown_text,
+    "latex": latex_text,
+}
+"""Writers by the name of their format."""
+ENDINGS = {".csv": "csv", ".json": "json", ".md": "markdown", ".tex": "latex"}
+"""Formats by the ending of a file's name."""

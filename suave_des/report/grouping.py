@@ -1,0 +1,142 @@
+"""Missions grouped for a comparison: by manager, source, and value of a sweep."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas
+from numpy.typing import NDArray
+
+from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.report.result_files import Missions
+
+_MOST_GROUPS = 60
+"""More make tables that nobody reads, and thousands of tests."""
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Missions that are compared with those of other groups.
+
+    Attributes:
+        name: the manager's, with its source or its value of a sweep where several have the same.
+        frame: a row for each independent value: for each mission, or, where points of a sweep are averaged, for each
+            run, whose random numbers all points share.
+        is_of_missions: whether each row is one mission.
+    """
+
+    name: str
+    frame: pandas.DataFrame
+    is_of_missions: bool
+
+    def values(self, metric: str) -> NDArray[np.float64]:
+        """Return the values of a metric, nan where there is none."""
+        return self.frame[metric].to_numpy(float)
+
+    def known_values(self, metric: str) -> NDArray[np.float64]:
+        """Return the values of a metric that there are."""
+        values = self.values(metric)
+        return values[~np.isnan(values)]
+
+    def by_run(self, metric: str) -> pandas.Series[float] | None:
+        """Return the values by (seed, run); None for missions without these."""
+        if self.frame["run"].isna().any() or (self.frame["seed"] == "").any():
+            return None
+        return self.frame.set_index(["seed", "run"])[metric].astype(float)
+
+
+def time_limit_s(groups: Sequence[Group]) -> float:
+    """Return the whole seconds that missions of every group had; where all found the pipeline, the longest search."""
+    lost = [group.frame.loc[group.frame["pipeline_found"] == 0.0, "search_time_s"] for group in groups]
+    limits_s = [float(times.max()) for times in lost if len(times)]
+    limit_s = min(limits_s) if limits_s else max(float(group.frame["search_time_s"].max()) for group in groups)
+    return math.floor(limit_s) or limit_s
+
+
+def grouped(missions: Missions, managers: Sequence[str], by: Sequence[str]) -> tuple[list[Group], list[str]]:
+    """Group missions by manager, source and the chosen parameters of a sweep.
+
+    Args:
+        missions: of all sources.
+        managers: names of those that are wanted; empty: all.
+        by: swept parameters of which each value makes a group of its own.
+
+    Returns:
+        The groups in the order of their first missions, and notes for the reader.
+
+    Raises:
+        InputError: a name is not there, or there are too many groups.
+    """
+    frame = missions.frame
+    known = list(dict.fromkeys(frame["manager"]))
+    for name in managers:
+        if name not in known:
+            raise InputError(f"there is no mission of {shown(name)}", remedy=did_you_mean(name, known, "there are"))
+    for name in by:
+        if name not in missions.swept:
+            remedy = did_you_mean(name, missions.swept, "swept are")
+            raise InputError(f"{shown(name)} is not what a sweep varies here", place="by", remedy=remedy)
+    if managers:
+        frame = frame[frame["manager"].isin(managers)]
+    keys = ["manager", "source", *by]
+    found = list(frame.groupby(keys, sort=False, dropna=False, observed=True))
+    if managers:
+        found.sort(key=lambda item: list(managers).index(str(item[0][0])))
+    if len(found) > _MOST_GROUPS:
+        problem = f"{len(found)} groups are too many to compare with each other"
+        raise InputError(problem, remedy=f"choose {_MOST_GROUPS} or fewer with managers and by")
+    averaged = [name for name in missions.swept if name not in by]
+    names = _names([key for key, _ in found], by)
+    groups = [_group(name, part, averaged) for name, (_, part) in zip(names, found, strict=True)]
+    return groups, list(_notes(groups, averaged, frame))
+
+
+def _names(keys: Sequence[tuple[object, ...]], by: Sequence[str]) -> list[str]:
+    sources: dict[object, set[object]] = {}
+    for manager, source, *_ in keys:
+        sources.setdefault(manager, set()).add(source)
+    return [
+        _printable(str(manager))
+        + (f" ({_printable(str(source))})" if len(sources[manager]) > 1 else "")
+        + "".join(f", {name} {_short(value)}" for name, value in zip(by, values, strict=True))
+        for manager, source, *values in keys
+    ]
+
+
+def _printable(name: str) -> str:
+    """Return a name from a file without what a terminal would take for commands."""
+    return name if name.isprintable() else repr(name)[1:-1]
+
+
+def _short(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else _printable(str(value))
+
+
+def _group(name: str, frame: pandas.DataFrame, averaged: Sequence[str]) -> Group:
+    if not averaged or frame[["seed", "run"]].duplicated().sum() == 0:
+        return Group(name, frame, True)
+    numbers = list(frame.select_dtypes("number").columns.difference(["run"]))
+    by_run = frame.groupby(["seed", "run"], sort=False, observed=True)
+    sizes = by_run.size()
+    means = by_run[numbers].mean()
+    means = means[sizes == sizes.max()]  # a run that lacks a point would be compared with others at other points
+    return Group(name, means.reset_index(), False)
+
+
+def _notes(groups: Sequence[Group], averaged: Sequence[str], frame: pandas.DataFrame) -> Iterator[str]:
+    if not all(group.is_of_missions for group in groups):
+        yield (
+            f"the values of a run are averaged over {', '.join(averaged)}: all points of a sweep share its random"
+            " numbers, so that runs are independent and missions are not"
+        )
+    scenarios = [name for name in dict.fromkeys(frame["scenario"]) if name]
+    if len(scenarios) > 1:
+        yield f"the missions are of different scenarios: {', '.join(scenarios)}"
+    few = min(len(group.frame) for group in groups)
+    if few < 20:
+        yield f"the fewest runs of one of them are {few}: intervals from fewer than 20 are rough"
+    if any(math.isnan(float(group.frame["pipeline_found"].mean())) for group in groups):
+        yield "some files do not say which missions found the pipeline"

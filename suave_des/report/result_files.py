@@ -1,0 +1,223 @@
+"""Gather the missions that are to be compared, from folders of results, single files or a data frame."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import pandas
+
+from suave_des.errors import InputError
+from suave_des.metrics.result import MissionMetrics
+from suave_des.report.runs import COLUMNS, read_runs
+
+OWN_COLUMNS = tuple(field.name for field in fields(MissionMetrics))
+"""Columns of runs.csv that every campaign has."""
+PAPER_ORDER = {"none": 0, "random": 1, "metacontrol": 2}
+_RUNS_FILE, _STORE_FILE, _MANIFEST_FILE = "runs.csv", "campaign.sqlite", "manifest.json"
+
+
+@dataclass(frozen=True)
+class Missions:
+    """Missions to be compared, a row for each.
+
+    Attributes:
+        frame: with `source`, `manager`, `scenario`, the columns of report.runs.COLUMNS, and those of a sweep.
+        swept: columns that a sweep varies: they differ between missions of one manager, seed and run.
+        notes: what a reader of the comparison should know of the files.
+    """
+
+    frame: pandas.DataFrame
+    swept: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def read_missions(paths: Sequence[Path]) -> Missions:
+    """Read the missions in folders or files of results.
+
+    Args:
+        paths: folders of `suave-des campaign` or `reproduce`, of the exemplar's own CSV files, or single CSV files.
+
+    Raises:
+        InputError: one of them has no missions, is given twice, or has missions of several scenarios.
+    """
+    if not paths:
+        raise InputError("no results are given", remedy="give the --out folders of suave-des campaign, or CSV files")
+    resolved = [path.resolve() for path in paths]
+    for place, path in enumerate(paths):
+        if resolved[place] in resolved[:place]:
+            raise InputError("is given twice", file=path, remedy="name each folder of results once")
+    sources = [_read_source(path) for path in paths]
+    names = _short_names(paths)
+    frames = [source.frame.assign(source=name) for source, name in zip(sources, names, strict=True)]
+    swept = tuple(dict.fromkeys(name for source in sources for name in source.swept))
+    notes = tuple(note for source in sources for note in source.notes)
+    return Missions(pandas.concat(frames, ignore_index=True), swept, notes)
+
+
+def missions_of(frame: pandas.DataFrame) -> Missions:
+    """Take the missions of a data frame with the columns of runs.csv, as run_campaign returns it or pandas reads it.
+
+    Raises:
+        InputError: it has no missions, or lacks a column.
+    """
+    for column in ("manager", "search_time_s", "distance_inspected_m"):
+        if column not in frame.columns:
+            raise InputError(f"the data frame has no column {column!r}", remedy="it needs the columns of runs.csv")
+    if frame.empty:
+        raise InputError("the data frame has no missions", remedy="one row for each mission is needed")
+    plain = pandas.DataFrame(frame).reset_index(drop=True)
+    missing = {name: "" if name == "seed" else float("nan") for name in COLUMNS if name not in plain}
+    plain = plain.assign(**missing, source="")
+    plain["manager"] = plain["manager"].astype(str)
+    plain["seed"] = plain["seed"].astype(str)
+    plain["scenario"] = plain["scenario"].astype(str) if "scenario" in plain else ""
+    for name in ("pipeline_found", "mean_reaction_time_s", "run"):
+        plain[name] = _as_floats(plain[name])
+    others = [name for name in frame.columns if name not in OWN_COLUMNS]
+    missions = Missions(plain, _varying(plain, others))
+    _check_once(missions, None)
+    return missions
+
+
+def swept_parameters(folder: Path) -> list[str]:
+    """Find the swept parameters of a campaign: columns of its summary.csv and runs.csv that are not metrics."""
+    try:
+        columns, known = _header(folder / "summary.csv"), _header(folder / _RUNS_FILE)
+    except (OSError, ValueError):
+        return []
+    return [name for name in columns if name in known and name not in OWN_COLUMNS]
+
+
+def _header(path: Path) -> list[str]:
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        return [name.strip() for name in next(csv.reader(file), [])]
+
+
+def _read_source(path: Path) -> Missions:
+    if not path.is_dir():
+        return _of_runs(path)
+    if (path / _RUNS_FILE).is_file():
+        missions = _of_runs(path / _RUNS_FILE)
+        return Missions(missions.frame, missions.swept, tuple(_unfinished(path)))
+    if (path / _STORE_FILE).is_file():
+        remedy = f"suave-des campaign --resume {path} does the rest and writes them"
+        raise InputError("the campaign ended before its result files were written", file=path, remedy=remedy)
+    return _read_exemplar_folder(path)
+
+
+def _of_runs(path: Path) -> Missions:
+    """Read one file; of a runs.csv with the columns that are not metrics, too."""
+    try:
+        header = _header(path) if path.is_file() else []
+    except (OSError, ValueError):
+        header = []  # read_runs says what is wrong
+    is_own = "manager" in header
+    others = [name for name in header if name not in OWN_COLUMNS] if is_own and "scenario" in header else []
+    adaptations = ["adaptations"] if is_own and "adaptations" in header else []
+    runs = read_runs(path, further=[*others, *adaptations], are_simulated="scenario" in header)
+    runs.check_simulated((), None)
+    found = _as_floats(runs.frame["pipeline_found"])
+    frame = runs.frame.assign(scenario=next(iter(runs.scenarios), ""), pipeline_found=found)
+    missions = Missions(frame if runs.scenarios else _in_paper_order(frame), _varying(runs.frame, others))
+    _check_once(missions, path)
+    return missions
+
+
+def _as_floats(column: pandas.Series) -> pandas.Series[float]:
+    """Return numbers, or 1 for true and 0 for false; nan where there is no value."""
+    return pandas.Series(column.astype("Float64").to_numpy(float, na_value=math.nan), column.index)
+
+
+def _in_paper_order(frame: pandas.DataFrame) -> pandas.DataFrame:
+    """Sort real missions as the paper's table has their managers; others come after these, in their own order."""
+    ranks = frame["manager"].map(PAPER_ORDER).fillna(len(PAPER_ORDER))
+    return frame.iloc[ranks.argsort(kind="stable")].reset_index(drop=True)
+
+
+def _read_exemplar_folder(folder: Path) -> Missions:
+    """Read all CSV files of a folder that are results; others, such as the exemplar's statistics, are left out."""
+    frames, notes, errors = [], [], []
+    try:
+        paths = sorted(folder.glob("*.csv"))
+        inner = sorted(child.name for child in folder.iterdir() if (child / _RUNS_FILE).is_file())
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", file=folder, remedy="check its rights") from None
+    for path in paths:
+        try:
+            frames.append(_of_runs(path).frame)
+        except InputError as error:
+            if not _is_foreign(path):
+                raise
+            errors.append(error)
+            notes.append(f"{path} is left out: it has no columns of missions")
+    if frames:
+        frame = _in_paper_order(pandas.concat(frames, ignore_index=True))
+        return Missions(frame, (), tuple(notes))
+    if errors:
+        raise errors[0]
+    if inner:
+        names = " ".join(str(folder / name) for name in inner[:4])
+        raise InputError("has no results itself", file=folder, remedy=f"give the folders in it: {names}")
+    remedy = "give the --out folder of suave-des campaign, or a folder with the exemplar's CSV files"
+    raise InputError("has no result files" if folder.exists() else "no such folder", file=folder, remedy=remedy)
+
+
+def _is_foreign(path: Path) -> bool:
+    """Whether a file has none of the columns that name a manager."""
+    try:
+        return not {"manager", "mission name", "mission_name"} & set(_header(path))
+    except (OSError, ValueError):
+        return False
+
+
+def _unfinished(folder: Path) -> Iterator[str]:
+    """Say how many missions a campaign lacks, from its manifest if it has one."""
+    try:
+        missions = json.loads((folder / _MANIFEST_FILE).read_text(encoding="utf-8"))["missions"]
+        left_out, failed, planned = (int(missions[key]) for key in ("left_out", "failed", "planned"))
+    except (OSError, ValueError, KeyError, TypeError):
+        return
+    if left_out:
+        how = f"suave-des campaign --resume {folder} does the rest"
+        yield f"{folder} is not finished: {left_out} of {planned} missions are missing; {how}"
+    if failed:
+        yield f"{folder}: {failed} of {planned} missions failed and are missing"
+
+
+def _varying(frame: pandas.DataFrame, columns: Iterable[str]) -> tuple[str, ...]:
+    """Return those columns that differ between missions of one manager, seed and run: what a sweep varies."""
+    columns = list(columns)
+    if not columns or frame["run"].isna().any():
+        return ()
+    counts = frame.groupby(["manager", "seed", "run"], sort=False, observed=True)[columns].nunique(dropna=False)
+    return tuple(name for name in columns if (counts[name] > 1).any())
+
+
+def _check_once(missions: Missions, path: Path | None) -> None:
+    """See that no mission is there twice.
+
+    Raises:
+        InputError: one is.
+    """
+    frame = missions.frame
+    known = frame[frame["run"].notna() & (frame["seed"] != "")]
+    twice = known.duplicated(["manager", "seed", "run", *missions.swept])
+    if twice.any():
+        row = known[twice].iloc[0]
+        problem = f"run {row['run']:.0f} of {row['manager']} with seed {row['seed']} is there twice"
+        raise InputError(problem, file=path, remedy="give each mission once")
+
+
+def _short_names(paths: Sequence[Path]) -> list[str]:
+    """Name sources by the last parts of their paths that tell them apart."""
+    parts = [path.resolve().with_suffix("").parts for path in paths]
+    for depth in range(1, max(map(len, parts))):
+        names = ["/".join(each[-depth:]) for each in parts]
+        if len(set(names)) == len(names):
+            return names
+    return [str(path) for path in paths]

@@ -1,0 +1,235 @@
+"""Managers are compared from result files: estimates, paired and unpaired differences, and what follows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import lifelines
+import numpy as np
+import pandas
+import pytest
+from scipy import stats
+from statsmodels.stats.multitest import multipletests
+
+from suave_des.campaign.campaign import run_campaign
+from suave_des.errors import InputError
+from suave_des.report.compare import Choices, Comparison, Difference, Summary, compare_folders, compare_frame
+from suave_des.report.compare_files import latex_text
+from suave_des.report.paper import published_runs
+
+MANAGERS = ("none", "random", "metacontrol")
+
+
+def difference(comparison: Comparison, first: str, second: str, metric: str = "search_time_s") -> Difference:
+    (found,) = (
+        each for each in comparison.differences if (each.first, each.second, each.metric) == (first, second, metric)
+    )
+    return found
+
+
+def summary(comparison: Comparison, group: str, metric: str = "search_time_s") -> Summary:
+    (found,) = (each for each in comparison.summaries if (each.group, each.metric) == (group, metric))
+    return found
+
+
+@pytest.fixture(scope="module")
+def published() -> Comparison:
+    return compare_folders([published_runs()])
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("campaign") / "out"
+    run_campaign("seams2023", ["none", "bt", "metacontrol"], 25, 1, out=folder)
+    return folder
+
+
+def runs(**values: list[float]) -> pandas.DataFrame:
+    """Missions of managers with given search times, run by run, with seed 1; 300 s: not found."""
+    return pandas.DataFrame(
+        [
+            {
+                "manager": manager,
+                "run": run,
+                "seed": 1,
+                "search_time_s": time_s,
+                "pipeline_found": time_s < 300.0,
+                "distance_inspected_m": 300.0 - time_s,
+            }
+            for manager, times_s in values.items()
+            for run, time_s in enumerate(times_s, 1)
+        ]
+    )
+
+
+class TestPublishedRuns:
+    def test_the_papers_table_is_printed_to_the_last_digit(self, published: Comparison) -> None:
+        lines = [" ".join(line.split()) for line in latex_text(published).splitlines()]
+        assert [line for line in lines if line.startswith(MANAGERS) and "-" not in line] == [
+            r"none & 187.85 & 42.40 & 31.40 & 13.00 \\",
+            r"random & 180.15 & 82.05 & 3.88 & 3.19 \\",
+            r"metacontrol & 106.95 & 39.46 & 51.15 & 12.01 \\",
+        ]
+
+    def test_p_values_are_scipys(self, published: Comparison) -> None:
+        frame = pandas.read_csv(published_runs())
+        count = 0
+        for first in MANAGERS:
+            for second in MANAGERS[MANAGERS.index(first) + 1 :]:
+                for metric in ("search_time_s", "distance_inspected_m"):
+                    x, y = (frame.loc[frame["manager"] == name, metric] for name in (first, second))
+                    tested = difference(published, first, second, metric).tested
+                    assert tested is not None
+                    assert tested.p == pytest.approx(stats.mannwhitneyu(x, y).pvalue, abs=1e-12)
+                    assert tested.p_less == pytest.approx(
+                        stats.mannwhitneyu(x, y, alternative="less").pvalue, abs=1e-12
+                    )
+                    assert tested.effect == pytest.approx(np.mean([(a > b) + 0.5 * (a == b) for a in x for b in y]))
+                    count += 1
+        assert count == 6
+
+    def test_holms_correction_counts_all_tests(self, published: Comparison) -> None:
+        ps = [each.tested.p for each in published.differences if each.tested]
+        assert len(ps) == 9
+        adjusted = multipletests(ps, method="holm")[1]
+        assert [each.p_holm for each in published.differences] == pytest.approx(list(adjusted))
+
+    def test_real_missions_are_not_paired_though_the_file_numbers_them(self, published: Comparison) -> None:
+        assert not any(each.pairing.is_paired for each in published.differences)
+        assert "share no random numbers" in published.differences[0].pairing.why
+
+    def test_shares_have_wilsons_interval_and_fishers_test(self, published: Comparison) -> None:
+        found = summary(published, "random", "pipeline_found")
+        assert found.mean is not None and found.mean.interval is not None
+        assert found.mean.value == 0.8
+        assert found.mean.interval == pytest.approx(tuple(stats.binomtest(16, 20).proportion_ci(0.95, "wilson")))
+        tested = difference(published, "none", "random", "pipeline_found").tested
+        assert tested is not None
+        assert tested.p == pytest.approx(stats.fisher_exact([[19, 1], [16, 4]]).pvalue, abs=1e-12)
+
+    def test_the_conclusion_names_the_best_with_an_interval(self, published: Comparison) -> None:
+        assert published.conclusion.startswith("metacontrol finds the pipeline soonest: 80.90 s sooner than none (95%")
+
+
+class TestCampaign:
+    def test_runs_with_common_random_numbers_are_paired(self, campaign: Path) -> None:
+        comparison = compare_folders([campaign])
+        times = pandas.read_csv(campaign / "runs.csv").pivot(index="run", columns="manager", values="search_time_s")
+        found = difference(comparison, "bt", "metacontrol")
+        assert (found.pairing.is_paired, found.n) == (True, (25,))
+        assert found.tested is not None and found.difference is not None
+        assert found.tested.p == pytest.approx(stats.wilcoxon(times["bt"], times["metacontrol"]).pvalue, abs=1e-12)
+        assert found.difference.value == pytest.approx((times["bt"] - times["metacontrol"]).mean())
+        apart = difference(compare_folders([campaign], Choices(unpaired=True)), "bt", "metacontrol")
+        assert (found.is_significant, apart.is_significant) == (True, False)
+        assert apart.tested is not None
+        assert apart.tested.p == pytest.approx(stats.mannwhitneyu(times["bt"], times["metacontrol"]).pvalue, abs=1e-12)
+
+    def test_the_runs_needed_give_that_interval(self, campaign: Path) -> None:
+        times = pandas.read_csv(campaign / "runs.csv").pivot(index="run", columns="manager", values="search_time_s")
+        comparison = compare_folders([campaign], Choices(half_widths=["search_time_s:2"]))
+        needed = difference(comparison, "bt", "metacontrol").runs_needed
+        assert needed is not None and needed.paired is not None and needed.unpaired is not None
+        apart = (times["bt"] - times["metacontrol"]).std()
+        for n, narrow in ((needed.paired, True), (needed.paired - 1, False)):
+            assert (stats.t.ppf(0.975, n - 1) * apart / n**0.5 <= 2.0) == narrow
+        assert needed.unpaired > 2 * needed.paired
+
+    def test_folders_side_by_side_are_told_apart_by_name(self, campaign: Path, tmp_path: Path) -> None:
+        run_campaign("seams2023", ["bt"], 10, 1, out=tmp_path / "again")
+        comparison = compare_folders([campaign, tmp_path / "again"])
+        assert {each.group for each in comparison.summaries} == {"none", "bt (out)", "bt (again)", "metacontrol"}
+        same = difference(comparison, "bt (out)", "bt (again)")
+        assert (same.pairing.is_paired, same.n) == (True, (10,))
+        assert "15 of one without a counterpart" in same.pairing.why
+        assert same.tested is not None and same.tested.p == 1.0
+
+    def test_different_seeds_are_not_paired(self, campaign: Path, tmp_path: Path) -> None:
+        run_campaign("seams2023", ["bt"], 10, 2, out=tmp_path / "again")
+        found = difference(compare_folders([campaign, tmp_path / "again"]), "bt (out)", "bt (again)")
+        assert not found.pairing.is_paired
+        assert "seeds 1 and 2 differ" in found.pairing.why
+
+    def test_a_data_frame_gives_the_same_as_its_folder(self, campaign: Path) -> None:
+        frame = pandas.read_csv(campaign / "runs.csv", keep_default_na=False, na_values=[""])
+        assert compare_frame(frame).difference_rows() == compare_folders([campaign]).difference_rows()
+
+    def test_the_restricted_mean_is_lifelines(self, campaign: Path) -> None:
+        frame = pandas.read_csv(campaign / "runs.csv")
+        own = frame[frame["manager"] == "metacontrol"]
+        fitted = lifelines.KaplanMeierFitter().fit(own["search_time_s"], own["pipeline_found"])
+        search = summary(compare_folders([campaign]), "metacontrol").search
+        assert search is not None and search.horizon_s == 300.0
+        expected = lifelines.utils.restricted_mean_survival_time(fitted, t=300.0)
+        assert search.restricted_mean_s.value == pytest.approx(expected)
+
+
+class TestSweep:
+    def test_runs_are_independent_and_points_are_not(self, tmp_path: Path) -> None:
+        values = {"visibility.period_s": [60.0, 80.0, 100.0]}
+        frame = run_campaign("seams2023", ["none", "metacontrol"], 5, 1, out=tmp_path / "out", sweep=values).frame()
+        comparison = compare_folders([tmp_path / "out"])
+        found = summary(comparison, "none")
+        assert found.n == 5
+        by_run = frame[frame["manager"] == "none"].groupby("run")["search_time_s"].mean()
+        assert found.std == pytest.approx(by_run.std())
+        assert any("averaged over visibility.period_s" in note for note in comparison.notes)
+
+    def test_points_can_be_compared_with_each_other(self, tmp_path: Path) -> None:
+        values = {"visibility.period_s": [60.0, 80.0]}
+        frame = run_campaign("seams2023", ["none"], 5, 1, out=tmp_path / "out", sweep=values).frame()
+        comparison = compare_folders([tmp_path / "out"], Choices(by=["visibility.period_s"]))
+        found = difference(comparison, "none, visibility.period_s 60", "none, visibility.period_s 80")
+        times = frame.pivot(index="run", columns="visibility.period_s", values="search_time_s")
+        assert found.difference is not None
+        assert found.pairing.is_paired
+        assert found.difference.value == pytest.approx((times[60.0] - times[80.0]).mean())
+
+
+class TestFewValues:
+    def test_one_run_has_a_mean_and_no_interval(self) -> None:
+        comparison = compare_frame(runs(a=[100.0], b=[120.0]))
+        found = summary(comparison, "a")
+        assert found.mean is not None
+        assert (found.mean.value, found.mean.interval, found.std) == (100.0, None, None)
+        assert not any(each.is_significant for each in comparison.differences)
+
+    def test_missions_that_all_never_found_the_pipeline_have_no_median(self) -> None:
+        comparison = compare_frame(runs(a=[300.0] * 25, b=[300.0] * 25))
+        search = summary(comparison, "a").search
+        assert search is not None
+        assert (search.restricted_mean_s.value, search.median_s) == (300.0, None)
+        found = difference(comparison, "a", "b")
+        assert found.tested is not None and found.tested.p == 1.0
+        assert "No difference in search time is shown" in found.conclusion
+
+    def test_one_manager_has_nothing_to_be_compared_with(self) -> None:
+        comparison = compare_frame(runs(a=[100.0, 110.0]))
+        assert comparison.differences == ()
+        assert comparison.conclusion == "There is only a, so there is nothing to compare it with."
+
+
+def test_a_significant_difference_of_ranks_against_that_of_means_is_told() -> None:
+    chance = np.random.default_rng(1)
+    a = chance.normal(100.0, 1.0, 60)
+    b = np.where(np.arange(60) < 8, 290.0, a - 5.0)
+    found = difference(compare_frame(runs(a=list(a), b=list(b))), "a", "b")
+    assert found.difference is not None and found.difference.value < 0.0
+    assert found.is_significant
+    assert "the distributions differ in shape" in found.conclusion
+
+
+@pytest.mark.parametrize(
+    ("choices", "words"),
+    [
+        (Choices(managers=["nonne"]), "no mission of 'nonne' .*did you mean 'none'"),
+        (Choices(metrics=["search_time"]), "'search_time' is no metric .*did you mean 'search_time_s'"),
+        (Choices(against="bt"), "nothing is called 'bt'"),
+        (Choices(by=["visibility"]), "'visibility' is not what a sweep varies"),
+        (Choices(half_widths=["search_time_s"]), "has no half-width .*search_time_s:2"),
+        (Choices(half_widths=["adaptations:1"]), "'adaptations' is not compared"),
+    ],
+)
+def test_a_choice_that_makes_no_sense_is_refused(choices: Choices, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        compare_folders([published_runs()], choices)
