@@ -1,7 +1,12 @@
 """The paper's two managers without knowledge: none and random (SEAMS 2023 paper; kas-lab/suave)."""
 
-from suave_des.domain import MAINTAIN_MOTION, Task
+from collections.abc import Collection
+from typing import ClassVar
+
+from suave_des.domain import GENERATE_SEARCH_PATH, MAINTAIN_MOTION, Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
+from suave_des.monitor.diagnostics import Diagnostic, Kind
+from suave_des.scenario.modes import UNGROUND_MODE
 
 
 class NoManager(ManagingSubsystem):
@@ -19,8 +24,11 @@ class RandomManager(ManagingSubsystem):
     """random: every period, each function of the task gets one of all its modes, with equal chance.
 
     maintain_motion is left alone; fd_unground and __DEFAULT__ are modes like others. Revision 2023 picks only on its
-    timer; revision 1.5 at each task request too.
+    timer, and sets the search to fd_unground as soon as the pipeline is detected; revision 1.5 picks at each task
+    request too.
     """
+
+    subscribes_to: ClassVar[Collection[Kind]] = (Kind.DETECTION,)
 
     def __init__(self, system: ManagedSystem) -> None:
         super().__init__(system)
@@ -40,6 +48,15 @@ class RandomManager(ManagingSubsystem):
         """Forget them, and set them to fd_unground."""
         self._functions = ()
         super().task_cancelled(task)
+
+    def diagnostic(self, diagnostic: Diagnostic) -> None:
+        """End the search when the pipeline is detected."""
+        if (
+            self.system.scenario.revision.random.ungrounds_search_at_detection
+            and GENERATE_SEARCH_PATH in self._functions
+        ):
+            self._functions = tuple(name for name in self._functions if name != GENERATE_SEARCH_PATH)
+            self.system.change_mode(GENERATE_SEARCH_PATH, UNGROUND_MODE)
 
     def adapt(self) -> None:
         """Pick a mode for each function."""

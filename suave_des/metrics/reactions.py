@@ -81,8 +81,8 @@ class ReactionMeter:
 class _OpenEvents:
     """The events that wait for their adaptation, and the reactions to those that were answered.
 
-    The altitude is compared at every visibility message of the whole mission, except while the battery is low. A
-    mismatch ends only when the expected altitude is set, not when the visibility comes back.
+    The altitude is compared at every visibility message of the whole mission, except while the battery is low: then an
+    open mismatch is dropped. It ends when the expected altitude is set, not when the visibility comes back.
 
     Args:
         next_message_s: gives the time of the next visibility message, changed or not.
@@ -110,8 +110,7 @@ class _OpenEvents:
         """A message of the battery's level."""
         if low:
             self._since_s.setdefault("low battery", t_s)
-            if self._since_s.get("mismatch", t_s) > t_s:
-                del self._since_s["mismatch"]  # the message that would have shown it comes too late
+            self._since_s.pop("mismatch", None)  # one that is open is dropped; if it lasts, it begins anew afterwards
         elif self._battery_low:
             self._battery_low = False
             self._compare_at(self._next_message_s(t_s))

@@ -20,6 +20,8 @@ class Kind(StrEnum):
     """Key pose, a `Pose`; not a diagnostic of the exemplar's, so nobody gets it without asking. Likewise the next."""
     DISTANCE = "Distance inspected"
     """Key distance_inspected_m."""
+    DETECTION = "Pipeline detected"
+    """Key pipeline, the index of the point seen first; at the moment of the first sight."""
 
 
 MEASURED_AND_COMPONENTS = (Kind.QA_STATUS, Kind.COMPONENT_STATUS)

@@ -20,11 +20,14 @@ from suave_des.scenario.exemplar_nodes import (
     read_configuration,
 )
 from suave_des.scenario.exemplar_releases import RELEASES, Release, release_of
-from suave_des.scenario.exemplar_settings import Settings, settings_of
+from suave_des.scenario.exemplar_settings import Setting, Settings, settings_of
 from suave_des.scenario.exemplar_text import commented, flow, heading, one_line
 from suave_des.scenario.layers import Files, Layer, Location, merge, scenario_layer
 from suave_des.scenario.loader import LoadedScenario, load_layer
 from suave_des.scenario.models import Scenario
+
+VISIBILITY = "signals.water_visibility."
+"""Begins the key paths of the visibility's settings."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +96,7 @@ def import_config(files: Sequence[Path], out: Path, options: ImportOptions) -> I
     below = scenario_layer(reader, base_path, (out,))
     release = _fitting_release(release, below)
     notes = list(configuration.notes)
-    settings = settings_of(configuration, release, notes)
+    settings = _with_kind_of_signal(settings_of(configuration, release, notes), below)
     try:
         loaded = load_layer(reader, merge(below, _layer(settings, configuration, release, out)), out)
     except InputError as error:
@@ -114,6 +117,14 @@ def import_config(files: Sequence[Path], out: Path, options: ImportOptions) -> I
     if notes:
         lines += ["", "# About the files:", *(f"#   {one_line(note)}" for note in notes)]
     return Imported(shown_base, why, "\n".join(lines) + "\n", text, tuple(notes))
+
+
+def _with_kind_of_signal(settings: Settings, base: Layer) -> Settings:
+    """The settings with the kind of the visibility, if there are some of it and the base has another kind."""
+    kind = base.data.get("signals", {}).get("water_visibility", {}).get("kind")
+    if kind == "sinusoid" or not any(path.startswith(VISIBILITY) for path in settings):
+        return settings
+    return {f"{VISIBILITY}kind": Setting("sinusoid", "as water_visibility_observer_node has it"), **settings}
 
 
 def _fitting_release(asked: Release | None, base: Layer) -> Release:

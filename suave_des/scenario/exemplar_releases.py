@@ -60,6 +60,7 @@ RELEASES: Mapping[str, Release] = {
         Release("1.2", "release15", period_key="adaptation_period", changes=_BEFORE_15),
         Release("1.3", "release15", changes=_BEFORE_15),
         Release("1.4", "release15", battery="all", changes=_BEFORE_15),
+        Release("2025", "planta_exp1", period_key="adaptation_period", battery="configured", event_times="after_start"),
         Release("1.5", "release15", battery="all", event_times="after_start"),
     )
 }
@@ -146,6 +147,8 @@ def defaults_of(release: Release, *, battery: bool) -> dict[str, tuple[str, Any]
         f"default_modes.{FOLLOW_PIPELINE}": (f"{manager}.{FOLLOW_PIPELINE}_mode", "fd_follow_pipeline"),
         "managers.random.adaptation_period_s": (f"{period}.{release.period_key}", RANDOM_PERIOD_S),
     }
+    if release.name == "2025":  # whose base starts where the study did
+        found["start.y_m"] = ("suave_runner_node.initial_pos_y", 2.0)
     if battery:
         found |= {
             "battery.discharge_time_s": ("battery_monitor.discharge_time", 200.0),

@@ -127,6 +127,8 @@ class RandomRevision(Strict):
 
     on_task_request: bool
     """Whether it picks a mode on each task request too."""
+    ungrounds_search_at_detection: bool
+    """Whether it sets the search to fd_unground when the pipeline is detected (else when the task is cancelled)."""
 
 
 class MetacontrolRevision(Strict):

@@ -22,7 +22,7 @@ from suave_des.managing.base import ManagedSystem, ManagingSubsystem
 from suave_des.metrics.reactions import ReactionMeter
 from suave_des.metrics.recording import Recorder
 from suave_des.metrics.result import MissionMetrics, MissionResult
-from suave_des.monitor.diagnostics import DiagnosticsBus, Kind
+from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.measurements import BatteryLevel, Measured, Measurements, Publishing, measure
 from suave_des.monitor.monitors import (
     ThrusterFault,
@@ -224,6 +224,8 @@ class MissionRun:
             self.env.process(pose_monitor(self.env, self._bus, lambda: self._vehicle.pose(self.env.now)))
         if self._bus.has_subscribers(Kind.DISTANCE):
             self.env.process(distance_monitor(self.env, self._bus, lambda: self._follow.distance_m))
+        if self._bus.has_subscribers(Kind.DETECTION):
+            self._detector.detected.callbacks.append(self._publish_detection)
         faults = []
         for n, event in enumerate(self._scenario.thruster_events):
             time_s = self._chance.draw(f"thruster_events.{n}.time_s", event.time_s, least=0.0)
@@ -232,6 +234,10 @@ class MissionRun:
         period_s, after_previous = monitors.thruster_check_period_s, monitors.thruster_event_times == "after_previous"
         phase_s = self._monitor_phase_s("thruster_monitor", period_s)
         self.env.process(thruster_monitor(self.env, self._bus, faults, set_health, phase_s, after_previous, period_s))
+
+    def _publish_detection(self, _: simpy.Event) -> None:
+        point = float(self._detector.first_point or 0)
+        self._bus.publish(Diagnostic(self.env.now, Kind.DETECTION, "pipeline", point))
 
     def _make_functions(self) -> dict[str, FunctionNode]:
         env, revision, chance = self.env, self._revision, self._chance

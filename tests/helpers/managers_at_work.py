@@ -93,6 +93,10 @@ class AtWork:
         """A component's status is published."""
         self.manager.diagnostic(Diagnostic(0.0, Kind.COMPONENT_STATUS, f"c_thruster_{thruster}", status))
 
+    def detected(self) -> list[tuple[str, str]]:
+        """What is asked for when the pipeline is detected."""
+        return self._during(lambda: self.manager.diagnostic(Diagnostic(0.0, Kind.DETECTION, "pipeline", 0.0)))
+
     def _during(self, action) -> list[tuple[str, str]]:
         before = len(self.modes.asked)
         action()

@@ -202,6 +202,17 @@ def test_altitude_is_checked_again_at_the_first_message_after_recharging() -> No
     assert timeline.reactions == [0.5, 1.0]  # from the message at 161.2 s, whose value is not new
 
 
+def test_an_open_mismatch_is_dropped_by_a_low_battery_and_begins_anew_afterwards() -> None:
+    timeline = Timeline().visibility(0.2, 3.75).altitude(0.7, 3.0).visibility(141.2, 2.5).battery(150.5, 0.2)
+    timeline.battery(192.5, 1.0).altitude(202.2, 2.0)
+    assert timeline.reactions == [0.5, 9.0]  # from 193.2 s, and not the 61 s from 141.2 s
+
+
+def test_a_mismatch_that_a_low_battery_dropped_is_not_answered_meanwhile() -> None:
+    timeline = Timeline().visibility(0.2, 3.75).altitude(0.7, 3.0).visibility(141.2, 2.5).battery(150.5, 0.2)
+    assert timeline.altitude(155.0, 2.0).battery(192.5, 1.0).reactions == [0.5]
+
+
 def test_a_message_that_would_have_shown_a_mismatch_comes_too_late_for_a_low_battery() -> None:
     timeline = Timeline().visibility(0.2, 3.75).altitude(0.7, 3.0)
     timeline.altitude(150.3, 1.0).battery(150.5, 0.2).altitude(153.2, 3.0)

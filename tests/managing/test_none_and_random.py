@@ -4,6 +4,8 @@ from collections import Counter
 
 import pytest
 
+from suave_des.scenario.loader import load_scenario
+from suave_des.simulation.simulator import Simulator
 from tests.helpers.managers_at_work import FOLLOW, MODES, MOTION, SEARCH, AtWork
 
 BOTH = pytest.mark.parametrize("revision", ["2023", "1.5"])
@@ -80,3 +82,30 @@ def test_random_draws_from_the_runs_stream() -> None:
         return [pick for _ in range(30) for pick in at_work.adapt()]
 
     assert picks(1) == picks(1) != picks(2)
+
+
+@pytest.mark.parametrize(("revision", "asked"), [("2023", [(SEARCH, "fd_unground")]), ("1.5", [])])
+def test_randoms_search_ends_at_the_detection_in_2023(revision: str, asked: list[tuple[str, str]]) -> None:
+    at_work = AtWork("random", revision)
+    at_work.request("search_pipeline")
+    assert at_work.detected() == asked
+    assert {function for function, _ in at_work.adapt()} == ({SEARCH} if revision == "1.5" else set())
+
+
+def test_a_detection_while_random_has_no_search_changes_nothing() -> None:
+    at_work = AtWork("random", "2023")
+    assert at_work.detected() == []
+
+
+def test_in_a_mission_of_2023_randoms_search_is_ungrounded_before_the_coordinators_poll() -> None:
+    simulator = Simulator(load_scenario("seams2023"))
+    events = next(
+        result.events
+        for run in range(1, 20)
+        if (result := simulator.run("random", run, seed=1, record=True)).metrics.pipeline_found
+    )
+    detected_s = next(each.t_s for each in events if each.event == "pipeline_detected")
+    done_s = next(each.t_s for each in events if each.event == "task_done")
+    requests = [each for each in events if each.event == "mode_requested" and each.t_s >= detected_s]
+    assert (requests[0].t_s, requests[0].detail) == (detected_s, f"{SEARCH} -> fd_unground")
+    assert detected_s < done_s <= detected_s + 1.0

@@ -191,15 +191,24 @@ class TestRevisions:
         assert load_scenario("scenario.yaml").scenario.mission.time_limit_s == 123
 
     @pytest.mark.parametrize(
-        ("revision", "node"), [("2023", "random_reasoner_node"), ("1.2", "task_bridge"), ("1.5", "task_bridge")]
+        ("revision", "node"),
+        [("2023", "random_reasoner_node"), ("1.2", "task_bridge"), ("2025", "task_bridge"), ("1.5", "task_bridge")],
     )
-    def test_before_13_the_random_manager_s_period_is_not_read(self, imported, revision, node) -> None:
+    def test_the_random_manager_s_period_is_read_in_15_alone(self, imported, revision, node) -> None:
         text = f"{node}: {{ros__parameters: {{adapt_period: 30}}}}\n"
         result = imported(text, revision=revision)
         is_read = revision == "1.5"
         notes = notes_about(result, f"{node}.adapt_period")
         assert not notes if is_read else "reads another parameter, adaptation_period" in notes[0]
         assert load_scenario("scenario.yaml").scenario.managers.random.adaptation_period_s == (30 if is_read else 15)
+
+    def test_2025_builds_on_the_scenario_of_its_runs(self, imported) -> None:
+        assert imported(MISSION_15, revision="2025").base == "planta_exp1"
+        scenario = load_scenario("scenario.yaml").scenario
+        assert scenario.revision.name == "2025"
+        assert (scenario.start.y_m, scenario.signals["water_visibility"].kind) == (2.0, "sinusoid")
+        assert scenario.battery is not None
+        assert scenario.thruster_events == ()
 
     def test_until_14_event_times_count_from_the_event_before(self, imported) -> None:
         imported(MISSION_15, revision="1.4")
@@ -220,15 +229,15 @@ class TestRevisions:
         [
             (
                 "mission_node: {ros__parameters: {time_limit: 3}}\n",
-                "2023, 1.2, 1.3, 1.4 and 1.5",
+                "2023, 1.2, 1.3, 1.4, 2025 and 1.5",
                 "mission_node (2023) or",
             ),
             (
                 "task_bridge: {ros__parameters: {adapt_period: 3}}\n",
-                "1.2, 1.3, 1.4 and 1.5",
-                "adaptation_period (1.2) or",
+                "1.2, 1.3, 1.4, 2025 and 1.5",
+                "adaptation_period (1.2, 2025) or",
             ),
-            (MISSION_15, "1.4 and 1.5", "counts from the one before (1.4) or the start (1.5)"),
+            (MISSION_15, "1.4, 2025 and 1.5", "counts from the one before (1.4) or the start (2025, 1.5)"),
         ],
     )
     def test_where_several_fit_the_user_is_asked(self, imported, text, fitting, difference) -> None:
