@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli import kb_rules
+from suave_des.cli import kb_rules, kb_test, kb_why_not
 from suave_des.cli.console import output, plain_table, print_table, print_trimmed
 from suave_des.cli.kb_options import (
     AsFormat,
@@ -280,6 +280,8 @@ def query(
             print("no rows")
 
 
+app.command("test")(kb_test.test)
+app.command("why-not")(kb_why_not.why_not)
 app.command("try")(kb_rules.try_rule)
 for _command in (
     *(kb_rules.check, kb_rules.rules, kb_rules.add_rule),

@@ -17,6 +17,7 @@ from suave_des.cli.options import KnowledgeFiles, Reasoner
 if TYPE_CHECKING:
     from suave_des.knowledge.state import KnowledgeState
     from suave_des.workbench import KnowledgeBase
+    from suave_des.workbench.state_input import StateBuilder
 
 
 class Format(StrEnum):
@@ -125,13 +126,17 @@ class StateParts:
         from suave_des.workbench.state_input import StateBuilder
 
         builder = StateBuilder(bench.base, bench.settings)
+        self.add_to(builder)
+        return builder.state()
+
+    def add_to(self, builder: StateBuilder) -> None:
+        """Add all parts to a state."""
         if self.state is not None:
             builder.add_file(self.state)
         builder.add_words("measurements", "--set", self.measured or ())
         builder.add_words("components", "--component", self.component or ())
         builder.add_words("groundings", "--ground", self.ground or ())
         builder.add_words("objectives", "--objective", self.objective or ())
-        return builder.state()
 
 
 def print_json(content: object) -> None:

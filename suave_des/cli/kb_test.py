@@ -1,0 +1,178 @@
+"""suave-des kb test: run tests of rules, measure what they cover, and write new ones."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.text import Text
+
+from suave_des.cli.console import output
+from suave_des.cli.kb_options import TimeLimitS
+from suave_des.cli.options import KnowledgeFiles, grouped_options
+
+if TYPE_CHECKING:
+    from suave_des.workbench import KnowledgeBase
+    from suave_des.workbench.testing.run import TestResult
+    from suave_des.workbench.testing.suite import RuleTest, TestFile
+
+FAILED = 1
+"""Exit status when a test fails."""
+_WIDTH = 80
+
+
+@dataclass(frozen=True)
+class Tested(KnowledgeFiles):
+    """Options that replace or add to what the files of tests say of their knowledge base."""
+
+    scenario: Annotated[
+        str | None, typer.Option("--scenario", metavar="SCENARIO", help="In place of the one that the tests name.")
+    ] = None
+
+
+@grouped_options
+def test(
+    knowledge: Tested,
+    files: Annotated[
+        list[Path] | None, typer.Argument(metavar="FILE", help="Tests in YAML; left out: those of the shipped rules.")
+    ] = None,
+    select: Annotated[
+        str | None, typer.Option("-k", metavar="TEXT", help="Only tests with this text in their name.")
+    ] = None,
+    junit_xml: Annotated[
+        Path | None, typer.Option("--junit-xml", "--junitxml", metavar="FILE", help="Write the results as JUnit XML.")
+    ] = None,
+    time_limit: TimeLimitS = 60.0,
+) -> None:
+    """Test rules: what must follow in a state, what must not, and what is decided.
+
+    Exit status: 0 all tests pass; 1 one fails; 2 something cannot be read.
+    """
+    from suave_des.campaign.output import check_output_file, write_files
+
+    if junit_xml is not None:
+        check_output_file(junit_xml, overwrite=True)
+    began = time.perf_counter()
+    suites = _suites(knowledge, files or (), time_limit)
+    console = output()
+    results = _run(console, suites, select)
+    _print_failures(console, results)
+    if junit_xml is not None:
+        from suave_des.workbench.testing.junit import junit_xml as written
+
+        write_files(junit_xml.parent, {junit_xml.name: written(results)})
+    _print_summary(console, results, time.perf_counter() - began)
+    if not all(result.passed for result in results):
+        raise typer.Exit(FAILED)
+
+
+@dataclass(frozen=True)
+class Suite:
+    """A file of tests with its knowledge base."""
+
+    file: TestFile
+    bench: KnowledgeBase
+    tests: tuple[RuleTest, ...]
+
+
+def _suites(knowledge: Tested, files: Sequence[Path], time_limit_s: float) -> list[Suite]:
+    """Read all files before anything runs, so that a mistake in the last one comes first."""
+    from suave_des.workbench.testing.suite import KnowledgeFiles as About
+    from suave_des.workbench.testing.suite import TestFile, shipped_tests
+
+    benches: dict[About, KnowledgeBase] = {}
+    suites = []
+    for file in [TestFile.read(path) for path in files or shipped_tests()]:
+        about = file.knowledge.with_replacements(knowledge.scenario, knowledge.replacements)
+        if about not in benches:
+            benches[about] = about.load(time_limit_s)
+        suites.append(Suite(file, benches[about], file.tests(benches[about])))
+    return suites
+
+
+def _run(console: Console, suites: Iterable[Suite], select: str | None) -> list[TestResult]:
+    from suave_des.errors import InputError, shown
+    from suave_des.workbench.testing.run import Runner
+
+    chosen = [
+        (suite, [test for test in suite.tests if select is None or select.lower() in test.name.lower()])
+        for suite in suites
+    ]
+    total = sum(len(tests) for _, tests in chosen)
+    if total == 0:
+        raise InputError(f"no test has {shown(select)} in its name", place="-k", remedy="see the names in the files")
+    results: list[TestResult] = []
+    runners: dict[int, Runner] = {}
+    for suite, tests in chosen:
+        if not tests:
+            continue
+        runner = runners.setdefault(id(suite.bench), Runner.of(suite.bench))
+        line = _Dots(console, _place(suite.file.document.path))
+        for test in tests:
+            results.append(runner.run(test))
+            line.add(results[-1].passed, len(results) / total)
+        line.end(len(results) / total)
+    return results
+
+
+def _place(file: Path, line: int | None = None) -> str:
+    from suave_des.workbench.findings import relative_path
+
+    return relative_path(file) + (f":{line}" if line is not None else "")
+
+
+class _Dots:
+    """A line of dots, as pytest prints it; a new one where the terminal ends."""
+
+    def __init__(self, console: Console, name: str) -> None:
+        self.console, self.width = console, min(console.width, _WIDTH)
+        console.print(Text(f"{name} "), end="", soft_wrap=True)
+        self.at = len(name) + 1
+
+    def add(self, passed: bool, share: float) -> None:
+        """Print one test's letter."""
+        if self.at >= self.width - 8:
+            self.end(share)
+        self.console.print(Text("." if passed else "F", "green" if passed else "red"), end="", soft_wrap=True)
+        self.at += 1
+
+    def end(self, share: float) -> None:
+        """Print how much is done, and end the line."""
+        self.console.print(Text(f"[{share:4.0%}]".rjust(max(7, self.width - self.at)), "cyan"), soft_wrap=True)
+        self.at = 0
+
+
+def _print_failures(console: Console, results: Sequence[TestResult]) -> None:
+    from suave_des.workbench.testing.junit import failure_lines
+
+    failed = [result for result in results if not result.passed]
+    if not failed:
+        return
+    width = min(console.width, _WIDTH)
+    console.print(Text("\n" + " FAILURES ".center(width, "=")), soft_wrap=True)
+    for result in failed:
+        console.print(Text(f" {result.test.name} ".center(width, "_"), "bold red"), soft_wrap=True)
+        console.print(Text(_place(result.test.file, result.test.line)), soft_wrap=True)
+        for failure in result.failures:
+            first, *more = failure_lines(failure)
+            console.print(Text(first, "red"), soft_wrap=True)
+            console.print(Text("\n".join(more)), soft_wrap=True)
+    console.print(Text(" short summary ".center(width, "=")), soft_wrap=True)
+    for result in failed:
+        place = _place(result.test.file, result.test.line)
+        console.print(Text(f"FAILED {place}: {result.test.name}: {result.failures[0].what}"), soft_wrap=True)
+
+
+def _print_summary(console: Console, results: Sequence[TestResult], duration_s: float) -> None:
+    failed = sum(not result.passed for result in results)
+    passed = len(results) - failed
+    states = sum(len(result.test.situations) for result in results)
+    counts = [f"{failed} failed"] * bool(failed) + [f"{passed} passed"] * bool(passed)
+    line = f" {', '.join(counts)}, {states} states, in {duration_s:.2f} s "
+    width = min(console.width, _WIDTH)
+    console.print(Text(line.center(width, "="), "bold red" if failed else "bold green"), soft_wrap=True)

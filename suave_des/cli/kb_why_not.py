@@ -1,0 +1,97 @@
+"""suave-des kb why-not: why rules do not fire, each in one line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from suave_des.cli.kb_options import AsFormat, Format, Sources, StateParts, TimeLimitS, print_json
+from suave_des.cli.options import grouped_options
+
+if TYPE_CHECKING:
+    from suave_des.knowledge.ontology import Ontology
+    from suave_des.workbench.state_input import StateBuilder
+    from suave_des.workbench.unusable_rules import UnusableRule
+
+
+@dataclass(frozen=True)
+class StateAnywhere(StateParts):
+    """Options that describe a state, or say where it is recorded."""
+
+    at: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--at",
+            metavar="WHAT",
+            help="Part of the state: NAME=VALUE of a quality attribute, component or function; a YAML file; "
+            "or FOLDER@SECONDS of a recorded mission.",
+        ),
+    ] = None
+
+    def add_to(self, builder: StateBuilder) -> None:
+        """Add all parts; those of --at come first, and the other options replace what they say."""
+        from suave_des.workbench.state_words import add_at
+
+        add_at(builder, self.at or ())
+        super().add_to(builder)
+
+
+@grouped_options
+def why_not(
+    sources: Sources,
+    parts: StateAnywhere,
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="RULE", help="Names of rules; left out: all that do not fire.")
+    ] = None,
+    facts: Annotated[
+        list[str] | None, typer.Option("--fact", metavar="FACT", help='Assert besides, such as "Binding(b1)".')
+    ] = None,
+    time_limit: TimeLimitS = 60.0,
+    form: AsFormat = Format.TEXT,
+) -> None:
+    """Say why a rule does not fire: the first atom that fails, what was found and what is needed.
+
+    Exit status: 0 also if a rule fires.
+    """
+    from suave_des.knowledge.limit import TimeLimit
+    from suave_des.scenario.loader import load_scenario
+    from suave_des.workbench.state_input import ManagingSettings, StateBuilder
+    from suave_des.workbench.testing.situation import FactReader, with_facts
+    from suave_des.workbench.why_not import RuleQuestions
+
+    base, unusable = _open(sources)
+    reader = FactReader(base)
+    reader.declare(facts or ())
+    base = with_facts(base, [reader.triple(fact) for fact in facts or ()])
+    builder = StateBuilder(base, ManagingSettings.of(load_scenario(sources.scenario).scenario))
+    parts.add_to(builder)
+    state = builder.state()
+    questions = RuleQuestions(base, tuple(unusable))
+    named = names or sorted({*(rule.name for rule in base.rules), *(each.name for each in unusable)})
+    limit = TimeLimit(time_limit, "--time-limit")
+    answers = [limit.run(partial(questions.why_not, name, state), f"looking for what {name} lacks") for name in named]
+    shown = [answer for answer in answers if names or not answer.fires]
+    if form is Format.JSON:
+        print_json(shown)
+        return
+    for answer in shown:
+        print(answer)
+    if not shown:
+        print("all rules fire")
+
+
+def _open(sources: Sources) -> tuple[Ontology, list[UnusableRule]]:
+    """Open a knowledge base with those of its rules as text that can be used, and list the others."""
+    from suave_des.knowledge.rules.syntax import RuleError
+    from suave_des.scenario.loader import load_scenario
+    from suave_des.scenario_knowledge import open_base
+    from suave_des.workbench.unusable_rules import open_without_unusable
+
+    loaded = load_scenario(sources.scenario, **sources.replacements)
+    try:
+        return open_base(loaded), []
+    except RuleError:
+        return open_without_unusable(loaded)

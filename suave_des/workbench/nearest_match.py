@@ -1,0 +1,241 @@
+"""Find the binding of a rule's variables that comes nearest to making the whole body hold.
+
+Atoms about facts are matched with what follows in a state. What a built-in says of given values, or computes from
+them, is asked of Pellet, with a rule that has this one atom.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Final
+
+from rdflib import BNode
+
+from suave_des.knowledge import jvm
+from suave_des.knowledge.content import Content
+from suave_des.knowledge.pellet import load_n_triples, one_at_a_time, read_term
+from suave_des.knowledge.rdf import EXACT, Lit, Triple, canonical
+from suave_des.knowledge.rules.names import TESTERS
+from suave_des.knowledge.rules.rdf import with_triples
+from suave_des.knowledge.rules.syntax import Atom, Named, Rule, Variable
+from suave_des.knowledge.vocabulary import RDF_TYPE, XSD
+from suave_des.workbench.derivations import FACT_KINDS, Binding, matched
+
+#: Ways to bind variables that are looked at for each number of atoms that fail.
+MOST_WAYS: Final = 20_000
+_PROBE: Final = "urn:suave-des:probe"
+
+
+@dataclass(frozen=True)
+class NearestMatch:
+    """The best way to match a rule's body.
+
+    Attributes:
+        binding: what the variables stand for.
+        failing: numbers of the atoms that do not hold, ascending; none where the whole body holds.
+        is_complete: whether all ways were looked at.
+    """
+
+    binding: Binding
+    failing: tuple[int, ...]
+    is_complete: bool = True
+
+
+class Facts:
+    """What follows in a state, to be looked up by property and subject."""
+
+    def __init__(self, known: Iterable[Triple]) -> None:
+        self.all = tuple((subject, predicate, comparable(value)) for subject, predicate, value in known)
+        self._by_predicate: dict[str, list[Triple]] = {}
+        self._by_subject: dict[tuple[str, str], list[Triple]] = {}
+        for triple in self.all:
+            self._by_predicate.setdefault(_key(triple), []).append(triple)
+            self._by_subject.setdefault((_key(triple), triple[0]), []).append(triple)
+
+    def candidates(self, atom: Atom, binding: Binding) -> Sequence[Triple]:
+        """Facts that an atom may say, given what its subject stands for."""
+        first = atom.arguments[0]
+        subject = first.iri if isinstance(first, Named) else binding.get(getattr(first, "name", ""))
+        if isinstance(subject, str):
+            return self._by_subject.get((atom.predicate, subject), ())
+        return self._by_predicate.get(atom.predicate, ())
+
+    def matches(self, atom: Atom, binding: Binding) -> Iterator[Binding]:
+        """Extend a binding in each way in which an atom says a fact."""
+        for triple in self.candidates(atom, binding):
+            bound = matched(atom, triple, binding)
+            if bound is not None:
+                yield bound
+
+    def values(self, subject: str, predicate: str) -> list[str | Lit]:
+        """Values of a property of an individual."""
+        return [triple[2] for triple in self._by_subject.get((predicate, subject), ())]
+
+    def members(self, name: str) -> list[str]:
+        """Members of a class."""
+        return [triple[0] for triple in self._by_predicate.get(name, ())]
+
+
+def comparable(value: str | Lit) -> str | Lit:
+    """Write a whole number as a decimal: Pellet takes 3 and 3.0 as equal."""
+    if isinstance(value, Lit) and value.datatype in EXACT:
+        return canonical(Lit(value.text, XSD + "decimal"))
+    return value
+
+
+def _key(triple: Triple) -> str:
+    """The property of a triple, or the class of which it says membership."""
+    return str(triple[2]) if triple[1] == RDF_TYPE else triple[1]
+
+
+@dataclass
+class NearestFinder:
+    """Finds the nearest match of one rule in one state.
+
+    Attributes:
+        rule: the rule.
+        facts: all that follows in the state.
+        start: what variables must stand for.
+    """
+
+    rule: Rule
+    facts: Facts
+    start: Binding = field(default_factory=dict)
+    _answers: dict[Atom, tuple[Lit, ...]] = field(default_factory=dict)
+    _ways: int = 0
+
+    def find(self) -> NearestMatch:
+        """Find the binding with the fewest atoms that fail.
+
+        Of several, one where a comparison fails comes before one where a value differs, and that before one where
+        nothing is known. Atoms of which there is no fact at all fail in any case.
+        """
+        body = tuple(map(_comparable_atom, self.rule.body))
+        hopeless = frozenset(
+            number
+            for number, atom in enumerate(body)
+            if atom.kind in FACT_KINDS and next(self.facts.matches(atom, self.start), None) is None
+        )
+        order = [number for number in _testable_order(body) if number not in hopeless]
+        complete = True
+        for allowed in range(len(order) + 1):
+            self._ways = 0
+            best: tuple[tuple[object, ...], NearestMatch] | None = None
+            for binding, failing in self._ways_to_match(order, self.start, (), allowed):
+                found = NearestMatch(binding, tuple(sorted({*failing, *hopeless})))
+                rank = tuple(self._distance(number, binding) for number in failing), str(sorted(binding.items()))
+                if best is None or rank < best[0]:
+                    best = rank, found
+            complete = complete and self._ways < MOST_WAYS
+            if best is not None:
+                return NearestMatch(best[1].binding, best[1].failing, complete)
+        return NearestMatch(self.start, tuple(range(len(body))), False)
+
+    def _ways_to_match(
+        self, order: Sequence[int], binding: Binding, failing: tuple[int, ...], allowed: int
+    ) -> Iterator[tuple[Binding, tuple[int, ...]]]:
+        self._ways += 1
+        if self._ways > MOST_WAYS:
+            return
+        if not order:
+            yield binding, failing
+            return
+        number, rest = order[0], order[1:]
+        atom = _comparable_atom(self.rule.body[number])
+        if atom.kind in FACT_KINDS:
+            for bound in self.facts.matches(atom, binding):
+                yield from self._ways_to_match(rest, bound, failing, allowed)
+            is_failing = True  # the fact that is missing may be the only thing wrong, with another binding
+        else:
+            results = self.tested(atom, binding)
+            for bound in results or ():
+                yield from self._ways_to_match(rest, bound, failing, allowed)
+            is_failing = results == []
+            if results is None:  # a variable has no value, as the atom that gives it one fails
+                yield from self._ways_to_match(rest, binding, failing, allowed)
+        if is_failing and len(failing) < allowed:
+            yield from self._ways_to_match(rest, binding, (*failing, number), allowed)
+
+    def tested(self, atom: Atom, binding: Binding) -> list[Binding] | None:
+        """What a built-in, a datatype, sameAs or differentFrom makes of a binding.
+
+        Returns:
+            the bindings with which it holds, with what it computes; None if an argument has no value.
+        """
+        given = [binding.get(term.name, term) if isinstance(term, Variable) else term for term in atom.arguments]
+        unbound = [number for number, term in enumerate(given) if isinstance(term, Variable)]
+        computes = atom.kind == "builtin" and atom.predicate not in TESTERS and unbound == [0]
+        if unbound and not computes:
+            return None
+        if atom.kind in ("same", "different"):
+            is_same = str(given[0]) == str(given[1])
+            return [binding] if is_same == (atom.kind == "same") else []
+        arguments = tuple(Named(term) if type(term) is str else term for term in given)
+        asked = Atom(atom.kind, atom.predicate, arguments)  # type: ignore[arg-type]
+        if asked not in self._answers:
+            self._answers[asked] = _ask_pellet(asked, computes=computes)
+        values = self._answers[asked]
+        if computes:
+            name = atom.arguments[0].name  # type: ignore[union-attr]
+            return [{**binding, name: comparable(value)} for value in values]
+        return [binding] if values else []
+
+    def _distance(self, number: int, binding: Binding) -> tuple[int, int]:
+        """How far an atom is from holding: a comparison, another value, nothing."""
+        atom = self.rule.body[number]
+        if atom.kind not in FACT_KINDS:
+            return 0, -number
+        if atom.kind == "class":
+            return 3, -number
+        first = atom.arguments[0]
+        subject = first.iri if isinstance(first, Named) else binding.get(getattr(first, "name", ""))
+        if isinstance(subject, str) and self.facts.values(subject, atom.predicate):
+            return 1, -number
+        return 2, -number
+
+
+def _comparable_atom(atom: Atom) -> Atom:
+    arguments = tuple(comparable(term) if isinstance(term, Lit) else term for term in atom.arguments)
+    return replace(atom, arguments=arguments)  # type: ignore[arg-type]
+
+
+def _testable_order(body: Sequence[Atom]) -> list[int]:
+    """Atoms in the order of the rule, but those that test or compute after all that bind their variables."""
+    waiting = list(range(len(body)))
+    bound: set[str] = set()
+    order: list[int] = []
+    while waiting:
+        ready = (
+            number
+            for number in waiting
+            if body[number].kind in FACT_KINDS or set(list(body[number].variables())[_outputs(body[number]) :]) <= bound
+        )
+        number = next(ready, waiting[0])
+        waiting.remove(number)
+        order.append(number)
+        bound |= set(body[number].variables())
+    return order
+
+
+def _outputs(atom: Atom) -> int:
+    """Whether the first argument of a built-in is computed: 1, else 0."""
+    is_computing = atom.kind == "builtin" and atom.predicate not in TESTERS
+    return int(is_computing and isinstance(atom.arguments[0], Variable))
+
+
+def _ask_pellet(atom: Atom, *, computes: bool) -> tuple[Lit, ...]:
+    """What Pellet computes for the first argument, or one value if the atom holds."""
+    result = atom.arguments[0] if computes else Lit("true", XSD + "boolean")
+    head = Atom("data", f"{_PROBE}#value", (Named(f"{_PROBE}#it"), result))
+    rule = with_triples(Rule("probe", "", Path(), True, BNode(), (), (atom,), (head,)))
+    with one_at_a_time:
+        knowledge_base = load_n_triples(Content((), (), (rule,)).n_triples())
+        term = jvm.java_class("org.mindswap.pellet.utils.ATermUtils").makeTermAppl
+        knowledge_base.addIndividual(term(f"{_PROBE}#it"))
+        knowledge_base.isConsistent()
+        entries = knowledge_base.getPropertyValues(term(f"{_PROBE}#value")).entrySet()
+        found = [read_term(str(value.toString())) for entry in entries for value in entry.getValue()]
+        jvm.take_warnings()
+    return tuple(sorted(value for value in found if isinstance(value, Lit)))

@@ -1,0 +1,1 @@
+"""Tests of rules: read, run and reported like those of programs, with coverage and mutation."""

@@ -1,0 +1,202 @@
+"""Read one test of a file: what is given, and what is expected."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Final
+
+from suave_des.errors import InputError, KeyPath, did_you_mean, shown
+from suave_des.knowledge.state import Fact, KnowledgeState
+from suave_des.scenario.yamlfile import YamlDocument
+from suave_des.workbench.knowledge_base import KnowledgeBase
+from suave_des.workbench.policy import NONE_LEFT
+from suave_des.workbench.policy_space import ValueRange
+from suave_des.workbench.state_input import StateBuilder
+from suave_des.workbench.state_words import add_state, recorded_state, recorded_states
+from suave_des.workbench.testing.regions import measurements_in, parse_region
+from suave_des.workbench.testing.situation import STAYS, FactReader, Situation, check_function
+from suave_des.workbench.testing.suite import RuleTest, check_keys, texts
+
+_TEST_KEYS: Final = ("name", "given", "follows", "follows_not", "decides", "contradiction", "without", "changes")
+_EXPECTATIONS: Final = ("follows", "follows_not", "decides", "contradiction", "changes")
+_STATE_KEYS: Final = ("objectives", "groundings", "components", "measurements")
+_GIVEN_KEYS: Final = (*_STATE_KEYS, "facts", "mission", "run", "at_s")
+
+
+@dataclass(frozen=True)
+class TestReader:
+    """Reads one test of a file; errors have its line and key.
+
+    Attributes:
+        document: the file.
+        bench: the knowledge base in which names are looked up.
+        place: of the test in the file.
+        content: of the test.
+        facts: reads facts, with the new individuals of this test.
+    """
+
+    __test__ = False  # pytest takes it for a test otherwise
+    document: YamlDocument
+    bench: KnowledgeBase
+    place: KeyPath
+    content: Mapping[str, Any]
+    facts: FactReader
+
+    @classmethod
+    def of(cls, document: YamlDocument, bench: KnowledgeBase, number: int) -> TestReader:
+        """Start with the test of a number, from 0."""
+        place = ("tests", number)
+        content = document.data["tests"][number]
+        check_keys(document, content, place, _TEST_KEYS)
+        return cls(document, bench, place, content, FactReader(bench.base))
+
+    def test(self) -> RuleTest:
+        """Read it.
+
+        Raises:
+            InputError: a name is unknown, or something is not as it must be.
+        """
+        content = self.content
+        name = content.get("name")
+        if not isinstance(name, str) or not name.strip():
+            raise self.error("this test has no name", (), "say in `name:` what the rules must do")
+        if not any(content.get(key) for key in _EXPECTATIONS):
+            raise self.error("this test expects nothing", (), f"give one of {', '.join(_EXPECTATIONS)}")
+        contradicts = content.get("contradiction", False)
+        if not isinstance(contradicts, bool):
+            raise self.error(f"{shown(contradicts)} is neither true nor false", ("contradiction",))
+        without = self._without()
+        return RuleTest(
+            name=name.strip(),
+            file=self.document.path,
+            line=self.document.line(self.place),
+            situations=self._situations(),
+            follows=self._facts("follows"),
+            follows_not=self._facts("follows_not"),
+            decides=tuple(self._decisions()),
+            contradicts=contradicts,
+            without=without,
+            changes=tuple(self._changes()),
+        )
+
+    def error(self, problem: str, place: KeyPath, remedy: str | None = None) -> InputError:
+        """An error about a part of the test."""
+        return self.document.error(problem, (*self.place, *place), remedy)
+
+    @contextmanager
+    def _at(self, *place: str | int) -> Iterator[None]:
+        """Give errors the place of a part of the test."""
+        try:
+            yield
+        except InputError as error:
+            if error.file is not None:
+                raise
+            raise self.error(error.problem, place, error.remedy) from None
+
+    def _texts(self, *place: str) -> list[str]:
+        content: Any = self.content
+        for key in place:
+            content = (content or {}).get(key)
+        return texts(self.document, content or [], (*self.place, *place))
+
+    def _mapping(self, key: str, example: str) -> Iterator[tuple[str, Any]]:
+        content = self.content.get(key) or {}
+        if not isinstance(content, Mapping):
+            raise self.error(f"{shown(content)} is not a mapping", (key,), example)
+        for name, value in content.items():
+            with self._at(key, name):
+                check_function(self.bench.base, name)
+            yield name, value
+
+    def _facts(self, key: str) -> tuple[Fact, ...]:
+        found = []
+        for at, text in enumerate(self._texts(key)):
+            with self._at(key, at):
+                found.append(self.facts.fact(text))
+        return tuple(found)
+
+    def _without(self) -> tuple[str, ...]:
+        names = self._texts("without")
+        known = sorted({rule.name for rule in self.bench.base.content.enabled_rules})
+        for name in names:
+            if name not in known:
+                raise self.error(f"there is no enabled rule {shown(name)}", ("without",), did_you_mean(name, known))
+        if bool(names) != bool(self.content.get("changes")):
+            remedy = "without: RULE, and changes: {FUNCTION: BEFORE -> AFTER}"
+            raise self.error("`without` and `changes` need one another", (), remedy)
+        return tuple(names)
+
+    def _decisions(self) -> Iterator[tuple[str, str]]:
+        for function, words in self._mapping("decides", "decides: {FUNCTION: DESIGN}"):
+            yield function, self._choice(function, words, ("decides", function))
+
+    def _changes(self) -> Iterator[tuple[str, str, str]]:
+        example = "changes: {FUNCTION: BEFORE -> AFTER}"
+        for function, words in self._mapping("changes", example):
+            place = ("changes", function)
+            sides = words.split("->") if isinstance(words, str) else ()
+            if len(sides) != 2:
+                raise self.error(f"{shown(words)} says of no change", place, example)
+            before, after = (self._choice(function, side, place) for side in sides)
+            yield function, before, after
+
+    def _choice(self, function: str, words: Any, place: KeyPath) -> str:
+        known = (*self.bench.base.designs(function), STAYS, NONE_LEFT)
+        choice = words.strip() if isinstance(words, str) else words
+        if choice not in known:
+            raise self.error(f"{function} has no function design {shown(words)}", place, did_you_mean(words, known))
+        return str(choice)
+
+    def _situations(self) -> tuple[Situation, ...]:
+        given = self.content.get("given") or {}
+        check_keys(self.document, given, (*self.place, "given"), _GIVEN_KEYS)
+        asserted = self._texts("given", "facts")
+        triples = []
+        for at, text in enumerate(asserted):
+            with self._at("given", "facts", at):
+                self.facts.declare([text])
+        for at, text in enumerate(asserted):
+            with self._at("given", "facts", at):
+                triples.append(self.facts.triple(text))
+        return tuple(Situation(state, tuple(triples), words) for state, words in self._states(given))
+
+    def _states(self, given: Mapping[str, Any]) -> Iterator[tuple[KnowledgeState, str]]:
+        builder = StateBuilder(self.bench.base, self.bench.settings)
+        if "mission" in given:
+            self._add_recorded(builder, given)
+        elif stray := given.keys() & {"run", "at_s"}:
+            raise self.error(f"{min(stray)} without a mission", ("given", min(stray)), "mission: FOLDER")
+        regions: dict[str, ValueRange] = {}
+        for kind in _STATE_KEYS:
+            content = given.get(kind) or {}
+            if isinstance(content, list) and kind == "objectives":
+                content = dict.fromkeys(content)
+            if not isinstance(content, Mapping):
+                raise self.error(f"{shown(content)} is not a mapping", ("given", kind), "write NAME: VALUE")
+            for name, value in content.items():
+                with self._at("given", kind, name):
+                    region = parse_region(value) if kind == "measurements" and isinstance(value, str) else None
+                    builder.add(kind, name, 0 if region else value)
+                    if region:
+                        regions[name] = region
+        with self._at("given"):
+            for values, words in measurements_in(self.bench.base, regions):
+                for name, value in values.items():
+                    if value is None:
+                        builder.measurements.pop(name, None)
+                    else:
+                        builder.add("measurements", name, value)
+                yield builder.state(), words
+
+    def _add_recorded(self, builder: StateBuilder, given: Mapping[str, Any]) -> None:
+        """Begin with the state that a mission recorded last at or before a time."""
+        folder, at_s = given["mission"], given.get("at_s")
+        if not isinstance(folder, str):
+            raise self.error(f"{shown(folder)} is not a folder", ("given", "mission"), "one that run --out wrote")
+        if isinstance(at_s, bool) or not isinstance(at_s, int | float):
+            raise self.error("the mission time is missing", ("given", "mission"), "at_s: 53.7")
+        with self._at("given", "mission"):
+            records = recorded_states(self.document.path.parent / folder, given.get("run"))
+            add_state(builder, recorded_state(records, at_s))

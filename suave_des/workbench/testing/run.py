@@ -1,0 +1,213 @@
+"""Run tests of rules, and explain what fails."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+from suave_des.errors import InputError, KnowledgeError
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.state import Fact
+from suave_des.workbench.explain import explain
+from suave_des.workbench.knowledge_base import KnowledgeBase
+from suave_des.workbench.testing.situation import STAYS, Outcome, Prover, Situation, with_content, with_facts
+from suave_des.workbench.testing.suite import RuleTest
+from suave_des.workbench.why_not import RuleQuestions
+
+#: Rules that are asked why they did not conclude a missing fact.
+_ASKED: Final = 3
+
+
+@dataclass(frozen=True)
+class Failure:
+    """An expectation that does not hold.
+
+    Attributes:
+        what: in one line.
+        situation: the first one in which it does not hold.
+        fact: the fact that it is about.
+        function: the function that it is about.
+        because: why, as lines.
+    """
+
+    what: str
+    situation: Situation
+    fact: Fact | None = None
+    function: str | None = None
+    because: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class TestResult:
+    """What came of a test.
+
+    Attributes:
+        test: the test.
+        failures: none if it passed.
+        duration_s: how long it took, explanations included.
+    """
+
+    __test__ = False  # pytest takes it for a test otherwise
+    test: RuleTest
+    failures: tuple[Failure, ...]
+    duration_s: float = field(compare=False)
+
+    @property
+    def passed(self) -> bool:
+        """Whether all that was expected is so."""
+        return not self.failures
+
+
+@dataclass(frozen=True)
+class Runner:
+    """Runs tests on one knowledge base.
+
+    Attributes:
+        bench: the knowledge base.
+        prover: the same, or a changed form of it, in Pellet.
+
+    Example:
+        >>> runner = Runner.of(KnowledgeBase.load())
+        >>> [result.passed for result in map(runner.run, tests)]
+        [True, True]
+    """
+
+    bench: KnowledgeBase
+    prover: Prover
+    _without: dict[tuple[str, ...], Prover] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, bench: KnowledgeBase, base: Ontology | None = None) -> Runner:
+        """Load a knowledge base, or a changed form of it, into Pellet.
+
+        Raises:
+            KnowledgeError: Pellet cannot use it.
+        """
+        return cls(bench, Prover.of(bench, base))
+
+    def run(self, test: RuleTest) -> TestResult:
+        """Run a test, and explain what fails.
+
+        Raises:
+            KnowledgeError: the reasoner takes too long.
+        """
+        began = time.perf_counter()
+        failures: tuple[Failure, ...] = ()
+        for situation in test.situations:
+            failures = tuple(
+                replace(each, because=tuple(self._because(each))) for each in self._problems(test, situation)
+            )
+            if failures:
+                break
+        return TestResult(test, failures, time.perf_counter() - began)
+
+    def passes(self, test: RuleTest) -> bool:
+        """Whether all that a test expects is so; nothing is explained."""
+        return not any(True for situation in test.situations for _ in self._problems(test, situation))
+
+    def _problems(self, test: RuleTest, situation: Situation) -> Iterator[Failure]:
+        """Each expectation that does not hold in a situation."""
+        outcome = self.prover.outcome(situation)
+        if outcome.conclusion is None:
+            if not test.contradicts:
+                yield Failure(f"the situation contradicts itself: {outcome.contradiction}", situation)
+            return
+        if test.contradicts:
+            yield Failure("the situation does not contradict itself", situation)
+        for fact in test.follows:
+            if fact not in outcome.known:
+                yield Failure(f"{fact} does not follow", situation, fact)
+        for fact in test.follows_not:
+            if fact in outcome.known:
+                yield Failure(f"{fact} follows", situation, fact)
+        for function, wanted in test.decides:
+            chosen = outcome.choice(function)
+            if not _same(chosen, wanted, situation, function):
+                what = f"{function}: {_words(chosen, situation, function)}, not {wanted}"
+                yield Failure(what, situation, function=function)
+        if test.changes:
+            yield from self._changes(test, situation, outcome)
+
+    def _changes(self, test: RuleTest, situation: Situation, outcome: Outcome) -> Iterator[Failure]:
+        without = self._prover_without(test.without).outcome(situation)
+        names = ", ".join(test.without)
+        for function, before, after in test.changes:
+            for chosen, wanted, what in (
+                (without.choice(function), before, f"without {names}"),
+                (outcome.choice(function), after, f"with {names}"),
+            ):
+                if not _same(chosen, wanted, situation, function):
+                    said = f"{function}, {what}: {_words(chosen, situation, function)}, not {wanted}"
+                    yield Failure(said, situation, function=function)
+
+    def _prover_without(self, names: tuple[str, ...]) -> Prover:
+        """The knowledge base without some rules."""
+        if names not in self._without:
+            base = self.prover.base
+            kept = tuple(rule for rule in base.rules if rule.name not in names)
+            changed = with_content(base, replace(base.content, rules=kept))
+            self._without[names] = Prover.of(self.bench, changed)
+        return self._without[names]
+
+    def _because(self, failure: Failure) -> Iterator[str]:
+        """Why something follows or does not, or is decided as it is."""
+        fact, function = failure.fact, failure.function
+        base = with_facts(self.prover.base, failure.situation.facts)
+        state, improves = failure.situation.state, self.prover.improves_exceeded
+        try:
+            if fact is not None and failure.what.endswith("does not follow"):
+                yield from _missing(base, failure.situation, fact)
+            elif fact is not None:
+                yield from explain(base, state, str(fact), improves).lines()
+            elif function is not None:
+                decisions = explain(base, state, "", improves).decisions
+                found = [each for each in decisions if each.function == function]
+                for decision in found:
+                    yield from (f"{each.design}: {each.verdict}: {each.reason}" for each in decision.candidates)
+                if not found:
+                    yield f"the objective of {function} calls for no adaptation"
+        except (InputError, KnowledgeError) as error:
+            yield str(error)
+
+
+def _missing(base: Ontology, situation: Situation, fact: Fact) -> Iterator[str]:
+    """Why each rule that could conclude a fact does not."""
+    questions = RuleQuestions(base)
+    able = [
+        rule
+        for rule in base.content.enabled_rules
+        if any(
+            (atom.predicate in base.vocabulary.candidates(str(fact.value)) and fact.property == "type")
+            or base.names.short(atom.predicate) == fact.property
+            for atom in rule.head
+        )
+    ]
+    answers = [answer for rule in able if not (answer := questions.of(rule, situation.state)).fires]
+    answers.sort(key=lambda answer: (answer.answer.count("more atom"), len(answer.answer)))
+    for answer in answers[:_ASKED]:
+        yield str(answer)
+    if not able:
+        what = f"membership in {fact.value}" if fact.property == "type" else fact.property
+        yield f"no rule concludes {what}"
+
+
+def _same(chosen: str, wanted: str, situation: Situation, function: str) -> bool:
+    """Whether two outcomes leave a function with the same design."""
+    present = situation.state.grounded(function)
+    return chosen == wanted or (chosen == STAYS and wanted == present)
+
+
+def _words(chosen: str, situation: Situation, function: str) -> str:
+    present = situation.state.grounded(function)
+    return f"{present} stays" if chosen == STAYS and present else chosen
+
+
+def situations_of(tests: Iterable[RuleTest]) -> Mapping[Situation, tuple[RuleTest, ...]]:
+    """Each situation of tests once, with the tests that use it."""
+    found: dict[Situation, list[RuleTest]] = {}
+    for test in tests:
+        for situation in test.situations:
+            found.setdefault(situation, []).append(test)
+    return {situation: tuple(users) for situation, users in found.items()}

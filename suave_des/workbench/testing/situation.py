@@ -1,0 +1,283 @@
+"""Situations that rules are tested in: a knowledge state, and further facts; and what Pellet concludes in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Final
+
+from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
+from suave_des.knowledge.content import Content
+from suave_des.knowledge.deliberation import Conclusion, Deliberation
+from suave_des.knowledge.limit import LOADING, TimeLimit, reasoning_on
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet import InProcessPellet
+from suave_des.knowledge.rdf import Lit, Triple, facts_of
+from suave_des.knowledge.rules.parser import parse_rule
+from suave_des.knowledge.rules.syntax import Atom, Named, RuleError, Term, Variable
+from suave_des.knowledge.state import Decision, Fact, Inference, KnowledgeState
+from suave_des.knowledge.vocabulary import RDF_TYPE, XSD, local_name, nearest
+from suave_des.workbench.knowledge_base import KnowledgeBase
+from suave_des.workbench.policy import NONE_LEFT
+
+#: Begins the IRIs of individuals that exist in a test only.
+NEW_INDIVIDUAL: Final = "urn:suave-des:test#"
+STAYS: Final = "stays"
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What rules are tested in.
+
+    Attributes:
+        state: the knowledge state.
+        facts: what is asserted besides, as triples.
+        ranges: words for the region that the state stands for; empty for a single state.
+    """
+
+    state: KnowledgeState
+    facts: tuple[Triple, ...] = ()
+    ranges: str = ""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What follows in a situation.
+
+    Attributes:
+        conclusion: what is inferred and planned; None where the situation contradicts itself.
+        contradiction: what contradicts what.
+    """
+
+    conclusion: Conclusion | None
+    contradiction: str = ""
+
+    @cached_property
+    def inferred(self) -> frozenset[Fact]:
+        """What was inferred; nothing where the situation contradicts itself."""
+        return frozenset() if self.conclusion is None else self.conclusion.inference.facts
+
+    @property
+    def known(self) -> frozenset[Fact]:
+        """What was asserted or inferred."""
+        return self.inferred if self.conclusion is None else self.inferred | self.conclusion.inference.asserted
+
+    @cached_property
+    def choices(self) -> tuple[tuple[str, str], ...]:
+        """What happens to each function's grounding that changes, or has no design left."""
+        if self.conclusion is None:
+            return ()
+        state = self.conclusion.inference.state
+        found = ((each.function, _outcome(each, state)) for each in self.conclusion.plan.decisions)
+        return tuple((function, outcome) for function, outcome in found if outcome != STAYS)
+
+    def choice(self, function: str) -> str:
+        """What happens to a function's grounding: a design, "stays" or "none left"."""
+        return dict(self.choices).get(function, STAYS)
+
+
+def _outcome(decision: Decision, state: KnowledgeState) -> str:
+    if decision.design is None:
+        return NONE_LEFT
+    return STAYS if decision.design == state.grounded(decision.function) else decision.design
+
+
+@dataclass(frozen=True, eq=False)
+class Prover:
+    """One knowledge base in Pellet, which concludes what follows in situations.
+
+    Example:
+        prover = Prover.of(KnowledgeBase.load())
+        prover.outcome(Situation(state)).choice("f_generate_search_path")  # "fd_spiral_low"
+    """
+
+    base: Ontology
+    improves_exceeded: bool
+    limit: TimeLimit = field(repr=False)
+    pellet: InProcessPellet = field(repr=False)
+    _outcomes: dict[Situation, Outcome] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, bench: KnowledgeBase, base: Ontology | None = None) -> Prover:
+        """Load a knowledge base, or a changed form of it, into Pellet.
+
+        Raises:
+            KnowledgeError: Pellet cannot use it.
+        """
+        used = base or bench.base
+        pellet = bench.limit.run(lambda: InProcessPellet(used), LOADING)
+        return cls(used, bench.settings.improves_exceeded, bench.limit, pellet)
+
+    def outcome(self, situation: Situation) -> Outcome:
+        """Conclude what follows; the same situation is reasoned about once.
+
+        Raises:
+            KnowledgeError: the reasoner takes too long.
+        """
+        if situation not in self._outcomes:
+            self._outcomes[situation] = self._conclude(situation)
+        return self._outcomes[situation]
+
+    def _conclude(self, situation: Situation) -> Outcome:
+        deliberation = Deliberation(self.base, _WithFacts(self, situation.facts))
+        try:
+            return Outcome(deliberation.analyze_and_plan(situation.state, improve_exceeded=self.improves_exceeded))
+        except KnowledgeError as error:
+            if not error.problem.startswith("contradiction"):
+                raise
+            return Outcome(None, error.problem.removeprefix("contradiction: "))
+
+
+@dataclass
+class _WithFacts:
+    """A reasoner that asserts further facts in each state."""
+
+    prover: Prover
+    facts: tuple[Triple, ...]
+    name: str = "pellet"
+
+    def infer(self, state: KnowledgeState) -> Inference:
+        """Infer what state and facts entail."""
+        base, pellet = self.prover.base, self.prover.pellet
+        assertions = (*base.assertions(state), *self.facts)
+        entailed = self.prover.limit.run(lambda: pellet.infer(assertions), reasoning_on(state))
+        asserted = base.facts.union(facts_of(assertions, base.names))
+        return Inference(state, asserted, frozenset(facts_of(entailed, base.names)) - asserted)
+
+
+def with_facts(base: Ontology, facts: Iterable[Triple]) -> Ontology:
+    """Assert facts in the ontology itself, so that everything that asks about states alone counts with them."""
+    more = tuple(facts)
+    if not more:
+        return base
+    content = replace(base.content, triples=(*base.content.triples, *more))
+    return replace(base, content=content, facts=base.facts.union(facts_of(more, base.names)))
+
+
+def with_content(base: Ontology, content: Content) -> Ontology:
+    """The same ontology with other rules or triples."""
+    return replace(base, content=content, rules=content.rules)
+
+
+@dataclass
+class FactReader:
+    """Reads facts that are written as atoms of rules, such as fg_status(fg_spiral_high, IN_ERROR_NFR).
+
+    Text needs no quotes. A name that the ontologies do not have becomes a new individual where it first occurs as a
+    member of a class: Binding(b1).
+
+    Attributes:
+        base: the ontologies.
+        new: IRIs of the new individuals, by name.
+    """
+
+    base: Ontology
+    new: dict[str, str] = field(default_factory=dict)
+
+    def declare(self, texts: Iterable[str]) -> None:
+        """Note the new individuals that facts introduce."""
+        for text in texts:
+            atom = _parsed(text)
+            if len(atom.arguments) == 1 and isinstance(atom.arguments[0], Named):
+                name = atom.arguments[0].iri
+                if ":" not in name and not self._individuals(name):
+                    self.new[name] = NEW_INDIVIDUAL + name
+
+    def triple(self, text: str) -> Triple:
+        """Read one fact.
+
+        Raises:
+            InputError: it is no fact, or a name in it is unknown.
+        """
+        atom = _parsed(text)
+        if not 1 <= len(atom.arguments) <= 2:
+            raise InputError(f"{shown(text)} is not a fact", remedy="write Class(individual) or property(one, other)")
+        if any(isinstance(term, Variable) for term in atom.arguments):
+            remedy = "name the individual, as in fg_status(fg_spiral_high, IN_ERROR_NFR)"
+            raise InputError(f"{shown(text)} has a variable, and so is not a fact", remedy=remedy)
+        kinds = ("class",) if len(atom.arguments) == 1 else ("object property", "data property")
+        predicate, kind = self._predicate(atom.predicate, kinds)
+        subject = self._individual(atom.arguments[0])
+        if kind == "class":
+            return subject, RDF_TYPE, predicate
+        value = atom.arguments[1]
+        return (
+            subject,
+            predicate,
+            self._individual(value) if kind == "object property" else self._value(predicate, value),
+        )
+
+    def fact(self, text: str) -> Fact:
+        """Read one fact, in the form in which inferences have it."""
+        return next(facts_of([self.triple(text)], self.base.names))
+
+    def _predicate(self, name: str, kinds: tuple[str, ...]) -> tuple[str, str]:
+        vocabulary = self.base.vocabulary
+        used = {iri: is_data for rule in self.base.rules for iri, is_data in rule.properties}
+        for iri in (name,) if ":" in name else vocabulary.candidates(name):
+            declared = vocabulary.kinds.get(iri, frozenset())
+            kind = next((each for each in kinds if each in declared), None)
+            if kind is None and iri in used and kinds != ("class",):
+                kind = "data property" if used[iri] else "object property"
+            if kind is not None:
+                return iri, kind
+        what = "class" if kinds == ("class",) else "property"
+        raise InputError(f"there is no {what} {shown(local_name(name))}", remedy=vocabulary.guess(name, kinds))
+
+    def _individuals(self, name: str) -> tuple[str, ...]:
+        vocabulary = self.base.vocabulary
+        return tuple(iri for iri in vocabulary.candidates(name) if "individual" in vocabulary.kinds.get(iri, ()))
+
+    def _individual(self, term: Term) -> str:
+        if not isinstance(term, Named):
+            raise InputError(f"{shown(_text(term))} is a value where an individual is needed")
+        name = term.iri
+        if ":" in name:
+            return name
+        found = self._individuals(name)
+        if found:
+            return found[0]
+        if name in self.new:
+            return self.new[name]
+        known = [each for each in self.base.vocabulary.by_name if self._individuals(each)]
+        near = nearest(name, (*known, *self.new))
+        remedy = f"{near.removesuffix('?')}? or introduce it" if near else "introduce it"
+        raise InputError(f"there is no individual {shown(name)}", remedy=f"{remedy} under facts, as Class({name})")
+
+    def _value(self, predicate: str, term: Term) -> Lit:
+        if isinstance(term, Named):
+            return Lit(term.iri, XSD + "string")
+        assert isinstance(term, Lit)
+        ranges = self.base.vocabulary.ranges.get(predicate, frozenset())
+        if term.datatype == XSD + "integer" and XSD + "decimal" in ranges:
+            return Lit(term.text, XSD + "decimal")
+        return term
+
+
+def _parsed(text: str) -> Atom:
+    try:
+        rule = parse_rule(f"fact: -> {text}")
+    except RuleError as error:
+        if text.count("(") > text.count(")"):
+            remedy = "in a YAML list in brackets a fact needs quotes, because of its comma"
+            raise InputError(f"{shown(text)} is half a fact", remedy=remedy) from None
+        remedy = error.remedy or "write it as an atom of a rule: fg_status(fg_spiral_high, IN_ERROR_NFR)"
+        raise InputError(f"{shown(text)} is not a fact: {error.problem}", remedy=remedy) from None
+    if len(rule.head) != 1:
+        raise InputError(f"{shown(text)} has {len(rule.head)} facts", remedy="write one")
+    return rule.head[0]
+
+
+def _text(term: Term) -> str:
+    return term.text if isinstance(term, Lit) else str(term[0])
+
+
+def check_function(base: Ontology, function: str) -> None:
+    """Check that there is a function of this name.
+
+    Raises:
+        InputError: there is none.
+    """
+    if function not in base.functions:
+        raise InputError(f"there is no function {shown(function)}", remedy=did_you_mean(function, base.functions))

@@ -1,0 +1,222 @@
+"""Say in one line why a rule does not fire in a state.
+
+What makes a rule useless in every state comes first: it is switched off, cannot be read, or is dropped by Pellet. Else
+the answer is the first atom that fails, for the binding that comes nearest, with the value found and the value needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
+from suave_des.knowledge.content import Content
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rdf import Lit, Triple, facts_of, value_of
+from suave_des.knowledge.rules.checks import RuleProblem, check_rule
+from suave_des.knowledge.rules.syntax import Atom, Named, Rule, Variable
+from suave_des.knowledge.rules.writer import write_atom
+from suave_des.knowledge.state import KnowledgeState, Value
+from suave_des.knowledge.vocabulary import RDF_TYPE
+from suave_des.workbench.atom_failure import describe_failure
+from suave_des.workbench.derivations import FACT_KINDS, Binding
+from suave_des.workbench.nearest_match import Facts, NearestFinder
+from suave_des.workbench.tracing import Tracer
+from suave_des.workbench.unusable_rules import UnusableRule
+
+
+@dataclass(frozen=True)
+class WhyNot:
+    """Why a rule does not fire, or that it does.
+
+    Attributes:
+        rule: its name.
+        answer: in one line, without the name.
+        fires: whether its whole body holds.
+        atom: the first atom that fails, as the rule writes it; empty where no single atom is the reason.
+        bindings: what the variables stand for in the nearest match.
+    """
+
+    rule: str
+    answer: str
+    fires: bool = False
+    atom: str = ""
+    bindings: tuple[tuple[str, Value], ...] = ()
+
+    def __str__(self) -> str:
+        """As `kb why-not` prints it."""
+        return f"{self.rule}: {self.answer}"
+
+
+@dataclass(frozen=True)
+class RuleQuestions:
+    """Answers for the rules of one knowledge base.
+
+    Attributes:
+        base: ontologies and rules.
+        unusable: rules of text files that the knowledge base could not be loaded with.
+
+    Example:
+        >>> questions = RuleQuestions(knowledge.base)
+        >>> print(questions.why_not("compError", knowledge.state()))
+        compError: c_status(?c, "FALSE") does not hold: nothing has a c_status; ...
+    """
+
+    base: Ontology
+    unusable: tuple[UnusableRule, ...] = ()
+    _facts: dict[KnowledgeState, Facts | str] = field(default_factory=dict, repr=False)
+
+    def why_not(self, name: str, state: KnowledgeState) -> WhyNot:
+        """Say why a rule does not fire in a state.
+
+        Raises:
+            InputError: there is no rule of that name.
+        """
+        for each in self.unusable:
+            if each.name == name:
+                return WhyNot(name, f"never fires: {each.reason}")
+        rules = [rule for rule in self.base.rules if rule.name == name]
+        if not rules:
+            known = sorted({*(rule.name for rule in self.base.rules), *(each.name for each in self.unusable)})
+            raise InputError(f"there is no rule {shown(name)}", remedy=did_you_mean(name, known))
+        answers = [self.of(rule, state) for rule in rules]
+        return next((each for each in answers if each.fires), answers[0])
+
+    def of(self, rule: Rule, state: KnowledgeState) -> WhyNot:
+        """Say why a rule, which may have the name of another one, does not fire in a state."""
+        if not rule.enabled:
+            return WhyNot(rule.name, f"never fires: it is switched off (enable-rule {rule.name}, or no --disable-rule)")
+        problem = next(iter(self._problems(rule)), None)
+        if problem is not None:
+            remedy = f"; {problem.remedy}" if problem.remedy else ""
+            return WhyNot(rule.name, f"never fires: {problem.message}{remedy}")
+        facts = self._known(state)
+        if isinstance(facts, str):
+            return WhyNot(rule.name, f"nothing follows, as the state contradicts itself: {facts}")
+        match = NearestFinder(rule, facts).find()
+        bindings = self._bindings(match.binding)
+        if not match.failing:
+            return WhyNot(rule.name, self._fires(rule, match.binding, facts), True, bindings=bindings)
+        first = rule.body[match.failing[0]]
+        reason = describe_failure(self._usable, first, match.binding, facts)
+        others = len(match.failing) - 1
+        more = f" ({others} more {'atom fails' if others == 1 else 'atoms fail'})" if others else ""
+        chain = self._concluder(rule, first, match.binding, facts)
+        text = write_atom(first)
+        return WhyNot(rule.name, f"{text} does not hold: {reason}{more}{chain}", atom=text, bindings=bindings)
+
+    @cached_property
+    def _usable(self) -> Ontology:
+        """The knowledge base without the rules that Pellet would drop."""
+        rules = tuple(rule for rule in self.base.rules if not rule.enabled or not self._problems(rule))
+        if len(rules) == len(self.base.rules):
+            return self.base
+        content: Content = replace(self.base.content, rules=rules)
+        return replace(self.base, content=content, rules=rules)
+
+    def _problems(self, rule: Rule) -> list[RuleProblem]:
+        return [problem for problem in check_rule(rule, self.base.vocabulary) if problem.is_fatal]
+
+    def _known(self, state: KnowledgeState) -> Facts | str:
+        """All that follows in a state, or what contradicts what in it."""
+        if state not in self._facts:
+            try:
+                tracer = Tracer(self._usable, state)
+                self._facts[state] = Facts(_with_languages(tracer.known, tracer.asserted))
+            except KnowledgeError as error:
+                if not error.problem.startswith("contradiction"):
+                    raise
+                self._facts[state] = error.problem.removeprefix("contradiction: ")
+        return self._facts[state]
+
+    def _fires(self, rule: Rule, binding: Binding, facts: Facts) -> str:
+        concluded = []
+        stays = ""
+        for atom in rule.head:
+            said = self._instance(atom, binding)
+            concluded.append(said)
+            others = self._other_values(atom, binding, facts)
+            if others:
+                stays = f"; {others[0]} stays beside it, as rules only add"
+        bound = ", ".join(f"?{name} = {value}" for name, value in self._bindings(binding))
+        return f"it fires{f' with {bound}' if bound else ''}, and concludes {', '.join(concluded)}{stays}"
+
+    def _instance(self, atom: Atom, binding: Binding) -> str:
+        """An atom of a head with the values of its variables, as a fact."""
+        terms = [binding.get(term.name) if isinstance(term, Variable) else term for term in atom.arguments]
+        if atom.kind not in FACT_KINDS or any(term is None for term in terms):
+            return write_atom(atom)
+        plain = [term.iri if isinstance(term, Named) else term for term in terms]
+        subject, value = str(plain[0]), plain[-1]
+        if atom.kind == "class":
+            return str(next(facts_of([(subject, RDF_TYPE, atom.predicate)], self.base.names)))
+        return str(next(facts_of([(subject, atom.predicate, value)], self.base.names)))  # type: ignore[list-item]
+
+    def _other_values(self, atom: Atom, binding: Binding, facts: Facts) -> list[str]:
+        """Facts that give the subject of a head's atom another value of the same data property."""
+        first, last = atom.arguments[0], atom.arguments[-1]
+        if atom.kind != "data" or not isinstance(last, Lit):
+            return []
+        subject = first.iri if isinstance(first, Named) else binding.get(getattr(first, "name", ""))
+        if not isinstance(subject, str):
+            return []
+        values = [value for value in facts.values(subject, atom.predicate) if value != last]
+        triples = [(subject, atom.predicate, value) for value in values]
+        return sorted(str(fact) for fact in facts_of(triples, self.base.names))
+
+    def _concluder(self, rule: Rule, atom: Atom, binding: Binding, facts: Facts) -> str:
+        """The rule that comes nearest to concluding what is missing, and why it does not."""
+        best: tuple[int, str, str] | None = None
+        for other, start in self._could_conclude(rule, atom, binding):
+            match = NearestFinder(other, facts, start).find()
+            if match.failing:
+                first = other.body[match.failing[0]]
+                reason = describe_failure(self._usable, first, match.binding, facts)
+                found = (len(match.failing), other.name, f"{write_atom(first)} fails: {reason}")
+                best = found if best is None or found < best else best
+        return "" if best is None else f"; {best[1]} would conclude it, but its {best[2]}"
+
+    def _could_conclude(self, rule: Rule, atom: Atom, binding: Binding) -> Iterator[tuple[Rule, Binding]]:
+        """Other rules with a head that says what an atom asks for, with the binding with which it does."""
+        if atom.kind not in FACT_KINDS:
+            return
+        wanted = [binding.get(term.name) if isinstance(term, Variable) else term for term in atom.arguments]
+        for other in self._usable.content.enabled_rules:
+            for head in other.head:
+                if other is rule or (head.kind, head.predicate) != (atom.kind, atom.predicate):
+                    continue
+                start = _unified(head, wanted)
+                if start is not None:
+                    yield other, start
+
+    def _bindings(self, binding: Binding) -> tuple[tuple[str, Value], ...]:
+        return tuple((name, value_of(binding[name], self.base.names)) for name in sorted(binding))
+
+
+def _with_languages(known: Iterable[Triple], asserted: Iterable[Triple]) -> list[Triple]:
+    """Facts with the languages of texts, which Pellet's answers leave out."""
+    languages: dict[tuple[str, str, str], list[Triple]] = {}
+    for triple in asserted:
+        if isinstance(triple[2], Lit) and triple[2].datatype.startswith("@"):
+            languages.setdefault((triple[0], triple[1], triple[2].text), []).append(triple)
+    found: list[Triple] = []
+    for triple in known:
+        subject, predicate, value = triple
+        found += languages.get((subject, predicate, value.text), [triple]) if isinstance(value, Lit) else [triple]
+    return found
+
+
+def _unified(head: Atom, wanted: Sequence[object]) -> Binding | None:
+    """The binding with which a head says what is wanted; None for a term stands for anything."""
+    binding: dict[str, str | Lit] = {}
+    for term, value in zip(head.arguments, wanted, strict=False):
+        plain = value.iri if isinstance(value, Named) else value
+        if plain is None:
+            continue
+        if isinstance(term, Variable):
+            if binding.setdefault(term.name, plain) != plain:  # type: ignore[arg-type]
+                return None
+        elif (term.iri if isinstance(term, Named) else term) != plain:
+            return None
+    return binding

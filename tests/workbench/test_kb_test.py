@@ -1,0 +1,202 @@
+"""kb test: tests of rules pass and fail as they should, say why, and refuse what makes no sense."""
+
+import textwrap
+from xml.etree import ElementTree
+
+import pytest
+
+from suave_des.errors import InputError
+from suave_des.workbench.policy_space import ranges_between
+from suave_des.workbench.testing.regions import measurements_in, parse_region
+from suave_des.workbench.testing.run import Runner
+from suave_des.workbench.testing.suite import TestFile, shipped_tests
+
+SPARE = """\
+spare: hasQAvalue(?fg, ?q) ^ isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ lessThan(?v, 3.5)
+       -> fd_realisability(fd_spiral_high, false)
+"""
+
+
+@pytest.fixture(scope="module")
+def runner(bench):
+    return Runner.of(bench)
+
+
+@pytest.fixture
+def suite(tmp_path, bench):
+    """Reads tests from YAML that is given as text."""
+
+    def read(text):
+        path = tmp_path / "mine.yaml"
+        path.write_text("tests:\n" + textwrap.dedent(text), encoding="utf-8")
+        return TestFile.read(path).tests(bench)
+
+    return read
+
+
+def test_the_shipped_rules_pass_the_shipped_tests(command):
+    status, out, _ = command("test")
+    assert status == 0
+    assert "passed" in out.splitlines()[-1]
+    assert len(shipped_tests()) == 2
+
+
+def test_a_fact_that_does_not_follow_is_a_failure_that_names_rule_and_values(suite, runner):
+    (test,) = suite("""
+        - name: too clear
+          given: {groundings: {f_generate_search_path: fd_spiral_high}, measurements: {water_visibility: 3.4}}
+          follows: ["fg_status(fg_spiral_high, IN_ERROR_NFR)"]
+        """)
+    (failure,) = runner.run(test).failures
+    assert failure.what == "fg_status(fg_spiral_high, IN_ERROR_NFR) does not follow"
+    assert "QAWaterVisibility: lessThan(?measured, ?expected) does not hold: found 3.4" in failure.because[0]
+
+
+def test_a_fact_that_must_not_follow_is_a_failure_with_its_derivation(suite, runner):
+    (test,) = suite("""
+        - name: never
+          given: {components: {c_thruster_1: FALSE}}
+          follows_not: ["fd_realisability(fd_all_thrusters, false)"]
+        """)
+    (failure,) = runner.run(test).failures
+    assert failure.what == "fd_realisability(fd_all_thrusters, false) follows"
+    assert "by rule compError" in failure.because[0]
+
+
+def test_a_region_stands_for_all_kinds_of_values_in_it(suite, runner):
+    (test,) = suite("""
+        - name: partly in error
+          given: {groundings: {f_generate_search_path: fd_spiral_medium}, measurements: {water_visibility: ">= 1.25"}}
+          follows: ["fg_status(fg_spiral_medium, IN_ERROR_NFR)"]
+        """)
+    assert [str(each.state.measurements[0][1]) for each in test.situations] == [
+        "1.25",
+        "1.75",
+        "2.25",
+        "2.75",
+        "3.25",
+        "3.75",
+    ]
+    (failure,) = runner.run(test).failures
+    assert failure.situation.ranges == "water_visibility 2.25"
+
+
+def test_a_decision_may_be_a_design_or_that_the_present_one_stays(suite, runner):
+    tests = suite("""
+        - name: both ways to say it
+          given: {groundings: {f_generate_search_path: fd_spiral_high}, measurements: {water_visibility: 4}}
+          decides: {f_generate_search_path: stays}
+        - name: by its name
+          given: {groundings: {f_generate_search_path: fd_spiral_high}, measurements: {water_visibility: 4}}
+          decides: {f_generate_search_path: fd_spiral_high}
+        - name: not so
+          given: {groundings: {f_generate_search_path: fd_spiral_high}, measurements: {water_visibility: 2}}
+          decides: {f_generate_search_path: stays}
+        """)
+    assert [runner.run(test).passed for test in tests] == [True, True, False]
+
+
+def test_what_a_rule_changes_is_tested_with_and_without_it(suite, runner):
+    tests = suite("""
+        - name: right
+          given: {groundings: {f_generate_search_path: fd_spiral_high}, measurements: {water_visibility: 2}}
+          without: QAWaterVisibility
+          changes: {f_generate_search_path: stays -> fd_spiral_low}
+        - name: wrong
+          given: {groundings: {f_generate_search_path: fd_spiral_high}, measurements: {water_visibility: 2}}
+          without: compError
+          changes: {f_generate_search_path: stays -> fd_spiral_low}
+        """)
+    assert [runner.run(test).passed for test in tests] == [True, False]
+
+
+def test_facts_may_introduce_individuals_and_contradict_the_state(suite, runner):
+    tests = suite("""
+        - name: a binding
+          given: {facts: [Binding(b1), "binding_component(b1, c_thruster_1)", "c_status(c_thruster_1, false)"]}
+          follows: ["b_status(b1, false)"]
+        - name: two statuses
+          given:
+            groundings: {f_generate_search_path: fd_spiral_high}
+            measurements: {water_visibility: 1}
+            facts: ["fg_status(fg_spiral_high, IN_ERROR_FR)"]
+          contradiction: true
+        - name: the same, unexpected
+          given:
+            groundings: {f_generate_search_path: fd_spiral_high}
+            measurements: {water_visibility: 1}
+            facts: ["fg_status(fg_spiral_high, IN_ERROR_FR)"]
+          follows: ["fg_status(fg_spiral_high, IN_ERROR_FR)"]
+        """)
+    assert [runner.run(test).passed for test in tests] == [True, True, False]
+
+
+def test_rules_of_the_file_are_tested_and_results_are_written_as_junit_xml(tmp_path, command):
+    (tmp_path / "spare.swrl").write_text(SPARE, encoding="utf-8")
+    tests = tmp_path / "spare.yaml"
+    tests.write_text(
+        textwrap.dedent("""
+            rules: [spare.swrl]
+            tests:
+            - name: not high below 3.5 m
+              given: {groundings: {f_generate_search_path: fd_spiral_medium}, measurements: {water_visibility: "< 3.5"}}
+              follows: ["fd_realisability(fd_spiral_high, false)"]
+            - name: wrong <&>
+              given: {measurements: {water_visibility: 2}}
+              follows: ["fd_realisability(fd_spiral_high, false)"]
+            """),
+        encoding="utf-8",
+    )
+    status, out, _ = command("test", tests, "--junit-xml", tmp_path / "out.xml")
+    assert status == 1
+    assert "1 failed, 1 passed" in out
+    root = ElementTree.parse(tmp_path / "out.xml").getroot()
+    assert [(suite.get("tests"), suite.get("failures")) for suite in root] == [("2", "1")]
+    assert [case.get("name") for case in root.iter("testcase")] == ["not high below 3.5 m", "wrong <&>"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("- name: x\n  folows: []", "line 3, tests[0].folows: 'folows' is not a key here (did you mean 'follows'?"),
+        ("- name: x", "this test expects nothing"),
+        ("- name: x\n  follows: [fg_status(fg_spiral_high, IN)]", "needs quotes, because of its comma"),
+        ('- name: x\n  follows: ["fg_stats(fg_spiral_high, IN)"]', "no property 'fg_stats' (did you mean fg_status?)"),
+        ('- name: x\n  follows: ["fg_status(fg_spiral_hig, IN)"]', "did you mean fg_spiral_high? or introduce it"),
+        ('- name: x\n  follows: ["fg_status(?fg, IN)"]', "has a variable"),
+        ("- name: x\n  decides: {f_generate_search_path: fd_spiral_hihg}", "did you mean 'fd_spiral_high'?"),
+        ("- name: x\n  decides: {f_search: stays}", "there is no function 'f_search'"),
+        ("- name: x\n  contradiction: 1", "1 is neither true nor false"),
+        (
+            "- name: x\n  without: nothing\n  changes: {f_generate_search_path: stays -> stays}",
+            "no enabled rule 'nothing'",
+        ),
+        ("- name: x\n  without: S1a\n  decides: {f_generate_search_path: stays}", "need one another"),
+        (
+            '- name: x\n  given: {measurements: {water_visibility: "1 << 2"}}\n  contradiction: true',
+            "'1 << 2' is not a region",
+        ),
+        ("- name: x\n  given: {mission: nowhere, at_s: 3}\n  contradiction: true", "nowhere has no recorded states"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_with_line_key_and_remedy(suite, text, said):
+    with pytest.raises(InputError) as error:
+        suite(text + "\n")
+    assert said in str(error.value)
+    assert "mine.yaml: line" in str(error.value)
+
+
+@pytest.mark.parametrize("region", [*map(str, ranges_between([1, 2])[1:]), "1 <= . <= 2", "not measured"])
+def test_regions_read_back_as_policies_write_them(region):
+    parsed = parse_region(region)
+    assert parsed is None if region in ("1", "2") else str(parsed) == region
+
+
+def test_a_region_without_numbers_is_refused():
+    with pytest.raises(InputError, match="no number is in the region"):
+        parse_region("2 <= . < 1")
+
+
+def test_ends_of_a_region_divide_the_kinds_of_values(bench):
+    found = [words for _, words in measurements_in(bench.base, {"water_visibility": parse_region("3 < . < 3.5")})]
+    assert found == [f"water_visibility {each}" for each in ("3 < . < 3.25", "3.25", "3.25 < . < 3.5")]
