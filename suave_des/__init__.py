@@ -6,16 +6,20 @@ Importing the package starts nothing: no Java, no pandas, no matplotlib until th
 from importlib import import_module as _import_module
 from typing import TYPE_CHECKING as _TYPE_CHECKING
 
+from suave_des import imports as _imports
+
 if _TYPE_CHECKING:
     from suave_des.api import resume_campaign, run_campaign, stream_campaign
     from suave_des.campaign.single import run_mission
     from suave_des.errors import InputError, MissionError
+    from suave_des.interfaces.mission import Mission
     from suave_des.scenario.loader import load_scenario, with_values
 
 __version__ = "0.1.0"
 
 __all__ = [
     "InputError",
+    "Mission",
     "MissionError",
     "load_scenario",
     "resume_campaign",
@@ -27,6 +31,7 @@ __all__ = [
 
 _HOMES = {
     "InputError": "suave_des.errors",
+    "Mission": "suave_des.interfaces.mission",
     "MissionError": "suave_des.errors",
     "load_scenario": "suave_des.scenario.loader",
     "resume_campaign": "suave_des.api",
@@ -36,6 +41,9 @@ _HOMES = {
     "with_values": "suave_des.scenario.loader",
 }
 """Where the names are that the package itself has; each module is imported when its name is first used."""
+
+
+_imports.when_imported("gymnasium", _imports.register_environments)
 
 
 def __getattr__(name: str) -> object:

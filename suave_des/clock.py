@@ -1,7 +1,7 @@
 """Additions to SimPy's clock: ticks of a periodic timer, events at a mission time, alarms.
 
 Activities are SimPy processes. What looks ahead and is often overtaken by events is not: it sets an alarm, and sets it
-anew. Alarms alone use callbacks and SimPy's private fields.
+anew. Alarms and `advance` alone use callbacks and SimPy's private fields.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Callable, Generator
 from typing import Any
 
 import simpy
+from simpy.core import StopSimulation
 
 Process = Generator[simpy.Event, Any, None]
 
@@ -24,6 +25,20 @@ def until(env: simpy.Environment, t_s: float) -> simpy.Timeout:
     """An event at mission time t, or now if t has passed."""
     delay_s = t_s - env.now
     return simpy.Timeout(env, delay_s if delay_s > 0.0 else 0.0)
+
+
+def advance(env: simpy.Environment, t_s: float) -> None:
+    """Process all events before mission time t, and go there; stop at the event of the mission's end.
+
+    This is `env.run(until=t_s)`, which takes 8 us more for its own event: a third of a step of an environment.
+    """
+    queue, step = env._queue, env.step
+    try:
+        while queue and queue[0][0] < t_s:
+            step()
+    except StopSimulation:
+        return
+    env._now = t_s
 
 
 class Alarm:

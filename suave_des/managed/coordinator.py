@@ -33,6 +33,7 @@ class MissionCoordinator:
         ended: the event of the mission's end: the time limit, or the end of the path.
         search_time_s: whole seconds until the pipeline was found, as the revision counts them; none while it is not.
         distance_inspected_m: distance inspected, as it was published last before the mission's end.
+        task: the task that is carried out, if there is one.
         lasting_functions: functions that are needed from launch to the end, and belong to no task.
     """
 
@@ -45,7 +46,7 @@ class MissionCoordinator:
     log: Log
     search_time_s: float | None = None
     distance_inspected_m: float = 0.0
-    _task: Task | None = None
+    task: Task | None = None
 
     def __post_init__(self) -> None:
         self.ended: simpy.Event = self.env.event()
@@ -89,12 +90,12 @@ class MissionCoordinator:
         return until(self.env, tick_at_or_after(self.env.now, phase_s, period_s))
 
     def _begin(self, task: Task) -> None:
-        self._task = task
+        self.task = task
         self.log("coordinator", "task_requested", task.name)
         self._request(task)
 
     def _end(self, how: str) -> None:
-        task, self._task = self._task, None
+        task, self.task = self.task, None
         if task is not None:
             self.log("coordinator", how, task.name)
             self._cancel(task)

@@ -1,13 +1,14 @@
 """One mission: scenario, manager, run and seed, wired into a SimPy environment."""
 
+from collections.abc import Callable
 from functools import partial
-from math import inf
 
 import simpy
 from simpy.core import StopSimulation
 
 from suave_des import domain
 from suave_des.chance import Chance
+from suave_des.clock import advance
 from suave_des.errors import SuaveDesError
 from suave_des.managed.coordinator import MissionCoordinator, MissionTiming
 from suave_des.managed.detection import PipelineDetector, measured_at_rows
@@ -112,6 +113,26 @@ class MissionRun:
         return self._host.manager
 
     @property
+    def bus(self) -> DiagnosticsBus:
+        """Where diagnostics are published."""
+        return self._bus
+
+    @property
+    def system(self) -> ManagedSystem:
+        """What the manager sees and can do."""
+        return self._host.system
+
+    @property
+    def task(self) -> domain.Task | None:
+        """The task that is carried out."""
+        return self._coordinator.task
+
+    @property
+    def found_s(self) -> float | None:
+        """When the search ended, as the revision counts it; none before."""
+        return self._coordinator.search_time_s
+
+    @property
     def is_over(self) -> bool:
         """Whether the mission has ended."""
         return self._coordinator.ended.triggered
@@ -123,21 +144,21 @@ class MissionRun:
             MissionError: the manager raised.
         """
         if until_s > self.env.now and not self.is_over:
-            self._run(until_s)
+            self._guarded(advance, self.env, until_s)
 
     def result(self) -> MissionResult:
         """Run to the end, and read the metrics."""
         if not self.is_over:
-            self._run(inf)
+            self._guarded(self.env.run, self._coordinator.ended)
         recorder, drawn, metrics = self._recorder, self._chance.drawn, self.metrics()
         self._host.end(metrics)
         trajectory = recorder.trajectory(self._vehicle, self._visibility)
         events, knowledge = tuple(recorder.events), tuple(recorder.knowledge)
         return MissionResult(metrics, events, trajectory, knowledge, drawn, self.modes.refused)
 
-    def _run(self, until_s: float) -> None:
+    def _guarded(self, run: Callable[..., object], *arguments: object) -> None:
         try:
-            self.env.run(until=self._coordinator.ended if until_s == inf else until_s)
+            run(*arguments)
         except SuaveDesError:
             raise
         except RAISED as error:  # in a process that the manager started by itself

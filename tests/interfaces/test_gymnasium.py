@@ -1,0 +1,166 @@
+"""The Gymnasium environment and its vector form."""
+
+import subprocess
+import sys
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import suave_des  # noqa: F401
+from suave_des import InputError, load_scenario
+from suave_des.simulation.simulator import Simulator
+
+NAME = "suave_des/PipelineInspection-v0"
+
+
+@pytest.fixture(scope="module")
+def simulator() -> Simulator:
+    return Simulator(load_scenario("seams2023"))
+
+
+def play(environment: gymnasium.Env, action: object, seed: int) -> tuple[list, float, dict]:
+    observation, info = environment.reset(seed=seed)
+    seen, total, is_over = [observation], 0.0, False
+    while not is_over:
+        observation, reward, is_over, _, info = environment.step(action)
+        seen.append(observation)
+        total += reward
+    return seen, total, info
+
+
+@pytest.mark.parametrize("scenario", ["seams2023", "release15"])
+def test_it_passes_gymnasiums_own_checker_without_a_warning(scenario: str) -> None:
+    environment = gymnasium.make(NAME, scenario=scenario).unwrapped
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(environment)
+
+
+@pytest.mark.parametrize("imports", ["import suave_des, gymnasium", "import gymnasium, suave_des"])
+def test_it_is_known_whichever_is_imported_first(imports: str) -> None:
+    code = f"{imports}; print(gymnasium.spec('{NAME}').name, 'numba' in __import__('sys').modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "PipelineInspection False\n"
+
+
+def test_an_episode_is_the_mission_of_its_seed(simulator: Simulator) -> None:
+    environment = gymnasium.make(NAME, scenario=simulator)
+    _, _, info = play(environment, [0, 0], seed=7)
+    expected = simulator.run("none", 1, 7).metrics
+    found = info["metrics"]
+    assert (found.search_time_s, found.distance_inspected_m) == (expected.search_time_s, expected.distance_inspected_m)
+
+
+def test_a_step_lasts_one_period(simulator: Simulator) -> None:
+    environment = gymnasium.make(NAME, scenario=simulator, period_s=7.5)
+    environment.reset(seed=1)
+    assert [environment.step([0, 0])[4]["time_s"] for _ in range(3)] == [7.5, 15.0, 22.5]
+
+
+def test_an_observation_has_what_monitors_measured(simulator: Simulator) -> None:
+    environment = gymnasium.make(NAME, scenario=simulator)
+    names = environment.unwrapped.observation_names
+    seen, _, info = play(environment, [2, 0], seed=3)
+    last = dict(zip(names, seen[-1].tolist(), strict=True))
+    assert last["distance_inspected_m"] == pytest.approx(info["metrics"].distance_inspected_m)
+    assert last["c_thruster_1"] == 0.0 and last["c_thruster_2"] == 1.0
+    first = dict(zip(names, seen[0].tolist(), strict=True))
+    assert first["water_visibility"] == -1.0 and first["time_share"] == 0.0
+    high = [dict(zip(names, each.tolist(), strict=True))["f_generate_search_path"] for each in seen[1:20]]
+    assert set(high) == {2.0}
+
+
+def test_modes_make_a_difference(simulator: Simulator) -> None:
+    environment = gymnasium.make(NAME, scenario=simulator)
+    assert play(environment, [2, 1], seed=1)[1] != play(environment, [0, 0], seed=1)[1]
+
+
+def test_the_reward_adds_up_to_what_it_weighs(simulator: Simulator) -> None:
+    weights = {"inspected_per_m": 2.0, "searched_per_s": -0.5, "found": 10.0, "adaptation": -3.0}
+    environment = gymnasium.make(NAME, scenario=simulator, reward=weights)
+    actions = np.random.default_rng(1).integers(0, [3, 2], (200, 2))
+    environment.reset(seed=2)
+    total = 0.0
+    for action in actions:
+        _, reward, is_over, _, info = environment.step(action)
+        total += reward
+        if is_over:
+            break
+    metrics = info["metrics"]
+    expected = 2.0 * metrics.distance_inspected_m - 0.5 * metrics.search_time_s + 10.0 * metrics.pipeline_found
+    assert metrics.pipeline_found and metrics.adaptations > 5
+    assert total == pytest.approx(expected - 3.0 * metrics.adaptations)
+
+
+@pytest.mark.parametrize("action", [[3, 0], [0, 2], [-1, 0], [0], [0, 0, 0], 1, [0.5, 0], "no", None])
+def test_actions_out_of_range_are_refused(simulator: Simulator, action: object) -> None:
+    environment = gymnasium.make(NAME, scenario=simulator).unwrapped
+    environment.reset(seed=1)
+    with pytest.raises(InputError, match="action"):
+        environment.step(action)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"period_s": 0.0}, "period_s"),
+        ({"period_s": float("nan")}, "period_s"),
+        ({"reward": {"speed": 1.0}}, "reward"),
+        ({"scenario": "no_such_scenario"}, "no such file"),
+    ],
+)
+def test_bad_options_are_refused(options: dict, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        gymnasium.make(NAME, **options)
+
+
+def test_a_step_before_reset_is_refused(simulator: Simulator) -> None:
+    with pytest.raises(InputError, match="call reset first"):
+        gymnasium.make(NAME, scenario=simulator).unwrapped.step([0, 0])
+
+
+class TestVector:
+    def test_its_missions_are_those_of_single_environments(self, simulator: Simulator) -> None:
+        vector = gymnasium.make_vec(NAME, num_envs=3, scenario=simulator)
+        single = [gymnasium.make(NAME, scenario=simulator) for _ in range(3)]
+        observations, _ = vector.reset(seed=5)
+        for n, one in enumerate(single):
+            assert (one.reset(seed=5 + n)[0] == observations[n]).all()
+        actions = np.random.default_rng(3).integers(0, [3, 2], (60, 3, 2))
+        for step in actions:
+            observations, rewards, *_ = vector.step(step)
+            for n, one in enumerate(single):
+                observation, reward, *_ = one.step(step[n])
+                assert (observation == observations[n]).all() and reward == rewards[n]
+
+    def test_a_mission_that_is_over_is_followed_by_another(self, simulator: Simulator) -> None:
+        vector = gymnasium.make_vec(NAME, num_envs=2, scenario=simulator, period_s=100.0)
+        vector.reset(seed=1)
+        actions = np.zeros((2, 2), np.int64)
+        overs = []
+        for _ in range(10):
+            observations, _, over, _, infos = vector.step(actions)
+            overs.append(over.all())
+            if over.all():
+                assert {each.run for each in infos["metrics"]} == {1}
+            elif overs[-2:-1] == [True]:
+                assert (observations[:, 9] == 0.0).all()
+        assert overs.count(True) == 2
+
+    def test_the_same_seed_gives_the_same_missions(self, simulator: Simulator) -> None:
+        def total() -> float:
+            vector = gymnasium.make_vec(NAME, num_envs=2, scenario=simulator, period_s=50.0)
+            vector.reset(seed=9)
+            return sum(vector.step(np.ones((2, 2), np.int64))[1].sum() for _ in range(30))
+
+        assert total() == total()
+
+    @pytest.mark.parametrize("actions", [np.zeros((2, 3), int), np.zeros((2, 2)), np.zeros(2, int)])
+    def test_actions_of_another_shape_are_refused(self, simulator: Simulator, actions: np.ndarray) -> None:
+        vector = gymnasium.make_vec(NAME, num_envs=2, scenario=simulator)
+        vector.reset(seed=1)
+        with pytest.raises(InputError, match="actions"):
+            vector.step(actions)

@@ -1,0 +1,115 @@
+"""A mission that its caller advances: the same as any other, whatever the steps."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from suave_des import InputError, Mission, load_scenario, run_mission
+from suave_des.simulation.simulator import Simulator
+
+SEARCH = "f_generate_search_path"
+
+
+@pytest.fixture(scope="module")
+def simulator() -> Simulator:
+    return Simulator(load_scenario("seams2023"))
+
+
+@given(steps_s=st.lists(st.floats(0.0, 40.0), min_size=1, max_size=30))
+@settings(max_examples=30)
+def test_how_a_mission_is_cut_into_steps_changes_nothing(simulator: Simulator, steps_s: list[float]) -> None:
+    mission = Mission(simulator, "metacontrol", run=2, seed=1)
+    for step_s in steps_s:
+        mission.advance(mission.now_s + step_s)
+    assert mission.result().metrics == simulator.run("metacontrol", 2, 1).metrics
+
+
+def test_without_requests_it_is_the_manager_none(simulator: Simulator) -> None:
+    mission = Mission(simulator, run=3)
+    mission.advance()
+    assert mission.metrics().search_time_s == simulator.run("none", 3, 1).metrics.search_time_s
+
+
+def test_a_requested_mode_takes_effect_after_the_latency() -> None:
+    mission = Mission("seams2023", run=1, record=True)
+    mission.advance(10.0)
+    mission.change_mode(SEARCH, "fd_spiral_high")
+    assert mission.current_mode(SEARCH) == "fd_spiral_high"
+    mission.advance(20.0)
+    times_s = [each.t_s for each in mission.result().events if each.detail == f"{SEARCH} = fd_spiral_high"]
+    assert times_s == [pytest.approx(10.5, abs=0.5)]
+
+
+def test_it_shows_what_a_manager_would_see(simulator: Simulator) -> None:
+    mission = Mission(simulator, run=1)
+    assert mission.measured("water_visibility") is None and mission.measured("water_visibility", 0.0) == 0.0
+    mission.advance(60.0)
+    assert mission.searches and SEARCH in mission.functions
+    assert mission.components == {"c_thruster_1": "FALSE"}
+    assert 0.0 < mission.measured("water_visibility") < 4.0
+    assert -20.0 < mission.pose.z_m < 0.0
+    assert mission.distance_inspected_m == 0.0
+
+
+def test_it_stops_at_its_end(simulator: Simulator) -> None:
+    mission = Mission(simulator, run=1)
+    mission.advance(1e6)
+    assert mission.is_over and mission.now_s == simulator.run("none", 1, 1).metrics.mission_duration_s
+    assert mission.task is None
+
+
+def test_reading_the_metrics_on_the_way_changes_nothing(simulator: Simulator) -> None:
+    mission = Mission(simulator, run=5)
+    while not mission.is_over:
+        mission.advance(mission.now_s + 10.0)
+        assert mission.metrics().mission_duration_s == mission.now_s
+    assert mission.metrics().distance_inspected_m == simulator.run("none", 5, 1).metrics.distance_inspected_m
+
+
+def test_many_missions_of_one_simulator_may_go_on_at_once(simulator: Simulator) -> None:
+    missions = [Mission(simulator, run=run) for run in range(1, 4)]
+    while not all(mission.is_over for mission in missions):
+        for mission in missions:
+            mission.advance(mission.now_s + 25.0)
+    found = [mission.result().metrics.search_time_s for mission in missions]
+    assert found == [simulator.run("none", run, 1).metrics.search_time_s for run in range(1, 4)]
+
+
+def test_a_recorded_mission_has_the_events_of_run_mission() -> None:
+    mission = Mission("seams2023", "metacontrol", run=1, seed=8, record=True)
+    mission.advance(100.0)
+    assert mission.result().events == run_mission("seams2023", "metacontrol", 1, 8).events
+
+
+@pytest.mark.parametrize(
+    ("function", "mode", "words"),
+    [
+        ("f_search", "fd_spiral_high", "there is no function 'f_search'"),
+        (SEARCH, "fd_spiral_hihg", "did you mean 'fd_spiral_high'"),
+        ("generate_recharge_path", "normal", "there is no function 'generate_recharge_path'"),
+    ],
+)
+def test_unknown_names_are_refused_with_what_is_known(
+    simulator: Simulator, function: str, mode: str, words: str
+) -> None:
+    with pytest.raises(InputError, match=words):
+        Mission(simulator).change_mode(function, mode)
+
+
+def test_modes_are_the_managers_business_if_there_is_one(simulator: Simulator) -> None:
+    with pytest.raises(InputError, match="has a manager"):
+        Mission(simulator, "none").change_mode(SEARCH, "fd_spiral_high")
+
+
+@pytest.mark.parametrize("until", [-1.0, 4.0, float("nan")])
+def test_it_does_not_go_back(simulator: Simulator, until: float) -> None:
+    mission = Mission(simulator)
+    mission.advance(5.0)
+    with pytest.raises(InputError, match="cannot go to"):
+        mission.advance(until)
+
+
+@pytest.mark.parametrize("number", [-1, 1.5, True, "1"])
+def test_a_run_is_a_whole_number(simulator: Simulator, number: object) -> None:
+    with pytest.raises(InputError, match="run"):
+        Mission(simulator, run=number)  # type: ignore[arg-type]
