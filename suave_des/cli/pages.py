@@ -11,6 +11,8 @@ from suave_des.cli.options import Files, grouped_options
 from suave_des.errors import InputError
 
 _SEED, _RUN, _POINT = 1, 1, 0
+_PATHS, _MOST_PATHS = 12, 100
+"""Defaults as in suave_des.pages, which is not imported for --help."""
 Open = Annotated[bool, typer.Option("--open", help="Show the page in the browser.")]
 
 
@@ -92,3 +94,43 @@ def replay(
         missions = missions_in(folders, chosen)
     write_page(page_file, replay_page(missions), show=show)
     print(f"{' and '.join(each.name for each in missions)}: {page_file}")
+
+
+def report(
+    results: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="DIR...", help="Folders of campaign or reproduce, the exemplar's CSV files, or folders of these."
+        ),
+    ],
+    paths: Annotated[
+        int | None,
+        typer.Option(
+            "--paths",
+            metavar="N",
+            help="Runs of each manager whose way and timeline are in the page; 0: none.",
+            show_default=str(_PATHS),
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="Page to write.", show_default="report.html, in the first DIR"),
+    ] = None,
+    show: Open = False,
+) -> None:
+    """Make a page about a campaign: what follows from it, its tables, charts to explore, and how it was made.
+
+    It is one file that needs no network.
+    """
+    from suave_des.pages.page import check_page_file, write_page
+    from suave_des.pages.report import report_page
+
+    runs = _PATHS if paths is None else paths
+    if not 0 <= runs <= _MOST_PATHS:
+        raise InputError(f"--paths: {runs} is out of range", remedy=f"give 0 to {_MOST_PATHS}")
+    first = results[0]
+    page_file = out or (first if first.is_dir() else first.parent) / "report.html"
+    if out is not None:
+        check_page_file(page_file)
+    write_page(page_file, report_page(results, runs), show=show)
+    print(f"the report is {page_file}")

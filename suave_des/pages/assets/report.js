@@ -1,0 +1,393 @@
+// The report: what is chosen, and the charts and tables that follow from it.
+
+const { results, ways, made } = DATA;
+const { drawn } = results;
+const { columns, groups, titles } = drawn;
+const COUNT = columns.group.length;
+const METRICS = Object.keys(titles);
+const state = { hidden: new Set(), metric: METRICS[0], found: 'all', sweep: {}, reference: 0, run: null, group: null };
+const seedOf = (row) => columns.seed[columns.seed.length === 1 ? 0 : row];
+const shownGroups = () => groups.map((_, number) => number).filter((number) => !state.hidden.has(number));
+
+function rowsOf(number) {
+  const rows = [];
+  for (let row = 0; row < COUNT; row++) {
+    if (columns.group[row] !== number) continue;
+    if (state.found !== 'all' && String(columns.found[row]) !== state.found) continue;
+    if (drawn.swept.some((name) => state.sweep[name] !== undefined && String(columns[name][row]) !== state.sweep[name])) continue;
+    rows.push(row);
+  }
+  return rows;
+}
+let chosen = new Map();
+const known = (rows, name) => rows.filter((row) => columns[name][row] !== null);
+
+function refresh() {
+  chosen = new Map(shownGroups().map((number) => [number, rowsOf(number)]));
+  const count = [...chosen.values()].reduce((sum, rows) => sum + rows.length, 0);
+  const every = drawn.every > 1 ? ` (each ${drawn.every}th run of ${drawn.missions.toLocaleString('en')} missions)` : '';
+  byId('count').textContent = `${count.toLocaleString('en')} missions${every}`;
+  drawDistribution();
+  drawSpread();
+  drawSweep();
+  drawPaired();
+  drawWhere();
+  drawRuns();
+  drawRun();
+}
+
+function drawDistribution() {
+  const traces = [];
+  for (const [number, rows] of chosen) {
+    const values = known(rows, state.metric).map((row) => columns[state.metric][row]);
+    if (!values.length) continue;
+    traces.push({
+      ...distribution(values), type: 'scatter', mode: 'lines', name: plain(groups[number]),
+      line: { color: groupColour(number), width: 2.2, shape: 'hv', dash: groupDash(number) },
+      hovertemplate: '%{y:.1%} at or below %{x:.4~g}<extra>%{fullData.name}</extra>',
+    });
+  }
+  byId('ecdf-title').textContent = `Distribution: ${titles[state.metric]}`;
+  show('ecdf', traces, layoutOf(titles[state.metric], 'share of missions at or below', {
+    yaxis: { range: [0, 1.02], tickformat: '.0%' },
+  }));
+}
+
+function drawSpread() {
+  const traces = [];
+  for (const [number, rows] of chosen) {
+    const some = thinned(known(rows, state.metric), 400);
+    if (!some.length) continue;
+    const all = known(rows, state.metric).map((row) => columns[state.metric][row]);
+    const shared = { name: plain(groups[number]), hoverinfo: 'x+name' };
+    traces.push({
+      ...shared, type: 'violin', x: thinned(all, 4000), y0: number, orientation: 'h', side: 'positive', width: 1.15, points: false,
+      fillcolor: fade(groupColour(number), 0.28), line: { color: groupColour(number), width: 1.4 }, spanmode: 'hard',
+      box: { visible: true, width: 0.16, fillcolor: colour('--card'), line: { color: colour('--ink'), width: 1.1 } }, hoveron: 'violins',
+    }, {
+      ...shared, type: 'scatter', mode: 'markers', x: some.map((row) => columns[state.metric][row]), customdata: some,
+      y: some.map((row) => number - 0.12 - 0.24 * jitter(row)), marker: { size: 3.6, color: groupColour(number), opacity: 0.5 },
+      hovertemplate: '%{x:.4~g}<extra>run %{text}</extra>', text: some.map((row) => columns.run[row]),
+    });
+    traces.push({
+      ...shared, type: 'scatter', mode: 'markers', x: [mean(all)], y: [number], marker: { symbol: 'diamond', size: 9, color: colour('--ink') },
+      hovertemplate: 'mean %{x:.2f}<extra>%{fullData.name}</extra>',
+    });
+  }
+  byId('spread-title').textContent = `Spread: ${titles[state.metric]}; box: quartiles, diamond: mean`;
+  show('spread', traces, layoutOf(titles[state.metric], '', {
+    yaxis: { tickvals: shownGroups(), ticktext: shownGroups().map((number) => plain(short(groups[number]))), zeroline: false, showgrid: false,
+      range: [Math.min(...shownGroups()) - 0.55, Math.max(...shownGroups()) + 0.85] },
+  }));
+  byId('spread').removeAllListeners?.('plotly_click');
+  byId('spread').on?.('plotly_click', (event) => pick(event.points[0].customdata));
+}
+
+const short = (name) => (name.length > 22 ? `${name.slice(0, 21)}…` : name);
+const jitter = (row) => { const value = Math.sin(row * 12.9898) * 43758.5453; return value - Math.floor(value); };
+function fade(hex, alpha) {
+  const [r, g, b] = [1, 3, 5].map((place) => parseInt(hex.slice(place, place + 2), 16));
+  return `rgba(${r},${g},${b},${alpha})`;
+}
+
+/** Means over a swept parameter; each point has runs of its own, so their mean has an ordinary interval. */
+function drawSweep() {
+  const name = drawn.swept.find((each) => state.sweep[each] === undefined);
+  byId('sweep-box').hidden = !name;
+  if (!name) return;
+  const traces = [];
+  for (const [number, rows] of chosen) {
+    const byValue = new Map();
+    for (const row of known(rows, state.metric)) {
+      const value = columns[name][row];
+      if (!byValue.has(value)) byValue.set(value, []);
+      byValue.get(value).push(columns[state.metric][row]);
+    }
+    const values = [...byValue.keys()].sort((a, b) => (typeof a === 'number' ? a - b : 0));
+    traces.push({
+      type: 'scatter', mode: 'lines+markers', name: plain(groups[number]), x: values, y: values.map((value) => mean(byValue.get(value))),
+      text: values.map((value) => byValue.get(value).length), line: { color: groupColour(number), width: 2, dash: groupDash(number) },
+      hovertemplate: '%{y:.2f} at %{x} (%{text} missions)<extra>%{fullData.name}</extra>', marker: { symbol: groupSymbol(number), size: 7 },
+    });
+  }
+  const others = drawn.swept.filter((each) => each !== name && state.sweep[each] === undefined);
+  byId('sweep-title').textContent = `Means over ${name}${others.length ? `, averaged over ${others.join(', ')}` : ''}`;
+  show('sweep', traces, layoutOf(name, titles[state.metric]));
+}
+
+function drawPaired() {
+  byId('paired-box').hidden = !drawn.is_paired;
+  if (!drawn.is_paired) return;
+  const key = (row) => [columns.run[row], seedOf(row), ...drawn.swept.map((name) => columns[name][row])].join('|');
+  const reference = new Map(rowsOf(state.reference).map((row) => [key(row), columns[state.metric][row]]));
+  const traces = [];
+  for (const [number, rows] of chosen) {
+    if (number === state.reference) continue;
+    const differences = [];
+    for (const row of known(rows, state.metric)) {
+      const other = reference.get(key(row));
+      if (other !== undefined && other !== null) differences.push(columns[state.metric][row] - other);
+    }
+    if (!differences.length) continue;
+    traces.push({
+      type: 'histogram', x: differences, name: plain(groups[number]), opacity: 0.62, nbinsx: 45, histnorm: 'percent',
+      marker: { color: groupColour(number), line: { color: colour('--card'), width: 0.6 } },
+      hovertemplate: `%{y:.1f}% of ${differences.length.toLocaleString('en')} pairs<br>differ by %{x}<extra>%{fullData.name}</extra>`,
+    }, {
+      type: 'scatter', mode: 'markers', x: [mean(differences)], y: [0], name: plain(groups[number]), cliponaxis: false,
+      marker: { symbol: 'triangle-up', size: 12, color: groupColour(number), line: { color: colour('--card'), width: 1 } },
+      hovertemplate: 'mean difference %{x:.2f}<extra>%{fullData.name}</extra>',
+    });
+  }
+  show('paired', traces, layoutOf(`${titles[state.metric]}: difference to ${plain(groups[state.reference])}`, 'share of pairs (%)', {
+    barmode: 'overlay', shapes: [{ type: 'line', x0: 0, x1: 0, yref: 'paper', y0: 0, y1: 1, line: { color: colour('--ink'), width: 1.2 } }],
+  }));
+}
+
+function pipelineTrace() {
+  return {
+    type: 'scatter', mode: 'lines', x: ways.pipeline.map((each) => each[0]), y: ways.pipeline.map((each) => each[1]),
+    line: { color: colour('--faint'), width: 7 }, name: 'pipeline', hoverinfo: 'name',
+  };
+}
+
+function drawWhere() {
+  byId('where-box').hidden = !ways.paths.length;
+  if (!ways.paths.length) return;
+  const traces = [pipelineTrace()];
+  for (const way of ways.paths) {
+    if (!chosen.has(way.group)) continue;
+    traces.push({
+      type: 'scatter', mode: 'lines', x: way.x_m, y: way.y_m, name: `${plain(groups[way.group])}, run ${way.run}`, opacity: 0.6,
+      line: { color: groupColour(way.group), width: 1.3, dash: groupDash(way.group) }, hoverinfo: 'name',
+      customdata: way.x_m.map(() => [way.group, way.run]),
+    });
+  }
+  show('where', traces, layoutOf('x, east (m)', 'y, north (m)', { yaxis: { scaleanchor: 'x', scaleratio: 1 } }));
+  byId('where').removeAllListeners?.('plotly_click');
+  byId('where').on?.('plotly_click', (event) => {
+    const [group, run] = event.points[0].customdata ?? [];
+    if (run !== undefined) selectRun(run, group);
+  });
+}
+
+const hasWay = (group, run) => ways.paths.some((way) => way.group === group && way.run === run);
+
+function drawRuns() {
+  const traces = [];
+  const [x, y] = METRICS.includes('distance_inspected_m') ? ['search_time_s', 'distance_inspected_m'] : ['search_time_s', METRICS.at(-1)];
+  const other = state.metric === x ? y : state.metric;
+  for (const [number, rows] of chosen) {
+    const some = thinned(rows.filter((row) => columns[x][row] !== null && columns[other][row] !== null), 1200);
+    traces.push({
+      type: 'scatter', mode: 'markers', name: plain(groups[number]), x: some.map((row) => columns[x][row]), y: some.map((row) => columns[other][row]),
+      customdata: some, text: some.map((row) => columns.run[row]),
+      marker: {
+        color: groupColour(number), symbol: groupSymbol(number), opacity: some.length > 300 ? 0.45 : 0.7,
+        size: some.map((row) => (columns.run[row] === state.run ? 15 : 6)),
+        line: { width: some.map((row) => (columns.run[row] === state.run ? 2.2 : hasWay(number, columns.run[row]) ? 1.4 : 0)), color: colour('--ink') },
+      },
+      hovertemplate: 'run %{text}<br>%{x:.4~g}, %{y:.4~g}<extra>%{fullData.name}</extra>',
+    });
+  }
+  show('runs', traces, layoutOf(titles[x], titles[other]));
+  byId('runs').removeAllListeners?.('plotly_click');
+  byId('runs').on?.('plotly_click', (event) => pick(event.points[0].customdata));
+}
+
+function pick(row) {
+  if (typeof row === 'number') selectRun(columns.run[row], columns.group[row]);
+}
+
+function selectRun(run, group) {
+  state.run = run;
+  state.group = group ?? state.group ?? shownGroups()[0];
+  drawRuns();
+  drawRun();
+}
+
+function drawRun() {
+  const rows = [];
+  for (let row = 0; row < COUNT; row++) if (columns.run[row] === state.run && chosen.has(columns.group[row])) rows.push(row);
+  byId('run').hidden = state.run === null;
+  if (state.run === null) return;
+  byId('run-number').value = String(state.run);
+  const shown = [...METRICS, ...drawn.swept];
+  const body = rows.slice(0, 60).map((row) => {
+    const number = columns.group[row];
+    const line = element('tr', {
+      tabindex: '0', class: hasWay(number, state.run) ? 'has-way' : '', 'aria-selected': String(number === state.group),
+      onclick: () => selectRun(state.run, number), onkeydown: (event) => { if (event.key === 'Enter') selectRun(state.run, number); },
+    }, element('td', {}, element('i', { style: `--own:${groupColour(number)}` }), groups[number]),
+    ...shown.map((name) => element('td', {}, String(columns[name][row] ?? '–'))),
+    element('td', {}, columns.found[row] === null ? '–' : columns.found[row] ? 'found' : 'not found'));
+    return line;
+  });
+  byId('run-table').replaceChildren(element('table', {}, element('thead', {}, element('tr', {}, element('th', {}, 'manager'),
+    ...shown.map((name) => element('th', {}, titles[name] ?? name)), element('th', {}, 'pipeline'))), element('tbody', {}, ...body)));
+  drawCommand();
+  const way = ways.paths.find((each) => each.group === state.group && each.run === state.run);
+  drawTimeOf(way);
+  drawMapOf(way);
+}
+
+function drawCommand() {
+  const canReplay = DATA.folders.length === 1 && made[0].facts.length > 0 && columns.run[0] !== null;
+  const command = `suave-des replay ${quoted(DATA.folders[0])} --run ${state.run} --managers ${quoted(groups[state.group] ?? '')} --open`;
+  byId('run-command').replaceChildren(...(canReplay ? [element('span', {}, 'watch it:'), element('code', {}, command), element('button', {
+    type: 'button', onclick: (event) => { navigator.clipboard?.writeText(command); event.target.textContent = 'copied'; },
+  }, 'copy')] : []));
+}
+const quoted = (text) => (/^[\w@%+=:,./-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
+
+function drawTimeOf(way) {
+  if (!way) {
+    show('run-time', [], {});
+    const empty = byId('run-time').querySelector('.empty');
+    const with_ = [...new Set(ways.paths.filter((each) => each.group === state.group).map((each) => each.run))];
+    if (empty) empty.textContent = with_.length ? `this page has the way and timeline of runs ${with_.join(', ')}; the command above shows any other` : (ways.note || 'no way is recorded');
+    return;
+  }
+  const modeColour = themeMode();
+  const traces = [{
+    type: 'scatter', mode: 'lines', x: way.t_s, y: way.visibility_m, name: 'visibility', fill: 'tozeroy', fillcolor: fade(groupColour(0), 0.08),
+    line: { color: colour('--faint'), width: 1.2, dash: 'dot' }, hovertemplate: '%{y:.2f} m at %{x:.0f} s<extra>visibility</extra>',
+  }];
+  way.modes.forEach(([from, mode], place) => {
+    const until = way.modes[place + 1]?.[0] ?? Infinity;
+    const inside = way.t_s.map((t, n) => n).filter((n) => way.t_s[n] >= from && way.t_s[n] <= until + 1);
+    traces.push({
+      type: 'scatter', mode: 'lines', x: inside.map((n) => way.t_s[n]), y: inside.map((n) => way.altitude_m[n]), name: plain(mode || 'no mode'),
+      line: { color: modeColour(mode), width: 2.6 }, hovertemplate: `%{y:.2f} m at %{x:.0f} s<extra>${plain(mode || 'no mode')}</extra>`,
+    });
+  });
+  const top = Math.max(...way.altitude_m, ...way.visibility_m.map((each) => each ?? 0)) * 1.08;
+  const words = { mode_requested: 'requested', component_status: 'reported', pipeline_detected: 'pipeline seen' };
+  for (const [kind, symbol, tint] of [['mode_requested', 'triangle-down', '--ink'], ['component_status', 'circle', '--bad'], ['pipeline_detected', 'star', '--good']]) {
+    const own = way.events.filter(([, event, detail]) => event === kind && !(kind === 'component_status' && !detail.endsWith(' FALSE')));
+    traces.push({
+      type: 'scatter', mode: 'markers', x: own.map((each) => each[0]), y: own.map(() => top), text: own.map((each) => plain(each[2])),
+      marker: { symbol, size: 10, color: colour(tint) }, hovertemplate: `%{x:.1f} s: ${words[kind]} %{text}<extra></extra>`, name: words[kind],
+    });
+  }
+  show('run-time', traces, layoutOf('mission time (s)', 'altitude; visibility, dotted (m)', { yaxis: { rangemode: 'tozero' } }));
+}
+
+function themeMode() {
+  const named = {
+    fd_spiral_low: '--mode-low', fd_spiral_medium: '--mode-medium', fd_spiral_high: '--mode-high', fd_follow_pipeline: '--mode-follow',
+    fd_unground: '--mode-idle', '': '--mode-idle',
+  };
+  return (mode) => colour(named[mode] ?? '--mode-other');
+}
+
+function drawMapOf(way) {
+  if (!way) {
+    show('run-map', [], {});
+    byId('run-map').replaceChildren();
+    return;
+  }
+  const modeColour = themeMode();
+  const colours = way.t_s.map((t) => modeColour(way.modes.findLast(([from]) => from <= t)?.[1] ?? ''));
+  show('run-map', [pipelineTrace(), {
+    type: 'scatter', mode: 'lines+markers', x: way.x_m, y: way.y_m, name: 'way', text: way.t_s, line: { color: colour('--faint'), width: 1 },
+    marker: { size: 4, color: colours }, hovertemplate: '%{text:.0f} s<extra></extra>',
+  }, {
+    type: 'scatter', mode: 'markers', x: way.x_m.slice(0, 1), y: way.y_m.slice(0, 1), name: 'start', marker: { size: 10, color: colour('--ink') }, hoverinfo: 'name',
+  }], layoutOf('x, east (m)', 'y, north (m)', { yaxis: { scaleanchor: 'x', scaleratio: 1 } }));
+}
+
+// Text and tables.
+
+function tableOf([headings, rows]) {
+  return element('div', { class: 'scroll' }, element('table', {}, element('thead', {}, element('tr', {},
+    ...headings.map((each) => element('th', {}, each)))), element('tbody', {}, ...rows.map((cells) => {
+    const number = groups.indexOf(cells[0]);
+    return element('tr', {}, ...cells.map((cell, place) => element('td', {},
+      place === 0 && number >= 0 ? element('i', { class: 'swatch', 'data-group': String(number) }) : null, cell)));
+  }))));
+}
+
+function writeText() {
+  byId('title').textContent = DATA.title;
+  byId('conclusion').textContent = results.conclusion;
+  byId('notes').append(...[...results.notes, ...(ways.note ? [ways.note] : [])].map((each) => element('li', {}, each)));
+  byId('tables').append(element('h2', {}, 'Tables'), ...results.sections.map((section, place) => element('details', { class: 'block', ...(place < 2 ? { open: '' } : {}) },
+    element('summary', {}, section.title),
+    ...section.tables.flatMap(([title, table]) => [title ? element('h3', {}, title) : null, tableOf(table)]),
+    section.conclusions.length ? element('ul', {}, ...section.conclusions.map((each) => element('li', {}, each))) : null)));
+  if (results.needed) {
+    byId('tables').append(element('details', { class: 'block' }, element('summary', {}, 'Runs that an interval needs'), tableOf(results.needed)));
+  }
+  byId('tables').append(element('details', { class: 'block' }, element('summary', {}, 'How it was compared'),
+    element('ul', {}, ...results.remarks.map((each) => element('li', {}, each)))));
+  byId('how').append(element('h2', {}, 'How it was made'), ...made.map((each) => element('details', { class: 'block', open: '' },
+    element('summary', {}, each.folder),
+    each.facts.length ? element('dl', {}, ...each.facts.flatMap(([name, value]) => [element('dt', {}, name), element('dd', {}, value)])) : element('p', {}, 'No manifest.json tells how these were made.'),
+    each.command ? element('div', {}, element('p', {}, 'To repeat it:'), element('pre', {}, element('code', {}, each.command))) : null,
+    listed('Files that went into it (SHA-256)', each.inputs), listed('Versions', each.versions))));
+  byId('made-by').textContent = `suave-des ${DATA.version}`;
+}
+
+const listed = (title, entries) => (Object.keys(entries).length ? element('details', {}, element('summary', {}, title), element('dl', {},
+  ...Object.entries(entries).flatMap(([name, value]) => [element('dt', {}, name), element('dd', { class: 'mono' }, value)]))) : null);
+
+function makeTools() {
+  const chip = (number) => element('button', {
+    type: 'button', 'aria-pressed': 'true', style: `--own:var(--m${number % 6})`, onclick: (event) => {
+      const button = event.currentTarget;
+      if (state.hidden.has(number)) state.hidden.delete(number);
+      else if (shownGroups().length > 1) state.hidden.add(number);
+      button.setAttribute('aria-pressed', String(!state.hidden.has(number)));
+      refresh();
+    },
+  }, element('i'), groups[number]);
+  byId('managers').append(...groups.map((_, number) => chip(number)));
+  const select = (place, entries, choose) => {
+    place.append(...entries.map(([value, label]) => element('option', { value }, label)));
+    place.addEventListener('change', () => { choose(place.value); refresh(); });
+  };
+  select(byId('metric'), METRICS.map((name) => [name, titles[name]]), (value) => { state.metric = value; });
+  select(byId('found'), [], (value) => { state.found = value; });
+  select(byId('reference'), groups.map((name, number) => [number, `less ${name}`]), (value) => { state.reference = Number(value); });
+  for (const name of drawn.swept) {
+    const values = [...new Set(columns[name])];
+    if (values.length > 40) continue;
+    const place = element('select', { 'aria-label': name });
+    byId('sweeps').append(element('label', {}, `${name} `, place));
+    select(place, [['', 'all'], ...values.map((value) => [String(value), String(value)])], (value) => { state.sweep[name] = value === '' ? undefined : value; });
+  }
+  byId('run-number').addEventListener('change', (event) => selectRun(Number(event.target.value)));
+}
+
+function colourSwatches() {
+  document.querySelectorAll('.swatch').forEach((each) => each.style.setProperty('--own', groupColour(Number(each.dataset.group))));
+}
+
+/** The run with a way that comes nearest to the last manager's median. */
+function firstShown() {
+  const group = groups.map((_, number) => number).findLast((number) => ways.paths.some((way) => way.group === number));
+  if (group === undefined) return [0, columns.run[0]];
+  const [metric] = METRICS;
+  const times = known(rowsOf(group), metric).map((row) => [columns[metric][row], columns.run[row]]).sort((a, b) => a[0] - b[0]);
+  const median = times[Math.floor(times.length / 2)]?.[0] ?? 0;
+  const near = times.filter(([, run]) => hasWay(group, run)).sort((a, b) => Math.abs(a[0] - median) - Math.abs(b[0] - median));
+  return [group, near[0]?.[1] ?? columns.run[0]];
+}
+
+async function start() {
+  writeText();
+  makeTools();
+  startTheme(byId('theme'));
+  [state.group, state.run] = firstShown();
+  await startPlotly();
+  refresh();
+  colourSwatches();
+  const alone = [...document.querySelectorAll('#charts > figure:not(.wide)')].filter((each) => !each.hidden);
+  if (alone.length % 2) alone.at(-1).classList.add('alone');
+  dispatchEvent(new Event('resize')); // the charts take their boxes' new width
+  themeListeners.push(() => { refresh(); colourSwatches(); });
+  addEventListener('beforeprint', () => setTheme('light'));
+  document.body.dataset.ready = 'true';
+}
+start();

@@ -1,0 +1,132 @@
+"""Paths of some of a campaign's missions, which are run again for its report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas
+
+from suave_des.campaign.again import OpenedCampaign, opened_campaign
+from suave_des.domain import SEA_BED_Z_M
+from suave_des.errors import SuaveDesError
+from suave_des.metrics.result import MissionResult
+
+_PERIOD_S = 1.0
+_TOLERANCE_S = 1e-3
+_EVENTS = ("mode_requested", "component_status", "pipeline_detected")
+
+
+@dataclass(frozen=True)
+class Way:
+    """The way of one mission.
+
+    Attributes:
+        group: number of its group of missions.
+        run: number of the run.
+        point: of the sweep.
+        t_s: times; x_m, y_m: where it was; altitude_m: above the sea bed; visibility_m: as measured.
+        modes: times at which the mode of the function that moves it changed, with its name.
+        events: times of mode requests, component reports and the first sight, with their detail.
+    """
+
+    group: int
+    run: int
+    point: int
+    t_s: Sequence[float]
+    x_m: Sequence[float]
+    y_m: Sequence[float]
+    altitude_m: Sequence[float]
+    visibility_m: Sequence[float | None]
+    modes: Sequence[tuple[float, str]]
+    events: Sequence[tuple[float, str, str]]
+
+
+@dataclass(frozen=True)
+class Paths:
+    """Ways of some missions.
+
+    Attributes:
+        pipeline: vertices, x and y in m.
+        paths: in the order of groups and runs.
+        note: why there are none, or fewer; empty: there are.
+    """
+
+    pipeline: Sequence[tuple[float, float]] = ()
+    paths: Sequence[Way] = ()
+    note: str = ""
+
+
+def paths_of(folder: Path, frame: pandas.DataFrame, groups: Sequence[str], runs: int) -> Paths:
+    """Run some missions of a campaign again, to have their ways: the first runs, and the quickest, median and slowest.
+
+    Args:
+        folder: the campaign's.
+        frame: its missions.
+        groups: managers in the order of the page's groups.
+        runs: how many runs of each manager; 0: none.
+    """
+    if runs == 0:
+        return Paths()
+    try:
+        with opened_campaign(folder) as campaign:
+            vertices = [(x, y) for x, y, *_ in campaign.loaded.scenario.pipeline.vertices_m]
+            return Paths(vertices, list(_paths(campaign, frame, groups, runs)))
+    except SuaveDesError as error:
+        return Paths(note=f"Paths and timelines are left out: {error}")
+
+
+def _paths(campaign: OpenedCampaign, frame: pandas.DataFrame, groups: Sequence[str], runs: int) -> Iterator[Way]:
+    simulator = campaign.simulator(0)
+    wanted = telling_runs(frame, groups, runs)
+    known = frame.drop_duplicates(["manager", "run"]).set_index(["manager", "run"])["search_time_s"]
+    for number, manager in enumerate(groups):
+        for run in wanted:
+            if (manager, run) in known.index:
+                result = campaign.run(manager, run, simulator=simulator)
+                is_same = campaign.variation.sweep.points > 1 or (
+                    abs(result.metrics.search_time_s - float(known[manager, run])) < _TOLERANCE_S
+                )
+                if is_same:
+                    yield _path(number, run, result)
+
+
+def telling_runs(frame: pandas.DataFrame, groups: Sequence[str], runs: int) -> list[int]:
+    """Choose runs to look at: those in which each manager was quickest, in the middle and slowest, and the first."""
+    chosen: dict[int, None] = {}
+    for manager in groups:
+        own = frame[frame["manager"] == manager].sort_values(["search_time_s", "run"], kind="stable")["run"]
+        for place in (0, len(own) // 2, len(own) - 1):
+            if len(own):
+                chosen.setdefault(int(own.iloc[place]))
+    chosen |= dict.fromkeys(sorted({int(run) for run in frame["run"]})[:runs])
+    return sorted(list(chosen)[:runs])
+
+
+def _path(group: int, run: int, result: MissionResult) -> Way:
+    points = result.trajectory
+    period_s = points[1].t_s - points[0].t_s if len(points) > 1 else _PERIOD_S
+    some = points[:: max(1, round(_PERIOD_S / period_s))]
+    modes: list[tuple[float, str]] = []
+    for point in some:
+        if not modes or modes[-1][1] != point.mode:
+            modes.append((point.t_s, point.mode))
+    return Way(
+        group,
+        run,
+        0,
+        [round(each.t_s, 1) for each in some],
+        _rounded([each.x_m for each in some]),
+        _rounded([each.y_m for each in some]),
+        _rounded([each.z_m - SEA_BED_Z_M for each in some]),
+        [None if each.visibility_m is None else round(each.visibility_m, 2) for each in some],
+        modes,
+        [(round(each.t_s, 1), each.event, each.detail) for each in result.events if each.event in _EVENTS],
+    )
+
+
+def _rounded(values: Sequence[Any]) -> list[float]:
+    return [float(value) for value in np.round(np.asarray(values, dtype=float), 2)]
