@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from suave_des.campaign import campaign as campaigns
 from suave_des.campaign.campaign import CampaignOptions, CampaignResult
+from suave_des.campaign.given import ManagerLike
 from suave_des.campaign.progress import OnProgress
 from suave_des.errors import InputError
+from suave_des.scenario.loader import LoadedScenario
 
 if TYPE_CHECKING:
     import pandas
 
 
 def run_campaign(
-    scenario: str | Path,
-    managers: Sequence[str] | None = None,
+    scenario: str | Path | LoadedScenario,
+    managers: ManagerLike | Iterable[ManagerLike] | None = None,
     runs: int | None = None,
     seed: int | None = None,
     workers: int = 1,
@@ -45,16 +47,18 @@ def run_campaign(
         frame.groupby("manager")["search_time_s"].mean()
 
     Args:
-        scenario: path of a scenario file or of a campaign file, or name of a shipped scenario.
-        managers: names, or module:Class; left out, as is the rest: as in the campaign file, or none, random and
-            metacontrol.
+        scenario: path of a scenario file or of a campaign file, name of a shipped scenario, or a loaded one.
+        managers: names, module:Class, or classes, one or several; left out, as is the rest: as in the campaign file,
+            or none, random and metacontrol.
         runs: missions for each manager, at each point of a sweep: 20.
         seed: of everything that is random: 1.
         workers: processes; with 1 the missions run in this one. With more, managers that the calling script defines
-            itself (`__main__:Class`) need `if __name__ == "__main__":` around the call, as workers import the script.
+            itself need `if __name__ == "__main__":` around the call, as workers import the script; those of a notebook
+            need nothing.
         out: folder for runs.csv, summary.csv and manifest.json, from which the campaign can be resumed. None: no files.
         progress: whether to show progress; left out: in a notebook and on a terminal.
-        options: see suave_des.campaign.spec.CampaignSpec, such as sweep, perturbations, until_ci and rules.
+        options: see suave_des.campaign.spec.CampaignSpec, such as sweep, perturbations, until_ci and rules. The values
+            of a sweep may be a list, an array or a range.
 
     Raises:
         InputError: something given cannot be used; nothing is written then.
@@ -62,7 +66,7 @@ def run_campaign(
         StoreError: the disk is full, or the folder was removed.
     """
     result, attrs = _with_progress(
-        str(scenario),
+        _label(scenario),
         progress,
         lambda show: campaigns.run_campaign(scenario, managers, runs, seed, workers, out, on_progress=show, **options),
     )
@@ -70,8 +74,8 @@ def run_campaign(
 
 
 def stream_campaign(
-    scenario: str | Path,
-    managers: Sequence[str] | None = None,
+    scenario: str | Path | LoadedScenario,
+    managers: ManagerLike | Iterable[ManagerLike] | None = None,
     runs: int | None = None,
     seed: int | None = None,
     workers: int = 1,
@@ -93,7 +97,7 @@ def stream_campaign(
     if chunk_rows < 1:
         raise InputError(f"chunk_rows: {chunk_rows} is out of range", remedy="give 1 or more")
     result, attrs = _with_progress(
-        str(scenario),
+        _label(scenario),
         progress,
         lambda show: campaigns.run_campaign(scenario, managers, runs, seed, workers, out, on_progress=show, **options),
     )
@@ -131,6 +135,10 @@ def resume_campaign(
         ),
     )
     return _with_attrs(result.frame(), attrs)
+
+
+def _label(scenario: str | Path | LoadedScenario) -> str:
+    return scenario.scenario.name if isinstance(scenario, LoadedScenario) else str(scenario)
 
 
 def _with_progress(

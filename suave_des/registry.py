@@ -39,6 +39,11 @@ def manager_names() -> tuple[str, ...]:
     return (*_BUILT_IN, *(name for name in sorted(_registered()) if name not in _BUILT_IN))
 
 
+def registered_name(target: str) -> str | None:
+    """The name that stands for a class given as module:Class; None if there is none."""
+    return next((name for name, known in (_BUILT_IN | _registered()).items() if known == target), None)
+
+
 def manager_class(name: str) -> type[ManagingSubsystem]:
     """The class of a manager.
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
+from suave_des.campaign.given import ManagerLike, manager_names, plain_sweep
 from suave_des.campaign.progress import OnProgress, Progress
 from suave_des.campaign.results import CampaignResult
 from suave_des.campaign.runner import CampaignInterrupted, resume_campaign, run
 from suave_des.campaign.spec import CampaignSpec
+from suave_des.scenario.loader import LoadedScenario
 
 __all__ = ["CampaignInterrupted", "CampaignOptions", "CampaignResult", "Progress", "resume_campaign", "run_campaign"]
 
@@ -29,6 +31,7 @@ class CampaignOptions(TypedDict, total=False):
     rules: Sequence[str | Path]
     disabled_rules: Sequence[str]
     suave_format: bool
+    parquet: bool
     record_knowledge: bool
     confirmed: bool
     overwrite: bool
@@ -36,8 +39,8 @@ class CampaignOptions(TypedDict, total=False):
 
 
 def run_campaign(
-    scenario: str | Path,
-    managers: Sequence[str] | None = None,
+    scenario: str | Path | LoadedScenario,
+    managers: ManagerLike | Iterable[ManagerLike] | None = None,
     runs: int | None = None,
     seed: int | None = None,
     workers: int = 1,
@@ -53,8 +56,8 @@ def run_campaign(
         print(result.frame().groupby("manager")["search_time_s"].mean())
 
     Args:
-        scenario: path of a scenario file or of a campaign file, or name of a shipped scenario.
-        managers: names, or module:Class.
+        scenario: path of a scenario file or of a campaign file, name of a shipped scenario, or a loaded one.
+        managers: names, module:Class, or classes; one or several.
         runs: missions for each manager, at each point; with `until_ci` at most, and 10,000 if they are left out.
         seed: of everything that is random.
         workers: processes; with 1 the missions run in this one. With more, managers that the calling script defines
@@ -66,5 +69,9 @@ def run_campaign(
     Raises:
         InputError, WorkerError, StoreError, CampaignInterrupted: as runner.run.
     """
-    given = {"managers": managers, "runs": runs, "seed": seed, "workers": workers, "out": out}
-    return run(CampaignSpec.of(scenario, **given, **options), on_progress)
+    given = {"managers": manager_names(managers), "runs": runs, "seed": seed, "workers": workers, "out": out}
+    if options.get("sweep") is not None:
+        options["sweep"] = plain_sweep(options["sweep"])
+    loaded = scenario if isinstance(scenario, LoadedScenario) else None
+    named = scenario.path if isinstance(scenario, LoadedScenario) else scenario
+    return run(CampaignSpec.of(named, **given, **options), on_progress, loaded)

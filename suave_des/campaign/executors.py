@@ -21,6 +21,7 @@ from multiprocessing.process import BaseProcess
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Self
 
+from suave_des.campaign.main_classes import define_in_main, main_classes
 from suave_des.campaign.missions import Chunk, Finished, JobSpec, MissionKey, WorkerError
 from suave_des.imports import main_hidden
 from suave_des.interrupts import INTERRUPTS, signals_deferred
@@ -75,6 +76,7 @@ class LocalWorkers:
 
     def __init__(self, managers: Sequence[str], workers: int) -> None:
         self._needs_script = any(name.startswith("__main__:") for name in managers)
+        self._definitions = main_classes(managers)
         self._may_be_killed = all(map(is_built_in, managers))
         self._size = workers
         self._workers: list[_Worker] = []
@@ -108,7 +110,7 @@ class LocalWorkers:
         remaining = iter(missions)
         self._tasks = map(_Task, iter(lambda: tuple(islice(remaining, size)), ()))
         for worker in self._workers:
-            worker.prepare(job)
+            worker.prepare(job, self._definitions)
         self._hand_out()
         while busy := [worker for worker in self._workers if worker.tasks]:
             future = self._next_ended(busy)
@@ -176,7 +178,7 @@ class LocalWorkers:
         self._again.extend(others)
         with _interrupts_held():
             self._workers[self._workers.index(worker)] = fresh = _Worker(needs_script=self._needs_script)
-        fresh.prepare(self._job)
+        fresh.prepare(self._job, self._definitions)
         self._hand_out()
 
 
@@ -208,9 +210,11 @@ class _Worker:
         self.process = context.process
         context.close_writer()
 
-    def prepare(self, job: JobSpec) -> None:
+    def prepare(self, job: JobSpec, definitions: bytes | None) -> None:
         """Give it what all its missions have in common; the first thing to do."""
         with suppress(BrokenProcessPool):  # it has ended, as the first chunk will show
+            if definitions is not None:
+                self._pool.submit(define_in_main, definitions)
             self._pool.submit(_prepare, job).add_done_callback(self._is_ready)
 
     def _is_ready(self, _: object) -> None:

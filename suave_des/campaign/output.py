@@ -32,6 +32,7 @@ FAMILIES: Mapping[str, tuple[str, ...]] = {
         "summary.csv",
         "manifest.json",
         "suave_results.csv",
+        "runs.parquet",
         *DERIVED,
         "knowledge_states.jsonl",
     ),

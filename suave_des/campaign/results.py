@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from suave_des.campaign.knowledge_records import CAMPAIGN_KNOWLEDGE_FILE, scenario_line
 from suave_des.campaign.missions import COLUMNS, Failure, Finished, Group, Row
 from suave_des.campaign.output import csv_pieces, csv_text, json_text, rounded, write_files
+from suave_des.campaign.parquet_format import PARQUET_FILE, parquet_bytes
 from suave_des.campaign.progress import FEWEST_RUNS, GroupProgress, parse_until_ci
 from suave_des.campaign.provenance import provenance
 from suave_des.campaign.spec import CampaignSpec
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     import pandas
 
 RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE = "runs.csv", "summary.csv", "manifest.json"
-FILES = (RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE, SUAVE_FILE, CAMPAIGN_KNOWLEDGE_FILE)
+FILES = (RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE, SUAVE_FILE, PARQUET_FILE, CAMPAIGN_KNOWLEDGE_FILE)
 
 METRICS = ("search_time_s", "distance_inspected_m")
 """Metrics that are summarised: those of the paper's table."""
@@ -66,6 +67,16 @@ class CampaignResult:
     failures: tuple[Failure, ...]
     summary: tuple[Row, ...]
     outcomes: Callable[[], Iterator[Finished]]
+
+    def __repr__(self) -> str:
+        """Return the summary as a table, and where the files are."""
+        headings = ("manager", "n", "found", *(f"{METRIC_TITLES[metric]}: mean, 95% interval" for metric in METRICS))
+        rows = [_shown_summary(record) for record in self.summary_records()]
+        widths = [max(map(len, column)) for column in zip(headings, *rows, strict=True)]
+        table = ["  ".join(map(str.ljust, cells, widths)).rstrip() for cells in (headings, *rows)]
+        where = "" if self.folder is None else f", files in {self.folder}"
+        title = f"{self.loaded.scenario.name}, seed {self.seed}: {self.done} of {self.planned} missions{where}"
+        return "\n".join([title, *table])
 
     @property
     def managers(self) -> tuple[str, ...]:
@@ -175,6 +186,18 @@ class CampaignResult:
         return f"{kept}, and kept in {self.folder}; suave-des campaign --resume {self.folder} does the rest"
 
 
+def _shown_summary(record: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return a row of summary.csv as text; the point of a sweep stands with the manager."""
+    swept = "".join(f", {name} {value}" for name, value in record.items() if name not in SUMMARY_COLUMNS)
+    cells = [f"{record['manager']}{swept}", str(record["n"])]
+    cells.append("" if record["found_share"] is None else f"{record['found_share']:.0%}")
+    for metric in METRICS:
+        mean, low, high = (record[f"{metric}_{figure}"] for figure in ("mean", "ci95_low", "ci95_high"))
+        interval = "" if low is None else f" ({low:.1f} to {high:.1f})"
+        cells.append("" if mean is None else f"{mean:.2f}{interval}")
+    return tuple(cells)
+
+
 _TYPES = {"float": "float64", "int": "int64", "bool": "bool"}
 """Types of columns of metrics; a missing float is nan."""
 
@@ -271,6 +294,8 @@ def write_results(result: CampaignResult, inputs: Mapping[str, str]) -> None:
     }
     if spec.suave_format:
         files[SUAVE_FILE] = suave_pieces(scenario.revision.name, _numbered(result), scenario.mission.time_limit_s)
+    if spec.parquet:
+        files[PARQUET_FILE] = parquet_bytes(result.frame())
     if spec.record_knowledge:
         files[CAMPAIGN_KNOWLEDGE_FILE] = result.knowledge_lines()
     write_files(result.folder, files, stale=FILES)

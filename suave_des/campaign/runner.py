@@ -28,7 +28,7 @@ from suave_des.campaign.store import (
 )
 from suave_des.campaign.variation import Variation, vary
 from suave_des.errors import InputError, SuaveDesError
-from suave_des.scenario.loader import LoadedScenario, load_scenario
+from suave_des.scenario.loader import LoadedScenario, Replacements, check_not_replaced, load_scenario
 
 LARGE = 1_000_000
 """Missions from which a campaign needs to be confirmed."""
@@ -47,7 +47,9 @@ class CampaignInterrupted(KeyboardInterrupt):
         super().__init__(f"interrupted; {result.kept()}")
 
 
-def run(spec: CampaignSpec, on_progress: OnProgress | None = None) -> CampaignResult:
+def run(
+    spec: CampaignSpec, on_progress: OnProgress | None = None, loaded: LoadedScenario | None = None
+) -> CampaignResult:
     """Run a campaign.
 
     The result is the same for any number of workers, and however often the campaign was interrupted and resumed. A
@@ -57,6 +59,7 @@ def run(spec: CampaignSpec, on_progress: OnProgress | None = None) -> CampaignRe
     Args:
         spec: what to run; what it leaves to the campaign file is read from there.
         on_progress: called when missions are done.
+        loaded: the scenario, in place of reading that which `spec` names.
 
     Raises:
         InputError: something given cannot be used; nothing is written then.
@@ -66,9 +69,9 @@ def run(spec: CampaignSpec, on_progress: OnProgress | None = None) -> CampaignRe
     """
     if spec.out is not None:
         _check_new(spec.out, overwrite=spec.overwrite)
-    file = read_campaign_file(spec.scenario)
+    file = read_campaign_file(spec.scenario) if loaded is None else None
     with ExitStack() as stack:
-        campaign = _Campaign(spec, file, stack)
+        campaign = _Campaign(spec, file, stack, loaded)
         if spec.suave_format and campaign.variation.sweep.points > 1:
             raise InputError(
                 "the exemplar's results file has no column for what a sweep varies",
@@ -148,9 +151,12 @@ class _Campaign:
         spec: what to run.
         file: the campaign file, if the specification names one.
         stack: what is started is stopped at its end.
+        loaded: the scenario; None: it is read.
     """
 
-    def __init__(self, spec: CampaignSpec, file: CampaignFile | None, stack: ExitStack) -> None:
+    def __init__(
+        self, spec: CampaignSpec, file: CampaignFile | None, stack: ExitStack, loaded: LoadedScenario | None = None
+    ) -> None:
         self.spec = spec = spec.with_file(file)
         try:
             spec.check()
@@ -158,7 +164,7 @@ class _Campaign:
             raise error if file is None or "until_ci" not in spec.from_file else file.located(error) from None
         self._stack = stack
         self._local = self._start_workers()
-        self.loaded, self.variation, self.inputs = read_inputs(spec, file)
+        self.loaded, self.variation, self.inputs = read_inputs(spec, file, loaded)
         self.job = JobSpec(
             self.loaded, self.variation, spec.managers, spec.seed, spec.time_out_s, spec.record_knowledge
         )
@@ -330,20 +336,25 @@ class _Campaign:
         return f"; what was kept before is safe: suave-des campaign --resume {self.spec.out} does the rest"
 
 
-def read_inputs(spec: CampaignSpec, file: CampaignFile | None) -> tuple[LoadedScenario, Variation, dict[str, str]]:
+def read_inputs(
+    spec: CampaignSpec, file: CampaignFile | None, loaded: LoadedScenario | None = None
+) -> tuple[LoadedScenario, Variation, dict[str, str]]:
     """Read what a campaign is made of: the scenario, what varies, and the SHA-256 of each input file.
 
     Raises:
         InputError: something cannot be used.
     """
-    loaded = load_scenario(
-        spec.scenario if file is None else file.scenario,
-        ontologies=spec.ontologies,
-        modes_file=spec.modes_file,
-        reasoner=spec.reasoner,
-        rules=spec.rules,
-        disabled_rules=spec.disabled_rules,
-    )
+    replacements: Replacements = {
+        "ontologies": spec.ontologies,
+        "modes_file": spec.modes_file,
+        "reasoner": spec.reasoner,
+        "rules": spec.rules,
+        "disabled_rules": spec.disabled_rules,
+    }
+    if loaded is None:
+        loaded = load_scenario(spec.scenario if file is None else file.scenario, **replacements)
+    else:
+        check_not_replaced(loaded, replacements)
     given = bool(spec.ontologies or spec.rules or spec.disabled_rules)
     try:
         loaded, variation = vary(loaded, spec.sweep, spec.perturbations, spec.runs_per_draw, spec.seed)

@@ -6,13 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, fields
 from pathlib import Path
 
+from suave_des.campaign.given import ManagerLike, manager_name
 from suave_des.campaign.knowledge_records import KNOWLEDGE_FILE, knowledge_text
 from suave_des.campaign.missions import COLUMNS, row_of
 from suave_des.campaign.output import check_output_folder, csv_text, json_text, make_output_folder, write_files
 from suave_des.campaign.provenance import check_knowledge, provenance
 from suave_des.campaign.spec import RUNS_LIMIT, check_range, check_seed
 from suave_des.metrics.result import Event, MissionResult, TrajectoryPoint
-from suave_des.scenario.loader import LoadedScenario, load_scenario
+from suave_des.scenario.loader import LoadedScenario, Replacements, check_not_replaced, load_scenario
 from suave_des.simulation.simulator import Simulator
 
 MISSION_FILE, EVENTS_FILE, TRAJECTORY_FILE = "mission.json", "events.csv", "trajectory.csv"
@@ -22,10 +23,10 @@ TRAJECTORY_COLUMNS = tuple(field.name for field in fields(TrajectoryPoint))
 
 
 def run_mission(
-    scenario: str | Path,
-    manager: str,
-    run: int,
-    seed: int,
+    scenario: str | Path | LoadedScenario,
+    manager: ManagerLike = "metacontrol",
+    run: int = 1,
+    seed: int = 1,
     out: str | Path | None = None,
     *,
     ontologies: Sequence[str | Path] = (),
@@ -44,8 +45,8 @@ def run_mission(
         print(mission.metrics.search_time_s, len(mission.events))
 
     Args:
-        scenario: path of a scenario file, or name of a shipped one.
-        manager: name of the managing subsystem, or module:Class.
+        scenario: path of a scenario file, name of a shipped one, or a loaded one.
+        manager: name of the managing subsystem, module:Class, or its class.
         run: number of the run, from 1.
         seed: of everything that is random.
         out: folder for mission.json, events.csv, trajectory.csv and, of a manager that reasons,
@@ -62,16 +63,20 @@ def run_mission(
         check_output_folder(folder, "mission", overwrite=overwrite)
     check_range("run", run, 1, RUNS_LIMIT)
     check_seed(seed)
-    loaded = load_scenario(
-        scenario,
-        ontologies=ontologies,
-        modes_file=modes_file,
-        reasoner=reasoner,
-        rules=rules,
-        disabled_rules=disabled_rules,
-    )
-    inputs = check_knowledge(loaded, [manager], given=bool(ontologies or rules or disabled_rules))
-    result = Simulator(loaded).run(manager, run, seed, record=True, on_time=on_time)
+    name = manager_name(manager)
+    replacements: Replacements = {
+        "ontologies": ontologies,
+        "modes_file": modes_file,
+        "reasoner": reasoner,
+        "rules": rules,
+        "disabled_rules": disabled_rules,
+    }
+    if isinstance(scenario, LoadedScenario):
+        check_not_replaced(loaded := scenario, replacements)
+    else:
+        loaded = load_scenario(scenario, **replacements)
+    inputs = check_knowledge(loaded, [name], given=bool(ontologies or rules or disabled_rules))
+    result = Simulator(loaded).run(name, run, seed, record=True, on_time=on_time)
     if folder is not None:
         make_output_folder(folder)
         write_files(folder, _files(loaded, result, inputs, command), stale=(KNOWLEDGE_FILE,))

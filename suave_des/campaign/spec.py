@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from suave_des.campaign.parquet_format import check_parquet
 from suave_des.campaign.progress import RUNS_LIMIT_DEFAULT, parse_until_ci
 from suave_des.errors import InputError, KeyPath, shown
 from suave_des.registry import manager_class
@@ -82,6 +83,7 @@ class CampaignSpec:
         rules: files of rules as text, besides the scenario's.
         disabled_rules: names of rules to switch off, besides the scenario's.
         suave_format: whether the exemplar's own results file is written, too.
+        parquet: whether runs.parquet is written, too; it needs pyarrow.
         record_knowledge: whether the states that managers reasoned about are kept, for `kb try`.
         out: folder for the result files; it is made if its parent exists. None: no files.
         workers: processes; with 1 the missions run in this one.
@@ -103,6 +105,7 @@ class CampaignSpec:
     rules: tuple[str, ...] = ()
     disabled_rules: tuple[str, ...] = ()
     suave_format: bool = False
+    parquet: bool = False
     record_knowledge: bool = False
     time_out_s: float = _DEFAULTS.time_out_s
     until_ci: str | None = None
@@ -168,6 +171,8 @@ class CampaignSpec:
             manager_class(manager)
             if manager in self.managers[:index]:
                 raise InputError(f"manager {manager!r} is given twice", remedy="name each manager once")
+        if self.parquet:
+            check_parquet()
         check_range("runs", self.runs, 1, RUNS_LIMIT)
         check_workers(self.workers)
         if self.scheduler is not None:

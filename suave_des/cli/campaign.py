@@ -24,6 +24,7 @@ class Format(StrEnum):
     """Result files to write besides our own."""
 
     SUAVE = "suave"
+    PARQUET = "parquet"
 
 
 @grouped_options
@@ -89,7 +90,10 @@ def campaign(
         typer.Option("--time-out", metavar="SECONDS", help="Time that a mission may take.", show_default=_TIME_OUT),
     ] = None,
     also: Annotated[
-        Format | None, typer.Option("--format", help="Write the exemplar's own suave_results.csv besides.")
+        list[Format] | None,
+        typer.Option(
+            "--format", help="Write the exemplar's own suave_results.csv, or runs.parquet, besides; repeat it for both."
+        ),
     ] = None,
     record_knowledge: Annotated[
         bool,
@@ -116,7 +120,7 @@ def campaign(
             "--managers": managers,
             "--seed": seed,
             "--time-out": time_out,
-            "--format": also,
+            "--format": also or None,
             "--record-knowledge": record_knowledge,
             "--overwrite": overwrite,
             "--yes": yes,
@@ -151,7 +155,8 @@ def campaign(
                 workers=workers,
                 out=out,
                 **files.replacements,
-                suave_format=also is Format.SUAVE,
+                suave_format=Format.SUAVE in (also or ()),
+                parquet=Format.PARQUET in (also or ()),
                 record_knowledge=record_knowledge,
                 time_out_s=time_out,
                 until_ci=until_ci,

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    import pandas
+
     from suave_des.knowledge.state import KnowledgeState
 
 
@@ -91,3 +94,33 @@ class MissionResult:
     """Values drawn for the scenario's distributions in this run, by key path."""
     refused: dict[tuple[str, str], int] = field(default_factory=dict)
     """How many requests of a mode were refused, by function and mode."""
+
+    def __repr__(self) -> str:
+        """Return the metrics as a table, and how much is recorded."""
+        metrics = self.metrics
+        title = f"{metrics.scenario}, {metrics.manager}, run {metrics.run}, seed {metrics.seed}"
+        rows = ((each.name, getattr(metrics, each.name)) for each in fields(metrics) if each.name not in _IN_TITLE)
+        lines = [f"  {name:<22} {f'{value:.6g}' if isinstance(value, float) else value}" for name, value in rows]
+        parts = {"events": self.events, "points": self.trajectory, "states of knowledge": self.knowledge}
+        recorded = ", ".join(f"{len(part)} {what}" for what, part in parts.items() if part)
+        return "\n".join([title, *lines, f"  recorded: {recorded or 'nothing'}"])
+
+    def events_frame(self) -> pandas.DataFrame:
+        """Return the events as a data frame with the columns of events.csv."""
+        return _frame(Event, self.events)
+
+    def trajectory_frame(self) -> pandas.DataFrame:
+        """Return the trajectory as a data frame with the columns of trajectory.csv."""
+        return _frame(TrajectoryPoint, self.trajectory)
+
+
+_IN_TITLE = ("scenario", "manager", "run", "seed")
+
+
+def _frame(
+    kind: type[Event] | type[TrajectoryPoint], entries: Sequence[Event] | Sequence[TrajectoryPoint]
+) -> pandas.DataFrame:
+    import pandas
+
+    names = [each.name for each in fields(kind)]
+    return pandas.DataFrame([[getattr(entry, name) for name in names] for entry in entries], columns=names)

@@ -117,6 +117,18 @@ def load_scenario(name: str | Path, **replacements: Unpack[Replacements]) -> Loa
     return load_layer(files, scenario_layer(files, path), path, **replacements)
 
 
+def check_not_replaced(loaded: LoadedScenario, replacements: Replacements) -> None:
+    """See that nothing is to replace files of a scenario that is loaded already.
+
+    Raises:
+        InputError: something is.
+    """
+    for name, value in replacements.items():
+        if value:
+            problem = f"{name}: the scenario {loaded.scenario.name} is loaded already, with its files"
+            raise InputError(problem, remedy=f"give {name} to load_scenario")
+
+
 def load_layer(files: Files, layer: Layer, path: Path, **replacements: Unpack[Replacements]) -> LoadedScenario:
     """Check a scenario that is merged over its base already, and read the other files that it names.
 
