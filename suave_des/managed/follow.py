@@ -74,8 +74,12 @@ class FollowPipeline(FunctionNode, WaypointSource):
         return self._published_m
 
     def activated(self) -> None:
-        """Start; the distance counts from zero again, though the published value stays until there is a new one."""
-        self._travelled_m = 0.0
+        """Start; the distance counts from zero again, though the published value stays until there is a new one.
+
+        Where the revision lets the distance go on, only the piece that was interrupted is not counted.
+        """
+        if not self.revision.distance_goes_on:
+            self._travelled_m = 0.0
         self._has_arrived = False
         if self.revision.restarts_on_activation:
             self._next = 0

@@ -92,10 +92,11 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
             self._restart()
         if self.revision.workaround_cleared_on_activation:
             self._lowered_m = 0.0
-        if self.revision.centre == "activation":
+        is_first = self._present is None
+        if self.revision.centre == "activation" or (self.revision.centre == "first_activation" and is_first):
             self.centre_m = self.sender.vehicle.position(self.env.now)[:2]
         first_s = tick_at_or_after(max(self.env.now, self.ready_s), self.phase_s, self.revision.tick_period_s)
-        self._guidance.start_at(first_s, resumes=self._present is not None)
+        self._guidance.start_at(first_s, resumes=not (is_first or self.revision.resends_on_activation))
 
     def deactivated(self) -> None:
         """Stop ticking."""

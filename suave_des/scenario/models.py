@@ -159,6 +159,8 @@ class Battery(Strict):
     """Half-width of the box in x and y within which the vehicle counts as docked."""
     approach_altitude_m: Length = 1.25
     """Altitude above the sea bed at which the station is approached."""
+    mission_ends_at_level: Annotated[float, Field(strict=True), Within(0.0, lt=1.0)] | None = None
+    """Level at which, or below which, the mission ends; left out: it goes on with an empty battery."""
     resend_period_s: Period = 10.0
     """Period at which the station is sent to the autopilot again."""
 

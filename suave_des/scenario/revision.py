@@ -39,10 +39,12 @@ class CoordinatorRevision(Strict):
 class SpiralRevision(Strict):
     """The search function's spiral and its altitude work-around."""
 
-    centre: Literal["origin", "activation"]
-    """Where the spiral is centred: the local frame's origin, or the position at each activation."""
+    centre: Literal["origin", "activation", "first_activation"]
+    """Where the spiral is centred: the local frame's origin, the position at each activation, or at the first."""
     restarts_on_activation: bool
     """Whether each activation starts the spiral afresh (else it goes on from the same counter)."""
+    resends_on_activation: bool = False
+    """Whether a spiral that goes on sends its way-point at once (else when it has waited for it long enough)."""
     tick_period_s: Period
     """Period of its timer; at most one way-point is reached a tick."""
     angle_step_rad: Annotated[float, Field(strict=True), Within(gt=0, le=6.3, unit="rad")]
@@ -72,6 +74,8 @@ class FollowRevision(Strict):
     """A point that is not reached is sent again after this many polls."""
     restarts_on_activation: bool
     """Whether the path starts again from its first point (else it goes on with those not yet reached)."""
+    distance_goes_on: bool = False
+    """Whether the distance goes on counting on activation (else from zero); a piece that was interrupted is left out."""
     adds_remaining_way: bool
     """Whether a deactivation adds the way from the last point to the present position to the distance."""
     resends_at_each_poll: bool
