@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, fields
+from operator import attrgetter
 from pathlib import Path
 
 from suave_des.campaign.given import ManagerLike, manager_name
@@ -19,7 +20,8 @@ from suave_des.simulation.simulator import Simulator
 MISSION_FILE, EVENTS_FILE, TRAJECTORY_FILE = "mission.json", "events.csv", "trajectory.csv"
 
 EVENT_COLUMNS = tuple(field.name for field in fields(Event))
-TRAJECTORY_COLUMNS = tuple(field.name for field in fields(TrajectoryPoint))
+TRAJECTORY_COLUMNS = tuple(field.name for field in fields(TrajectoryPoint) if field.name != "further")
+"""Columns that every trajectory.csv has."""
 
 
 def run_mission(
@@ -95,8 +97,14 @@ def _files(
     files = {
         MISSION_FILE: json_text(mission),
         EVENTS_FILE: csv_text(EVENT_COLUMNS, map(astuple, result.events)),
-        TRAJECTORY_FILE: csv_text(TRAJECTORY_COLUMNS, map(astuple, result.trajectory)),
+        TRAJECTORY_FILE: _trajectory_text(result.trajectory),
     }
     if result.knowledge:
         files[KNOWLEDGE_FILE] = knowledge_text(result.knowledge)
     return files
+
+
+def _trajectory_text(points: Sequence[TrajectoryPoint]) -> str:
+    cells, further = attrgetter(*TRAJECTORY_COLUMNS), tuple(points[0].further)
+    rows = ((*cells(point), *(point.further[name] for name in further)) for point in points)
+    return csv_text((*TRAJECTORY_COLUMNS, *further), rows)

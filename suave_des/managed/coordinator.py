@@ -12,6 +12,7 @@ from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOT
 from suave_des.managed.detection import PipelineDetector
 from suave_des.managed.follow import FollowPipeline
 from suave_des.managed.node import Log
+from suave_des.monitor.measurements import BatteryLevel
 from suave_des.scenario.models import MissionFunctions
 from suave_des.scenario.revision import CoordinatorRevision
 
@@ -61,6 +62,10 @@ class MissionCoordinator:
         self.env.process(self._watch_time_limit())
         self.env.process(self._carry_out_tasks())
 
+    def end_with(self, battery: BatteryLevel, least_level: float) -> None:
+        """End the mission when the battery is at a level, or below it; looked at when the level is measured."""
+        self.env.process(self._watch_battery(battery, least_level))
+
     def search_time_or_limit_s(self) -> float:
         """The search time metric; the time limit when the pipeline was not found."""
         return self.timing.time_limit_s if self.search_time_s is None else self.search_time_s
@@ -84,6 +89,12 @@ class MissionCoordinator:
         timing, period_s = self.timing, self.revision.limit_check_period_s
         yield until(self.env, tick_at_or_after(timing.time_limit_s, timing.limit_phase_s, period_s))
         self._finish("time limit")
+
+    def _watch_battery(self, battery: BatteryLevel, least_level: float) -> Process:
+        yield until(self.env, battery.publishing.phase_s)
+        while battery.level(self.env.now) > least_level:
+            yield self.env.timeout(battery.publishing.period_s)
+        self._finish(f"the battery is down to {battery.level(self.env.now):.2f}")
 
     def _next_poll(self) -> simpy.Event:
         phase_s, period_s = self.timing.poll_phase_s, self.revision.poll_period_s

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import simpy
 
-from suave_des.domain import MAINTAIN_MOTION
+from suave_des.domain import MOVING_FUNCTIONS
 from suave_des.metrics.result import Event, KnowledgeRecord, TrajectoryPoint
 from suave_des.monitor.diagnostics import Diagnostic, Kind
-from suave_des.monitor.measurements import Measurements
+from suave_des.monitor.measurements import Measured, Measurements
 from suave_des.scenario.modes import Mode
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
 
@@ -30,6 +30,7 @@ class Recorder:
     enabled: bool
     events: list[Event] = field(default_factory=list)
     knowledge: list[KnowledgeRecord] = field(default_factory=list)
+    _moving: str | None = None  # the function that the last of these modes is one of
     _modes: list[tuple[float, str]] = field(default_factory=lambda: [(0.0, "")])
 
     def log(self, source: str, event: str, detail: str) -> None:
@@ -42,35 +43,38 @@ class Recorder:
         if self.enabled and (not self.knowledge or self.knowledge[-1].state != state):
             self.knowledge.append(KnowledgeRecord(float(self.env.now), state))
 
-    def diagnostic_of(self, thresholds: Sequence[float]) -> Callable[[Diagnostic], None]:
-        """A subscriber that keeps component reports, and visibility measurements that cross a threshold."""
-        band: int | None = None
-        rising = sorted(thresholds)
+    def diagnostic_of(self, thresholds_m: Sequence[float], battery_limit: float) -> Callable[[Diagnostic], None]:
+        """A subscriber that keeps component reports, and measurements of visibility and battery that cross a limit."""
+        bands: dict[str, int] = {}
+        edges = {"water_visibility": sorted(thresholds_m), "battery_level": [battery_limit]}
 
         def take(diagnostic: Diagnostic) -> None:
-            nonlocal band
             if diagnostic.kind == Kind.COMPONENT_STATUS:
                 self.log("thruster_monitor", "component_status", f"{diagnostic.key} {diagnostic.value}")
-            elif diagnostic.key == "water_visibility":
-                value = diagnostic.value
+            elif diagnostic.key in edges:
+                value, rising = diagnostic.value, edges[diagnostic.key]
                 assert isinstance(value, float)
-                now_in = bisect_right(rising, value)
+                word, unit = ("visibility", " m") if diagnostic.key == "water_visibility" else ("battery", "")
+                band, now_in = bands.get(diagnostic.key), bisect_right(rising, value)
                 if band is None:
-                    self.log("visibility_monitor", "first_measurement", f"{value:.2f} m")
+                    self.log(f"{word}_monitor", "first_measurement", f"{value:.2f}{unit}")
                 elif now_in != band:
-                    word, edge = ("rises to", rising[now_in - 1]) if now_in > band else ("falls below", rising[now_in])
-                    self.log("visibility_monitor", "visibility_crossing", f"{word} {edge:g} m ({value:.2f} m)")
-                band = now_in
+                    way, edge = ("rises to", rising[now_in - 1]) if now_in > band else ("falls below", rising[now_in])
+                    self.log(f"{word}_monitor", f"{word}_crossing", f"{way} {edge:g}{unit} ({value:.2f}{unit})")
+                bands[diagnostic.key] = now_in
 
         return take
 
     def mode_effect(self, function: str, mode: Mode) -> None:
         """Keep the mode of the function that moves the vehicle, for the trajectory."""
-        if function != MAINTAIN_MOTION:
+        if function in MOVING_FUNCTIONS and (mode.active or self._moving in (function, None)):
+            self._moving = function
             self._modes.append((float(self.env.now), mode.name))
 
-    def trajectory(self, vehicle: Vehicle, visibility: Measurements) -> tuple[TrajectoryPoint, ...]:
-        """The vehicle's way until now, with the mode in force and the visibility measured at each point."""
+    def trajectory(
+        self, vehicle: Vehicle, visibility: Measurements, further: Mapping[str, Measured]
+    ) -> tuple[TrajectoryPoint, ...]:
+        """The vehicle's way until now: at each point the mode in force, the visibility, and what else was measured."""
         if not self.enabled:
             return ()
         points = []
@@ -78,7 +82,6 @@ class Recorder:
         for row in range(0, int(self.env.now / STEP_S) + 1, TRAJECTORY_PERIOD_ROWS):
             t_s = round(row * STEP_S, 6)
             pose = vehicle.pose(t_s)
-            measured = bisect_right(visibility.times_s, t_s)
             points.append(
                 TrajectoryPoint(
                     t_s,
@@ -89,7 +92,8 @@ class Recorder:
                     pose.pitch_rad,
                     pose.yaw_rad,
                     self._modes[bisect_right(mode_times, t_s) - 1][1],
-                    visibility.values[measured - 1] if measured else None,
+                    visibility.value(t_s),
+                    {name: measured.value(t_s) for name, measured in further.items()},
                 )
             )
         return tuple(points)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING
 
@@ -61,7 +61,11 @@ class MissionMetrics:
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryPoint:
-    """Where the vehicle was at a mission time, and under which mode; visibility as measured, none before that."""
+    """Where the vehicle was at a mission time, and under which mode; visibility as measured, none before that.
+
+    Attributes:
+        further: what else was measured, such as battery_level, by its column; of each point the same.
+    """
 
     t_s: float
     x_m: float
@@ -72,6 +76,7 @@ class TrajectoryPoint:
     yaw_rad: float
     mode: str
     visibility_m: float | None
+    further: Mapping[str, float | None] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -69,6 +69,11 @@ class Measurements:
         passed = bisect_right(times_s, t_s)
         return times_s[passed] if passed < len(times_s) else math.inf
 
+    def value(self, t_s: float) -> float | None:
+        """The value that was published last at mission time t; none before the first."""
+        published = self.published(t_s)
+        return self.values[published - 1] if published else None
+
     def next_message_s(self, t_s: float) -> float:
         """Time of the first message, changed or not, at or after t."""
         return tick_at_or_after(t_s, self.phase_s, self.period_s)
@@ -87,6 +92,19 @@ class Publishing:
     period_s: float
     phase_s: float
     time_step_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Disturbance:
+    """What is wrong with a monitor.
+
+    Attributes:
+        error: draws the error of one measurement.
+        is_lost: whether the message at a mission time is not published.
+    """
+
+    error: Callable[[], float] = lambda: 0.0
+    is_lost: Callable[[float], bool] = lambda t_s: False
 
 
 def measure(
@@ -142,6 +160,9 @@ class BatteryLevel:
         is_at_station: whether the vehicle is at the station at a mission time.
         discharge_time_s: time from full to empty.
         publishing: when it is measured.
+        disturbance: what is wrong with its monitor.
+        times_s, values: of what was published so far.
+        recharges: how often the vehicle came to the station so far.
     """
 
     key: ClassVar[str] = "battery_level"
@@ -149,9 +170,12 @@ class BatteryLevel:
     is_at_station: Callable[[float], bool]
     discharge_time_s: float
     publishing: Publishing
+    disturbance: Disturbance = Disturbance()
     times_s: list[float] = field(default_factory=list, init=False)
     values: list[float] = field(default_factory=list, init=False)
+    recharges: int = field(default=0, init=False)
     _full_at_s: float = field(default=0.0, init=False)
+    _was_at_station: bool = field(default=False, init=False)
 
     def __post_init__(self) -> None:
         self._next_s = self.publishing.phase_s
@@ -159,12 +183,29 @@ class BatteryLevel:
     def published(self, t_s: float) -> int:
         """How many values are published until mission time t, which must not lie in the future."""
         while self._next_s <= t_s:
-            if self.is_at_station(self._next_s):
+            if at_station := self.is_at_station(self._next_s):
                 self._full_at_s = self._next_s
-            self.times_s.append(self._next_s)
-            self.values.append(max(0.0, 1.0 - (self._next_s - self._full_at_s) / self.discharge_time_s))
+                self.recharges += not self._was_at_station
+            self._was_at_station = at_station
+            error = self.disturbance.error()
+            if not self.disturbance.is_lost(self._next_s):
+                self.times_s.append(self._next_s)
+                self.values.append(self._level(self._next_s) + error)
             self._next_s += self.publishing.period_s
         return bisect_right(self.times_s, t_s)
+
+    def value(self, t_s: float) -> float | None:
+        """The level that was published last at mission time t; none before the first."""
+        published = self.published(t_s)
+        return self.values[published - 1] if published else None
+
+    def level(self, t_s: float) -> float:
+        """The true level at mission time t, which is now."""
+        self.published(t_s)
+        return self._level(t_s)
+
+    def _level(self, t_s: float) -> float:
+        return max(0.0, 1.0 - (t_s - self._full_at_s) / self.discharge_time_s)
 
     def region(self, t_s: float, thresholds: Thresholds) -> int:
         """Region of the level that was published last at mission time t."""

@@ -21,10 +21,13 @@ def signal_monitor(env: simpy.Environment, bus: DiagnosticsBus, measurements: Me
 
 def battery_monitor(env: simpy.Environment, bus: DiagnosticsBus, level: BatteryLevel) -> Process:
     """Publish the battery's level, once a period."""
+    known = 0
     yield until(env, level.publishing.phase_s)
     while True:
-        newest = level.published(env.now) - 1
-        bus.publish(Diagnostic(env.now, Kind.QA_STATUS, level.key, level.values[newest]))
+        published = level.published(env.now)
+        if published > known:  # or the message was lost
+            bus.publish(Diagnostic(env.now, Kind.QA_STATUS, level.key, level.values[published - 1]))
+        known = published
         yield env.timeout(level.publishing.period_s)
 
 

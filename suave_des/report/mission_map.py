@@ -28,11 +28,13 @@ _METRICS = (
     *("scenario", "manager", "run", "seed", "search_time_s", "pipeline_found"),
     *("detection_x_m", "detection_y_m"),
 )
+_MISSING = {"visibility_m": [""], "battery_level": [""]}
 _REMEDY = "give the --out folder of suave-des run"
 _IDLE_MODES = ("", "fd_unground")
 _ZOOM_MARGIN_M = 0.6
 _PIPELINE_COLOUR, _PIPELINE_WIDTH = "#CFCFCF", 4.0
 _VISIBILITY_COLOUR = "#A8A8A8"
+_BATTERY, _BATTERY_COLOUR = "battery_level", style.PURPLE
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,9 @@ def read_mission(folder: Path) -> MissionRecord:
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"is not the record of a mission: {error}", file=path, remedy=_REMEDY) from None
     events = _table(folder / "events.csv", ("t_s", "source", "event", "detail"))
-    trajectory = _table(folder / "trajectory.csv", ("t_s", "x_m", "y_m", "z_m", "mode", "visibility_m"))
+    trajectory = _table(
+        folder / "trajectory.csv", ("t_s", "x_m", "y_m", "z_m", "mode", "visibility_m"), optional=(_BATTERY,)
+    )
     return MissionRecord(metrics, scenario, events, trajectory)
 
 
@@ -79,12 +83,15 @@ def _check_columns(path: Path, needed: Iterable[str], found: Container[str]) -> 
             raise InputError(f"{name} is missing", file=path, remedy=_REMEDY)
 
 
-def _table(path: Path, columns: tuple[str, ...]) -> pandas.DataFrame:
-    """Read a table of which `columns` are needed; those of _NUMBERS have finite numbers, the others are text."""
+def _table(path: Path, columns: tuple[str, ...], optional: tuple[str, ...] = ()) -> pandas.DataFrame:
+    """Read a table of which `columns` are needed; those of _NUMBERS have finite numbers, the others are text.
+
+    Columns of `optional` have finite numbers where they are there.
+    """
     text = {name: "str" for name in columns if name not in _NUMBERS}
     try:
         # "none" and "nan" may be words here, so that only numbers have something that counts as missing.
-        frame = pandas.read_csv(path, dtype=text, keep_default_na=False, na_values={"visibility_m": [""]})
+        frame = pandas.read_csv(path, dtype=text, keep_default_na=False, na_values=_MISSING)
     except FileNotFoundError:
         raise InputError("no such file", file=path, remedy=_REMEDY) from None
     except (OSError, ValueError) as error:
@@ -92,7 +99,7 @@ def _table(path: Path, columns: tuple[str, ...]) -> pandas.DataFrame:
     _check_columns(path, columns, frame.columns)
     if frame.empty:
         raise InputError("is empty", file=path, remedy=_REMEDY)
-    for name in set(columns) & set(_NUMBERS):
+    for name in (*(set(columns) & set(_NUMBERS)), *(set(optional) & set(frame.columns))):
         is_wrong = ~np.isfinite(pandas.to_numeric(frame[name], errors="coerce")) & frame[name].notna()
         for row in np.flatnonzero(is_wrong)[:1]:
             problem = f"{name}: expected a finite number, got {str(frame[name].iloc[row])!r}"
@@ -136,18 +143,24 @@ def draw(folder: Path) -> Figure:
         f"a   Mission: {metrics['scenario']}, {metrics['manager']}, run {metrics['run']}, seed {metrics['seed']}"
     )
     zoom.set_title("b   Search")
-    time.set_title("c   Altitude and visibility")
-    whole.legend(handles=_legend(colours, marks), loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+    has_battery = _BATTERY in record.trajectory
+    if has_battery:
+        _draw_battery(time, record)
+    time.set_title("c   Altitude, visibility and battery" if has_battery else "c   Altitude and visibility")
+    handles = _legend(colours, marks, has_battery=has_battery)
+    whole.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
     return figure
 
 
-def _legend(colours: dict[str, str], marks: list[_Mark]) -> list[Line2D]:
+def _legend(colours: dict[str, str], marks: list[_Mark], *, has_battery: bool) -> list[Line2D]:
     named = [(mode, colour) for mode, colour in colours.items() if mode not in _IDLE_MODES]
     if len(named) < len(colours):
         named.append(("no mode that moves it", style.GREY))
     lines = [Line2D([], [], color=colour, lw=1.6, label=name) for name, colour in named]
     lines.append(Line2D([], [], color=_PIPELINE_COLOUR, lw=_PIPELINE_WIDTH, label="pipeline"))
     lines.append(Line2D([], [], color=_VISIBILITY_COLOUR, lw=1.0, label="visibility (c)"))
+    if has_battery:
+        lines.append(Line2D([], [], color=_BATTERY_COLOUR, lw=1.0, ls="--", label="battery (c)"))
     lines.append(Line2D([], [], color=style.BLACK, lw=0, marker="o", ms=4, label="start"))
     for mark in marks:
         symbol = rf"$\mathbf{{{mark.letter}}}$"
@@ -179,6 +192,10 @@ def _told(events: pandas.DataFrame) -> Iterator[tuple[float, str, str]]:
         name = component.removeprefix("c_").replace("_", " ")
         if event == "pipeline_detected":
             yield t_s, "pipeline detected", style.BLACK
+        elif event == "battery_crossing" and detail.startswith("falls"):
+            yield t_s, "battery low", _BATTERY_COLOUR
+        elif event == "battery_crossing":
+            yield t_s, "recharged", _BATTERY_COLOUR
         elif event == "component_status" and status == "FALSE":
             failed.add(component)
             yield t_s, f"{name} failed", style.VERMILION
@@ -256,6 +273,18 @@ def _search_frame(record: MissionRecord) -> Bbox:
         seen = [record.metrics["detection_x_m"], record.metrics["detection_y_m"]]
         search = np.vstack([search, seen])
     return Bbox([search.min(axis=0) - _ZOOM_MARGIN_M, search.max(axis=0) + _ZOOM_MARGIN_M])
+
+
+def _draw_battery(axes: Axes, record: MissionRecord) -> None:
+    """The battery's level over time, on an axis of its own."""
+    level = axes.twinx()
+    level.plot(record.trajectory["t_s"], record.trajectory[_BATTERY], color=_BATTERY_COLOUR, lw=1.0, ls="--")
+    level.grid(visible=False)
+    level.set_ylim(0.0, 1.18)
+    level.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0])
+    level.set_ylabel("battery level", color=_BATTERY_COLOUR)
+    level.tick_params(axis="y", colors=_BATTERY_COLOUR)
+    level.spines["right"].set_visible(True)
 
 
 def _draw_over_time(axes: Axes, record: MissionRecord, colours: dict[str, str], marks: list[_Mark]) -> None:

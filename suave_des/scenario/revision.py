@@ -75,7 +75,7 @@ class FollowRevision(Strict):
     restarts_on_activation: bool
     """Whether the path starts again from its first point (else it goes on with those not yet reached)."""
     distance_goes_on: bool = False
-    """Whether the distance goes on counting on activation (else from zero); a piece that was interrupted is left out."""
+    """Whether the distance goes on counting on activation (else from zero); an interrupted piece is left out."""
     adds_remaining_way: bool
     """Whether a deactivation adds the way from the last point to the present position to the distance."""
     resends_at_each_poll: bool

@@ -97,7 +97,8 @@ class MissionRun:
         self._bus.subscribe(self._reactions.diagnostic, (Kind.COMPONENT_STATUS,))
         if record:
             thresholds_m = self._scenario.reaction_metric.visibility_thresholds_m
-            self._bus.subscribe(self._recorder.diagnostic_of(thresholds_m))
+            battery_limit = self._scenario.reaction_metric.battery_limit
+            self._bus.subscribe(self._recorder.diagnostic_of(thresholds_m, battery_limit))
             self.modes.listeners.append(self._recorder.mode_effect)
         self.modes.listeners.append(self._reactions.mode_effect)
         self._coordinator = self._make_coordinator()
@@ -152,7 +153,8 @@ class MissionRun:
             self._guarded(self.env.run, self._coordinator.ended)
         recorder, drawn, metrics = self._recorder, self._chance.drawn, self.metrics()
         self._host.end(metrics)
-        trajectory = recorder.trajectory(self._vehicle, self._visibility)
+        measured = {} if self._battery is None else {self._battery.key: self._battery}
+        trajectory = recorder.trajectory(self._vehicle, self._visibility, measured)
         events, knowledge = tuple(recorder.events), tuple(recorder.knowledge)
         return MissionResult(metrics, events, trajectory, knowledge, drawn, self.modes.refused)
 
@@ -317,9 +319,13 @@ class MissionRun:
             limit_phase_s=phase("limit", settings.limit_check_period_s),
         )
         functions = self._scenario.mission.functions
-        return MissionCoordinator(
+        coordinator = MissionCoordinator(
             self.env, settings, timing, functions, self._detector, self._follow, self._recorder.log
         )
+        battery = self._scenario.battery
+        if self._battery is not None and battery is not None and battery.mission_ends_at_level is not None:
+            coordinator.end_with(self._battery, battery.mission_ends_at_level)
+        return coordinator
 
     def _make_host(self, kind: type[ManagingSubsystem] | None) -> ManagerHost:
         name = self._manager

@@ -62,7 +62,7 @@ def test_columns_of_the_exemplar_s_file_are_those_of_its_revision(revision, plac
     assert [cell for cell in cells if cell] == [name.replace("(x;y)", "(x,y)") for name in header.split(",")]
 
 
-@pytest.mark.parametrize("scenario", ["seams2023", "release15"])
+@pytest.mark.parametrize("scenario", ["seams2023", "release15", "extended"])
 def test_every_event_of_a_mission_is_in_the_list(scenario):
     rows = tables(section(CSV_PAGE, "events.csv"))[1]
     listed = {(name.strip("`"), source) for names, source, _ in rows for name in names.split(", ")}

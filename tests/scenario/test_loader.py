@@ -16,7 +16,7 @@ from suave_des.scenario.quantities import Normal, Uniform
 from suave_des.scenario.signal_kinds import ConstantSignal, SinusoidSignal, TableSignal
 
 HEAD = "base: seams2023.yaml\n"
-SHIPPED = ("seams2023", "planta_exp1", "release15", "paper_table_values")
+SHIPPED = ("seams2023", "planta_exp1", "release15", "extended", "paper_table_values")
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -27,7 +27,7 @@ def test_a_shipped_scenario_loads_with_its_own_name(name):
 
 def test_every_shipped_scenario_is_known_here():
     files = {path.stem for path in shipped_folder("scenarios").glob("*.yaml")}
-    assert files == {*SHIPPED, "planta_exp1_campaign", "suave_modes"}
+    assert files == {*SHIPPED, "planta_exp1_campaign", "suave_modes", "suave_extended_modes"}
 
 
 def test_seams2023_is_the_papers_experiment():

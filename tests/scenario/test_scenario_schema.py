@@ -30,7 +30,7 @@ def errors(validator: Draft202012Validator, path: Path) -> list[Any]:
     return [error.message for error in validator.iter_errors(read_yaml(path).data)]
 
 
-@pytest.mark.parametrize("name", ["seams2023", "release15", "paper_table_values"])
+@pytest.mark.parametrize("name", ["seams2023", "release15", "extended", "paper_table_values"])
 def test_the_schema_accepts_the_shipped_scenarios(validator, name):
     assert errors(validator, shipped_folder("scenarios") / f"{name}.yaml") == []
 

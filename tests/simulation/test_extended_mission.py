@@ -1,0 +1,126 @@
+"""The extended mission: the battery is recharged as the knowledge base says, and the task goes on where it was left."""
+
+from functools import cache
+from itertools import pairwise
+
+import pytest
+
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.reasoners import make_reasoner
+from suave_des.knowledge.state import KnowledgeState, ObjectiveState
+from suave_des.metrics.result import MissionResult
+from suave_des.resources import find
+from suave_des.scenario.loader import load_scenario, with_values
+from suave_des.simulation.simulator import Simulator
+
+RECHARGES = pytest.mark.parametrize("manager", ["metacontrol", "bt_extended"])
+
+
+@cache
+def flown(manager: str, run: int = 3, disabled: tuple[str, ...] = (), **values: object) -> MissionResult:
+    loaded = load_scenario("extended", disabled_rules=disabled)
+    changed = {path.replace("__", "."): value for path, value in values.items()}
+    return Simulator(with_values(loaded, changed)).run(manager, run=run, seed=1, record=True)
+
+
+def times_s(result: MissionResult, event: str, detail: str) -> list[float]:
+    return [each.t_s for each in result.events if each.event == event and detail in each.detail]
+
+
+def is_on_the_way(result: MissionResult) -> list[bool]:
+    """At each point of the trajectory: whether the vehicle is on its way to the station."""
+    return [point.mode in ("fd_recharge", "normal") for point in result.trajectory]
+
+
+@RECHARGES
+def test_the_vehicle_sets_off_for_the_station_when_the_battery_is_below_a_quarter(manager: str) -> None:
+    result = flown(manager)
+    low_s = times_s(result, "battery_crossing", "falls below 0.25")[0]
+    mode = "fd_recharge" if manager == "metacontrol" else "normal"
+    set_off_s = times_s(result, "mode_set", f"generate_recharge_path = {mode}")
+    assert 0.0 < set_off_s[0] - low_s < 4.0
+
+
+@RECHARGES
+def test_nothing_else_moves_the_vehicle_on_the_way(manager: str) -> None:
+    result = flown(manager)
+    way = [point for point, on_way in zip(result.trajectory, is_on_the_way(result), strict=True) if on_way]
+    gaps_m = [max(abs(point.x_m + 3.0), abs(point.y_m + 2.0)) for point in way[20:]]
+    assert gaps_m[0] > 5.0 > 0.6 > gaps_m[-1]
+    assert all(later <= earlier + 0.02 for earlier, later in pairwise(gaps_m))
+
+
+@RECHARGES
+def test_the_battery_is_full_again_at_the_station(manager: str) -> None:
+    levels = [point.further["battery_level"] for point in flown(manager).trajectory]
+    rises = [later for earlier, later in pairwise(levels) if None not in (earlier, later) and later > earlier]
+    assert rises == [1.0]
+
+
+@RECHARGES
+def test_the_search_goes_on_around_the_same_centre(manager: str) -> None:
+    """With no pipeline to find, the vehicle comes back to where it was, and goes on outwards."""
+    result = flown(manager, pipeline__vertices_m=((500.0, 500.0, -20.0), (510.0, 500.0, -20.0)))
+    centre = result.trajectory[0]
+    distance_m = [max(abs(p.x_m - centre.x_m), abs(p.y_m - centre.y_m)) for p in result.trajectory]
+    on_way = is_on_the_way(result)
+    left, back = on_way.index(True), len(on_way) - on_way[::-1].index(True)
+    assert distance_m[back] > 10.0
+    assert distance_m[-1] == pytest.approx(distance_m[left], abs=2.0)
+
+
+@RECHARGES
+def test_following_goes_on_at_the_point_where_it_was_left_and_the_distance_is_kept(manager: str) -> None:
+    result = flown(manager, mission__time_limit_s=900.0, battery__discharge_time_s=400.0)
+    assert result.metrics.distance_inspected_m > 20.0
+    followed = [p for p in result.trajectory if p.mode == "fd_follow_pipeline"]
+    first_leg = [p for p in followed if p.t_s < times_s(result, "battery_crossing", "falls below")[0]]
+    # The second leg begins at the station, and inspects what lies beyond the first: it passes no place twice.
+    assert min(p.x_m for p in followed) < min(p.x_m for p in first_leg) - 3.0
+
+
+def test_the_level_is_the_knowledge_bases_and_not_the_codes() -> None:
+    loaded = load_scenario("extended")
+    half = with_values(loaded, {"knowledge.values": {"qa_battery_level_work": 0.5}})
+    result = Simulator(half).run("metacontrol", run=3, seed=1, record=True)
+    set_off_s = times_s(result, "mode_set", "generate_recharge_path = fd_recharge")[0]
+    assert 100.0 < set_off_s < 104.0
+
+
+def test_without_the_rule_on_the_battery_the_vehicle_is_never_recharged() -> None:
+    result = flown("metacontrol", disabled=("QABatteryLevel",))
+    assert not times_s(result, "mode_set", "generate_recharge_path = fd_recharge")
+
+
+def test_without_the_rule_on_the_charged_battery_the_vehicle_stays_at_the_station() -> None:
+    result = flown("metacontrol", disabled=("QABatteryCharged",))
+    assert times_s(result, "battery_crossing", "rises to")
+    assert len(times_s(result, "mode_set", "generate_recharge_path = fd_no_recharge")) == 1
+
+
+@pytest.mark.parametrize("level", [0.0, 0.4])
+def test_the_mission_ends_at_the_level_that_the_scenario_names(level: float) -> None:
+    result = flown("none", battery__mission_ends_at_level=level)
+    assert result.metrics.mission_duration_s == pytest.approx(200.0 * (1.0 - level), abs=1.0)
+    assert times_s(result, "mission_ended", "the battery is down to")
+
+
+def test_a_mission_without_battery_has_no_column_for_it() -> None:
+    point = Simulator(load_scenario("release15")).run("none", 1, 1, record=True).trajectory[5]
+    assert point.further == {}
+
+
+@pytest.mark.parametrize("level", [1.0, 0.25, 0.2])
+@pytest.mark.parametrize("design", ["fd_recharge", "fd_no_recharge"])
+def test_stock_pellet_infers_the_same_of_the_extended_ontology(level: float, design: str) -> None:
+    base = Ontology.load([find("suave_extended.owl", "ontology")])
+    state = KnowledgeState.of(
+        [ObjectiveState("generate_recharge_path")],
+        groundings={"generate_recharge_path": design},
+        measurements={"battery_level": level},
+    )
+    ours, stock = (make_reasoner(name, base).infer(state) for name in ("pellet", "owlready2"))
+    assert ours == stock
+    in_error = design == "fd_no_recharge" and level < 0.25
+    assert (ours.grounding_status("generate_recharge_path") == "IN_ERROR_NFR") is in_error
+    assert ours.is_updatable("generate_recharge_path") is (design == "fd_recharge" and level >= 0.25)
