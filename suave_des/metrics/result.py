@@ -116,7 +116,9 @@ class MissionResult:
 
     def trajectory_frame(self) -> pandas.DataFrame:
         """Return the trajectory as a data frame with the columns of trajectory.csv."""
-        return _frame(TrajectoryPoint, self.trajectory)
+        frame = _frame(TrajectoryPoint, self.trajectory)
+        further = [dict(each) for each in frame.pop("further")]
+        return frame.assign(**{name: [each[name] for each in further] for name in (further[0] if further else {})})
 
 
 _IN_TITLE = ("scenario", "manager", "run", "seed")
