@@ -1,6 +1,6 @@
 """`python -m suave_des` is `suave-des`."""
 
-from suave_des.cli.main import main
+from suave_des.entry import main
 
 if __name__ == "__main__":
     main()

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
+import pickle
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final, TypeVar, cast
 
 import numba
 import numpy as np
+from numba.core import caching
 from numpy.typing import NDArray
 
 from suave_des.imports import hidden
+from suave_des.resources import private_cache
 
 # What numba would load on the first call. To see that there is a BLAS, it imports scipy.linalg, which takes 0.2 s and
 # is used by no inner loop. There is one, as scipy is installed; what uses it imports it then.
@@ -25,4 +32,77 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 def compiled(function: _F) -> _F:
     """Compile a function of arrays and numbers on its first call (division by zero gives inf or nan, as in numpy)."""
-    return cast(_F, numba.njit(cache=True, error_model="numpy")(function))
+    dispatcher: Any = numba.njit(error_model="numpy")(function)
+    with suppress(RuntimeError):  # no folder to keep machine code in: it is compiled in each process
+        dispatcher._cache = _CodeCache(function)
+    return cast(_F, dispatcher)
+
+
+# The cache, by private interfaces of numba: its own stops a process at a damaged file or a full disk, runs damaged
+# machine code, and is beside the sources, which others may own.
+
+
+class _CodeCache(caching.FunctionCache):
+    """Keeps machine code in the user's cache folder; what is damaged there, or cannot be kept, is compiled again."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        if not os.environ.get("NUMBA_CACHE_DIR"):
+            folder = private_cache("numba")
+            if folder is None:
+                raise RuntimeError("there is no cache folder")
+            config: Any = numba.config
+            config.CACHE_DIR = str(folder)
+        super().__init__(function)
+        plain = self._cache_file
+        self._cache_file = _CheckedFile(self._cache_path, self._impl.filename_base, plain._source_stamp)
+
+    def load_overload(self, signature: Any, target_context: Any) -> Any:
+        """Load the machine code for a signature; None if there is none, or none that can be used."""
+        try:
+            return super().load_overload(signature, target_context)
+        except Exception:  # whatever a file that another version of numba has written leads to
+            return None
+
+    def save_overload(self, signature: Any, data: Any) -> None:
+        """Keep the machine code for a signature, if possible."""
+        with suppress(Exception):  # such as a full disk
+            super().save_overload(signature, data)
+
+
+_DIGEST_BYTES: Final = hashlib.sha256().digest_size
+
+
+class _CheckedFile(caching.IndexDataCacheFile):
+    """Index and data files of numba's cache, each with a checksum."""
+
+    def _load_index(self) -> dict[Any, Any]:
+        content = _checked(Path(self._index_path))
+        if content is None:
+            return {}
+        version, stamp, overloads = pickle.loads(content)
+        return dict(overloads) if (version, stamp) == (self._version, self._source_stamp) else {}
+
+    def _save_index(self, overloads: dict[Any, Any]) -> None:
+        self._write(self._index_path, (self._version, self._source_stamp, overloads))
+
+    def _load_data(self, name: str) -> Any:
+        content = _checked(Path(self._data_path(name)))
+        return None if content is None else pickle.loads(content)
+
+    def _save_data(self, name: str, data: Any) -> None:
+        self._write(self._data_path(name), data)
+
+    def _write(self, path: str, data: Any) -> None:
+        content = self._dump(data)
+        with self._open_for_write(path) as file:
+            file.write(hashlib.sha256(content).digest() + content)
+
+
+def _checked(path: Path) -> bytes | None:
+    """The content of a file, if it is there, and is what was written."""
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return None
+    digest, content = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
+    return content if hashlib.sha256(content).digest() == digest else None

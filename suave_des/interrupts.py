@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-INTERRUPTS = (signal.SIGINT, signal.SIGTERM)
+INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _REPEAT_S = 0.05
 _received: list[int] = []
 
@@ -71,6 +71,11 @@ def _repeated_if_lost() -> Iterator[None]:
 def _stop(number: int, frame: FrameType | None) -> None:
     _received.append(number)
     raise Stopped
+
+
+def was_interrupted() -> bool:
+    """Return whether a signal has asked this process to stop since signals_raised began."""
+    return bool(_received)
 
 
 def exit_status() -> int:

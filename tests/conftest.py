@@ -11,9 +11,13 @@ import tempfile
 import pytest
 from hypothesis import HealthCheck, settings
 
+from suave_des.resources import private_cache
+
 settings.register_profile("repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("repeatable")
 
+# Machine code is the same for all: it is kept where it always is, so that each run of the tests need not compile anew.
+os.environ.setdefault("NUMBA_CACHE_DIR", str(private_cache("numba")))
 if "PYTEST_XDIST_WORKER" not in os.environ:  # such a process has inherited the setting
     os.environ["SUAVE_DES_CACHE_DIR"] = tempfile.mkdtemp(prefix="suave-des-tests-")
 os.environ["SUAVE_DES_JAVA_ARCHIVE"] = "off"  # or processes that outlive the tests would make one in that folder

@@ -43,6 +43,7 @@ _START_S = 300.0
 _MARGIN_S = 60.0
 """Added to the time that a chunk's missions may take, such as for starting Java, before its worker is killed."""
 _STOP_TIMEOUT_S = 5.0
+_SAFE_PATH = "PYTHONSAFEPATH"
 _OUT_OF_MEMORY = 12
 """Exit status of a worker that could not get the memory it asked for (the system's number of that error)."""
 
@@ -279,13 +280,30 @@ class _Context(SpawnContext):
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
     """Hold Ctrl-C and kill back while a worker starts: it inherits that, so that they reach this process alone."""
-    resource_tracker.ensure_running()  # or the first worker's start starts it, which lets them through again
-    with signals_deferred():
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
-        try:
-            yield
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    with _without_current_folder():
+        resource_tracker.ensure_running()  # or the first worker's start starts it, which lets them through again
+        with signals_deferred():
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
+            try:
+                yield
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _without_current_folder() -> Iterator[None]:
+    """Have processes that start meanwhile import nothing from the current folder while Python starts in them.
+
+    A file such as signal.py or types.py there would be taken for Python's own module of that name.
+    """
+    if _SAFE_PATH in os.environ:
+        yield
+        return
+    os.environ[_SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        del os.environ[_SAFE_PATH]
 
 
 # What runs in a worker process.

@@ -144,14 +144,14 @@ def make_output_folder(folder: Path) -> None:
         folder.mkdir(exist_ok=True)
 
 
-def remove_derived(folder: Path) -> None:
-    """Remove files that were made from a campaign that is replaced.
+def remove_results(folder: Path, names: Collection[str]) -> None:
+    """Remove files that were made from a campaign that is replaced, those of these names among them.
 
     Raises:
         InputError: it cannot be removed.
     """
     with _user_errors(folder):
-        for name in DERIVED:
+        for name in (*names, *DERIVED):
             (folder / name).unlink(missing_ok=True)
 
 
@@ -170,11 +170,12 @@ def write_files(folder: Path, files: Mapping[str, str | bytes | Iterable[str]], 
     try:
         with _user_errors(folder):
             for content, temporary in zip(files.values(), written.values(), strict=True):
-                if isinstance(content, str | bytes):
-                    temporary.write_bytes(content if isinstance(content, bytes) else content.encode())
-                    continue
-                with temporary.open("wb") as file:
-                    file.writelines(piece.encode() for piece in content)
+                temporary.unlink(missing_ok=True)
+                with temporary.open("xb") as file:  # x: a link of that name is not followed
+                    if isinstance(content, str | bytes):
+                        file.write(content if isinstance(content, bytes) else content.encode())
+                    else:
+                        file.writelines(piece.encode() for piece in content)
             for final, temporary in written.items():
                 temporary.replace(final)
             for name in set(stale) - set(files):

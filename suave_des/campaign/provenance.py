@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import json
 import platform
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -128,6 +129,12 @@ def deciding(spec: CampaignSpec, loaded: LoadedScenario, inputs: Mapping[str, st
             if not name.endswith((".yaml", ".yml")) or Path(name).name == loaded.modes_path.name
         },
     }
+
+
+def identity(decides: Mapping[str, Any]) -> str:
+    """Return what tells a campaign from others that used its folder; more runs leave it the same campaign."""
+    same = {name: value for name, value in decides.items() if name not in ("runs", "until_ci")}
+    return hashlib.sha256(json.dumps(same, sort_keys=True).encode()).hexdigest()
 
 
 def manager_code(name: str) -> str:

@@ -269,8 +269,13 @@ def _figures(values: Sequence[float]) -> Row:
 # Files.
 
 
-def write_results(result: CampaignResult, inputs: Mapping[str, str]) -> None:
+def write_results(result: CampaignResult, inputs: Mapping[str, str], identity: str) -> None:
     """Write a campaign's files into its folder, in place of those of an earlier use.
+
+    Args:
+        result: what the campaign gave.
+        inputs: SHA-256 of each input file, by its name as shown to the user.
+        identity: of the campaign, as its store has it.
 
     Raises:
         InputError: they cannot be written; nothing half-written stays.
@@ -289,6 +294,7 @@ def write_results(result: CampaignResult, inputs: Mapping[str, str]) -> None:
                 **_varied(result),
                 **result.report(),
                 **provenance(result.loaded, inputs, spec.command),
+                "campaign_sha256": identity,
             }
         ),
     }

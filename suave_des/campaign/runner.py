@@ -10,9 +10,9 @@ from pathlib import Path
 
 from suave_des.campaign.executors import InProcess, LocalWorkers
 from suave_des.campaign.missions import Executor, Finished, JobSpec, MissionKey, WorkerError, plan
-from suave_des.campaign.output import check_output_folder, make_output_folder, remove_derived, remove_parts
+from suave_des.campaign.output import check_output_folder, make_output_folder, remove_parts, remove_results
 from suave_des.campaign.progress import OnProgress, ProgressTracker, parse_until_ci
-from suave_des.campaign.provenance import check_knowledge, check_same, deciding
+from suave_des.campaign.provenance import check_knowledge, check_same, deciding, identity
 from suave_des.campaign.results import FILES, CampaignResult, gather, write_results
 from suave_des.campaign.spec import CampaignFile, CampaignSpec, read_campaign_file
 from suave_des.campaign.store import (
@@ -32,7 +32,11 @@ from suave_des.scenario.loader import LoadedScenario, Replacements, check_not_re
 
 LARGE = 1_000_000
 """Missions from which a campaign needs to be confirmed."""
+TIME_OUT_S = 120.0
+TIME_OUTS_S = {"owlready2": 1800.0}
+"""Time that a mission may take with a reasoner, if not TIME_OUT_S: owlready2 takes some two minutes a mission."""
 _TIMED_RUNS = 3
+_REASONER = "knowledge.reasoner"
 
 
 class CampaignInterrupted(KeyboardInterrupt):
@@ -164,7 +168,9 @@ class _Campaign:
             raise error if file is None or "until_ci" not in spec.from_file else file.located(error) from None
         self._stack = stack
         self._local = self._start_workers()
-        self.loaded, self.variation, self.inputs = read_inputs(spec, file, loaded)
+self.loaded, self.variation, self.inputs = read_inputs(spec, file, loaded)
+        if "time_out_s" in spec.from_file and not (file is not None and file.sets("time_out_s")):
+            self.spec = spec = replace(spec, time_out_s=default_time_out_s(self.loaded, self.variation))
         self.job = JobSpec(
             self.loaded, self.variation, spec.managers, spec.seed, spec.time_out_s, spec.record_knowledge
         )
@@ -254,15 +260,16 @@ class _Campaign:
         folder = self.spec.out
         if folder is None:
             return Store(None)
-        about = {"request": self.spec.stored(), "deciding": deciding(self.spec, self.loaded, self.inputs)}
+        decides = deciding(self.spec, self.loaded, self.inputs)
+        about = {"request": self.spec.stored(), "deciding": decides, "identity": identity(decides)}
         path = folder / STORE_FILE
         if not resumed:
+            remove_results(folder, FILES)  # first, or a kill would leave them beside the new campaign
             make_store(path, about)
-            remove_derived(folder)
         store = Store(path)
         try:
             if resumed:
-                check_same(store.about("deciding"), about["deciding"], folder)
+                check_same(store.about("deciding"), decides, folder)
                 store.forget_passing_failures()
                 for name, value in about.items():
                     store.note(name, value)
@@ -309,7 +316,7 @@ class _Campaign:
         )
         if self.spec.out is not None:
             try:
-                write_results(result, self.inputs)
+                write_results(result, self.inputs, identity(deciding(self.spec, self.loaded, self.inputs)))
             except InputError as error:
                 raise InputError(error.problem, file=error.file, remedy=self._how_to_have_files()) from None
         return result
@@ -362,6 +369,13 @@ def read_inputs(
         raise error if file is None else file.located(error) from None
     inputs = check_knowledge(loaded, spec.managers, given=given)
     return loaded, variation, inputs if file is None else {**inputs, **file.inputs}
+
+
+def default_time_out_s(loaded: LoadedScenario, variation: Variation) -> float:
+    """Return the time that a mission may take if none is given: it follows from the reasoners."""
+    sweep, name = variation.sweep, next((name for name, path in variation.paths.items() if path == _REASONER), None)
+    swept = [] if name is None else [sweep.values(point)[name] for point in sweep.each_value()]
+    return max(TIME_OUTS_S.get(str(each), TIME_OUT_S) for each in (loaded.scenario.knowledge.reasoner, *swept))
 
 
 def _duration_text(seconds: float) -> str:

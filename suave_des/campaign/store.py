@@ -26,13 +26,15 @@ NEW_STORE_FILE = f".{STORE_FILE}.new"
 """Its name until it is complete."""
 LOCK_FILE = ".campaign.lock"
 
-_VERSION = 1
+_ENDINGS = ("", "-wal", "-shm", "-journal")
+"""Of the database's files."""
+_VERSION = 2
 _COMMIT_PERIOD_S = 0.1
 """A kill loses at most the missions of this time, besides those under way."""
 _ROW, _LASTING, _PASSING = 0, 1, 2
 """Kinds of outcome: a row of runs.csv, a failure, a failure that may not happen again."""
 _TABLES = """
-CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL, crc INTEGER NOT NULL) WITHOUT ROWID;
 CREATE TABLE outcomes (
     point INTEGER, manager INTEGER, run INTEGER, kind INTEGER NOT NULL, content TEXT NOT NULL, crc INTEGER NOT NULL,
     PRIMARY KEY (point, manager, run)
@@ -50,11 +52,16 @@ def locked(folder: Path) -> Iterator[None]:
         InputError: another campaign holds it, or it cannot be locked.
     """
     path = folder / LOCK_FILE
+    _check_no_links(folder)
     lock = FileLock(path, timeout=0, mode=0o666)
     try:
         try:
             lock.acquire()
-            path.write_text(str(os.getpid()))
+            handle = os.open(path, os.O_WRONLY | os.O_TRUNC | os.O_NOFOLLOW)
+            try:
+                os.write(handle, str(os.getpid()).encode())
+            finally:
+                os.close(handle)
         except Timeout:
             process = path.read_text(errors="replace") if path.is_file() else ""
             problem = f"another campaign is running in the output folder (process {process or 'unknown'})"
@@ -68,6 +75,17 @@ def locked(folder: Path) -> Iterator[None]:
             lock.acquire()
             path.unlink(missing_ok=True)
         lock.release(force=True)
+
+
+def _check_no_links(folder: Path) -> None:
+    """See that what is written to in place is no link: a folder that came from elsewhere could have one to any file.
+
+    Raises:
+        InputError: it is.
+    """
+    for name in (LOCK_FILE, *(f"{STORE_FILE}{ending}" for ending in _ENDINGS)):
+        if (folder / name).is_symlink():
+            raise InputError("is a link, which is not followed", file=folder / name, remedy="remove it")
 
 
 class StoreError(SuaveDesError):
@@ -126,15 +144,21 @@ class Store:
     # What it is about.
 
     def about(self, name: str) -> Any:
-        """Return what was noted under a name; None if nothing was."""
+        """Return what was noted under a name.
+
+        Raises:
+            InputError: nothing was, or it is damaged.
+        """
         with _user_errors(self.path):
-            found = self._db.execute("SELECT value FROM about WHERE name = ?", (name,)).fetchone()
-        return None if found is None else json.loads(found[0])
+            found = self._db.execute("SELECT value, crc FROM about WHERE name = ?", (name,)).fetchone()
+        if found is None or _note_crc(name, found[0]) != found[1]:
+            raise _damaged(self.path, f"its {name} is {'missing' if found is None else 'not what was written'}")
+        return json.loads(found[0])
 
     def note(self, name: str, value: Any) -> None:
         """Note something about the campaign, at once and durably."""
         with _user_errors(self.path):
-            self._db.execute("INSERT OR REPLACE INTO about VALUES (?, ?)", (name, json.dumps(value)))
+            self._db.execute("INSERT OR REPLACE INTO about VALUES (?, ?, ?)", _note(name, value))
         self.commit()
 
     # Outcomes.
@@ -219,7 +243,7 @@ def make_store(path: Path, about: Mapping[str, Any]) -> None:
     try:
         with _user_errors(path), closing(sqlite3.connect(new, isolation_level=None)) as db:
             db.executescript(f"BEGIN; {_TABLES} PRAGMA user_version = {_VERSION};")
-            db.executemany("INSERT INTO about VALUES (?, ?)", ((name, json.dumps(about[name])) for name in about))
+            db.executemany("INSERT INTO about VALUES (?, ?, ?)", (_note(name, about[name]) for name in about))
             db.execute("COMMIT")
         remove_store(path.parent)
         new.rename(path)
@@ -241,8 +265,12 @@ def stored_outcomes(path: Path) -> Iterator[Finished]:
 
 def remove_store(folder: Path) -> None:
     """Remove a campaign's store from a folder, if there is one."""
-    for ending in ("", "-wal", "-shm", "-journal"):
+    for ending in _ENDINGS:
         (folder / f"{STORE_FILE}{ending}").unlink(missing_ok=True)
+
+
+_DAMAGES = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR)
+"""Codes of errors that a damaged file leads to; with the last, a table is not as it was made."""
 
 
 @contextmanager
@@ -251,7 +279,8 @@ def _user_errors(path: Path | None) -> Iterator[None]:
     try:
         yield
     except sqlite3.OperationalError as error:
-        if error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB):
+        code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT)  # none: what is read is no text
+        if code & 0xFF in _DAMAGES:
             raise _damaged(path, error) from None
         raise StoreError(f"{path or 'temporary files'}: results cannot be kept: {error}") from None
     except sqlite3.DatabaseError as error:
@@ -259,7 +288,17 @@ def _user_errors(path: Path | None) -> Iterator[None]:
 
 
 def _damaged(path: Path | None, what: object) -> InputError:
-    return InputError(f"is damaged: {what}", file=path, remedy="start anew with --overwrite")
+    remedy = "put a copy in its place, or start anew with --overwrite; result files beside it are whole"
+    return InputError(f"is damaged: {what}", file=path, remedy=remedy)
+
+
+def _note(name: str, value: Any) -> tuple[str, str, int]:
+    text = json.dumps(value)
+    return name, text, _note_crc(name, text)
+
+
+def _note_crc(name: str, text: object) -> int:
+    return zlib.crc32(f"{name} {text}".encode(errors="replace"))
 
 
 def _record(finished: Finished) -> tuple[int, int, int, int, str, int]:
@@ -271,7 +310,10 @@ def _record(finished: Finished) -> tuple[int, int, int, int, str, int]:
 
 def _finished(record: tuple[int, int, int, int, str, int], path: Path | None) -> Finished:
     *numbers, kind, content, crc = record
-    key = MissionKey(*numbers)
+    try:
+        key = MissionKey(*map(int, numbers))
+    except (TypeError, ValueError):
+        raise _damaged(path, "an outcome has no number of its mission") from None
     if _crc(key, kind, content) != crc:
         raise _damaged(path, f"the outcome of run {key.run} is not what was written")
     cells = json.loads(content)
@@ -279,4 +321,4 @@ def _finished(record: tuple[int, int, int, int, str, int], path: Path | None) ->
 
 
 def _crc(key: MissionKey, kind: int, content: str) -> int:
-    return zlib.crc32(f"{key.point} {key.manager} {key.run} {kind} {content}".encode())
+    return zlib.crc32(f"{key.point} {key.manager} {key.run} {kind} {content}".encode(errors="replace"))

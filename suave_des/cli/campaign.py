@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli.options import Files, Overwrite, Quiet, command_line, grouped_options
+from suave_des.cli.options import Files, Overwrite, Quiet, TimeOut, command_line, grouped_options
 from suave_des.errors import InputError
 
 if TYPE_CHECKING:
     from suave_des.campaign.campaign import CampaignResult
 
 _FAILURES_SHOWN = 20
-_MANAGERS, _RUNS, _SEED, _TIME_OUT = "none,random,metacontrol", "20", "1", "120"
+_MANAGERS, _RUNS, _SEED = "none,random,metacontrol", "20", "1"
 """As in campaign.spec, which is not imported for --help."""
 _WORKERS = 2
 
@@ -85,10 +85,7 @@ def campaign(
             " after --runs (then 10000 if left out) at most; for instance search_time_s:5.",
         ),
     ] = None,
-    time_out: Annotated[
-        float | None,
-        typer.Option("--time-out", metavar="SECONDS", help="Time that a mission may take.", show_default=_TIME_OUT),
-    ] = None,
+    time_out: TimeOut = None,
     also: Annotated[
         list[Format] | None,
         typer.Option(

@@ -16,7 +16,7 @@ from suave_des import __version__
 from suave_des.cli import bench, calibrate, campaign, compare, kb, missions, pages, reproduce, validate
 from suave_des.cli.options import remember_command_line
 from suave_des.errors import InputError, SuaveDesError
-from suave_des.interrupts import exit_status, signals_raised
+from suave_des.interrupts import exit_status, signals_raised, was_interrupted
 
 BAD_INPUT, MISSIONS_MISSING = 2, 3
 """Exit statuses besides 0 and those of signals; 3: done, but failed missions have no row."""
@@ -104,7 +104,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
             status = command.main(arguments, prog_name="suave-des", standalone_mode=False) or 0
     except SuaveDesError as error:
         status = _report(str(error), BAD_INPUT if isinstance(error, InputError) else MISSIONS_MISSING)
-    except Exception as error:
+    except BaseException as error:
+        if was_interrupted():  # in the middle of an import, whose own error this may be
+            _leave(_report("interrupted", exit_status()), by_force=False)
+        if not isinstance(error, Exception):
+            raise
         # A wrong option or argument: a class that is private to typer, and was click's in earlier versions of it.
         if not hasattr(error, "format_message"):
             raise

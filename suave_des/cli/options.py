@@ -39,6 +39,15 @@ Seed = Annotated[int, typer.Option("--seed", help="Seed of everything that is ra
 Workers = Annotated[
     int, typer.Option("--workers", help="Processes that run missions; any number gives the same bytes.")
 ]
+TimeOut = Annotated[
+    float | None,
+    typer.Option(
+        "--time-out",
+        metavar="SECONDS",
+        help="Real time that a mission may take.",
+        show_default="120; with the reasoner owlready2 1800",
+    ),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress.")]
 Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="Replace results of the same kind that are in the output folder already.")

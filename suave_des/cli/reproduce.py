@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from suave_des.cli.campaign import exit_telling_failures
-from suave_des.cli.options import Files, Overwrite, Quiet, Seed, Workers, command_line, grouped_options
+from suave_des.cli.options import Files, Overwrite, Quiet, Seed, TimeOut, Workers, command_line, grouped_options
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,6 +33,7 @@ def reproduce(
     ] = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
+    time_out: TimeOut = None,
     *,
     files: Files,
 ) -> None:
@@ -56,6 +57,7 @@ def reproduce(
             workers,
             out,
             overwrite=overwrite,
+            time_out_s=time_out,
             command=command_line(),
             on_progress=show,
             **files.replacements,

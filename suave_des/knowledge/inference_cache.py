@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from suave_des.knowledge.state import Fact, Value
-from suave_des.resources import cache_folder
+from suave_des.resources import private_cache
 
 #: Objectives, groundings, components and measurements of a state, the last as regions or as exact values.
 Key = tuple[Any, ...]
@@ -48,10 +48,8 @@ class InferenceCache:
     def __init__(self, digest: str, folder: Path | None = None) -> None:
         self._salt = digest.encode()
         self._first = f"suave-des memory {_FORMAT} {digest}".encode()
-        try:
-            self._path: Path | None = (folder or cache_folder()) / _FOLDER / f"{digest}{_SUFFIX}"
-        except RuntimeError:  # no home folder
-            self._path = None
+        files = private_cache(_FOLDER) if folder is None else folder / _FOLDER
+        self._path = None if files is None else files / f"{digest}{_SUFFIX}"
 
     def load(self) -> dict[Key, frozenset[Fact]]:
         """Return all entries with a right checksum; a file that has others is rewritten without them."""

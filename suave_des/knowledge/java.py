@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import re
 import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -14,15 +16,27 @@ from suave_des.errors import InputError
 
 #: owlready2 0.50 and 0.51 ship a Jena class compiled for Java 25 (class-file version 69).
 NEEDED_VERSION: Final = 25
+_OPTION_VARIABLES: Final = ("JAVA_TOOL_OPTIONS", "JDK_JAVA_OPTIONS", "_JAVA_OPTIONS")
 #: Options of the Java that runs inside this process.
 OPTIONS: Final = (
     "-Xrs",  # Ctrl-C is handled by Python: without this the process ends without running "finally"
     "-Xmx512m",
     "-XX:TieredStopAtLevel=1",  # halves the time to the first inference
     "-XX:+UseSerialGC",  # one thread less per worker; the heap is small
+    "-XX:+DisableAttachMechanism",  # Java would leave a socket .java_pidN in the temporary folder
     "-Xlog:disable",  # Java would report an unusable cache of classes on the terminal
     "--enable-native-access=ALL-UNNAMED",  # Java would report JPype's loading of its library on the terminal
 )
+
+
+@contextmanager
+def without_options_of_others() -> Iterator[None]:
+    """Hide variables that add options to every Java: it would print them, and might not start."""
+    hidden = {name: os.environ.pop(name) for name in _OPTION_VARIABLES if name in os.environ}
+    try:
+        yield
+    finally:
+        os.environ.update(hidden)
 
 
 def java_home() -> Path:

@@ -23,7 +23,7 @@ from typing import Final
 
 from suave_des.errors import InputError
 from suave_des.knowledge.java import OPTIONS, jars, java_library
-from suave_des.resources import cache_folder
+from suave_des.resources import private_cache
 
 _SWITCH: Final = "SUAVE_DES_JAVA_ARCHIVE"
 #: Archives that are kept, about 25 MB each; the least recently used are removed.
@@ -63,9 +63,10 @@ def archive_path(class_path: Sequence[str] | None = None, options: Sequence[str]
         for path in (str(java_library()), *(jars() if class_path is None else class_path)):
             status = Path(path).stat()
             total.update(f"{path} {status.st_size} {status.st_mtime_ns}\n".encode())
-        return cache_folder() / "java" / f"{total.hexdigest()[:32]}.aot"
-    except (OSError, RuntimeError, InputError):  # no home folder, or no Java: starting it gives the error
+    except (OSError, InputError):  # no Java: starting it gives the error
         return None
+    folder = private_cache("java")
+    return None if folder is None else folder / f"{total.hexdigest()[:32]}.aot"
 
 
 def options_for(archive: Path | None) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from typing import Any, Final
 from suave_des.errors import InputError
 from suave_des.imports import hidden
 from suave_des.knowledge import java_archive
-from suave_des.knowledge.java import OPTIONS, jars, java_library
+from suave_des.knowledge.java import OPTIONS, jars, java_library, without_options_of_others
 
 with hidden("numpy"):  # takes 0.1 s, and JPype needs it only to recognise numpy's truth values
     import jpype
@@ -62,7 +62,8 @@ def start(*more: str) -> None:
 def _start(more: tuple[str, ...]) -> None:
     archive = java_archive.archive_path()
     sharing = java_archive.options_for(archive)
-    jpype.startJVM(str(java_library()), *OPTIONS, *sharing, *more, classpath=jars(), convertStrings=False)
+    with without_options_of_others():
+        jpype.startJVM(str(java_library()), *OPTIONS, *sharing, *more, classpath=jars(), convertStrings=False)
     if archive is not None:
         info = str(jpype.JClass("java.lang.System").getProperty("java.vm.info"))
         if sharing and "sharing" not in info:  # Java rejected it: it is damaged

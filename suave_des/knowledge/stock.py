@@ -20,7 +20,7 @@ from rdflib.namespace import OWL, RDF, RDFS
 from rdflib.term import Node
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.java import java_executable
+from suave_des.knowledge.java import java_executable, without_options_of_others
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import unescape
 from suave_des.knowledge.rdf import Lit, Triple, n_triple, term_of
@@ -55,7 +55,9 @@ class StockPellet:
             ontology = world.get_ontology(_STATE_IRI).load(fileobj=io.BytesIO(text.encode()), only_local=True)
             for triple in lossy:
                 _add_exactly(world, ontology, triple)
-            if not _reason(world):
+            with without_options_of_others():
+                is_consistent = _reason(world)
+            if not is_consistent:
                 return None
             return frozenset(self._read(world)) - {_as_float(triple) for triple in lossy}
         finally:

@@ -20,6 +20,7 @@ from suave_des.errors import InputError
 from suave_des.estimates import estimate
 from suave_des.metrics.result import MissionMetrics
 from suave_des.report import mission_map, style
+from suave_des.report.result_files import check_one_campaign
 from suave_des.report.runs import METRICS, read_runs
 
 ENDINGS = (".png", ".pdf", ".svg")
@@ -48,6 +49,7 @@ def draw_folder(folder: Path, out: Path) -> None:
         if (folder / "trajectory.csv").is_file():
             picture = mission_map.draw(folder)
         elif (folder / "runs.csv").is_file():
+            check_one_campaign(folder)
             swept = swept_parameters(folder)
             picture = draw_sweep(folder, swept) if swept else draw_distributions(folder / "runs.csv")
         else:

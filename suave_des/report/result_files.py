@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import json
 import math
+import sqlite3
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -101,6 +103,7 @@ def _header(path: Path) -> list[str]:
 def _read_source(path: Path) -> Missions:
     if not path.is_dir():
         return _of_runs(path)
+    check_one_campaign(path)
     if (path / _RUNS_FILE).is_file():
         missions = _of_runs(path / _RUNS_FILE)
         return Missions(missions.frame, missions.swept, tuple(_unfinished(path)))
@@ -108,6 +111,25 @@ def _read_source(path: Path) -> Missions:
         remedy = f"suave-des campaign --resume {path} does the rest and writes them"
         raise InputError("the campaign ended before its result files were written", file=path, remedy=remedy)
     return _read_exemplar_folder(path)
+
+
+def check_one_campaign(folder: Path) -> None:
+    """See that the result files of a folder are of the campaign whose missions are kept in it, as far as both say so.
+
+    Raises:
+        InputError: they are of another campaign.
+    """
+    try:
+        written = json.loads((folder / _MANIFEST_FILE).read_text(encoding="utf-8"))["campaign_sha256"]
+        address = (folder / _STORE_FILE).absolute().as_uri()
+        with closing(sqlite3.connect(f"{address}?mode=ro", uri=True)) as store:
+            (kept,) = store.execute("SELECT value FROM about WHERE name = 'identity'").fetchone()
+        is_one = json.loads(kept) == written
+    except (OSError, ValueError, KeyError, TypeError, RecursionError, sqlite3.Error):
+        return
+    if not is_one:
+        remedy = f"suave-des campaign --resume {folder} writes those of the campaign that is kept there"
+        raise InputError(f"{_RUNS_FILE} and {_STORE_FILE} are of different campaigns", file=folder, remedy=remedy)
 
 
 def _of_runs(path: Path) -> Missions:
