@@ -73,6 +73,37 @@ def _stop(number: int, frame: FrameType | None) -> None:
     raise Stopped
 
 
+@contextmanager
+def ends_at_once(limit_s: float, message: str) -> Iterator[None]:
+    """End the process at once when the block takes longer than a time, or when a signal asks to stop.
+
+    For a block that nothing is lost with, and that swallows exceptions or spends long in compiled code: evaluation of
+    regular expressions lets signals through, but not other threads.
+
+    Args:
+        limit_s: what the block may take.
+        message: printed when it takes longer; the exit status is then 2.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(number: int, frame: FrameType | None) -> None:
+        is_late = number == signal.SIGALRM
+        os.write(2, f"suave-des: {message if is_late else 'interrupted'}\n".encode())
+        os._exit(2 if is_late else 128 + number)
+
+    ending = (signal.SIGALRM, *INTERRUPTS)
+    before = [signal.signal(number, end) for number in ending]
+    signal.setitimer(signal.ITIMER_REAL, limit_s)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        for number, handler in zip(ending, before, strict=True):
+            signal.signal(number, handler)
+
+
 def was_interrupted() -> bool:
     """Return whether a signal has asked this process to stop since signals_raised began."""
     return bool(_received)

@@ -90,8 +90,7 @@ class LocalWorkers:
         """Start the workers."""
         try:
             for _ in range(self._size):
-                with _interrupts_held():
-                    self._workers.append(_Worker(needs_script=self._needs_script))
+                self._workers.append(self._new_worker())
         except BaseException:
             self.__exit__()
             raise
@@ -131,6 +130,14 @@ class LocalWorkers:
             self._hand_out()
             yield future.result()
         self._is_done = True
+
+    def _new_worker(self) -> _Worker:
+        try:
+            with _interrupts_held():
+                return _Worker(needs_script=self._needs_script)
+        except OSError as error:  # the system's limit of processes, files or memory
+            problem = f"a worker process cannot be started: {error.strerror}"
+            raise WorkerError(f"{problem} (raise the limit, see ulimit -a, or give --workers 1)") from None
 
     def _hand_out(self) -> None:
         """Give every worker its share, as long as there is something to do."""
@@ -177,8 +184,7 @@ class LocalWorkers:
             cause = f"its worker process ended with status {status}, {attempts} times (killed, or out of memory?)"
             yield [self._job.failed(suspect.chunk[0], cause)]
         self._again.extend(others)
-        with _interrupts_held():
-            self._workers[self._workers.index(worker)] = fresh = _Worker(needs_script=self._needs_script)
+        self._workers[self._workers.index(worker)] = fresh = self._new_worker()
         fresh.prepare(self._job, self._definitions)
         self._hand_out()
 

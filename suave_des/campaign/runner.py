@@ -168,7 +168,7 @@ class _Campaign:
             raise error if file is None or "until_ci" not in spec.from_file else file.located(error) from None
         self._stack = stack
         self._local = self._start_workers()
-self.loaded, self.variation, self.inputs = read_inputs(spec, file, loaded)
+        self.loaded, self.variation, self.inputs = read_inputs(spec, file, loaded)
         if "time_out_s" in spec.from_file and not (file is not None and file.sets("time_out_s")):
             self.spec = spec = replace(spec, time_out_s=default_time_out_s(self.loaded, self.variation))
         self.job = JobSpec(

@@ -283,7 +283,7 @@ def _user_errors(path: Path | None) -> Iterator[None]:
         if code & 0xFF in _DAMAGES:
             raise _damaged(path, error) from None
         raise StoreError(f"{path or 'temporary files'}: results cannot be kept: {error}") from None
-    except sqlite3.DatabaseError as error:
+    except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
         raise _damaged(path, error) from None
 
 

@@ -12,6 +12,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from suave_des.cli.terminal import PlainConsole
+
 if TYPE_CHECKING:
     from suave_des.campaign.progress import OnProgress
     from suave_des.metrics.result import Event, MissionMetrics, MissionResult
@@ -38,7 +40,7 @@ _STYLES = {
 
 def output() -> Console:
     """The console for results."""
-    console = Console(highlight=False)
+    console = PlainConsole(highlight=False)
     if not console.is_terminal and "COLUMNS" not in os.environ:
         console.width = _PLAIN_WIDTH
     return console
@@ -46,7 +48,7 @@ def output() -> Console:
 
 def errors() -> Console:
     """The console for errors and progress."""
-    return Console(stderr=True, highlight=False)
+    return PlainConsole(stderr=True, highlight=False)
 
 
 def progress(label: str, *, quiet: bool) -> AbstractContextManager[OnProgress | None]:

@@ -26,6 +26,7 @@ from suave_des.cli.kb_options import (
 )
 from suave_des.cli.options import grouped_options
 from suave_des.errors import InputError
+from suave_des.interrupts import ends_at_once
 
 if TYPE_CHECKING:
     from suave_des.workbench.policy import Policy
@@ -266,7 +267,10 @@ def query(
     from suave_des.campaign.output import csv_text
 
     bench = knowledge.bench()
-    found = bench.query(text, parts.build(bench) if parts.is_given else None, inferred=inferred)
+    state = parts.build(bench) if parts.is_given else None
+    late = f"answering the query: not done after {knowledge.time_limit:g} s (allow more with --time-limit)"
+    with ends_at_once(knowledge.time_limit, late):
+        found = bench.query(text, state, inferred=inferred)
     if form is TableFormat.JSON:
         print_json([dict(zip(found.columns, row, strict=True)) for row in found.rows])
     elif form is TableFormat.CSV:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import atexit
 import gc
 import os
+import signal
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Annotated, Any
 
 import typer
@@ -15,6 +17,7 @@ from typer.core import TyperGroup
 from suave_des import __version__
 from suave_des.cli import bench, calibrate, campaign, compare, kb, missions, pages, reproduce, validate
 from suave_des.cli.options import remember_command_line
+from suave_des.cli.terminal import plain, write_what_the_terminal_has
 from suave_des.errors import InputError, SuaveDesError
 from suave_des.interrupts import exit_status, signals_raised, was_interrupted
 
@@ -31,10 +34,14 @@ class _Commands(TyperGroup):
             return super().invoke(ctx)
         except KeyboardInterrupt as error:
             raise typer.Exit(_report(str(error) or "interrupted", exit_status())) from None
+        except BrokenPipeError:  # whoever reads the output has enough of it, such as head
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            raise typer.Exit(128 + signal.SIGPIPE) from None
 
 
 def _report(message: str, status: int) -> int:
-    print("suave-des: " + " ".join(message.splitlines()), file=sys.stderr)
+    with suppress(BrokenPipeError):
+        print("suave-des: " + plain(" ".join(message.splitlines())), file=sys.stderr)
     return status
 
 
@@ -95,6 +102,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """
     arguments = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     remember_command_line(arguments)
+    write_what_the_terminal_has()
     atexit.unregister(gc.freeze)  # as of an earlier call
     atexit.register(gc.freeze)  # a last collection of all that was imported would take a tenth of a second
     abandoned = _abandoned()
@@ -102,6 +110,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         with signals_raised():
             status = command.main(arguments, prog_name="suave-des", standalone_mode=False) or 0
+            if was_interrupted() and status == 128 + signal.SIGINT:  # typer's for any signal before the command began
+                status = exit_status()
     except SuaveDesError as error:
         status = _report(str(error), BAD_INPUT if isinstance(error, InputError) else MISSIONS_MISSING)
     except BaseException as error:

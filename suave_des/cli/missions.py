@@ -144,6 +144,7 @@ def import_config(
     What has no counterpart is reported, a line each. Files of any revision are read, with or without leading slashes.
     """
     from suave_des.campaign.output import check_output_file, write_files
+    from suave_des.cli.terminal import plain
     from suave_des.errors import InputError
     from suave_des.registry import manager_names
     from suave_des.scenario.exemplar import ImportOptions
@@ -164,7 +165,7 @@ def import_config(
     for folder, contents in written.items():
         write_files(folder, contents)
     for note in imported.notes:
-        print(note)
+        print(plain(note))
     print(f"{out} is written, over the base {imported.base}: {imported.why}")
     if campaign is not None:
         print(f"{campaign} is written")

@@ -14,6 +14,8 @@ from suave_des.knowledge.state import KnowledgeState
 
 #: What a reasoner may take for one state by default, in s.
 TIME_LIMIT_S: Final = 60.0
+#: The longest limit; longer times are more than some systems can count.
+LONGEST_S: Final = 1e6
 #: What a reasoner does at first, for the message.
 LOADING: Final = "loading the ontologies"
 _Result = TypeVar("_Result")
@@ -39,6 +41,9 @@ class TimeLimit:
     """
 
     def __init__(self, seconds: float = TIME_LIMIT_S, option: str | None = None) -> None:
+        if not 0.0 < seconds <= LONGEST_S:
+            problem = f"{option or 'time limit'}: {seconds:g} is out of range"
+            raise KnowledgeError(problem, remedy=f"give seconds above 0, at most {LONGEST_S:g}")
         self.seconds = seconds
         self._option = option
         self._jobs: _Jobs | None = None

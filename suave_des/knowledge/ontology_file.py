@@ -108,6 +108,8 @@ def _read_bytes(path: Path) -> bytes:
     if path.is_dir():
         raise KnowledgeError("this is a folder", file=path, remedy="give an ontology file")
     try:
+        if path.exists() and not path.is_file():  # a pipe would be waited for without end
+            raise KnowledgeError("is not a regular file", file=path, remedy="give an ontology file on disk")
         size = path.stat().st_size
         if size > MAX_BYTES:
             problem = f"{size / 2**20:.0f} MiB is too large for an ontology"

@@ -29,6 +29,8 @@ file does not tell, and mean_reaction_time_s nan where nothing was reacted to or
 seed, which is text, empty where the file does not tell.
 """
 _SIZE_LIMIT_BYTES = 500_000_000
+_GREATEST = 1e12
+"""Of numbers, as in scenarios."""
 _WHOLE_LIMIT = 2**63
 
 
@@ -285,7 +287,7 @@ class _Cells(NamedTuple):
     def numbers(self, column: str, *, least: float = 0.0, may_be_empty: bool = False) -> NDArray[np.float64]:
         """Convert a column; empty cells are nan."""
         numbers = pandas.to_numeric(self.text[column], errors="coerce").to_numpy(float)
-        is_right = np.isfinite(numbers) & (numbers >= least)
+        is_right = np.isfinite(numbers) & (numbers >= least) & (np.abs(numbers) <= _GREATEST)
         if may_be_empty:
             is_right |= (self.text[column] == "").to_numpy()
         self.check(column, is_right, "a finite number" + (f", at least {least:g}" if least > -math.inf else ""))

@@ -139,6 +139,8 @@ class ThrusterEvent(Strict):
         parts: dict[str, Any] = match.groupdict()
         for key, convert, expected in (("thruster", int, "a whole number from 1 to 6"), ("time_s", float, "a number")):
             try:
+                if not parts[key].isascii() or "_" in parts[key]:  # digits to Python, and to nobody else
+                    raise ValueError
                 parts[key] = convert(parts[key])
             except ValueError:
                 raise wrong(f"expected {expected} as {key}, got {shown(parts[key])}", "as in (1,failure,35)") from None

@@ -28,7 +28,7 @@ class CoordinatorRevision(Strict):
 
     poll_period_s: Period
     """Period of its loop."""
-    limit_check_period_s: Period
+    limit_check_period_s: Annotated[float, Field(strict=True), Within(0.001, 1000, unit="s")]
     """Period at which the time limit is checked."""
     search_time: Literal["poll", "detection"]
     """Time of the poll that saw the detection, or of the detection itself; cut to whole seconds."""

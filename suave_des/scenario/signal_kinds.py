@@ -15,7 +15,6 @@ from suave_des.errors import InputError, shown
 from suave_des.scenario.quantities import (
     LARGEST,
     LONGEST_S,
-    Duration,
     NotNegative,
     Number,
     Period,
@@ -44,7 +43,7 @@ class SinusoidSignal(_Signal):
 
     kind: Literal["sinusoid"]
     """A cosine between minimum and maximum."""
-    period_s: Duration
+    period_s: Period
     """Time from one maximum to the next."""
     minimum: Number
     """Smallest value."""

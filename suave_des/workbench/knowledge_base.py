@@ -16,7 +16,7 @@ from suave_des.scenario_knowledge import open_base
 from suave_des.workbench.explain import Explanation, explain
 from suave_des.workbench.policy import Policy, PolicyDifference, compare, make_policy
 from suave_des.workbench.policy_space import PolicySpace
-from suave_des.workbench.query import QueryResult, run_query
+from suave_des.workbench.query import QueryResult, answer, graph_of
 from suave_des.workbench.state_input import ManagingSettings, StateBuilder
 
 DEFAULT_SCENARIO = "seams2023"
@@ -179,7 +179,7 @@ class KnowledgeBase:
         """Answer a query in SPARQL.
 
         Args:
-            text: the query; see suave_des.workbench.query.run_query.
+            text: the query; see suave_des.workbench.query.answer.
             state: adds what it asserts; None: the ontologies alone.
             inferred: adds what Pellet infers.
 
@@ -187,4 +187,5 @@ class KnowledgeBase:
             InputError: it is not a query.
             KnowledgeError: the state contradicts itself, or it takes too long.
         """
-        return self.limit.run(lambda: run_query(self.base, text, state, inferred=inferred), "answering the query")
+        graph = self.limit.run(lambda: graph_of(self.base, state, inferred=inferred), "answering the query")
+        return answer(graph, text)

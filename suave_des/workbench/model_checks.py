@@ -176,6 +176,8 @@ def check_shapes(sources: Sequence[OntologyFile], more: Sequence[Path]) -> Itera
 def _read_shapes(path: Path) -> Graph:
     graph = Graph()
     try:
+        if path.exists() and not path.is_file() and not path.is_dir():  # a pipe would be waited for without end
+            raise InputError("is not a regular file", file=path, remedy=_TURTLE)
         content = path.read_bytes()
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", file=path, remedy=_TURTLE) from error

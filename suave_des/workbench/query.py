@@ -44,18 +44,15 @@ class QueryResult:
     rows: tuple[tuple[str | None, ...], ...]
 
 
-def run_query(base: Ontology, text: str, state: KnowledgeState | None, *, inferred: bool) -> QueryResult:
-    """Answer a query.
+def graph_of(base: Ontology, state: KnowledgeState | None, *, inferred: bool) -> rdflib.Graph:
+    """Return the graph that queries are answered from.
 
     Args:
         base: the ontologies; labels and comments are there too.
-        text: SELECT, ASK, CONSTRUCT or DESCRIBE. The prefixes suave, tomasys, mros, rdf, rdfs, owl, xsd
-            and swrl need no declaration.
         state: adds what it asserts; None: the ontologies alone.
         inferred: adds what Pellet infers.
 
     Raises:
-        InputError: it is not a query, or would read something else than the knowledge base.
         KnowledgeError: the state contradicts itself.
     """
     situation = () if state is None else base.assertions(state)
@@ -72,7 +69,7 @@ def run_query(base: Ontology, text: str, state: KnowledgeState | None, *, inferr
                     graph.add((subject, predicate, value))
     for prefix, namespace in _PREFIXES.items():
         graph.bind(prefix, namespace, override=True, replace=True)
-    return _answer(graph, text)
+    return graph
 
 
 def _with_fixed_names(structure: Sequence[str]) -> tuple[str, ...]:
@@ -84,7 +81,17 @@ def _with_fixed_names(structure: Sequence[str]) -> tuple[str, ...]:
     return tuple(sorted(f"{' '.join(term.n3() for term in triple)} .\n" for triple in graph))
 
 
-def _answer(graph: rdflib.Graph, text: str) -> QueryResult:
+def answer(graph: rdflib.Graph, text: str) -> QueryResult:
+    """Answer a query.
+
+    Args:
+        graph: of graph_of.
+        text: SELECT, ASK, CONSTRUCT or DESCRIBE. The prefixes suave, tomasys, mros, rdf, rdfs, owl, xsd
+            and swrl need no declaration.
+
+    Raises:
+        InputError: it is not a query, or would read something else than the knowledge base.
+    """
     from rdflib.plugins.sparql import prepareQuery
 
     try:

@@ -76,6 +76,12 @@ class TestGroupTracker:
         assert (tracker.runs, tracker.done) == (last, last)
         assert tracker.failed == values[:last].count("failed")
 
+    def test_does_not_stop_before_the_twentieth_value_however_narrow_the_interval_is(self) -> None:
+        tracker = GroupTracker(50, "search_time_s", 5.0)
+        for run in range(1, 51):
+            tracker.add(run, row(100.0 + 0.001 * (run % 2)))
+        assert tracker.runs == 20
+
     def test_a_run_that_comes_twice_counts_once(self) -> None:
         tracker = GroupTracker(5, "search_time_s", None)
         for run in (2, 2, 1, 1, 2, 3):

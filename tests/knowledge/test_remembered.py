@@ -299,3 +299,36 @@ def test_a_contradiction_is_told_for_each_state_with_its_own_values(kb: Ontology
         with pytest.raises(KnowledgeError, match="o_status"):
             remembered.infer(searching("fd_spiral_high", "1.0", status="UNGROUNDED"))
     assert not (tmp_path / "memory").exists()
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 0, 2)])
+def test_a_value_on_a_threshold_is_not_one_beside_it(order: tuple[int, int, int], tmp_path: Path) -> None:
+    # fd_spiral_high expects 3.25 m; the rule QAWaterVisibility says less than that is an error, so 3.25 itself is none.
+    kb = Ontology.load()
+    remembered = CachedPellet(kb, tmp_path)
+    cases = [("3.2499", "IN_ERROR_NFR"), ("3.25", None), ("3.2501", None)]
+    for place in order:
+        value, status = cases[place]
+        inference = remembered.infer(searching("fd_spiral_high", value))
+        assert inference.grounding_status(SEARCH) == status, value
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 0, 2), (2, 0, 1)])
+def test_a_rule_for_a_threshold_alone_holds_on_it_alone(order: tuple[int, int, int], tmp_path: Path) -> None:
+    (tmp_path / "equal.swrl").write_text(
+        "Level: isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ equal(?v, 3.25) -> Binding(?q)\n"
+    )
+    kb = Ontology.load(rules=[tmp_path / "equal.swrl"])
+    remembered = CachedPellet(kb, tmp_path)
+    for place in order:
+        value = ("3.2499", "3.25", "3.2501")[place]
+        facts = remembered.infer(searching("fd_spiral_high", value)).facts
+        assert any(fact.value == "Binding" for fact in facts) == (value == "3.25"), value
+
+
+def test_a_threshold_and_the_gaps_beside_it_are_three_regions() -> None:
+    regions = Regions((Decimal("1.25"), Decimal("3.25")), ())
+    values = ("1", "1.25", "2", "3.2499", "3.25", "3.2501")
+    assert [regions.region(Decimal(value)) for value in values] == [0, 1, 2, 2, 3, 4]
+    assert regions.around(3.25) == (3.25, 3.25)
+    assert regions.around(3.0) == (1.25, 3.25)

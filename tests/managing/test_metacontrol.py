@@ -261,3 +261,31 @@ def test_that_no_design_is_left_is_told_once_until_there_is_one_again(name: str,
     assert [t_s < 20.0 for t_s, _ in lines] == [True, False]
     assert 30.0 <= lines[1][0] < 36.0
     assert "water_visibility 1.00 measured < 1.25 expected" in lines[0][1]
+
+
+SLOW = {"latencies.inference_s": 5.0, "calibration.altitude_error_m": 0.0, "thruster_events": []}
+
+
+def detection_s(result: MissionResult) -> float:
+    return next(each.t_s for each in result.events if each.event == "pipeline_detected")
+
+
+def test_a_decision_on_a_task_that_is_over_meanwhile_is_not_carried_out() -> None:
+    detected_s = detection_s(mission({**SLOW, **visibility(2.4)}, name="release15", limit_s=250.0))
+    # The water clears 2 s before the pipeline comes into view: a higher search is decided on, and is over.
+    after = mission({**SLOW, **steps(2.4, 3.3, detected_s - 2.0)}, name="release15", limit_s=detected_s + 10.0)
+    assert detection_s(after) == detected_s
+    assert [mode for t_s, mode in modes(after, SEARCH) if t_s > detected_s - 2.0] == ["fd_unground"]
+
+
+def test_a_decision_on_the_task_before_is_not_carried_out_for_the_next() -> None:
+    detected_s = detection_s(mission({**SLOW, **visibility(2.4)}, name="release15", limit_s=250.0))
+    # A thruster fails 3 s before: its recovery is decided on for the search's objective. That of the inspection is new,
+    # so it has to be reasoned about, which takes 5 s from then on.
+    failure = [{"thruster": 1, "event": "failure", "time_s": detected_s - 3.0}]
+    values = {**SLOW, **visibility(2.4), "thruster_events": failure}
+    after = mission(values, name="release15", limit_s=detected_s + 20.0)
+    found_s = detection_s(after)
+    (over_s, over), (next_s, _) = [(t_s, mode) for t_s, mode in modes(after, MOTION) if t_s >= found_s][:2]
+    assert over == "fd_unground"
+    assert next_s >= over_s + 5.0

@@ -61,6 +61,8 @@ def _read_text(path: Path) -> str:
     try:
         if path.is_dir():
             raise InputError("this is a folder", file=path, remedy="give a file of rules")
+        if path.exists() and not path.is_file():  # a pipe would be waited for without end
+            raise InputError("is not a regular file", file=path, remedy="give a file on disk")
         if path.stat().st_size > MAX_BYTES:
             raise InputError("too large for rules", file=path, remedy=f"at most {MAX_BYTES // 2**20} MiB are read")
         content = path.read_bytes()

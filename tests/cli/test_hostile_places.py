@@ -1,0 +1,246 @@
+"""Commands where something of the system is missing, damaged, closed, or made by somebody else."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from suave_des import resources
+from suave_des.cli.main import main
+from suave_des.cli.terminal import plain
+from suave_des.errors import InputError
+from suave_des.knowledge.limit import TimeLimit
+
+COMMAND = [sys.executable, "-P", "-m", "suave_des"]
+CHECKOUT = Path(resources.__file__).parent.parent
+ONE_MISSION = ["run", "seams2023", "--manager", "none"]
+
+
+def run(*arguments: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    kept = {name: value for name, value in os.environ.items() if name not in ("SUAVE_DES_CACHE_DIR", "NUMBA_CACHE_DIR")}
+    return subprocess.run(
+        [*COMMAND, *arguments], cwd=cwd, env={**kept, **environment}, capture_output=True, text=True, timeout=300
+    )
+
+
+class TestCacheFolder:
+    def test_that_cannot_be_made_is_replaced_by_a_temporary_one_and_this_is_said_once(self, tmp_path: Path) -> None:
+        done = run(*ONE_MISSION, cwd=tmp_path, HOME="/dev/null/home", XDG_CACHE_HOME="", TMPDIR=str(tmp_path))
+        assert done.returncode == 0
+        assert done.stderr.count("the cache folder cannot be used") == 1
+        (folder,) = tmp_path.glob("suave-des-*")
+        assert folder.stat().st_mode & 0o777 == 0o700
+        assert list(folder.rglob("*.nbc"))
+
+    @pytest.mark.parametrize(
+        "damage", ["flip", *(pytest.param(each, marks=pytest.mark.slow) for each in ("cut", "text"))]
+    )
+    def test_with_damaged_machine_code_is_mended(self, tmp_path: Path, damage: str) -> None:
+        cache = tmp_path / "cache"
+        environment = {**os.environ, "SUAVE_DES_CACHE_DIR": str(cache)}
+        environment.pop("NUMBA_CACHE_DIR", None)
+        small = tmp_path / "small.py"
+        small.write_text(
+            "import sys; sys.path.insert(0, sys.argv[1])\nfrom small_loop import total\nprint(total(10.0))\n"
+        )
+        (tmp_path / "small_loop.py").write_text(
+            "from suave_des.compiling import compiled\n\n\n"
+            "@compiled\ndef total(n):\n    s = 0.0\n    while n > 0.0:\n"
+            "        s += n\n        n -= 1.0\n    return s\n"
+        )
+        command = [sys.executable, str(small), str(tmp_path)]
+
+        def result() -> str:
+            done = subprocess.run(command, env=environment, cwd=CHECKOUT, capture_output=True, text=True, timeout=120)
+            assert done.stderr == ""
+            return done.stdout
+
+        assert result() == "55.0\n"
+        files = list((cache / "numba").rglob("*.nb*"))
+        assert {path.suffix for path in files} == {".nbi", ".nbc"}
+        whole = {path: path.read_bytes() for path in files}
+        for path, content in whole.items():
+            middle = len(content) // 2
+            path.write_bytes(
+                {
+                    "flip": content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :],
+                    "cut": content[:middle],
+                    "text": b"hello",
+                }[damage]
+            )
+        assert result() == "55.0\n"
+        assert {path.read_bytes() for path in files} != {b"hello"}
+        assert result() == "55.0\n"
+
+    def test_of_somebody_else_or_behind_a_link_is_not_used(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        monkeypatch.setenv("SUAVE_DES_CACHE_DIR", str(tmp_path / "cache"))
+        (tmp_path / "theirs").mkdir()
+        (tmp_path / "cache").mkdir()
+        (tmp_path / "cache" / "numba").symlink_to(tmp_path / "theirs")
+        monkeypatch.setattr(resources.tempfile, "gettempdir", lambda: str(tmp_path))
+        found = resources.private_cache("numba")
+        assert found == tmp_path / f"suave-des-{os.getuid()}" / "numba"
+        assert "is used instead" in capsys.readouterr().err
+        assert not list((tmp_path / "theirs").iterdir())
+
+    def test_that_others_may_enter_is_closed_to_them(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setenv("SUAVE_DES_CACHE_DIR", str(tmp_path))
+        (tmp_path / "java").mkdir(mode=0o755)
+        assert resources.private_cache("java") == tmp_path / "java"
+        assert (tmp_path / "java").stat().st_mode & 0o777 == 0o700
+
+
+class TestCurrentFolder:
+    def test_files_named_like_python_s_own_modules_are_not_run_by_workers(self, tmp_path: Path) -> None:
+        for name in ("signal", "types", "re", "random", "numpy", "suave_des"):
+            (tmp_path / f"{name}.py").write_text(f"open('ran-{name}', 'w')\nraise RuntimeError\n")
+        (tmp_path / "mine.py").write_text(
+            "from suave_des.managing.simple import NoManager\n\n\nclass Mine(NoManager):\n    pass\n"
+        )
+        managers = ["campaign", "seams2023", "--managers", "none,mine:Mine", "--runs", "2", "--workers", "2"]
+        done = run(*managers, "--out", "out", "--quiet", cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        assert not list(tmp_path.glob("ran-*"))
+
+
+class TestStopped:
+    @pytest.mark.parametrize(("number", "status"), [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)])
+    @pytest.mark.parametrize("after_s", [0.1, pytest.param(0.5, marks=pytest.mark.slow)])
+    def test_as_it_starts_it_ends_in_one_line(self, tmp_path: Path, number: str, status: int, after_s: float) -> None:
+        program = (
+            "import os, signal, sys, threading, time\n"
+            "from suave_des.entry import main\n"
+            f"threading.Timer({after_s}, os.kill, (os.getpid(), signal.{number})).start()\n"
+            "sys.argv[1:] = sys.argv[2:]\n"
+            "main()\n"
+            "time.sleep(5)\n"
+        )
+        command = [sys.executable, "-c", program, "x", "campaign", "seams2023", "--runs", "300", "--out", "out"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+        assert done.returncode == status
+        assert "Traceback" not in done.stderr
+        assert len(done.stderr.splitlines()) == 1
+
+    @pytest.mark.slow
+    def test_at_any_moment_it_ends_without_a_traceback(self, tmp_path: Path) -> None:
+        for place in range(60):
+            process = subprocess.Popen(
+                [*COMMAND, *ONE_MISSION], cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+            )
+            number = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)[place % 3]
+            time.sleep(0.05 + 0.025 * place)
+            process.send_signal(number)
+            _, told = process.communicate(timeout=60)
+            # Before Python runs a line of the command, the system ends it, or Python by its own KeyboardInterrupt.
+            assert process.returncode in (0, 128 + number, -number) or (place < 8 and number == signal.SIGINT)
+            assert "Traceback" not in told or place < 8
+
+
+class TestOutput:
+    def test_in_ascii_has_other_characters(self, tmp_path: Path) -> None:
+        done = run(
+            "campaign",
+            "seams2023",
+            "--managers",
+            "none",
+            "--runs",
+            "2",
+            "--out",
+            "out",
+            cwd=tmp_path,
+            PYTHONIOENCODING="ascii",
+        )
+        assert done.returncode == 0
+        assert "+-" in done.stdout and done.stdout.isascii()
+
+    def test_that_nobody_reads_is_no_error_and_results_are_kept(self, tmp_path: Path) -> None:
+        arguments = ["campaign", "seams2023", "--managers", "none", "--runs", "2", "--out", "out", "--quiet"]
+        process = subprocess.Popen([*COMMAND, *arguments], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        process.stdout.close()
+        told = process.stderr.read()
+        assert process.wait(300) == 128 + signal.SIGPIPE
+        assert told == b""
+        assert (tmp_path / "out" / "runs.csv").is_file()
+
+    def test_has_no_control_characters_of_others(self, capsys: pytest.CaptureFixture[str]) -> None:
+        with pytest.raises(SystemExit):
+            main(["run", "\x1b]0;owned\x07\x1b[31mred.yaml"])
+        assert "\x1b" not in capsys.readouterr().err
+        assert plain("a\x1b[31m\u202eb ± é\n") == "a\\x1b[31m\\u202eb ± é\n"
+
+
+class TestJava:
+    def test_takes_no_options_from_the_environment(self, tmp_path: Path) -> None:
+        done = run(
+            "kb",
+            "infer",
+            "--reasoner",
+            "pellet",
+            "--set",
+            "water_visibility=1",
+            cwd=tmp_path,
+            JAVA_TOOL_OPTIONS="-Xmx1k -XX:+NoSuchOption",
+            _JAVA_OPTIONS="-XX:+NoSuchOption",
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+
+    def test_leaves_nothing_in_the_temporary_folder(self, tmp_path: Path) -> None:
+        done = run("kb", "infer", "--reasoner", "pellet", cwd=tmp_path, TMPDIR=str(tmp_path))
+        assert done.returncode == 0
+        assert not list(tmp_path.glob(".java_pid*"))
+
+
+class TestLimits:
+    @pytest.mark.parametrize("seconds", [float("inf"), float("nan"), 0.0, -1.0, 1e300])
+    def test_that_cannot_be_waited_for_are_refused(self, seconds: float) -> None:
+        with pytest.raises(InputError, match=r"--time-limit: .* is out of range"):
+            TimeLimit(seconds, "--time-limit")
+
+    CATASTROPHIC = 'SELECT ?x WHERE { ?x a ?c . FILTER(REGEX("' + "a" * 44 + '", "(a+)+b")) }'
+
+    def test_of_a_query_holds_within_a_regular_expression(self, tmp_path: Path) -> None:
+        done = run("kb", "query", "--time-limit", "1", self.CATASTROPHIC, cwd=tmp_path)
+        assert done.returncode == 2
+        assert done.stderr == "suave-des: answering the query: not done after 1 s (allow more with --time-limit)\n"
+
+    def test_sigterm_ends_such_a_query(self, tmp_path: Path) -> None:
+        process = subprocess.Popen(
+            [*COMMAND, "kb", "query", self.CATASTROPHIC], cwd=tmp_path, stderr=subprocess.PIPE, text=True
+        )
+        time.sleep(6)
+        process.terminate()
+        assert process.communicate(timeout=30)[1] == "suave-des: interrupted\n"
+        assert process.returncode == 143
+
+    def test_of_open_files_is_told(self, tmp_path: Path) -> None:
+        import resource
+
+        arguments = ["campaign", "seams2023", "--managers", "none", "--runs", "9", "--workers", "2", "--out", "out"]
+        done = subprocess.run(
+            [*COMMAND, *arguments],
+            cwd=tmp_path,
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (16, 16)),
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
+        assert done.returncode in (2, 3)
+        assert "Traceback" not in done.stderr and "Too many open files" in done.stderr
+
+    @pytest.mark.parametrize("option", ["--shapes", "--rules", "--ontology"])
+    def test_a_pipe_in_place_of_a_file_is_not_waited_for(
+        self, tmp_path: Path, option: str, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        os.mkfifo(tmp_path / "pipe")
+        with pytest.raises(SystemExit) as ended:
+            main(["kb", "check", option, str(tmp_path / "pipe")])
+        assert ended.value.code == 2
+        assert "is not a regular file" in "".join(capsys.readouterr())
