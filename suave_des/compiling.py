@@ -15,8 +15,8 @@ import numpy as np
 from numba.core import caching
 from numpy.typing import NDArray
 
+from suave_des.caches import private_cache
 from suave_des.imports import hidden
-from suave_des.resources import private_cache
 
 # What numba would load on the first call. To see that there is a BLAS, it imports scipy.linalg, which takes 0.2 s and
 # is used by no inner loop. There is one, as scipy is installed; what uses it imports it then.

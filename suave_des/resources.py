@@ -1,17 +1,12 @@
-"""Where the shipped ontologies, scenarios and modes files are, in a checkout and installed; and the cache folder."""
+"""Where the shipped ontologies, scenarios and modes files are, in a checkout and installed."""
 
 from __future__ import annotations
 
-import os
-import stat
-import sys
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
 from suave_des.errors import InputError
 
-_CACHE_VARIABLE = "SUAVE_DES_CACHE_DIR"
 _PACKAGE = Path(__file__).resolve().parent
 _KINDS = {
     "ontology": ".owl",
@@ -27,70 +22,6 @@ def shipped_folder(kind: str) -> Path:
     """Folder of shipped files of one kind, such as "ontology", "scenarios" or "scenarios/revisions"."""
     installed = _PACKAGE / "shipped" / kind
     return installed if installed.is_dir() else _PACKAGE.parent / kind
-
-
-def cache_folder() -> Path:
-    """The user's folder for what can be made again: SUAVE_DES_CACHE_DIR, or where the system keeps such things."""
-    chosen = os.environ.get(_CACHE_VARIABLE)
-    if chosen:
-        return Path(chosen)
-    if sys.platform == "win32":
-        start = os.environ.get("LOCALAPPDATA")
-        return (Path(start) if start else Path.home() / "AppData" / "Local") / "suave-des" / "Cache"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "suave-des"
-    start = os.environ.get("XDG_CACHE_HOME")  # ignored unless absolute, as the XDG specification requires
-    return (Path(start) if start and Path(start).is_absolute() else Path.home() / ".cache") / "suave-des"
-
-
-def private_cache(kind: str) -> Path | None:
-    """Make the part of the cache folder for one kind of content, if need be: a folder that only this user may enter.
-
-    Machine code and classes are kept there, which are run without a further look. Where the cache folder cannot be
-    used, as without a home folder, a temporary one takes its place, for this process and those that it starts; this is
-    said once. None if there is none of either.
-    """
-    try:
-        chosen = cache_folder()
-        return _private(chosen / kind)
-    except (OSError, RuntimeError) as error:  # RuntimeError: no home folder
-        reason = getattr(error, "strerror", None) or str(error)
-    try:
-        folder = _temporary_folder()
-        private = _private(folder / kind)
-    except OSError:
-        return None
-    os.environ[_CACHE_VARIABLE] = str(folder)
-    print(f"suave-des: the cache folder cannot be used ({reason}); {folder} is used instead", file=sys.stderr)
-    return private
-
-
-def _temporary_folder() -> Path:
-    """A folder of this user's alone that the next process finds, too; a new one if somebody else has made that."""
-    if not hasattr(os, "getuid"):
-        return Path(tempfile.mkdtemp(prefix="suave-des-"))
-    folder = Path(tempfile.gettempdir()) / f"suave-des-{os.getuid()}"
-    try:
-        return _private(folder)
-    except OSError:
-        return Path(tempfile.mkdtemp(prefix="suave-des-"))
-
-
-def _private(folder: Path) -> Path:
-    """Make a folder that only this user may enter, or see that it is one.
-
-    Raises:
-        OSError: it cannot be made or written, is a link, or is somebody else's.
-    """
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-    status = folder.lstat()
-    if not stat.S_ISDIR(status.st_mode) or status.st_uid != getattr(os, "getuid", lambda: status.st_uid)():
-        raise PermissionError(None, f"{folder} is not a folder of this user's")
-    if stat.S_IMODE(status.st_mode) & 0o077:
-        folder.chmod(0o700)
-    if not os.access(folder, os.R_OK | os.W_OK | os.X_OK):
-        raise PermissionError(None, f"{folder} cannot be written")
-    return folder
 
 
 def _is_a(kind: Callable[[Path], bool], path: Path) -> bool:

@@ -18,8 +18,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
+from suave_des.caches import private_cache
 from suave_des.knowledge.state import Fact, Value
-from suave_des.resources import private_cache
 
 #: Objectives, groundings, components and measurements of a state, the last as regions or as exact values.
 Key = tuple[Any, ...]

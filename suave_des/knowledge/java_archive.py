@@ -21,9 +21,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
+from suave_des.caches import private_cache
 from suave_des.errors import InputError
 from suave_des.knowledge.java import OPTIONS, jars, java_library
-from suave_des.resources import private_cache
 
 _SWITCH: Final = "SUAVE_DES_JAVA_ARCHIVE"
 #: Archives that are kept, about 25 MB each; the least recently used are removed.

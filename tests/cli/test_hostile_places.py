@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from suave_des import resources
+from suave_des import caches
 from suave_des.cli.main import main
 from suave_des.cli.terminal import plain
 from suave_des.errors import InputError
 from suave_des.knowledge.limit import TimeLimit
 
 COMMAND = [sys.executable, "-P", "-m", "suave_des"]
-CHECKOUT = Path(resources.__file__).parent.parent
+CHECKOUT = Path(caches.__file__).parent.parent
 ONE_MISSION = ["run", "seams2023", "--manager", "none"]
 
 
@@ -85,8 +85,8 @@ class TestCacheFolder:
         (tmp_path / "theirs").mkdir()
         (tmp_path / "cache").mkdir()
         (tmp_path / "cache" / "numba").symlink_to(tmp_path / "theirs")
-        monkeypatch.setattr(resources.tempfile, "gettempdir", lambda: str(tmp_path))
-        found = resources.private_cache("numba")
+        monkeypatch.setattr(caches.tempfile, "gettempdir", lambda: str(tmp_path))
+        found = caches.private_cache("numba")
         assert found == tmp_path / f"suave-des-{os.getuid()}" / "numba"
         assert "is used instead" in capsys.readouterr().err
         assert not list((tmp_path / "theirs").iterdir())
@@ -94,7 +94,7 @@ class TestCacheFolder:
     def test_that_others_may_enter_is_closed_to_them(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setenv("SUAVE_DES_CACHE_DIR", str(tmp_path))
         (tmp_path / "java").mkdir(mode=0o755)
-        assert resources.private_cache("java") == tmp_path / "java"
+        assert caches.private_cache("java") == tmp_path / "java"
         assert (tmp_path / "java").stat().st_mode & 0o777 == 0o700
 
 
