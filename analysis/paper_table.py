@@ -13,8 +13,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from suave_des.campaign.output import write_files
-from suave_des.errors import SuaveDesError
+from suave_des import InputError
 from suave_des.report.paper import FILES, compare, published_estimates, published_runs
 from suave_des.report.runs import read_runs
 
@@ -29,8 +28,10 @@ def main() -> None:
     try:
         comparison = compare(read_runs(arguments.runs).frame, published_estimates(arguments.published))
         if arguments.out is not None:
-            write_files(arguments.out, dict(zip(FILES, (comparison.markdown(), comparison.csv()), strict=True)))
-    except SuaveDesError as error:
+            arguments.out.mkdir(parents=True, exist_ok=True)
+            for name, text in zip(FILES, (comparison.markdown(), comparison.csv()), strict=True):
+                (arguments.out / name).write_text(text, encoding="utf-8")
+    except InputError as error:
         print("paper_table.py: " + " ".join(str(error).split()), file=sys.stderr)
         sys.exit(2)
     print(comparison.markdown(), end="")

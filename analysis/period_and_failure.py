@@ -1,98 +1,108 @@
-"""How the paper's table changes with the visibility's period and with the time of the thruster failure.
+"""Metacontrol's advantage over no adaptation, by the visibility's period and the time of the thruster failure.
 
-Writes period_and_failure.csv and period_and_failure.png.
+The same runs are made under both managers at each pair of values; differences are paired by run. The columns that begin
+with `failure` are what the failure itself does to the manager none: its missions less those in which the thruster fails
+only when they are nearly over.
 
     python analysis/period_and_failure.py [--out DIR] [--runs N] [--workers N]
 """
 
 from __future__ import annotations
 
-import argparse
-import csv
-import multiprocessing
-from pathlib import Path
+from itertools import product
 
 import numpy as np
+import pandas
+import studies
+from matplotlib.colors import CenteredNorm
+from matplotlib.figure import Figure
 
-from suave_des.estimates import estimate
-from suave_des.scenario.loader import load_scenario, with_values
-from suave_des.simulation.simulator import Simulator
-
-MANAGERS = ("none", "random", "metacontrol")
-METRICS = {"search_time_s": "search time (s)", "distance_inspected_m": "distance inspected (m)"}
-STUDIES = {
-    "signals.water_visibility.period_s": (40.0, 60.0, 80.0, 100.0, 120.0, 160.0, 240.0),
-    "thruster_events.0.time_s": (5.0, 35.0, 65.0, 95.0, 125.0, 155.0, 200.0),
-}
-LABELS = {
-    "signals.water_visibility.period_s": "period of the water visibility (s)",
-    "thruster_events.0.time_s": "time of the failure of thruster 1 (s)",
-}
+SCENARIO = "seams2023"
+PERIODS_S = (40.0, 60.0, 80.0, 120.0, 160.0, 240.0)
+FAILURES_S = (5.0, 35.0, 65.0, 95.0, 155.0, 290.0)
+PAPERS = (80.0, 35.0)
+PERIOD, FAILURE = "signals.water_visibility.period_s", "thruster_events.0.time_s"
 
 
-def cell(task: tuple[str, float, str, int]) -> dict[str, list[float]]:
-    """Both metrics of the missions of one manager, with one value changed."""
-    path, value, manager, runs = task
-    simulator = Simulator(with_values(load_scenario("seams2023"), {path: value}))
-    metrics = [simulator.run(manager, run, 1).metrics for run in range(1, runs + 1)]
-    return {name: [float(getattr(each, name)) for each in metrics] for name in METRICS}
+def study(runs: int, workers: int, chosen: list[tuple[float, float]] | None = None) -> pandas.DataFrame:
+    """Run every pair of values; a row for each and metric: metacontrol less none."""
+    wanted = list(product(PERIODS_S, FAILURES_S)) if chosen is None else chosen
+    pairs = list(dict.fromkeys([*wanted, *((period_s, FAILURES_S[-1]) for period_s, _ in wanted)]))
+    sweep = {"zip": {PERIOD: [period_s for period_s, _ in pairs], FAILURE: [failure_s for _, failure_s in pairs]}}
+    frame = studies.missions(SCENARIO, ["none", "metacontrol"], runs, workers, sweep=sweep)
+    rows = []
+    for (period_s, failure_s), metric in product(wanted, studies.METRICS):
+        here = frame[frame[PERIOD] == period_s]
+        ours, theirs, unharmed = (
+            studies.by_run(here[(here["manager"] == manager) & (here[FAILURE] == time_s)], metric)
+            for manager, time_s in (("metacontrol", failure_s), ("none", failure_s), ("none", FAILURES_S[-1]))
+        )
+        effect = studies.paired(theirs, unharmed)
+        row = {"period_s": period_s, "failure_s": failure_s, "metric": metric}
+        row |= {"metacontrol": ours.mean(), "none": theirs.mean(), **studies.paired(ours, theirs)}
+        row |= {"failure_difference": effect["mean_difference"]}
+        rows.append(row | {f"failure_{end}": effect[end] for end in ("low95", "high95")})
+    return pandas.DataFrame(rows)
 
 
-def draw(path: Path, found: dict[tuple[str, float, str], dict[str, list[float]]]) -> None:
-    """A row a metric, a column a study: means with 95% intervals."""
-    from matplotlib.figure import Figure
+def draw(figure: Figure, rows: pandas.DataFrame) -> None:
+    """Draw a panel for each metric: differences by period and time of the failure."""
+    panels = figure.subplots(1, len(studies.METRICS), sharey=True)
+    for panel, (metric, title) in zip(panels, studies.METRICS.items(), strict=True):
+        own = rows[rows["metric"] == metric].set_index(["failure_s", "period_s"])
+        table = own["mean_difference"].unstack()
+        colours = "RdBu" if metric == "distance_inspected_m" else "RdBu_r"
+        image = panel.imshow(table.to_numpy(float), cmap=colours, norm=CenteredNorm(), aspect="auto")
+        panel.grid(False)
+        for (line, failure_s), (column, period_s) in product(enumerate(table.index), enumerate(table.columns)):
+            cell = own.loc[(failure_s, period_s)]
+            text = f"{cell['mean_difference']:+.0f}"
+            dark = abs(cell["mean_difference"]) > 0.7 * np.abs(table.to_numpy()).max()
+            text = text if cell["low95"] > 0.0 or cell["high95"] < 0.0 else f"({text})"
+            panel.text(column, line, text, ha="center", va="center", fontsize=6.5, color="white" if dark else "black")
+        panel.set_xticks(range(len(table.columns)), [f"{each:g}" for each in table.columns])
+        panel.set_yticks(range(len(table.index)), [f"{each:g}" for each in table.index])
+        panel.set_xlabel("period of the visibility (s)")
+        figure.colorbar(image, ax=panel).set_label(f"metacontrol - none: {title}")
+    panels[0].set_ylabel("failure of thruster 1 at (s)")
 
-    figure = Figure(figsize=(8.4, 5.4), layout="constrained")
-    panels = figure.subplots(len(METRICS), len(STUDIES), sharey="row")
-    colours = {"none": "#7f8c8d", "random": "#d98c21", "metacontrol": "#1f5f99"}
-    for row, (metric, title) in enumerate(METRICS.items()):
-        for column, (study, values) in enumerate(STUDIES.items()):
-            panel = panels[row, column]
-            for manager in MANAGERS:
-                estimates = [estimate(found[study, value, manager][metric]) for value in values]
-                means = np.array([each.mean for each in estimates], dtype=float)
-                low, high = zip(*(each.mean_interval or (np.nan, np.nan) for each in estimates), strict=True)
-                panel.fill_between(values, low, high, color=colours[manager], alpha=0.2, lw=0)
-                panel.plot(values, means, color=colours[manager], marker="o", ms=3.5, lw=1.3, label=manager)
-            panel.axvline({0: 80.0, 1: 35.0}[column], color="0.6", lw=0.8, ls=":")
-            for side in ("top", "right"):
-                panel.spines[side].set_visible(False)
-            if column == 0:
-                panel.set_ylabel(title)
-            if row == len(METRICS) - 1:
-                panel.set_xlabel(LABELS[study])
-    for row in panels:  # when everything is drawn: the panels of a row share their scale
-        row[0].set_ylim(bottom=0.0)
-    panels[0, 1].legend(frameon=False, fontsize=9)
-    figure.savefig(path, dpi=160)
+
+def conclude(rows: pandas.DataFrame) -> str:
+    """Say how the advantage depends on both."""
+    sentences = []
+    for metric, unit, digits, better in (("search_time_s", "s", 0, -1), ("distance_inspected_m", "m", 1, 1)):
+        own = rows[rows["metric"] == metric]
+        papers = own[(own["period_s"] == PAPERS[0]) & (own["failure_s"] == PAPERS[1])].iloc[0]
+        least, most = (own.loc[(better * own["mean_difference"]).agg(kind)] for kind in ("idxmin", "idxmax"))
+        sure = int(((own["low95"] > 0.0) if better > 0 else (own["high95"] < 0.0)).sum())
+        sentences.append(
+            f"- {studies.METRICS[metric].capitalize()}: metacontrol is better in {sure} of {len(own)} pairs of values;"
+            f" the difference is {studies.shown(papers, unit, digits)} with the paper's values, at best"
+            f" {studies.shown(most, unit, digits)} {_named(most)}, at worst {studies.shown(least, unit, digits)}"
+            f" {_named(least)}."
+        )
+    papers = rows[(rows["period_s"] == PAPERS[0]) & (rows["failure_s"] == PAPERS[1])].set_index("metric")
+    effect = papers.filter(regex="^failure_(difference|low95|high95)").rename(columns=_EFFECT)
+    sentences.append(
+        "- With the paper's values the failure itself changes none's search time by"
+        f" {studies.shown(effect.loc['search_time_s'])} and its distance by"
+        f" {studies.shown(effect.loc['distance_inspected_m'], 'm', 1)}."
+    )
+    return "\n".join(sentences)
+
+
+_EFFECT = {"failure_difference": "mean_difference", "failure_low95": "low95", "failure_high95": "high95"}
+
+
+def _named(row: pandas.Series) -> str:
+    return f"with a period of {row['period_s']:g} s and the failure at {row['failure_s']:g} s"
 
 
 def main() -> None:
-    """Simulate every cell, write the table and the figure."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--out", type=Path, default=Path(__file__).parent / "period_and_failure")
-    options.add_argument("--runs", type=int, default=150)
-    options.add_argument("--workers", type=int, default=2)
-    chosen = options.parse_args()
-    chosen.out.mkdir(parents=True, exist_ok=True)
-
-    tasks = [
-        (study, value, name, chosen.runs) for study, values in STUDIES.items() for value in values for name in MANAGERS
-    ]
-    with multiprocessing.get_context("spawn").Pool(chosen.workers) as pool:
-        found = {task[:3]: result for task, result in zip(tasks, pool.map(cell, tasks, chunksize=1), strict=True)}
-    with (chosen.out / "period_and_failure.csv").open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["parameter", "value", "manager", "metric", "n", "mean", "low95", "high95", "std"])
-        for (study, value, manager), metrics in found.items():
-            for metric, values in metrics.items():
-                one = estimate(values)
-                numbers = (
-                    f"{number:.2f}" for number in (one.mean, *(one.mean_interval or ()), one.std) if number is not None
-                )
-                writer.writerow([study, value, manager, metric, one.n, *numbers])
-    draw(chosen.out / "period_and_failure.png", found)
-    print(f"{len(tasks) * chosen.runs} missions; see {chosen.out}")
+    """Simulate every pair of values, write the table and the figure."""
+    chosen = studies.options(__file__, __doc__ or "", runs=20)
+    rows = study(chosen.runs, chosen.workers)
+    studies.write(chosen, "period_and_failure", rows, draw, conclude, height=2.8)
 
 
 if __name__ == "__main__":

@@ -14,21 +14,22 @@ import csv
 import multiprocessing
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from SALib.analyze import morris as analyze_morris
 from SALib.sample import morris as sample_morris
 
+from suave_des import load_scenario, with_values
 from suave_des.calibration.parameters import read_parameters
 from suave_des.resources import find
-from suave_des.scenario.loader import LoadedScenario, load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
 
 MANAGERS = ("none", "random", "metacontrol")
 METRICS = {"search_time_s": "mean search time (s)", "distance_inspected_m": "mean distance inspected (m)"}
 
 
-def means(loaded: LoadedScenario, paths: tuple[str, ...], runs: int, values: tuple[float, ...]) -> list[float]:
+def means(loaded: Any, paths: tuple[str, ...], runs: int, values: tuple[float, ...]) -> list[float]:
     """Mean search time and distance of each manager with some parameter values."""
     simulator = Simulator(with_values(loaded, dict(zip(paths, values, strict=True))))
     found = []

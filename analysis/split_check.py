@@ -14,15 +14,14 @@ from pathlib import Path
 
 import pandas
 
+from suave_des import load_scenario, run_campaign
 from suave_des.calibration.fit import fit
 from suave_des.calibration.loss import Problem, published_vectors
 from suave_des.calibration.parameters import read_parameters
 from suave_des.calibration.report import fitted_scenario, fitted_values
-from suave_des.campaign.campaign import run_campaign
 from suave_des.estimates import estimate
 from suave_des.report.runs import METRICS, choose_managers, read_runs
 from suave_des.resources import find
-from suave_des.scenario.loader import load_scenario
 from suave_des.validation.validation import sample
 
 WITHIN_STD = 0.5
@@ -96,7 +95,7 @@ def main() -> None:
         values = fitted_values(free, best)
         scenario = chosen.out / f"without_{left_out}.yaml"
         scenario.write_text(fitted_scenario(problem, "seams2023", values))
-        predicted[left_out] = run_campaign(scenario, [left_out], chosen.missions, 2, chosen.workers).frame()
+        predicted[left_out] = run_campaign(scenario, [left_out], chosen.missions, 2, chosen.workers, progress=False)
         print(f"without {left_out}: distance of the two others {best.loss:.4f}")
     result = split_check(predicted, published.frame)
     result.to_csv(chosen.out / "split_check.csv", index=False, float_format="%.4g", lineterminator="\n")

@@ -15,6 +15,7 @@ _KINDS = {
     "scenarios/vehicles": ".yaml",
     "scenarios/published": ".csv",
     "scenarios/calibration": ".yaml",
+    "scenarios/ensembles": ".csv",
 }
 
 

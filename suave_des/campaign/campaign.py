@@ -22,6 +22,7 @@ class CampaignOptions(TypedDict, total=False):
     sweep: Mapping[str, Any] | None
     perturbations: Mapping[str, Any] | None
     runs_per_draw: int | None
+    ensemble: str | Path | None
     until_ci: str | None
     time_out_s: float | None
     scheduler: str | None

@@ -14,7 +14,7 @@ from dataclasses import replace
 from types import FrameType
 
 from suave_des.campaign.knowledge_records import mission_line
-from suave_des.campaign.missions import Failure, Finished, JobSpec, MissionKey, Outcome, further_of, row_of
+from suave_des.campaign.missions import Failure, Finished, JobSpec, MissionKey, Outcome, row_of
 from suave_des.campaign.variation import cell_of
 from suave_des.errors import MissionError
 from suave_des.metrics.result import MissionResult
@@ -58,15 +58,17 @@ class MissionRunner:
         job = self._job
         if key.point != self._point:
             self._go_to(key.point)
+        member = job.variation.member(key.run)
+        simulator = self._simulator(member)
         try:
             with limit(job.time_out_s):
-                result = self._simulator.run(job.managers[key.manager], key.run, job.seed, record=job.record_knowledge)
+                result = simulator.run(job.managers[key.manager], key.run, job.seed, record=job.record_knowledge)
         except MissionError as error:
             return Failure(error.manager, error.run, error.time_s, error.cause, point=key.point)
         except TimeOut:
             return job.timed_out(key)[1]
-        drawn = (result.drawn[path] for path in self._drawn)
-        row = (*row_of(result.metrics), *self._swept, *drawn, *further_of(result))
+        row = (*row_of(result.metrics), *self._swept, *(result.drawn[path] for path in self._drawn))
+        row = row if member is None else (*row, member)
         return (*row, self._knowledge(key, result)) if job.record_knowledge else row
 
     def _knowledge(self, key: MissionKey, result: MissionResult) -> str:
@@ -78,11 +80,18 @@ class MissionRunner:
         return mission_line(self._job.managers[key.manager], key.point, key.run, result.knowledge, swept)
 
     def _go_to(self, point: int) -> None:
-        """Make the simulator of a point; only one is kept, as missions come point by point."""
-        variation = self._job.variation
-        loaded = variation.scenario(self._job.loaded, point)
-        self._point, self._simulator = point, Simulator(loaded, dict.fromkeys(variation.drawn, variation.runs_per_draw))
-        self._swept = tuple(map(cell_of, variation.sweep.values(point).values()))
+        """Forget the simulators of the point before: missions come point by point."""
+        self._point = point
+        self._simulators: dict[int | None, Simulator] = {}
+        self._swept = tuple(map(cell_of, self._job.variation.sweep.values(point).values()))
+
+    def _simulator(self, member: int | None) -> Simulator:
+        """Return the simulator of the present point, with a member of the ensemble."""
+        if member not in self._simulators:
+            variation = self._job.variation
+            loaded = variation.scenario(self._job.loaded, self._point, member)
+            self._simulators[member] = Simulator(loaded, dict.fromkeys(variation.drawn, variation.runs_per_draw))
+        return self._simulators[member]
 
 
 # Time limits, so that a manager that never returns costs its own mission only.

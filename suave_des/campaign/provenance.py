@@ -121,6 +121,7 @@ def deciding(spec: CampaignSpec, loaded: LoadedScenario, inputs: Mapping[str, st
         "sweep": spec.sweep,
         "perturbations": spec.perturbations,
         "runs_per_draw": spec.runs_per_draw,
+        "ensemble": None if spec.ensemble is None else Path(spec.ensemble).stem,
         "scenario": loaded.scenario.model_dump(mode="json"),
         # The scenario's own files are compared by their content: another comment in them decides nothing.
         "files_sha256": {

@@ -9,6 +9,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from suave_des.campaign.ensemble import ENSEMBLE_COLUMNS, ENSEMBLE_FILE, Difference, differences
 from suave_des.campaign.knowledge_records import CAMPAIGN_KNOWLEDGE_FILE, scenario_line
 from suave_des.campaign.missions import COLUMNS, Failure, Finished, Group, Row
 from suave_des.campaign.output import csv_pieces, csv_text, json_text, rounded, write_files
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     import pandas
 
 RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE = "runs.csv", "summary.csv", "manifest.json"
-FILES = (RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE, SUAVE_FILE, PARQUET_FILE, CAMPAIGN_KNOWLEDGE_FILE)
+FILES = (RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE, ENSEMBLE_FILE, SUAVE_FILE, PARQUET_FILE, CAMPAIGN_KNOWLEDGE_FILE)
 
 METRICS = ("search_time_s", "distance_inspected_m")
 """Metrics that are summarised: those of the paper's table."""
@@ -101,7 +102,7 @@ class CampaignResult:
     @property
     def columns(self) -> tuple[str, ...]:
         """Columns of runs.csv."""
-        return (*COLUMNS, *self.variation.columns, *self.loaded.scenario.further_columns)
+        return (*COLUMNS, *self.variation.columns)
 
     @property
     def summary_columns(self) -> tuple[str, ...]:
@@ -152,6 +153,14 @@ class CampaignResult:
             if not isinstance(outcome, Failure) and (line := outcome[len(self.columns)]):
                 yield str(line)
 
+    def differences(self) -> tuple[Difference, ...]:
+        """Return how managers differ, over the members of the ensemble; empty without one."""
+        if self.variation.ensemble is None:
+            return ()
+        kept = ((key, outcome) for key, outcome in self.outcomes() if not isinstance(outcome, Failure))
+        metrics = {metric: COLUMNS.index(metric) for metric in METRICS}
+        return tuple(differences(kept, self.managers, metrics, self.variation.ensemble))
+
     def report(self) -> dict[str, Any]:
         """Return how many missions were run, where managers were stopped, and what failed, as in manifest.json."""
         return {
@@ -177,6 +186,17 @@ class CampaignResult:
     def summary_records(self) -> list[dict[str, Any]]:
         """Return the rows of summary.csv by its columns."""
         return [dict(zip(self.summary_columns, row, strict=True)) for row in self.summary]
+
+    def difference_row(self, found: Difference) -> Row:
+        """Return the row of ensemble.csv of a difference."""
+        low, high = found.interval or (None, None)
+        low_of_sets, high_of_sets = found.range or (None, None)
+        swept = map(cell_of, self.variation.sweep.values(found.point).values())
+        return (
+            *(found.first, found.second, found.metric, found.n, found.mean, low, high),
+            *(len(found.member_means), found.above, found.below, low_of_sets, high_of_sets),
+            *swept,
+        )
 
     def kept(self) -> str:
         """Say how many missions are done, and where they are."""
@@ -298,6 +318,10 @@ def write_results(result: CampaignResult, inputs: Mapping[str, str], identity: s
             }
         ),
     }
+    if result.variation.ensemble is not None:
+        files[ENSEMBLE_FILE] = csv_text(
+            (*ENSEMBLE_COLUMNS, *result.variation.sweep.parameters), map(result.difference_row, result.differences())
+        )
     if spec.suave_format:
         files[SUAVE_FILE] = suave_pieces(scenario.revision.name, _numbered(result), scenario.mission.time_limit_s)
     if spec.parquet:
@@ -314,6 +338,7 @@ def _exact(row: Row) -> Row:
 
 
 def _varied(result: CampaignResult) -> dict[str, Any]:
+    ensemble = result.variation.ensemble
     if not result.variation.columns:
         return {}
     return {
@@ -321,6 +346,7 @@ def _varied(result: CampaignResult) -> dict[str, Any]:
         "points": result.variation.sweep.points,
         "perturbations": dict(result.spec.perturbations),
         "runs_per_draw": result.spec.runs_per_draw,
+        **({"ensemble": ensemble.name, "ensemble_members": len(ensemble.members)} if ensemble else {}),
     }
 
 

@@ -8,6 +8,7 @@ from contextlib import ExitStack, closing, suppress
 from dataclasses import replace
 from pathlib import Path
 
+from suave_des.campaign.ensemble import read_ensemble, with_ensemble
 from suave_des.campaign.executors import InProcess, LocalWorkers
 from suave_des.campaign.missions import Executor, Finished, JobSpec, MissionKey, WorkerError, plan
 from suave_des.campaign.output import check_output_folder, make_output_folder, remove_parts, remove_results
@@ -28,6 +29,7 @@ from suave_des.campaign.store import (
 )
 from suave_des.campaign.variation import Variation, vary
 from suave_des.errors import InputError, SuaveDesError
+from suave_des.scenario.layers import Files
 from suave_des.scenario.loader import LoadedScenario, Replacements, check_not_replaced, load_scenario
 
 LARGE = 1_000_000
@@ -367,7 +369,14 @@ def read_inputs(
         loaded, variation = vary(loaded, spec.sweep, spec.perturbations, spec.runs_per_draw, spec.seed)
     except InputError as error:
         raise error if file is None else file.located(error) from None
-    inputs = check_knowledge(loaded, spec.managers, given=given)
+    files = Files()
+    if spec.ensemble is not None:
+        is_from_file = file is not None and "ensemble" in spec.from_file
+        beside = file.layer.place(("ensemble",)).file.parent if file is not None and is_from_file else None
+        ensemble, path, digest = read_ensemble(spec.ensemble, beside)
+        variation = with_ensemble(loaded, variation, ensemble, path)
+        files.note(path, digest)
+    inputs = {**check_knowledge(loaded, spec.managers, given=given), **files.inputs}
     return loaded, variation, inputs if file is None else {**inputs, **file.inputs}
 
 

@@ -48,6 +48,7 @@ class CampaignSettings(Strict):
     perturbations: dict[str, Any] = Field(default_factory=dict)
     runs_per_draw: Annotated[int, Field(strict=True)] = 1
     sweep: dict[str, Any] = Field(default_factory=dict)
+    ensemble: str | None = None
 
 
 _DEFAULTS = CampaignSettings(campaign=FORMAT, scenario="")
@@ -77,6 +78,8 @@ class CampaignSpec:
         perturbations: distributions by key path of the scenario: each run draws its own value, the same under all
             managers and at all points. Each is a column of runs.csv.
         runs_per_draw: how many consecutive runs share what is drawn.
+        ensemble: CSV file of parameter sets that fit the real runs equally well, or name of a shipped one: each run has
+            one of them, the same under all managers; see docs/guides/ensembles.md.
         ontologies: files in place of the scenario's.
         modes_file: file in place of the scenario's.
         reasoner: in place of the scenario's.
@@ -112,6 +115,7 @@ class CampaignSpec:
     sweep: Mapping[str, Any] = field(default_factory=dict)
     perturbations: Mapping[str, Any] = field(default_factory=dict)
     runs_per_draw: int = 1
+    ensemble: str | None = None
     from_file: tuple[str, ...] = ()
     folder: str = ""
     command: tuple[str, ...] = ()
@@ -130,8 +134,9 @@ class CampaignSpec:
         for name in ("managers", "disabled_rules", "command"):
             if name in given:
                 given[name] = tuple(given[name])
-        if "modes_file" in given:
-            given["modes_file"] = str(given["modes_file"])
+        for name in ("modes_file", "ensemble"):
+            if name in given:
+                given[name] = str(given[name])
         if "out" in given:
             given["out"] = Path(given["out"])
         left_out = tuple(name for name in _FILE_KEYS if name not in given)

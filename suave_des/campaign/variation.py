@@ -15,6 +15,8 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from suave_des.campaign.ensemble import COLUMN as ENSEMBLE_COLUMN
+from suave_des.campaign.ensemble import Ensemble
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.scenario.loader import LoadedScenario, value_at, with_values
 from suave_des.scenario.models import Mission
@@ -130,20 +132,26 @@ class Variation:
         drawn: names of what each run draws, by the key path in the scenario.
         paths: key path in the scenario of each parameter that is swept, by its name as given.
         runs_per_draw: how many consecutive runs share what is drawn.
+        ensemble: parameter sets of which each run has one; none: all have the scenario's.
     """
 
     sweep: Sweep = field(default_factory=Sweep)
     drawn: Mapping[str, str] = field(default_factory=dict)
     paths: Mapping[str, str] = field(default_factory=dict)
     runs_per_draw: int = 1
+    ensemble: Ensemble | None = None
 
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of all that varies, as given, which are further columns of runs.csv."""
-        return (*self.sweep.parameters, *self.drawn.values())
+        return (*self.sweep.parameters, *self.drawn.values(), *((ENSEMBLE_COLUMN,) if self.ensemble else ()))
 
-    def scenario(self, loaded: LoadedScenario, point: int) -> LoadedScenario:
-        """Return the scenario of a point's missions.
+    def member(self, run: int) -> int | None:
+        """Return the number, from 1, of the parameter set that a run has; none without an ensemble."""
+        return None if self.ensemble is None else self.ensemble.member(run)
+
+    def scenario(self, loaded: LoadedScenario, point: int, member: int | None = None) -> LoadedScenario:
+        """Return the scenario of a point's missions, or of those with one member of the ensemble.
 
         Raises:
             InputError: the scenario does not allow the point's values together.
@@ -155,6 +163,8 @@ class Variation:
             except InputError as error:
                 at = ", ".join(f"{name}={shown(value)}" for name, value in values.items())
                 raise InputError(f"at {at}: {error.problem}", file=error.file, remedy=error.remedy) from None
+        if member is not None and self.ensemble is not None:
+            loaded = with_values(loaded, self.ensemble.values(member))
         return loaded
 
 

@@ -76,6 +76,15 @@ def campaign(
     seed: Annotated[
         int | None, typer.Option("--seed", help="Seed of everything that is random.", show_default=_SEED)
     ] = None,
+    ensemble: Annotated[
+        str | None,
+        typer.Option(
+            "--ensemble",
+            metavar="FILE",
+            help="Give each run one of this file's parameter sets, which fit the real runs equally well; for instance"
+            " seams2023, which is shipped.",
+        ),
+    ] = None,
     until_ci: Annotated[
         str | None,
         typer.Option(
@@ -116,6 +125,7 @@ def campaign(
             "--out": out,
             "--managers": managers,
             "--seed": seed,
+            "--ensemble": ensemble,
             "--time-out": time_out,
             "--format": also or None,
             "--record-knowledge": record_knowledge,
@@ -135,7 +145,7 @@ def campaign(
     from suave_des.campaign.runner import resume_campaign, run
     from suave_des.campaign.spec import CampaignSpec
     from suave_des.cli.console import output, progress
-    from suave_des.cli.summary import print_stops, print_summary
+    from suave_des.cli.summary import print_differences, print_stops, print_summary
 
     with progress(str(resume or scenario), quiet=quiet) as show:
         if resume is not None:
@@ -157,6 +167,7 @@ def campaign(
                 record_knowledge=record_knowledge,
                 time_out_s=time_out,
                 until_ci=until_ci,
+                ensemble=ensemble,
                 confirmed=yes,
                 overwrite=overwrite,
                 command=command_line(),
@@ -166,6 +177,7 @@ def campaign(
     console = output()
     print_summary(console, result)
     print_stops(console, result)
+    print_differences(console, result)
     console.print(f"{result.done} missions are in {result.folder}/runs.csv", soft_wrap=True)
     exit_telling_failures(result)
 

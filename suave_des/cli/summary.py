@@ -88,3 +88,30 @@ def print_stops(console: Console, result: CampaignResult) -> None:
 def _group(result: CampaignResult, stop: GroupProgress) -> str:
     values = result.variation.sweep.values(stop.point)
     return " ".join([stop.manager, *(f"{name}={cell_of(value)}" for name, value in values.items())])
+
+
+def print_differences(console: Console, result: CampaignResult) -> None:
+    """Print how managers differ, and in how many of the ensemble's parameter sets they do so in the same direction."""
+    found = result.differences()
+    if not found:
+        return
+    table = plain_table(
+        (*result.variation.sweep.parameters, "first - second", "difference", "by chance", "over the sets", "same sign"),
+        right={*result.variation.sweep.parameters, "difference", "by chance", "over the sets", "same sign"},
+        overflow="fold",
+    )
+    title = ""
+    for each in found:
+        if each.metric != title:
+            title = each.metric
+            table.add_row(*[""] * len(result.variation.sweep.parameters), METRIC_TITLES[each.metric])
+        swept = map(str, map(cell_of, result.variation.sweep.values(each.point).values()))
+        same = f"{max(each.above, each.below)} of {len(each.member_means)}"
+        ranges = (_range(each.interval), _range(each.range))
+        table.add_row(*swept, f"  {each.first} - {each.second}", f"{each.mean:+.2f}", *ranges, same)
+    console.print()
+    print_table(console, "Differences, paired by run, with 95% ranges", table)
+
+
+def _range(interval: tuple[float, float] | None) -> str:
+    return "" if interval is None else f"{interval[0]:+.1f} to {interval[1]:+.1f}"

@@ -92,14 +92,15 @@ def validate(
     from suave_des.cli.validation_tables import print_validation
     from suave_des.errors import InputError
     from suave_des.validation.conditions import CONDITION
-    from suave_des.validation.real import read_real
+    from suave_des.validation.real import read_conditions, read_real
     from suave_des.validation.validation import validate as compare
 
     name = scenario or _SCENARIO
     if runs_file is not None:
         for option in files.given:
             raise InputError(f"{option} has no use with --runs-file", remedy="leave one of them out")
-    conditions = _conditions(name, files) if runs_file is None or scenario is not None else None
+    wants_conditions = runs_file is None or scenario is not None
+    conditions = read_conditions(name, **files.replacements) if wants_conditions else None
     real = read_real(_data_files(name, data), conditions)
     chosen = real.choose(managers)
     shares, limits, targets_paths = _targets(real, targets)
@@ -166,25 +167,6 @@ def _data_files(scenario: str, given: list[str] | None) -> list[Path]:
         return [find(each, "scenarios/published") for each in given]
     own = shipped_folder("scenarios/published") / f"{Path(scenario).stem.removesuffix('_campaign')}_runs.csv"
     return [own if own.is_file() else find(_DATA, "scenarios/published")]
-
-
-def _conditions(scenario: str, files: Files) -> Conditions | None:
-    """Return the conditions of a campaign file that sweeps some; none of another file."""
-    from suave_des.campaign.spec import read_campaign_file
-    from suave_des.campaign.variation import vary
-    from suave_des.errors import InputError
-    from suave_des.scenario.loader import load_scenario
-    from suave_des.validation.conditions import Conditions
-
-    file = read_campaign_file(scenario)
-    if file is None or not file.settings.sweep:
-        return None
-    settings = file.settings
-    try:
-        _, variation = vary(load_scenario(file.scenario, **files.replacements), settings.sweep, {}, 1, settings.seed)
-    except InputError as error:
-        raise file.located(error) from None
-    return Conditions.of(variation.sweep)
 
 
 def _targets(

@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 import pandas
 from numpy.typing import NDArray
 
+from suave_des.campaign.spec import read_campaign_file
+from suave_des.campaign.variation import vary
 from suave_des.errors import InputError
 from suave_des.report.runs import Runs, choose_names, read_runs
+from suave_des.scenario.loader import Replacements, load_scenario
 from suave_des.validation.conditions import CONDITION, NUMBER_COLUMNS, Conditions
 
 _REMEDY = f"add a column {CONDITION} with the number of each mission's condition in the campaign, from 1"
@@ -88,6 +92,27 @@ def read_real(paths: Sequence[str | Path], conditions: Conditions | None = None)
         frame[CONDITION] = np.concatenate(known)
         frame = frame[[column for column in frame if column not in names or column == CONDITION]]
     return RealRuns(tuple(files), frame, tuple(notes))
+
+
+def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) -> Conditions | None:
+    """Read the conditions that a campaign file sweeps; none of another file, or if it sweeps none.
+
+    Args:
+        campaign: path of the file, or name of a shipped one.
+        replacements: of the scenario's files, as of load_scenario.
+
+    Raises:
+        InputError: the file cannot be used.
+    """
+    file = read_campaign_file(campaign)
+    if file is None or not file.settings.sweep:
+        return None
+    settings, loaded = file.settings, load_scenario(file.scenario, **replacements)
+    try:
+        _, variation = vary(loaded, settings.sweep, {}, 1, settings.seed)
+    except InputError as error:
+        raise file.located(error) from None
+    return Conditions.of(variation.sweep)
 
 
 def _numbered(file: Runs, conditions: Conditions) -> NDArray[np.int64] | None:

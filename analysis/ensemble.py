@@ -1,0 +1,313 @@
+"""Parameter sets that fit the real runs as well as the shipped one: the ensembles of `campaign --ensemble`.
+
+A set is admitted if its loss against each data set, the runs of 2023 and experiment 1 of 2025, is at most that of the
+shipped values plus a tolerance: the loss's standard error over resampled real runs, as in the calibration's profiles. A
+parameter that both scenarios leave free, and have alike, has one value for both. The admitted region is sampled evenly
+by a population of Markov chains, whose steps are differences between chains (DE-MC: ter Braak, Statistics and Computing
+16, 2006). The chains' last states are then simulated again with twice the missions and other random numbers, and are
+members if they are admitted there, too. The shipped values are the first member. Writes a CSV file for each scenario,
+with a column for each parameter; for release15, of which there are no real runs, those of seams2023 that it takes over.
+
+    python analysis/ensemble.py [--out DIR] [--members N] [--generations N] [--runs N] [--workers N]
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import multiprocessing
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from suave_des import load_scenario, with_values
+from suave_des.calibration.loss import (
+    SCALES,
+    FreeParameter,
+    Problem,
+    energy_distance,
+    evaluate,
+    published_shares,
+    published_vectors,
+    resampling_spread,
+)
+from suave_des.calibration.parameters import read_parameters
+from suave_des.report.runs import choose_managers, read_runs
+from suave_des.resources import find
+from suave_des.simulation.simulator import Simulator
+from suave_des.validation.real import read_conditions, read_real
+
+Values = Mapping[str, float]
+Losses = tuple[float, ...]
+"""By data set."""
+
+UNSEEN = "release15"
+FIRST_STEP = 0.03
+"""Standard deviation of the chains' first states about the shipped values, as a share of each parameter's range."""
+JITTER = 1e-3
+LAST_GENERATIONS = 3
+"""Generations whose states are checked."""
+CHECK_FACTOR = 2
+"""How many times the missions the check has."""
+RESAMPLES = 200
+
+
+@dataclass(frozen=True)
+class Published:
+    """The runs of 2023, whose conditions do not differ: the calibration's own loss."""
+
+    problem: Problem
+
+    @property
+    def parameters(self) -> tuple[FreeParameter, ...]:
+        """What is free."""
+        return self.problem.parameters
+
+    def loss(self, values: Values) -> float:
+        """Simulate with some values, and measure the distance to the real runs."""
+        return evaluate(self.problem, [values[each.path] for each in self.parameters]).loss
+
+    def tolerance(self, values: Values) -> float:
+        """Return the standard error of the loss over resampled real runs."""
+        here = evaluate(self.problem, [values[each.path] for each in self.parameters])
+        return resampling_spread(self.problem, here, self.problem.seed)
+
+    def larger(self, factor: int) -> Published:
+        """Return the same with more missions and other random numbers."""
+        problem = self.problem
+        return Published(replace(problem, runs=problem.runs * factor, seed=problem.seed + 1))
+
+
+@dataclass(frozen=True)
+class UnderConditions:
+    """The runs of 2025: the mean over managers and conditions of the energy distance of search time and distance."""
+
+    loaded: Any
+    parameters: tuple[FreeParameter, ...]
+    conditions: tuple[Mapping[str, Any], ...]
+    real: Mapping[tuple[str, int], NDArray[np.float64]]
+    runs: int
+    seed: int
+
+    def loss(self, values: Values) -> float:
+        """Simulate with some values, and measure the distance to the real runs."""
+        simulated = self._simulate(values)
+        return float(np.mean([energy_distance(simulated[cell], real) for cell, real in self.real.items()]))
+
+    def tolerance(self, values: Values) -> float:
+        """Return the standard error of the loss over resampled real runs."""
+        simulated, rng = self._simulate(values), np.random.default_rng(self.seed)
+        losses = []
+        for _ in range(RESAMPLES):
+            drawn = {cell: real[rng.integers(len(real), size=len(real))] for cell, real in self.real.items()}
+            losses.append(np.mean([energy_distance(simulated[cell], real) for cell, real in drawn.items()]))
+        return float(np.std(losses, ddof=1))
+
+    def larger(self, factor: int) -> UnderConditions:
+        """Return the same with more missions and other random numbers."""
+        return replace(self, runs=self.runs * factor, seed=self.seed + 1)
+
+    def _simulate(self, values: Values) -> dict[tuple[str, int], NDArray[np.float64]]:
+        own = {each.path: values[each.path] for each in self.parameters}
+        names = list(SCALES)[:2]
+        found = {}
+        for number, condition in enumerate(self.conditions, 1):
+            simulator = Simulator(with_values(self.loaded, {**own, **condition}))
+            for manager in dict.fromkeys(manager for manager, _ in self.real):
+                metrics = [simulator.run(manager, run, self.seed).metrics for run in range(1, self.runs + 1)]
+                found[manager, number] = np.array(
+                    [[getattr(each, name) / SCALES[name] for name in names] for each in metrics]
+                )
+        return found
+
+
+Data = Published | UnderConditions
+
+
+def published(runs: int) -> Published:
+    """Return the runs of 2023 with what `suave-des calibrate seams2023` frees."""
+    real = read_runs(find("seams2023_runs.csv", "scenarios/published"))
+    managers = choose_managers(real, None)
+    form, free = read_parameters(find("seams2023", "scenarios/calibration"), load_scenario("seams2023"))
+    shares = published_shares(real.frame, managers, real.path)
+    return Published(Problem(form, free, published_vectors(real.frame, managers), runs, 1, shares))
+
+
+def under_conditions(runs: int) -> UnderConditions:
+    """Return experiment 1 of 2025 with what the file of its calibration frees."""
+    loaded = load_scenario("planta_exp1")
+    conditions = read_conditions("planta_exp1_campaign")
+    real = read_real([find("planta_exp1_runs.csv", "scenarios/published")], conditions).frame
+    form, free = read_parameters(find("planta_exp1", "scenarios/calibration"), loaded)
+    scales = [SCALES[name] for name in list(SCALES)[:2]]
+    # What random does differs from run to run by far more than with any parameter.
+    cells = {
+        (manager, number): own[list(SCALES)[:2]].to_numpy(float) / scales
+        for (manager, number), own in real[real["manager"] != "random"].groupby(["manager", "condition"])
+    }
+    points = tuple(dict(zip(conditions.names, values, strict=True)) for values in conditions.values)
+    return UnderConditions(form, free, points, cells, runs, 1)
+
+
+@dataclass(frozen=True)
+class Region:
+    """All data sets together.
+
+    Attributes:
+        data: by scenario.
+        keys: by scenario and path, the name of the parameter: the path, or with the scenario where its values differ.
+        parameters: by that name.
+        shipped: values by that name.
+    """
+
+    data: Mapping[str, Data]
+    keys: Mapping[str, Mapping[str, str]]
+    parameters: Mapping[str, FreeParameter]
+    shipped: Values
+
+    @classmethod
+    def of(cls, data: Mapping[str, Data]) -> Region:
+        """Find out which parameters the scenarios share."""
+        plain = {name: load_scenario(name).scenario.model_dump() for name in data}
+        found = {
+            name: {each.path: value_at(plain[name], each.path) for each in one.parameters} for name, one in data.items()
+        }
+        keys = {
+            name: {
+                path: path if all(other.get(path, value) == value for other in found.values()) else f"{name}: {path}"
+                for path, value in own.items()
+            }
+            for name, own in found.items()
+        }
+        parameters = {keys[name][each.path]: each for name, one in data.items() for each in one.parameters}
+        shipped = {keys[name][path]: value for name, own in found.items() for path, value in own.items()}
+        return cls(data, keys, parameters, shipped)
+
+    def own(self, name: str, values: Values) -> Values:
+        """Return the values of one scenario, by path."""
+        return {path: values[key] for path, key in self.keys[name].items()}
+
+    def larger(self, factor: int) -> Region:
+        """Return the same with more missions and other random numbers."""
+        return replace(self, data={name: one.larger(factor) for name, one in self.data.items()})
+
+
+def losses(region: Region, values: Values) -> Losses:
+    """Return the loss of some values against each data set."""
+    return tuple(one.loss(region.own(name, values)) for name, one in region.data.items())
+
+
+EvaluateAll = Callable[[Sequence[Values]], list[Losses]]
+
+
+def chains(region: Region, limits: Losses, count: int, generations: int, evaluate_all: EvaluateAll) -> list[Values]:
+    """Sample the region within the limits of every loss; returns the chains' last states, the latest first."""
+    rng = np.random.default_rng(1)
+    free = region.parameters
+    lower, upper = (np.array([getattr(each, end) for each in free.values()]) for end in ("lower", "upper"))
+    states = [region.shipped] * count
+    visited: list[Values] = []
+    for generation in range(generations):
+        here = (np.array([[state[key] for key in free] for state in states]) - lower) / (upper - lower)
+        steps = rng.normal(0.0, FIRST_STEP, here.shape)
+        if generation >= 2:  # until then all chains stand nearly in one place
+            others = [rng.choice(np.delete(np.arange(count), chain), 2, replace=False) for chain in range(count)]
+            differences = np.array([here[first] - here[second] for first, second in others])
+            steps = 2.38 / np.sqrt(2 * len(lower)) * differences + rng.normal(0.0, JITTER, here.shape)
+        proposed = [
+            {key: each.value(float(unit)) for (key, each), unit in zip(free.items(), units, strict=True)}
+            for units in here + steps
+        ]
+        moved = [_admitted(found, limits) for found in evaluate_all(proposed)]
+        states = [new if accepted else old for old, new, accepted in zip(states, proposed, moved, strict=True)]
+        visited = [*states, *visited]
+        print(f"generation {generation + 1} of {generations}: {sum(moved)} of {count} chains moved", flush=True)
+    return visited[: LAST_GENERATIONS * count]
+
+
+def _admitted(found: Losses, limits: Losses) -> bool:
+    return all(loss <= limit for loss, limit in zip(found, limits, strict=True))
+
+
+def value_at(plain: Any, path: str) -> float:
+    """Return the number at a key path of plain data."""
+    for key in path.split("."):
+        plain = plain[int(key) if isinstance(plain, list) else key]
+    return float(plain)
+
+
+def taken_over(parameters: Sequence[FreeParameter], shipped: Values) -> list[FreeParameter]:
+    """Return the parameters that the scenario without real runs has with the same value."""
+    plain = load_scenario(UNSEEN).scenario.model_dump()
+    found = []
+    for each in parameters:
+        try:
+            same = value_at(plain, each.path) == shipped[each.path]
+        except (KeyError, TypeError):  # it has no such number
+            same = False
+        found += [each] if same else []
+    return found
+
+
+def write(path: Path, parameters: Sequence[FreeParameter], members: Sequence[tuple[Values, float]]) -> None:
+    """Write the ensemble of one scenario: a row for each member, with its loss against the scenario's data."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["member", *(each.path for each in parameters), "loss"])
+        for number, (values, loss) in enumerate(members, 1):
+            writer.writerow([number, *(f"{values[each.path]:.5g}" for each in parameters), f"{loss:.4f}"])
+
+
+def main() -> None:
+    """Sample the region, check the members, write them."""
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--out", type=Path, default=Path(__file__).parents[1] / "scenarios" / "ensembles")
+    options.add_argument("--members", type=int, default=24)
+    options.add_argument("--generations", type=int, default=6)
+    options.add_argument("--runs", type=int, default=30, help="missions for each manager of 2023; of 2025, a tenth")
+    options.add_argument("--workers", type=int, default=2)
+    chosen = options.parse_args()
+
+    data: dict[str, Data] = {
+        "seams2023": published(chosen.runs),
+        "planta_exp1": under_conditions(max(2, chosen.runs // 10)),
+    }
+    region = Region.of(data)
+    best = losses(region, region.shipped)
+    tolerances = tuple(one.tolerance(region.own(name, region.shipped)) for name, one in data.items())
+    for name, loss, tolerance in zip(data, best, tolerances, strict=True):
+        print(f"{name}: loss of the shipped values {loss:.4f}, tolerance {tolerance:.4f}", flush=True)
+    with multiprocessing.get_context("spawn").Pool(chosen.workers) as pool:
+        evaluate_all = partial(pool.map, partial(losses, region), chunksize=1)
+        sampled = chains(region, _sums(best, tolerances), chosen.members, chosen.generations, evaluate_all)
+        rounded = [{key: float(f"{value:.5g}") for key, value in values.items()} for values in sampled]
+        distinct = [
+            each for place, each in enumerate(rounded) if each not in rounded[:place] and each != region.shipped
+        ]
+        distinct = [region.shipped, *distinct[: 2 * chosen.members]]
+        checked = pool.map(partial(losses, region.larger(CHECK_FACTOR)), distinct, chunksize=1)
+    limits = _sums(checked[0], tolerances)
+    passed = [(values, found) for values, found in zip(distinct, checked, strict=True) if _admitted(found, limits)]
+    members = passed[: chosen.members]
+    if len(members) < chosen.members:
+        print(f"only {len(members)} of {chosen.members} members: more --generations sample the region better")
+    for place, (name, one) in enumerate(data.items()):
+        rows = [(region.own(name, values), found[place]) for values, found in members]
+        write(chosen.out / f"{name}.csv", one.parameters, rows)
+        if name == "seams2023":
+            write(chosen.out / f"{UNSEEN}.csv", taken_over(one.parameters, region.own(name, region.shipped)), rows)
+    print(f"{len(members)} members of {len(distinct)} that were checked; see {chosen.out}")
+
+
+def _sums(best: Losses, tolerances: Losses) -> Losses:
+    return tuple(loss + tolerance for loss, tolerance in zip(best, tolerances, strict=True))
+
+
+if __name__ == "__main__":
+    main()

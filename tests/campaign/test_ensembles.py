@@ -1,0 +1,179 @@
+"""Each run of a campaign has one member of an ensemble, the same under all managers; differences are told by member."""
+
+import csv
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from suave_des.campaign.campaign import resume_campaign, run_campaign
+from suave_des.campaign.ensemble import COLUMN, Ensemble, differences, read_ensemble
+from suave_des.campaign.missions import MissionKey
+from suave_des.cli.main import main
+from suave_des.errors import InputError
+from suave_des.resources import shipped_folder
+from suave_des.scenario.loader import load_scenario, with_values
+from suave_des.simulation.simulator import Simulator
+
+GAIN = "calibration.position_gain_per_s"
+TWO = f"member,{GAIN},loss\n1,0.66,0.2\n2,0.9,0.21\n"
+
+
+@pytest.fixture
+def two(tmp_path: Path) -> Path:
+    path = tmp_path / "two.csv"
+    path.write_text(TWO, encoding="utf-8")
+    return path
+
+
+def test_runs_have_the_members_in_turn_and_managers_have_the_same():
+    frame = run_campaign("seams2023", ["none", "bt"], 3, ensemble="seams2023").frame()
+    assert frame[COLUMN].tolist() == [1, 2, 3, 1, 2, 3]
+
+
+def test_a_run_is_the_mission_of_the_scenario_with_its_members_values(two):
+    row = run_campaign("seams2023", ["none"], 2, seed=3, ensemble=two).frame().iloc[1]
+    loaded = with_values(load_scenario("seams2023"), {GAIN: 0.9})
+    alone = Simulator(loaded).run("none", 2, 3).metrics
+    assert (row["search_time_s"], row["detection_time_s"]) == (alone.search_time_s, round(alone.detection_time_s, 6))
+
+
+def test_members_run_through_again_at_each_point_of_a_sweep(two):
+    sweep = {"visibility.period_s": [60, 80]}
+    frame = run_campaign("seams2023", ["none"], 3, ensemble=two, sweep=sweep).frame()
+    assert frame[COLUMN].tolist() == [1, 2, 1, 1, 2, 1]
+
+
+def test_resuming_gives_the_same_bytes(two, tmp_path):
+    run_campaign("seams2023", ["none", "bt"], 4, out=tmp_path / "whole", ensemble=two)
+    run_campaign("seams2023", ["none", "bt"], 2, out=tmp_path / "parts", ensemble=two)
+    resume_campaign(tmp_path / "parts", runs=4)
+    for name in ("runs.csv", "ensemble.csv"):
+        assert (tmp_path / "parts" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+def test_a_campaign_is_not_resumed_with_another_ensemble(two, tmp_path):
+    run_campaign("seams2023", ["none"], 1, out=tmp_path / "out", ensemble=two)
+    two.write_text(TWO.replace("0.66", "0.67"), encoding="utf-8")
+    with pytest.raises(InputError, match=r"cannot be resumed: files_sha256\.two\.csv"):
+        resume_campaign(tmp_path / "out", runs=2)
+
+
+def test_a_campaign_file_names_its_ensemble_relative_to_itself(two, tmp_path):
+    (tmp_path / "mine.yaml").write_text("campaign: 1\nscenario: seams2023\nruns: 2\nensemble: two.csv\n")
+    frame = run_campaign(tmp_path / "mine.yaml", ["none"]).frame()
+    assert frame[COLUMN].tolist() == [1, 2]
+
+
+def test_the_file_of_differences_has_a_row_for_each_pair_and_metric(two, tmp_path):
+    run_campaign("seams2023", ["none", "random", "bt"], 4, out=tmp_path / "out", ensemble=two)
+    with (tmp_path / "out" / "ensemble.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["first"], row["second"]) for row in rows[:3]] == [("random", "none"), ("bt", "none"), ("bt", "random")]
+    assert {row["metric"] for row in rows} == {"search_time_s", "distance_inspected_m"}
+    assert {(row["n"], row["members"]) for row in rows} == {("4", "2")}
+
+
+def test_a_campaign_without_an_ensemble_has_neither_column_nor_file(tmp_path):
+    result = run_campaign("seams2023", ["none"], 1, out=tmp_path / "out")
+    assert COLUMN not in result.columns
+    assert not (tmp_path / "out" / "ensemble.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "line 1: has no columns of parameters"),
+        ("member,loss\n1,2\n2,3\n", "line 1: has no columns of parameters"),
+        (f"{GAIN}\n0.6\n", "line 1: has 1 members"),
+        (f"{GAIN},{GAIN}\n1,1\n1,1\n", "line 1: has column 'calibration.position_gain_per_s' twice"),
+        (f"{GAIN}\n0.6\nfast\n", "line 3: calibration.position_gain_per_s: expected a number, got 'fast'"),
+        (f"{GAIN}\n0.6\nnan\n", "line 3: calibration.position_gain_per_s: expected a number, got 'nan'"),
+        (f"{GAIN}\n0.6\n0.6,0.7\n", "line 3: has 2 values, but the header has 1"),
+        (f"{GAIN}\n0.6\n-4\n", "member 2: "),
+        ("calibration.gain\n1\n2\n", "calibration.gain: "),
+        ("start.y_m\n1\n2\n", "start.y_m: expected a number in scenario seams2023"),
+        ("revision\n1\n2\n", "revision: expected a number"),
+    ],
+)
+def test_an_ensemble_that_cannot_be_used_is_named_with_its_place(two, text, told):
+    two.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as error:
+        run_campaign("seams2023", ["none"], 1, ensemble=two)
+    assert told in str(error.value)
+    assert "two.csv" in str(error.value)
+
+
+DRIFT = "calibration.drift_y_m"
+
+
+@pytest.mark.parametrize(
+    "varied",
+    [{"sweep": {DRIFT: [0.1]}}, {"perturbations": {DRIFT: {"distribution": "uniform", "minimum": 0.1, "maximum": 1}}}],
+)
+def test_what_the_ensemble_varies_is_not_varied_by_the_campaign_too(two, varied):
+    two.write_text(TWO.replace(GAIN, DRIFT), encoding="utf-8")
+    with pytest.raises(InputError, match=f"varies {DRIFT}, as the campaign's sweep or perturbations do"):
+        run_campaign("seams2023", ["none"], 1, ensemble=two, **varied)
+
+
+def rows_of(by_manager: dict[int, list[float]]):
+    return [
+        (MissionKey(0, manager, run), (value,))
+        for manager, values in by_manager.items()
+        for run, value in enumerate(values, 1)
+    ]
+
+
+def test_a_difference_is_paired_by_run_and_told_by_member():
+    ensemble = Ensemble("two", ("x",), ((1.0,), (2.0,)))
+    rows = rows_of({0: [10.0, 20.0, 12.0, 22.0], 1: [9.0, 25.0, 10.0, 27.0]})
+    (found,) = differences(rows, ["none", "bt"], {"search_time_s": 0}, ensemble)
+    assert (found.first, found.second, found.n) == ("bt", "none", 4)
+    assert found.member_means == (-1.5, 5.0)
+    assert (found.mean, found.below, found.above) == (1.75, 1, 1)
+
+
+def test_a_run_that_one_manager_lacks_is_left_out():
+    ensemble = Ensemble("two", ("x",), ((1.0,), (2.0,)))
+    rows = [row for row in rows_of({0: [1.0, 2.0], 1: [1.0, 5.0]}) if row[0] != MissionKey(0, 0, 1)]
+    (found,) = differences(rows, ["none", "bt"], {"search_time_s": 0}, ensemble)
+    assert (found.n, found.mean, found.interval, found.range) == (1, 3.0, None, None)
+
+
+def test_the_range_over_members_is_that_of_their_means():
+    ensemble = Ensemble("three", ("x",), ((1.0,), (2.0,), (3.0,)))
+    rows = rows_of({0: [0.0] * 6, 1: [0.0, 10.0, 20.0, 2.0, 12.0, 22.0]})
+    (found,) = differences(rows, ["none", "bt"], {"search_time_s": 0}, ensemble)
+    assert found.range == pytest.approx((11.0 - 4.302653 * 10.0, 11.0 + 4.302653 * 10.0), rel=1e-6)
+
+
+@given(st.integers(1, 10_000), st.integers(2, 50))
+def test_members_are_used_equally_often(run, size):
+    ensemble = Ensemble("any", ("x",), tuple((float(number),) for number in range(size)))
+    assert ensemble.member(run) == ensemble.member(run + size)
+    assert 1 <= ensemble.member(run) <= size
+
+
+SHIPPED = sorted(shipped_folder("scenarios/ensembles").glob("*.csv"))
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_a_shipped_ensemble_has_twenty_different_members_of_the_scenario_of_its_name(path):
+    ensemble, _, _ = read_ensemble(path)
+    assert len(set(ensemble.members)) == len(ensemble.members) >= 20
+    loaded = load_scenario(path.stem)
+    for member in range(1, len(ensemble.members) + 1):
+        with_values(loaded, ensemble.values(member))
+
+
+def test_the_command_prints_what_survives(two, tmp_path, capsys):
+    arguments = ("campaign", "seams2023", "--managers", "none,bt", "--ensemble", str(two), "--runs", "4", "--quiet")
+    with pytest.raises(SystemExit) as ended:
+        main((*arguments, "--workers", "1", "--out", str(tmp_path / "out")))
+    printed = capsys.readouterr().out
+    assert not ended.value.code
+    assert "Differences, paired by run, with 95% ranges" in printed
+    assert "bt - none" in printed
+    assert "2 of 2" in printed or "1 of 2" in printed
