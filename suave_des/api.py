@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
@@ -111,6 +111,8 @@ def resume_campaign(
     runs: int | None = None,
     until_ci: str | None = None,
     scheduler: str | None = None,
+    managers: Sequence[str] = (),
+    confirmed: bool = False,
     progress: bool | None = None,
 ) -> pandas.DataFrame:
     """Go on with the campaign in a folder where it stopped, and return its rows as run_campaign does.
@@ -121,6 +123,8 @@ def resume_campaign(
         runs: more runs than at first; left out: as many.
         until_ci: the metric given at first with a smaller half-width; left out: as at first.
         scheduler: address of a Dask scheduler whose workers run the missions, instead of processes here.
+        managers: those of the campaign's that are not installed; their code is run only if they are named here.
+        confirmed: whether to run the code of all managers that the folder names.
         progress: whether to show progress; left out: in a notebook and on a terminal.
 
     Raises:
@@ -131,7 +135,14 @@ def resume_campaign(
         str(folder),
         progress,
         lambda show: campaigns.resume_campaign(
-            folder, workers, runs=runs, until_ci=until_ci, on_progress=show, scheduler=scheduler
+            folder,
+            workers,
+            runs=runs,
+            until_ci=until_ci,
+            on_progress=show,
+            scheduler=scheduler,
+            managers=managers,
+            confirmed=confirmed,
         ),
     )
     return _with_attrs(result.frame(), attrs)

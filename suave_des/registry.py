@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import sys
+from collections.abc import Callable
 from difflib import get_close_matches
 from functools import cache
 from importlib.metadata import entry_points
@@ -26,12 +28,39 @@ _BUILT_IN = {
     "metacontrol": "suave_des.managing.metacontrol:Metacontrol",
     "bt": "suave_des.managing.bt:BehaviourTree",
     "bt_extended": "suave_des.managing.bt:ExtendedBehaviourTree",
+    "threshold": "suave_des.managing.reference:Threshold",
+    "oracle": "suave_des.managing.reference:Oracle",
+}
+_FAMILIES = {
+    "fixed": ("suave_des.managing.reference:fixed_mode", "fixed:MODE"),
+    "exec": ("suave_des.interfaces.exec:exec_manager", "exec:COMMAND"),
+}
+"""Managers that are named with an argument after a colon: what makes the class of one, and how it is written."""
+_checked: set[type] = set()
+_HOOKS = {
+    "__init__": "(self, system)",
+    "mission_started": "(self)",
+    "mission_ended": "(self, metrics)",
+    "task_requested": "(self, task)",
+    "task_cancelled": "(self, task)",
+    "diagnostic": "(self, diagnostic)",
+    "adapt": "(self)",
 }
 
 
 def is_built_in(name: str) -> bool:
-    """Whether a manager is the project's own."""
-    return name in _BUILT_IN
+    """Whether a manager is the project's own code alone."""
+    return name in _BUILT_IN or name.startswith("fixed:")
+
+
+def takes_argument(name: str) -> bool:
+    """Whether what stands before the colon of a name is no module, as in fixed:MODE."""
+    return name.partition(":")[0] in _FAMILIES
+
+
+def is_installed(name: str) -> bool:
+    """Whether a manager is built in or registered by a package: code that somebody has installed on purpose."""
+    return is_built_in(name) or name in _registered()
 
 
 def manager_names() -> tuple[str, ...]:
@@ -50,12 +79,55 @@ def manager_class(name: str) -> type[ManagingSubsystem]:
     Raises:
         InputError: there is no such manager, or what the name leads to is no subclass of ManagingSubsystem.
     """
+    family, _, argument = name.partition(":")
+    if family in _FAMILIES:
+        return _member(family, argument)
     target = name if ":" in name else _BUILT_IN.get(name) or _registered().get(name)
     if target is None:
         close = get_close_matches(name, manager_names(), n=1)
         hint = f"did you mean {close[0]}?" if close else f"known: {', '.join(manager_names())}"
         raise InputError(f"there is no manager {name!r}", remedy=f"{hint}; your own is given as package.module:Class")
-    return _load(f"manager {name!r}", target, ManagingSubsystem)
+    found = _load(f"manager {name!r}", target, ManagingSubsystem)
+    if not is_built_in(name):
+        _check_hooks(name, found)
+    return found
+
+
+def _member(family: str, argument: str) -> type[ManagingSubsystem]:
+    target, form = _FAMILIES[family]
+    if not argument.strip():
+        raise InputError(f"there is no manager {family!r}", remedy=f"write {form}")
+    module, _, function = target.partition(":")
+    make: Callable[[str], type[ManagingSubsystem]] = getattr(importlib.import_module(module), function)
+    return make(argument)
+
+
+def _check_hooks(name: str, kind: type[ManagingSubsystem]) -> None:
+    """See that each hook that a class has can be called as hooks are called.
+
+    Raises:
+        InputError: one takes other arguments; or none is there, but something that resembles one.
+    """
+    if kind in _checked:
+        return
+    for hook, form in _HOOKS.items():
+        function = getattr(kind, hook)
+        arguments = [object()] * (form.count(",") + 1)
+        if not callable(function):
+            raise InputError(f"manager {name!r}: {hook} is not a method", remedy=f"write def {hook}{form}")
+        try:
+            inspect.signature(function).bind(*arguments)
+        except TypeError as error:
+            problem = f"manager {name!r}: {hook}{inspect.signature(function)} cannot be called as a hook: {error}"
+            raise InputError(problem, remedy=f"write def {hook}{form}") from None
+        except ValueError:  # no signature: compiled
+            continue
+    own = {each for base in kind.__mro__ if base is not object and base is not ManagingSubsystem for each in vars(base)}
+    if not own & _HOOKS.keys():
+        resembling = {each: near for each in own for near in get_close_matches(each, _HOOKS, n=1, cutoff=0.75)}
+        for each, hook in sorted(resembling.items()):
+            raise InputError(f"manager {name!r} has no hook, but {each}", remedy=f"did you mean {hook}{_HOOKS[hook]}?")
+    _checked.add(kind)
 
 
 def registered_functions() -> tuple[str, ...]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from suave_des.campaign.manager_inputs import check_trusted
 from suave_des.campaign.runner import read_inputs
 from suave_des.campaign.spec import CampaignSpec, read_campaign_file
 from suave_des.campaign.store import STORE_FILE, Store
@@ -65,11 +66,16 @@ class OpenedCampaign:
 
 
 @contextmanager
-def opened_campaign(folder: Path) -> Iterator[OpenedCampaign]:
+def opened_campaign(folder: Path, named: Collection[str] = ()) -> Iterator[OpenedCampaign]:
     """Open a campaign, to run missions of it again; what it names is looked up where it was started.
 
+    Args:
+        folder: the campaign's.
+        named: managers that the user has named: their code may run, see `check_trusted`.
+
     Raises:
-        InputError: there is no campaign in the folder, or what it was made of is not there any more.
+        InputError: there is no campaign in the folder, what it was made of is not there any more, or it names managers
+            that are neither installed nor named.
     """
     path = (folder / STORE_FILE).absolute()
     if not path.is_file():
@@ -80,6 +86,7 @@ def opened_campaign(folder: Path) -> Iterator[OpenedCampaign]:
     with _where_started(spec.folder):
         file = read_campaign_file(spec.scenario)
         spec = spec.with_file(file)
+        check_trusted(spec.managers, named, folder, confirmed=False)
         spec.check()
         loaded, variation, _ = read_inputs(spec, file)
         yield OpenedCampaign(spec, loaded, variation)

@@ -31,6 +31,8 @@ class CampaignOptions(TypedDict, total=False):
     reasoner: str | None
     rules: Sequence[str | Path]
     disabled_rules: Sequence[str]
+    values: Mapping[str, Any]
+    manager_options: Mapping[str, Mapping[str, Any]]
     suave_format: bool
     parquet: bool
     record_knowledge: bool

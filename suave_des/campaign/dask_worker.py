@@ -53,6 +53,7 @@ class Parcel:
         job: the job, with the paths that the user's files have there.
         ontologies: names and contents of ontologies, imported ones included.
         rules: names and contents of files of rules.
+        manager_files: names and contents of the files that managers declare.
         modules: Python files of managers and functions, by their path below the folder of modules.
         manager_code: SHA-256 of each manager's module.
     """
@@ -60,6 +61,7 @@ class Parcel:
     job: JobSpec
     ontologies: tuple[tuple[str, bytes], ...]
     rules: tuple[tuple[str, bytes], ...]
+    manager_files: tuple[tuple[str, bytes], ...]
     modules: Mapping[str, bytes]
     manager_code: Mapping[str, str]
 
@@ -70,14 +72,17 @@ def pack(job: JobSpec) -> Parcel:
     Raises:
         InputError: a file cannot be read, or a manager is in a module that cannot be sent.
     """
+    from suave_des.campaign.manager_inputs import declared_files, scenarios_of
     from suave_des.campaign.own_modules import own_modules
     from suave_des.simulation.functions import own_functions
 
+    declared = declared_files(scenarios_of(job.loaded, job.variation), job.managers)
     modules = own_modules(job.managers, own_functions(job.loaded))
     return Parcel(
         job,
         ontologies=tuple((str(path), path.read_bytes()) for path in _with_imports(job.loaded)),
         rules=tuple((str(path), path.read_bytes()) for path in job.loaded.rules),
+        manager_files=tuple((name, path.read_bytes()) for name, path in declared.items()),
         modules={place: path.read_bytes() for place, path in modules.items()},
         manager_code={name: manager_code(name) for name in job.managers},
     )
@@ -115,7 +120,10 @@ class Unpacked:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content)
         ontologies, rules = self._written(parcel.ontologies), self._written(parcel.rules)
-        self.job = replace(parcel.job, loaded=replace(parcel.job.loaded, ontologies=ontologies, rules=rules))
+        names = [name for name, _ in parcel.manager_files]
+        files = dict(zip(names, self._written(parcel.manager_files), strict=True))
+        loaded = replace(parcel.job.loaded, ontologies=ontologies, rules=rules, manager_files=files)
+        self.job = replace(parcel.job, loaded=loaded)
 
     def _written(self, files: Iterable[tuple[str, bytes]]) -> tuple[Path, ...]:
         """Write each file into a folder of its own: it keeps its name, which counts, and is beside no other."""

@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 import suave_des
 from suave_des.errors import InputError
-from suave_des.registry import manager_class
+from suave_des.registry import manager_class, takes_argument
 
 _INSTALLED = (
     *(Path(sysconfig.get_path(kind)).resolve() for kind in ("stdlib", "platstdlib", "purelib", "platlib")),
@@ -43,7 +43,8 @@ def own_modules(managers: Iterable[str], functions: Mapping[str, type] = Mapping
     ]
     for manager in managers:
         defined_in = manager_class(manager).__module__
-        named = manager.partition(":")[0] if ":" in manager else defined_in
+        is_module = ":" in manager and not takes_argument(manager)
+        named = manager.partition(":")[0] if is_module else defined_in
         defining.append((f"manager {manager!r}", (named, defined_in)))
     for what, modules in defining:
         for module in dict.fromkeys(modules):

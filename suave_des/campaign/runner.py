@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack, closing, suppress
 from dataclasses import replace
 from pathlib import Path
 
 from suave_des.campaign.ensemble import read_ensemble, with_ensemble
 from suave_des.campaign.executors import InProcess, LocalWorkers
+from suave_des.campaign.manager_inputs import check_managers, check_trusted, scenarios_of
 from suave_des.campaign.missions import Executor, Finished, JobSpec, MissionKey, WorkerError, plan
 from suave_des.campaign.output import check_output_folder, make_output_folder, remove_parts, remove_results
 from suave_des.campaign.progress import OnProgress, ProgressTracker, parse_until_ci
@@ -28,7 +29,7 @@ from suave_des.campaign.store import (
     stored_outcomes,
 )
 from suave_des.campaign.variation import Variation, vary
-from suave_des.errors import InputError, SuaveDesError
+from suave_des.errors import InputError, SuaveDesError, did_you_mean
 from suave_des.scenario.layers import Files
 from suave_des.scenario.loader import LoadedScenario, Replacements, check_not_replaced, load_scenario
 
@@ -96,6 +97,8 @@ def resume_campaign(
     until_ci: str | None = None,
     on_progress: OnProgress | None = None,
     scheduler: str | None = None,
+    managers: Collection[str] = (),
+    confirmed: bool = False,
 ) -> CampaignResult:
     """Go on with a campaign where it stopped; its specification is in its folder.
 
@@ -108,6 +111,8 @@ def resume_campaign(
         until_ci: the metric asked for at first with a smaller half-width; left out: as at first.
         on_progress: called when missions are done.
         scheduler: as of run_campaign; it may be another, or none.
+        managers: those of the campaign's that are not installed; their code is run only if they are named here.
+        confirmed: whether to run the code of all managers that the folder names.
 
     Raises:
         InputError: there is no campaign, it is damaged or in use, or something that decides results has changed; the
@@ -117,6 +122,10 @@ def resume_campaign(
     folder = Path(folder)
     spec = _stored_spec(folder, runs, until_ci)
     spec = replace(spec, out=folder, workers=workers, scheduler=scheduler)
+    if unknown := [name for name in managers if name not in spec.managers]:
+        problem = f"the campaign has no manager {unknown[0]!r}, and goes on as it began"
+        raise InputError(problem, file=folder, remedy=did_you_mean(unknown[0], spec.managers, "its managers"))
+    check_trusted(spec.managers, managers, folder, confirmed=confirmed)
     with ExitStack() as stack:
         try:
             campaign = _Campaign(spec, read_campaign_file(spec.scenario), stack)
@@ -359,6 +368,8 @@ def read_inputs(
         "reasoner": spec.reasoner,
         "rules": spec.rules,
         "disabled_rules": spec.disabled_rules,
+        "values": spec.values,
+        "manager_options": spec.manager_options,
     }
     if loaded is None:
         loaded = load_scenario(spec.scenario if file is None else file.scenario, **replacements)
@@ -377,6 +388,7 @@ def read_inputs(
         variation = with_ensemble(loaded, variation, ensemble, path)
         files.note(path, digest)
     inputs = {**check_knowledge(loaded, spec.managers, given=given), **files.inputs}
+    inputs |= check_managers(scenarios_of(loaded, variation), spec.managers)
     return loaded, variation, inputs if file is None else {**inputs, **file.inputs}
 
 

@@ -6,9 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, fields
 from operator import attrgetter
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 from suave_des.campaign.given import ManagerLike, manager_name
 from suave_des.campaign.knowledge_records import KNOWLEDGE_FILE, knowledge_text
+from suave_des.campaign.manager_inputs import check_managers
 from suave_des.campaign.missions import COLUMNS, row_of
 from suave_des.campaign.output import check_output_folder, csv_text, json_text, make_output_folder, write_files
 from suave_des.campaign.provenance import check_knowledge, provenance
@@ -36,6 +39,8 @@ def run_mission(
     reasoner: str | None = None,
     rules: Sequence[str | Path] = (),
     disabled_rules: Sequence[str] = (),
+    values: Mapping[str, Any] = MappingProxyType({}),
+    manager_options: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
     overwrite: bool = False,
     command: Sequence[str] = (),
     on_time: Callable[[float, float], None] | None = None,
@@ -53,7 +58,8 @@ def run_mission(
         seed: of everything that is random.
         out: folder for mission.json, events.csv, trajectory.csv and, of a manager that reasons,
             knowledge.jsonl; it is made if its parent exists. None: no files.
-        ontologies, modes_file, reasoner, rules, disabled_rules, overwrite, command: see CampaignSpec.
+        ontologies, modes_file, reasoner, rules, disabled_rules, values, manager_options: see CampaignSpec.
+        overwrite, command: see CampaignSpec.
         on_time: called each second of mission time with it and the time limit, in s.
 
     Raises:
@@ -72,12 +78,15 @@ def run_mission(
         "reasoner": reasoner,
         "rules": rules,
         "disabled_rules": disabled_rules,
+        "values": values,
+        "manager_options": manager_options,
     }
     if isinstance(scenario, LoadedScenario):
         check_not_replaced(loaded := scenario, replacements)
     else:
         loaded = load_scenario(scenario, **replacements)
     inputs = check_knowledge(loaded, [name], given=bool(ontologies or rules or disabled_rules))
+    inputs |= check_managers([loaded], [name])
     result = Simulator(loaded).run(name, run, seed, record=True, on_time=on_time)
     if folder is not None:
         make_output_folder(folder)

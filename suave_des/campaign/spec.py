@@ -85,6 +85,8 @@ class CampaignSpec:
         reasoner: in place of the scenario's.
         rules: files of rules as text, besides the scenario's.
         disabled_rules: names of rules to switch off, besides the scenario's.
+        values: new values by key path of the scenario.
+        manager_options: settings of managers, by manager and key.
         suave_format: whether the exemplar's own results file is written, too.
         parquet: whether runs.parquet is written, too; it needs pyarrow.
         record_knowledge: whether the states that managers reasoned about are kept, for `kb try`.
@@ -107,6 +109,8 @@ class CampaignSpec:
     reasoner: str | None = None
     rules: tuple[str, ...] = ()
     disabled_rules: tuple[str, ...] = ()
+    values: Mapping[str, Any] = field(default_factory=dict)
+    manager_options: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     suave_format: bool = False
     parquet: bool = False
     record_knowledge: bool = False
@@ -289,6 +293,12 @@ def read_campaign_file(name: str | Path) -> CampaignFile | None:
     settings = validated(layer, CampaignSettings)
     scenario = find_named(layer, ("scenario",), settings.scenario, "scenarios")
     return CampaignFile(settings, scenario, files.inputs, layer)
+
+
+def managers_of(scenario: str | Path) -> tuple[str, ...]:
+    """Return the managers that a campaign has if none are given: those of a campaign file, or the default."""
+    file = read_campaign_file(scenario)
+    return _DEFAULTS.managers if file is None else file.settings.managers
 
 
 def settings_for(file: CampaignFile | None, names: Iterable[str]) -> dict[str, Any]:

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli.options import Files, Overwrite, Quiet, TimeOut, command_line, grouped_options
+from suave_des.cli.options import (
+    Files,
+    ManagerOptions,
+    Overwrite,
+    Quiet,
+    TimeOut,
+    command_line,
+    grouped_options,
+)
 from suave_des.errors import InputError
 
 if TYPE_CHECKING:
@@ -107,7 +115,14 @@ def campaign(
     ] = False,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
-    yes: Annotated[bool, typer.Option("--yes", help="More than a million missions are meant.")] = False,
+    yes: Annotated[
+        bool,
+        typer.Option(
+            "--yes",
+            help="More than a million missions are meant; with --resume: managers that DIR names may run.",
+        ),
+    ] = False,
+    manager_option: ManagerOptions = None,
     *,
     files: Files,
 ) -> None:
@@ -123,14 +138,13 @@ def campaign(
         fixed = {
             "SCENARIO": scenario,
             "--out": out,
-            "--managers": managers,
             "--seed": seed,
             "--ensemble": ensemble,
             "--time-out": time_out,
             "--format": also or None,
             "--record-knowledge": record_knowledge,
             "--overwrite": overwrite,
-            "--yes": yes,
+            "--manager-option": manager_option,
             **files.given,
         }
         for option, value in fixed.items():
@@ -143,17 +157,29 @@ def campaign(
         missing = "SCENARIO" if scenario is None else "--out DIR"
         raise InputError(f"{missing} is missing", remedy="see suave-des campaign --help")
     from suave_des.campaign.runner import resume_campaign, run
-    from suave_des.campaign.spec import CampaignSpec
+    from suave_des.campaign.spec import CampaignSpec, managers_of
     from suave_des.cli.console import output, progress
     from suave_des.cli.summary import print_differences, print_stops, print_summary
 
     with progress(str(resume or scenario), quiet=quiet) as show:
         if resume is not None:
             result = resume_campaign(
-                resume, workers, runs=runs, until_ci=until_ci, on_progress=show, scheduler=scheduler
+                resume,
+                workers,
+                runs=runs,
+                until_ci=until_ci,
+                on_progress=show,
+                scheduler=scheduler,
+                managers=names or (),
+                confirmed=yes,
             )
         else:
             assert scenario is not None
+            options = (
+                files.with_options(manager_option, names or managers_of(scenario))
+                if manager_option
+                else files.replacements
+            )
             spec = CampaignSpec.of(
                 scenario,
                 managers=names,
@@ -161,7 +187,7 @@ def campaign(
                 seed=seed,
                 workers=workers,
                 out=out,
-                **files.replacements,
+                **options,
                 suave_format=Format.SUAVE in (also or ()),
                 parquet=Format.PARQUET in (also or ()),
                 record_knowledge=record_knowledge,

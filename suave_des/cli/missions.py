@@ -8,7 +8,15 @@ from typing import Annotated
 
 import typer
 
-from suave_des.cli.options import Files, Overwrite, Scenario, Seed, command_line, grouped_options
+from suave_des.cli.options import (
+    Files,
+    ManagerOptions,
+    Overwrite,
+    Scenario,
+    Seed,
+    command_line,
+    grouped_options,
+)
 
 
 @grouped_options
@@ -28,6 +36,7 @@ def run(
         ),
     ] = None,
     overwrite: Overwrite = False,
+    manager_option: ManagerOptions = None,
     *,
     files: Files,
 ) -> None:
@@ -45,7 +54,7 @@ def run(
             overwrite=overwrite,
             command=command_line(),
             on_time=show,
-            **files.replacements,
+            **files.with_options(manager_option, [manager]),
         )
     console = output()
     print_timeline(console, result)

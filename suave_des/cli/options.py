@@ -70,21 +70,90 @@ class KnowledgeFiles:
 
 @dataclass(frozen=True)
 class Files(KnowledgeFiles):
-    """Options that replace or add to a scenario's files and settings."""
+    """Options that replace or add to a scenario's files and values."""
 
     modes: Modes = None
     reasoner: Reasoner = None
+    set: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="Value of the scenario, such as mission.time_limit_s=400; repeat it."
+        ),
+    ] = None
 
     @property
     def replacements(self) -> Replacements:
         """What is given, as the loader takes it."""
-        return super().replacements | {"modes_file": self.modes, "reasoner": self.reasoner}
+        changed: Replacements = {"modes_file": self.modes, "reasoner": self.reasoner}
+        if self.set:
+            changed["values"] = dict(key_and_value(word, "--set") for word in self.set)
+        return super().replacements | changed
+
+    def with_options(self, words: Sequence[str] | None, managers: Sequence[str]) -> Replacements:
+        """What is given, with settings of managers as `manager_options` reads them."""
+        options: Replacements = {"manager_options": manager_options(words, managers)} if words else {}
+        return self.replacements | options
 
     @property
     def given(self) -> dict[str, object]:
         """The options that are given, by name."""
         values = {f"--{each.name.replace('_', '-')}": getattr(self, each.name) for each in fields(self)}
         return {option: value for option, value in values.items() if value}
+
+
+def key_and_value(word: str, option: str) -> tuple[str, Any]:
+    """Split KEY=VALUE; the value is read as in a YAML file.
+
+    Raises:
+        InputError: there is no key, no value, or the value is not YAML.
+    """
+    from suave_des.errors import InputError, shown
+    from suave_des.scenario.yamlfile import read_value
+
+    key, equals, value = word.partition("=")
+    if not equals or not key.strip():
+        raise InputError(f"{shown(word)} is not KEY=VALUE", place=option, remedy=f"for instance {option} key=1.5")
+    return key.strip(), read_value(value, option)
+
+
+ManagerOptions = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--manager-option",
+        metavar="[MANAGER.]KEY=VALUE",
+        help="Setting of a manager; without its name, of each that is not built in. Repeat it.",
+    ),
+]
+
+
+def manager_options(words: Sequence[str] | None, managers: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Settings by manager and key.
+
+    Args:
+        words: as given, MANAGER.KEY=VALUE or KEY=VALUE.
+        managers: names of the managers that missions are run with.
+
+    Raises:
+        InputError: a word has another form, or is for no manager of these.
+    """
+    from suave_des.errors import InputError, did_you_mean, shown
+    from suave_des.registry import is_built_in
+
+    settings: dict[str, dict[str, Any]] = {}
+    own = [name for name in managers if not is_built_in(name)]
+    for word in words or ():
+        named = max((name for name in managers if word.startswith(f"{name}.")), key=len, default=None)
+        key, value = key_and_value(word.removeprefix(f"{named}."), "--manager-option")
+        if named is None and ":" in key:
+            remedy = did_you_mean(key.rpartition(".")[0], managers, "its managers")
+            raise InputError(f"{shown(key)} is for none of the managers", place="--manager-option", remedy=remedy)
+        targets = own or (list(managers) if len(managers) == 1 else []) if named is None else [named]
+        if not targets:
+            remedy = f"name it, for instance {managers[0]}.{word}" if managers else "name the managers, too"
+            raise InputError(f"{shown(word)} is for no manager of one's own", place="--manager-option", remedy=remedy)
+        for target in targets:
+            settings.setdefault(target, {})[key] = value
+    return settings
 
 
 def grouped_options(command: Callable[..., None]) -> Callable[..., None]:

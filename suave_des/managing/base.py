@@ -26,6 +26,7 @@ if TYPE_CHECKING:  # or looking a manager up would load the vehicle, the compile
     from suave_des.managed.mode_manager import ModeManager
     from suave_des.metrics.result import MissionMetrics
     from suave_des.monitor.measurements import Measured
+    from suave_des.scenario.loader import LoadedScenario
     from suave_des.vehicle.frames import Pose
 
 AdaptationProcess = Generator[simpy.Event, Any, None]
@@ -56,8 +57,8 @@ class ManagedSystem:
         recorded: whether the mission is recorded.
         pose: gives the vehicle's pose now.
         distance_inspected_m: gives the distance inspected so far, as it was published last.
-        true_value: gives the value now of a quality attribute that has a signal: what would be measured without delay
-            and noise. For references such as `oracle`; no real manager could know it.
+        true_signal: gives the true value over mission time (s) of a quality attribute that has a signal, for references
+            such as `oracle`: no real manager could know it.
         files: where the manager's input files are here, by their names as given; see `file`.
         learned: what the manager has learned. In `suave-des train` a dict that is kept from mission to mission; else
             the content of the file that the setting `learned` names, which cannot be changed, empty without one.
@@ -78,7 +79,7 @@ class ManagedSystem:
     recorded: bool = True
     pose: Callable[[], Pose] = _unknown
     distance_inspected_m: Callable[[], float] = _unknown
-    true_value: Callable[[str], float] = _unknown
+    true_signal: Callable[[str], Callable[[float], float]] = _unknown
     files: Mapping[str, Path] = field(default_factory=dict)
     learned: Mapping[str, Any] = field(default_factory=dict)
     training: bool = False
@@ -168,6 +169,14 @@ class ManagingSubsystem:
         They are hashed into manifest.json, compared when a campaign is resumed, and sent to the workers of a cluster.
         """
         return (str(settings["learned"]),) if "learned" in settings else ()
+
+    @classmethod
+    def check(cls, loaded: LoadedScenario) -> None:
+        """See that the manager can work with a scenario; called before the first mission.
+
+        Raises:
+            InputError: it cannot.
+        """
 
     def __init__(self, system: ManagedSystem) -> None:
         self.system = system

@@ -50,7 +50,7 @@ def missions_in(folders: Sequence[Path], chosen: Chosen) -> list[Recorded]:
             _check_folder(folder)
             missions.append(read_recorded(folder))
         else:
-            with opened_campaign(folder) as campaign:
+            with opened_campaign(folder, chosen.managers) as campaign:
                 missions += missions_of(campaign, chosen)
     _check_number(len(missions))
     pipelines = [mission.scenario.pipeline.vertices_m for mission in missions]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any, TypedDict, Unpack
+from typing import Any, Protocol, TypedDict, Unpack
 
 from suave_des.domain import GENERATE_SEARCH_PATH
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown
@@ -20,6 +20,13 @@ from suave_des.scenario.signal_kinds import SignalTable, TableSignal, read_table
 
 MANAGER_GROUP = "suave_des.managers"
 """Entry point group in which packages register their managers."""
+
+
+class _DeclaresFiles(Protocol):
+    """A manager's class."""
+
+    def input_files(self, settings: Mapping[str, Any], /) -> Collection[str]:
+        """Name the files that the manager reads, with its settings."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +64,38 @@ class LoadedScenario:
         settings = (self.scenario.managers.model_extra or {}).get(manager)
         return settings if isinstance(settings, dict) else {}
 
+    def manager_file(self, manager: str, name: str) -> Path:
+        """Where a file is that a manager reads, by its name as given.
+
+        It is looked for where the command is given; if the scenario has settings for the manager, beside that first.
+
+        Raises:
+            InputError: there is none.
+        """
+        if name in self.manager_files:
+            return self.manager_files[name]
+        places = [Path(name), self.path.parent / name]
+        if self.layer.has(("managers", manager)):
+            places.reverse()
+        for place in places:
+            if place.is_file():
+                return place
+        problem = f"manager {manager} reads this file, and it is not there"
+        raise InputError(problem, file=name, remedy="give its path from here, or from the scenario that names it")
+
+    def declared_files(self, manager: str, kind: _DeclaresFiles) -> Iterator[tuple[str, Path]]:
+        """Yield name and place of each file that a manager's class declares.
+
+        Raises:
+            InputError: a file is not there, or what the class declares is no list of names.
+        """
+        names = kind.input_files(self.manager_settings(manager))
+        if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+            problem = f"manager {manager}: input_files gave {shown(names)}"
+            raise InputError(problem, remedy="return a list of file names as text")
+        for name in names:
+            yield name, self.manager_file(manager, name)
+
     def located(self, error: InputError) -> InputError:
         """Add file and line to an error about a name that only the ontology could check.
 
@@ -84,6 +123,8 @@ class Replacements(TypedDict, total=False):
         reasoner: to use in place of the scenario's.
         rules: files of rules as text, besides the scenario's.
         disabled_rules: names of rules to switch off, besides the scenario's.
+        values: new values by key path, as of `with_values`.
+        manager_options: settings of managers, by manager and key, over the scenario's.
     """
 
     ontologies: Sequence[str | Path]
@@ -91,6 +132,8 @@ class Replacements(TypedDict, total=False):
     reasoner: str | None
     rules: Sequence[str | Path]
     disabled_rules: Sequence[str]
+    values: Mapping[str, Any]
+    manager_options: Mapping[str, Mapping[str, Any]]
 
 
 def load_scenario(name: str | Path, **replacements: Unpack[Replacements]) -> LoadedScenario:
@@ -103,7 +146,8 @@ def load_scenario(name: str | Path, **replacements: Unpack[Replacements]) -> Loa
     Args:
         name: path of a scenario file, or name of a shipped one with or without ".yaml".
         replacements: ontologies, modes_file and reasoner to use in place of the scenario's; rules (files of rules as
-            text) and disabled_rules (names of rules to switch off) besides the scenario's.
+            text) and disabled_rules (names of rules to switch off) besides the scenario's; values by key path and
+            settings of managers over all that.
 
     Raises:
         InputError: a file that cannot be read, or a value that cannot be right, with file and line.
@@ -179,7 +223,29 @@ def load_layer(files: Files, layer: Layer, path: Path, **replacements: Unpack[Re
             files.note(table_path, digest)
 
     scenario = _replaced(scenario, replacements)
-    return LoadedScenario(scenario, path, ontologies, modes, modes_path, tables, files.inputs, layer, rules)
+    loaded = LoadedScenario(scenario, path, ontologies, modes, modes_path, tables, files.inputs, layer, rules)
+    return _with_options(loaded, replacements.get("values") or {}, replacements.get("manager_options") or {})
+
+
+def _with_options(
+    loaded: LoadedScenario, values: Mapping[str, Any], options: Mapping[str, Mapping[str, Any]]
+) -> LoadedScenario:
+    """Replace values by key path, and settings of managers."""
+    for path, value in values.items():
+        try:
+            loaded = with_values(loaded, {path: value})
+        except InputError as error:
+            inside = error.problem if path in error.problem else f"{path}: {error.problem}"
+            raise InputError(inside, place="--set", remedy=error.remedy) from None
+    if options:
+        managers = loaded.scenario.managers.model_dump(mode="json")
+        for manager, settings in options.items():
+            managers[manager] = {**managers.get(manager, {}), **settings}
+        try:
+            loaded = with_values(loaded, {"managers": managers})
+        except InputError as error:
+            raise InputError(error.problem, place="--manager-option", remedy=error.remedy) from None
+    return loaded
 
 
 def _replaced(scenario: Scenario, replacements: Replacements) -> Scenario:
@@ -303,9 +369,26 @@ def set_value(data: dict[str, Any], path: str, value: Any) -> None:
     holder[key] = value
 
 
+def _parts(data: dict[str, Any], path: str) -> list[str]:
+    """The keys of a key path; names of managers may have points in them, and their settings need not be there yet."""
+    first, _, rest = path.partition(".")
+    if first != "managers" or ":" not in rest:
+        return path.split(".")
+    managers = data["managers"]
+    named = max((name for name in managers if rest.startswith(f"{name}.")), key=len, default=None)
+    if named is None:
+        module, _, below = rest.partition(":")
+        named = f"{module}:{below.partition('.')[0]}"
+    keys = rest.removeprefix(named).removeprefix(".").split(".")
+    settings = managers.setdefault(named, {})
+    if isinstance(settings, dict) and keys != [""]:
+        settings.setdefault(keys[0], None)
+    return ["managers", named, *(keys if keys != [""] else [])]
+
+
 def _holder(data: dict[str, Any], path: str) -> tuple[Any, Any]:
     """The mapping or list that holds the value at a key path, and its key there."""
-    here, parts = data, path.split(".")
+    here, parts = data, _parts(data, path)
     for depth, part in enumerate(parts):
         if isinstance(here, list):
             if not (part.isascii() and part.isdigit() and len(part) < 10) or int(part) >= len(here):

@@ -120,6 +120,20 @@ def read_yaml(path: Path | str) -> YamlDocument:
     return YamlDocument(path, data, reading.lines, hashlib.sha256(content).hexdigest())
 
 
+def read_value(text: str, option: str) -> Any:
+    """Read a value that is given on the command line, as it would be read in a file.
+
+    Raises:
+        InputError: it is not YAML, or not plain data; its place is the option.
+    """
+    try:
+        root = _Composer(text).get_single_node()
+        return None if root is None else _Reading(Path(option)).plain(root, (), ())
+    except (ReaderError, yaml.MarkedYAMLError, InputError) as error:
+        problem = error.problem if isinstance(error, InputError) else "is not YAML"
+        raise InputError(f"{shown(text)}: {problem}", place=option, remedy="put text in quotes") from None
+
+
 def _yaml_error(path: Path, error: yaml.MarkedYAMLError) -> InputError:
     mark = error.problem_mark or error.context_mark
     problem = error.problem or error.context or "cannot be parsed"

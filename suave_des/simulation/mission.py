@@ -347,8 +347,8 @@ class MissionRun:
             recorded=self._recorder.enabled,
             pose=lambda: self._vehicle.pose(self.env.now),
             distance_inspected_m=lambda: self._follow.distance_m,
-            true_value=lambda attribute: self._true_signals[attribute](self.env.now),
-            files=self._simulator.loaded.manager_files,
+            true_signal=self._true_signals.__getitem__,
+            files={} if kind else self._simulator.manager_files(name),
             learned=self._simulator.learned(name),
             training=self._simulator.training is not None,
         )

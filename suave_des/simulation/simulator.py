@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from functools import cached_property
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,6 +14,7 @@ from suave_des.compiling import Array
 from suave_des.managed.follow import InspectionPath
 from suave_des.managing.learned import read_learned
 from suave_des.metrics.result import MissionResult
+from suave_des.registry import manager_class
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.simulation.functions import own_functions
 from suave_des.simulation.vehicles import vehicle_model
@@ -68,6 +70,7 @@ class Simulator:
         self.view_tangent = scenario.vehicle.camera.tangent
         self._spare_memory: list[MissionMemory] = []
         self._learned: dict[str, Mapping[str, Any]] = {}
+        self._manager_files: dict[str, Mapping[str, Path]] = {}
 
     @cached_property
     def knowledge(self) -> "Deliberation":
@@ -86,8 +89,19 @@ class Simulator:
             return self.training.setdefault(manager, {})
         if manager not in self._learned:
             name = self.loaded.manager_settings(manager).get("learned")
-            self._learned[manager] = {} if name is None else read_learned(self.loaded.manager_files[str(name)])
+            path = None if name is None else self.loaded.manager_file(manager, str(name))
+            self._learned[manager] = {} if path is None else read_learned(path)
         return self._learned[manager]
+
+    def manager_files(self, manager: str) -> Mapping[str, Path]:
+        """Where the files are that a manager declares, by their names as given.
+
+        Raises:
+            InputError: one is not there.
+        """
+        if manager not in self._manager_files:
+            self._manager_files[manager] = dict(self.loaded.declared_files(manager, manager_class(manager)))
+        return self._manager_files[manager]
 
     def start(
         self, manager: str, run: int, seed: int, *, record: bool = False, kind: "type[ManagingSubsystem] | None" = None

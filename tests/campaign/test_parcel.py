@@ -72,8 +72,20 @@ class TestOwnModules:
             own_modules(["__main__:Mine"])
 
 
+def test_files_that_managers_declare_travel_with_their_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "table.txt").write_text("fd_spiral_high")
+    monkeypatch.chdir(tmp_path)
+    settings = {f"{AWKWARD}:Declares": {"table": "table.txt"}}
+    loaded = load_scenario("seams2023", manager_options=settings)
+    declaring = replace(job(f"{AWKWARD}:Declares"), loaded=loaded)
+    unpacked = Unpacked(pickle.loads(pickle.dumps(pack(declaring))), tmp_path / "there")
+    (tmp_path / "table.txt").unlink()
+    path = unpacked.job.loaded.manager_file(f"{AWKWARD}:Declares", "table.txt")
+    assert path.is_relative_to(tmp_path / "there") and path.read_text() == "fd_spiral_high"
+
+
 def test_errors_name_the_user_s_files(tmp_path: Path) -> None:
-    parcel = Parcel(job("none"), (("own/suave.owl", b"<"), ("tomasys.owl", b"<")), (("r.swrl", b""),), {}, {})
+    parcel = Parcel(job("none"), (("own/suave.owl", b"<"), ("tomasys.owl", b"<")), (("r.swrl", b""),), (), {}, {})
     unpacked = Unpacked(parcel, tmp_path)
     suave, tomasys = unpacked.job.loaded.ontologies
     assert [path.name for path in (suave, tomasys, *unpacked.job.loaded.rules)] == [

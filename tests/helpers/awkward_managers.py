@@ -103,3 +103,11 @@ class BlocksInSome(_InRun):
         if self.draw < 0.1:
             signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGALRM})
             time.sleep(60.0)
+
+
+class Declares(NoManager):
+    """Declares the file that its settings name."""
+
+    @classmethod
+    def input_files(cls, settings):
+        return [settings["table"]]

@@ -1,0 +1,150 @@
+"""Managers to compare others with: a fixed mode, plain thresholds without an ontology, and perfect knowledge."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Collection, Iterator
+from functools import cache
+from itertools import count
+from typing import TYPE_CHECKING, ClassVar
+
+from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOTION, Task
+from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.managing.base import AdaptationProcess, ManagedSystem, ManagingSubsystem, Thresholds
+from suave_des.managing.simple import NoManager
+from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
+from suave_des.scenario.modes import DEFAULT_MODE, UNGROUND_MODE
+
+if TYPE_CHECKING:
+    from suave_des.scenario.loader import LoadedScenario
+
+_LOOK_EVERY_S = 0.05
+
+
+class FixedMode(NoManager):
+    """fixed:MODE: functions that have this mode get it, others their default mode; nothing is ever adapted."""
+
+    mode: ClassVar[str]
+
+    @classmethod
+    def check(cls, loaded: LoadedScenario) -> None:
+        """See that some function has the mode."""
+        known = sorted({mode for function in loaded.modes.functions for mode in loaded.modes.modes(function)})
+        if cls.mode not in known:
+            known = [mode for mode in known if mode not in (DEFAULT_MODE, UNGROUND_MODE)]
+            remedy = did_you_mean(cls.mode, known, f"modes in {loaded.modes_path.name}")
+            raise InputError(f"manager fixed:{cls.mode}: no function has a mode {shown(cls.mode)}", remedy=remedy)
+
+    def task_requested(self, task: Task) -> None:
+        """Set the modes of the task's functions."""
+        others = []
+        for function in task.functions:
+            if self.mode in self.system.modes.available_modes(function):
+                self.system.change_mode(function, self.mode)
+            else:
+                others.append(function)
+        super().task_requested(Task(task.name, tuple(others)))
+
+
+@cache
+def fixed_mode(mode: str) -> type[ManagingSubsystem]:
+    """Make the class of the manager `fixed:MODE`."""
+    return type("FixedMode", (FixedMode,), {"mode": mode, "__doc__": FixedMode.__doc__})
+
+
+class Threshold(ManagingSubsystem):
+    """threshold: metacontrol's decisions as plain if-then: what differs from metacontrol is the ontology's price.
+
+    It adapts at metacontrol's times (`managers.metacontrol.reasoning_period_s`, with the same phase in each run), takes
+    no time to reason, and searches by the thresholds of `managers.bt`.
+    """
+
+    subscribes_to: ClassVar[Collection[Kind]] = (Kind.COMPONENT_STATUS,)
+
+    def __init__(self, system: ManagedSystem) -> None:
+        super().__init__(system)
+        self.period_s: float | None = system.scenario.managers.metacontrol.reasoning_period_s
+        self.starts_s = system.stream("metacontrol/phase").uniform(0.0, self.period_s or 0.0)
+        self.thresholds_m = system.scenario.managers.bt.visibility_thresholds_m
+        self.search_modes = system.scenario.managers.bt.search_modes
+        self.functions = system.lasting_functions
+        self.failed: set[str] = set()
+
+    @property
+    def depends_on(self) -> Thresholds:
+        """The thresholds between the search modes."""
+        return {"water_visibility": tuple(sorted(self.thresholds_m))}
+
+    def task_requested(self, task: Task) -> None:
+        """From now on the task's functions are adapted, too."""
+        self.functions += task.functions
+
+    def task_cancelled(self, task: Task) -> None:
+        """Set the task's functions to fd_unground, and leave them alone."""
+        self.functions = tuple(name for name in self.functions if name not in task.functions)
+        super().task_cancelled(task)
+
+    def diagnostic(self, diagnostic: Diagnostic) -> None:
+        """Remember failed thrusters."""
+        (self.failed.add if diagnostic.value == FAILED else self.failed.discard)(diagnostic.key)
+
+    def adapt(self) -> None:
+        """Request the modes that fit."""
+        for function, mode in self.wanted(self.system.measured("water_visibility")):
+            self.system.change_mode(function, mode)
+
+    def wanted(self, visibility_m: float | None) -> Iterator[tuple[str, str]]:
+        """The mode that fits, of each function; a visibility that is not known yet counts as good."""
+        for function in self.functions:
+            if function == MAINTAIN_MOTION:
+                yield function, "fd_recover_thrusters" if self.failed else "fd_all_thrusters"
+            elif function == GENERATE_SEARCH_PATH:
+                pairs = zip(self.thresholds_m, self.search_modes, strict=True)
+                fitting = (mode for least_m, mode in pairs if visibility_m is None or visibility_m >= least_m)
+                yield function, next(fitting, self.search_modes[-1])
+            elif function == FOLLOW_PIPELINE:
+                yield function, self.system.scenario.default_modes[FOLLOW_PIPELINE]
+
+
+class Oracle(Threshold):
+    """oracle: the same decisions from the true visibility, at once and without latency.
+
+    What is left between it and a manager of the same thresholds is the price of measuring, deciding and changing modes.
+    """
+
+    def __init__(self, system: ManagedSystem) -> None:
+        super().__init__(system)
+        self.period_s = None
+        self._visibility_m = system.true_signal("water_visibility")
+
+    def mission_started(self) -> None:
+        """Begin to watch the true visibility."""
+        self.system.env.process(self._watch())
+
+    def task_requested(self, task: Task) -> None:
+        """Request the modes of the task's functions at once."""
+        super().task_requested(task)
+        self.adapt()
+
+    def diagnostic(self, diagnostic: Diagnostic) -> None:
+        """Take a thruster's status, and adapt at once."""
+        super().diagnostic(diagnostic)
+        self.adapt()
+
+    def adapt(self) -> None:
+        """Request the modes that fit the true visibility, with effect at once."""
+        for function, mode in self.wanted(self._visibility_m(self.system.now_s)):
+            self.system.change_mode(function, mode, latency_s=0.0)
+
+    def _watch(self) -> AdaptationProcess:
+        """Adapt whenever the true visibility crosses a threshold."""
+        env, thresholds_m = self.system.env, tuple(sorted(self.thresholds_m))
+        region = bisect_right(thresholds_m, self._visibility_m(0.0))
+        for step in count(1):
+            t_s = step * _LOOK_EVERY_S
+            if (now_in := bisect_right(thresholds_m, self._visibility_m(t_s))) != region:
+                region = now_in
+                yield env.timeout(t_s - env.now)
+                self.adapt()
+            elif step % 1000 == 0:  # or the search for the next crossing would go on beyond the mission's end
+                yield env.timeout(t_s - env.now)
