@@ -19,6 +19,8 @@ from suave_des.scenario.loader import LoadedScenario
 if TYPE_CHECKING:
     import pandas
 
+    from suave_des.report.frames import CampaignFrame
+
 
 def run_campaign(
     scenario: str | Path | LoadedScenario,
@@ -30,8 +32,10 @@ def run_campaign(
     *,
     progress: bool | None = None,
     **options: Unpack[CampaignOptions],
-) -> pandas.DataFrame:
+) -> CampaignFrame:
     """Run missions of a scenario under each manager; a row for each mission, with the columns of runs.csv.
+
+    The data frame can be compared and drawn: `frame.compare()`, `frame.figure()`.
 
     The rows are the same for any number of workers. Columns scenario and manager are categories, the managers in the
     order given; run, seed and adaptations int64, pipeline_found bool, other metrics float64, nan if not measured.
@@ -84,7 +88,7 @@ def stream_campaign(
     chunk_rows: int = 10_000,
     progress: bool | None = None,
     **options: Unpack[CampaignOptions],
-) -> Iterator[pandas.DataFrame]:
+) -> Iterator[CampaignFrame]:
     """Yield the same in data frames of `chunk_rows` rows, in order, for more rows than memory has room for.
 
     The campaign runs at once; its rows are kept on disk, in a temporary file without `out`, and read as they are
@@ -114,7 +118,7 @@ def resume_campaign(
     managers: Sequence[str] = (),
     confirmed: bool = False,
     progress: bool | None = None,
-) -> pandas.DataFrame:
+) -> CampaignFrame:
     """Go on with the campaign in a folder where it stopped, and return its rows as run_campaign does.
 
     Args:
@@ -183,6 +187,9 @@ def _shown(label: str, progress: bool | None) -> AbstractContextManager[OnProgre
     return shown(label, console, quiet=not is_wanted)
 
 
-def _with_attrs(frame: pandas.DataFrame, attrs: dict[str, Any]) -> pandas.DataFrame:
-    frame.attrs.update(attrs)
-    return frame
+def _with_attrs(frame: pandas.DataFrame, attrs: dict[str, Any]) -> CampaignFrame:
+    from suave_des.report.frames import CampaignFrame
+
+    rows = CampaignFrame(frame)
+    rows.attrs.update(attrs)
+    return rows

@@ -4,18 +4,12 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from textwrap import fill
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-
-    from rich.console import Console
-
-    from suave_des.report.compare import Comparison
-    from suave_des.report.compare_files import Table
 
 _TEXT_WIDTH = 95
 
@@ -82,7 +76,7 @@ def compare(
     """
     from suave_des.cli.console import output
     from suave_des.report.compare import Choices, compare_folders
-    from suave_des.report.compare_files import ENDINGS, WRITERS
+    from suave_des.report.compare_files import ENDINGS, WRITERS, plain_text
 
     if out is not None:
         _check_out(out, ENDINGS)
@@ -101,7 +95,7 @@ def compare(
         write_files(out.parent, {out.name: WRITERS[ENDINGS[out.suffix.lower()]](comparison)})
         print(f"compared in {out}")
     elif as_format is Format.TABLE:
-        print_comparison(output(), comparison)
+        print(plain_text(comparison, min(output().width, _TEXT_WIDTH)), end="")
     else:
         print(WRITERS[as_format.value](comparison), end="")
 
@@ -118,57 +112,3 @@ def _check_out(out: Path, endings: Iterable[str]) -> None:
         problem = f"expected a table, got {out.suffix or 'a file without an ending'}"
         raise InputError(problem, file=out, remedy=f"one of {', '.join(endings)}")
     check_output_file(out, overwrite=True)
-
-
-def print_comparison(console: Console, comparison: Comparison) -> None:
-    """Print what follows, then the tables, then how it was compared."""
-    from suave_des.report import compare_files as tables
-
-    width = min(console.width, _TEXT_WIDTH)
-    _say(console, comparison.conclusion, width)
-    for metric in comparison.metrics:
-        summaries, differences = comparison.of_metric(metric.name)
-        _print(console, metric.heading, tables.summary_table(metric, summaries))
-        if censored := tables.search_table(summaries):
-            _print(console, f"{metric.heading}, missions that never found it as censored (Kaplan-Meier)", censored)
-        if differences:
-            has_effects = _width(tables.difference_table(metric, differences)) <= console.width
-            _print(console, "", tables.difference_table(metric, differences, has_effects=has_effects))
-            console.print()
-            for each in differences:
-                _say(console, f"- {each.conclusion}", width)
-    if comparison.differences:
-        title = "runs of each manager that an interval of the difference needs"
-        _print(console, title, tables.runs_table(comparison))
-    console.print()
-    for line in tables.remarks(comparison):
-        _say(console, line, width)
-
-
-def _width(table: Table) -> int:
-    headings, rows = table
-    return sum(max(map(len, column)) + 2 for column in zip(headings, *rows, strict=True)) - 2
-
-
-def _say(console: Console, text: str, width: int) -> None:
-    indent = "  " if text.startswith("- ") else ""
-    lines = fill(text, width, subsequent_indent=indent, break_on_hyphens=False)
-    console.print(lines, markup=False, soft_wrap=True)
-
-
-def _print(console: Console, title: str, content: Table) -> None:
-    from rich.text import Text
-
-    from suave_des.cli.console import plain_table, print_table, print_trimmed
-
-    headings, rows = content
-    table = plain_table()
-    for place, heading in enumerate(headings):
-        table.add_column(heading, justify="right" if place else "left", overflow="fold", no_wrap=bool(place))
-    for row in rows:
-        table.add_row(*map(Text, row))
-    console.print()
-    if title:
-        print_table(console, title, table)
-    else:
-        print_trimmed(console, table)

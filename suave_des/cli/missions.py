@@ -62,20 +62,6 @@ def run(
         console.print(f"\nmission.json, events.csv and trajectory.csv are in {out}", soft_wrap=True)
 
 
-def figure(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Output folder of run, campaign or reproduce.")],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Picture to write: .png, .pdf or .svg.")],
-) -> None:
-    """Draw a mission's map or a campaign's results.
-
-    Which of the two depends on what is in DIR.
-    """
-    from suave_des.report.figures import draw_folder
-
-    draw_folder(folder, out)
-    print(f"drawn in {out}")
-
-
 def scenarios() -> None:
     """List the shipped scenarios and other inputs."""
     from suave_des.cli.console import output, plain_table, print_table

@@ -14,7 +14,7 @@ from suave_des.campaign.knowledge_records import KNOWLEDGE_FILE, read_knowledge
 from suave_des.campaign.missions import COLUMNS, Cell, row_of
 from suave_des.errors import InputError
 from suave_des.metrics.result import Event, KnowledgeRecord, MissionResult, TrajectoryPoint
-from suave_des.report.mission_map import read_mission
+from suave_des.report.mission_record import read_mission
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import Scenario
 

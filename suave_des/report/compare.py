@@ -161,6 +161,18 @@ class Comparison:
         """Return difference_rows() as a data frame."""
         return pandas.DataFrame(self.difference_rows())
 
+    def __str__(self) -> str:
+        """Return all of it as text, as `suave-des compare` prints it."""
+        from suave_des.report.compare_files import plain_text
+
+        return plain_text(self)
+
+    def _repr_markdown_(self) -> str:
+        """Return all of it for a notebook."""
+        from suave_des.report.compare_files import markdown_text
+
+        return markdown_text(self)
+
     def metric(self, name: str) -> ComparedMetric:
         """Return what is known of a metric: its title, unit, and which values are better."""
         return next(each for each in self.metrics if each.name == name)

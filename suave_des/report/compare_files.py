@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from textwrap import fill
 
 from suave_des.estimates import Interval
 from suave_des.report.compare import Comparison, Difference, Summary
@@ -26,6 +27,43 @@ def csv_text(comparison: Comparison) -> str:
     if "other" in columns:
         columns.insert(1, columns.pop(columns.index("other")))
     return pandas.DataFrame(rows, columns=columns, dtype=object).to_csv(index=False, lineterminator="\n")
+
+
+def plain_text(comparison: Comparison, width: int = 95) -> str:
+    """Write what follows, the tables, and how it was compared, for a terminal of that width."""
+    parts = [_folded(comparison.conclusion, width)]
+    for metric in comparison.metrics:
+        summaries, differences = comparison.of_metric(metric.name)
+        parts.append(f"{metric.heading}\n{_aligned(summary_table(metric, summaries))}")
+        if censored := search_table(summaries):
+            title = f"{metric.heading}, missions that never found it as censored (Kaplan-Meier)"
+            parts.append(f"{title}\n{_aligned(censored)}")
+        if differences:
+            table = _aligned(difference_table(metric, differences))
+            if max(map(len, table.splitlines())) > width:
+                table = _aligned(difference_table(metric, differences, has_effects=False))
+            parts.append(table)
+            parts.append("\n".join(_folded(f"- {each.conclusion}", width) for each in differences))
+    needed = runs_table(comparison)
+    if needed[1]:
+        parts.append(f"runs of each manager that an interval of the difference needs\n{_aligned(needed)}")
+    parts.append("\n".join(_folded(line, width) for line in remarks(comparison)))
+    return "\n\n".join(parts) + "\n"
+
+
+def _folded(text: str, width: int) -> str:
+    return fill(text, width, subsequent_indent="  " if text.startswith("- ") else "", break_on_hyphens=False)
+
+
+def _aligned(table: Table) -> str:
+    """Write a table with its first column aligned to the left, and the others to the right."""
+    headings, rows = table
+    widths = [max(map(len, column)) for column in zip(headings, *rows, strict=True)]
+    lines = []
+    for first, *others in (headings, *rows):
+        cells = [first.ljust(widths[0]), *map(str.rjust, others, widths[1:])]
+        lines.append("  ".join(cells).rstrip())
+    return "\n".join(lines)
 
 
 def json_text(comparison: Comparison) -> str:

@@ -1,166 +1,159 @@
-"""Draw what is in a folder of results: a mission's map, a campaign's distributions, or the results of a sweep."""
+"""Draw what is in folders of results: missions, a campaign, or the results of a sweep."""
 
 from __future__ import annotations
 
-import csv
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pandas
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
 
-from suave_des.errors import InputError
-from suave_des.estimates import estimate
-from suave_des.metrics.result import MissionMetrics
-from suave_des.report import mission_map, style
-from suave_des.report.result_files import check_one_campaign
-from suave_des.report.runs import METRICS, read_runs
+from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.report import campaign_figures, mission_map, paths_figure, style, timeline_figure
+from suave_des.report.grouping import Group, grouped
+from suave_des.report.mission_record import MissionRecord, read_mission
+from suave_des.report.paper import published_runs
+from suave_des.report.result_files import Missions, missions_of, read_missions
+from suave_des.report.sweep_figures import draw_sweep
 
 ENDINGS = (".png", ".pdf", ".svg")
-_MOST_PARAMETERS = 4
-_MOST_VALUES = 16
-"""A parameter with more values is a sampled one: its missions are drawn in so many bins of equal numbers at most."""
-_BINS = 8
-_APART = 0.008
-"""Between managers at the same value, as a share of the axis, so that their intervals do not hide each other."""
+AUTO, SWEEP, PATHS = "auto", "sweep", "paths"
+_PUBLISHED_SCENARIO = "seams2023"
+
+
+def _rainclouds(groups: Sequence[Group]) -> Figure:
+    scenarios = {str(name) for group in groups for name in group.frame.get("scenario", [])}
+    published = grouped(read_missions([published_runs()]), (), ())[0] if scenarios == {_PUBLISHED_SCENARIO} else []
+    names = [group.name for group in groups]
+    return campaign_figures.draw_rainclouds(groups, {group.name: group for group in published if group.name in names})
+
+
+CAMPAIGN_KINDS: Mapping[str, Callable[[Sequence[Group]], Figure]] = {
+    "distributions": campaign_figures.draw_distributions,
+    "raincloud": _rainclouds,
+    "detections": campaign_figures.draw_detections,
+    "convergence": campaign_figures.draw_convergence,
+    "reactions": campaign_figures.draw_reactions,
+}
+"""Figures of a campaign's missions by their names."""
+MISSION_KINDS: Mapping[str, Callable[[MissionRecord], Figure]] = {
+    "map": mission_map.draw,
+    "timeline": timeline_figure.draw_timeline,
+}
+"""Figures of one mission by their names."""
+KINDS = (AUTO, *MISSION_KINDS, *CAMPAIGN_KINDS, SWEEP, PATHS)
+"""All figures by their names."""
 
 
 def draw_folder(folder: Path, out: Path) -> None:
-    """Draw what is in a folder of results, and write the picture.
+    """Draw what is in a folder of results, and write the picture; see draw_results."""
+    draw_results([folder], out)
+
+
+def draw_results(
+    folders: Sequence[Path],
+    out: Path,
+    kind: str = AUTO,
+    parameters: Sequence[str] = (),
+    completed: Callable[[Path, MissionRecord], MissionRecord] | None = None,
+) -> None:
+    """Draw what is in folders of results, and write the picture.
 
     Args:
-        folder: output folder of a mission (trajectory.csv) or of a campaign (runs.csv).
+        folders: of missions (trajectory.csv), or of campaigns (runs.csv) and files like these.
         out: picture to write; its ending says which kind.
+        kind: one of KINDS; "auto": of one mission its map, of several their paths, of a campaign the distributions, of
+            a sweep the means.
+        parameters: of a sweep: those to draw; empty: all.
+        completed: adds to the record of a mission in a folder what is not in its files, such as rules that fired.
 
     Raises:
-        InputError: there are no results in the folder, or the picture cannot be written.
+        InputError: there are no results of that kind in the folders, or the picture cannot be written.
+    """
+    check_picture(out)
+    with style.publication():
+        write_picture(_figure(folders, kind, parameters, completed or (lambda _, record: record)), out)
+
+
+def check_picture(out: Path) -> None:
+    """See that a name is a picture's.
+
+    Raises:
+        InputError: it has another ending.
     """
     if out.suffix.lower() not in ENDINGS:
         problem = f"expected a picture, got {out.suffix or 'a file without an ending'}"
         raise InputError(problem, file=out, remedy=f"one of {', '.join(ENDINGS)}")
-    with style.publication():
-        if (folder / "trajectory.csv").is_file():
-            picture = mission_map.draw(folder)
-        elif (folder / "runs.csv").is_file():
-            check_one_campaign(folder)
-            swept = swept_parameters(folder)
-            picture = draw_sweep(folder, swept) if swept else draw_distributions(folder / "runs.csv")
-        else:
+
+
+def write_picture(figure: Figure, out: Path) -> None:
+    """Write a figure, whole or not at all.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    temporary = out.with_name(f".{os.getpid()}{out.suffix}")
+    try:
+        figure.savefig(temporary)
+        temporary.replace(out)
+    except OSError as error:
+        remedy = "give a path in a folder that is yours"
+        raise InputError(f"cannot be written: {error.strerror}", file=out, remedy=remedy) from None
+    finally:
+        with suppress(OSError):  # there may not even be a folder
+            temporary.unlink()
+
+
+def _figure(
+    folders: Sequence[Path],
+    kind: str,
+    parameters: Sequence[str],
+    completed: Callable[[Path, MissionRecord], MissionRecord],
+) -> Figure:
+    if kind not in KINDS:
+        raise InputError(f"there is no figure {shown(kind)}", place="kind", remedy=did_you_mean(kind, KINDS))
+    missions = [folder for folder in folders if (folder / "trajectory.csv").is_file()]
+    if missions and len(missions) == len(folders) and kind not in (*CAMPAIGN_KINDS, SWEEP):
+        records = [completed(folder, read_mission(folder)) for folder in folders]
+        if kind == PATHS or (kind == AUTO and len(records) > 1):
+            return paths_figure.draw_paths(records)
+        if len(records) > 1:
+            problem = f"the figure {kind} is of one mission, and {len(records)} are given"
+            raise InputError(problem, remedy=f"give one of them, or --kind {PATHS}")
+        return MISSION_KINDS["map" if kind == AUTO else kind](records[0])
+    if missions:
+        problem = "has a mission, where the figure needs missions of a campaign"
+        raise InputError(problem, file=missions[0], remedy="give folders of suave-des campaign")
+    if kind in (*MISSION_KINDS, PATHS):
+        problem = "has no trajectory.csv: the figure needs a mission"
+        raise InputError(problem, file=folders[0], remedy="give a folder of suave-des run")
+    for folder in folders:
+        if folder.is_dir() and not list(folder.glob("*.csv")):
             remedy = "give the --out folder of suave-des run, campaign or reproduce"
             raise InputError("has neither trajectory.csv nor runs.csv", file=folder, remedy=remedy)
-        temporary = out.with_name(f".{os.getpid()}{out.suffix}")
-        try:
-            picture.savefig(temporary)
-            temporary.replace(out)
-        except OSError as error:
-            remedy = "give a path in a folder that is yours"
-            raise InputError(f"cannot be written: {error.strerror}", file=out, remedy=remedy) from None
-        finally:
-            with suppress(OSError):  # there may not even be a folder
-                temporary.unlink()
+    return _of_missions(read_missions(folders), kind, parameters)
 
 
-def draw_distributions(path: Path) -> Figure:
-    """Draw the empirical distribution functions of search time and inspected distance, a curve for each manager.
+def draw_frame(frame: pandas.DataFrame, kind: str = AUTO) -> Figure:
+    """Draw the missions of a data frame with the columns of runs.csv.
 
     Raises:
-        InputError: the file is not a runs.csv, or has no missions.
+        InputError: there is no such figure of a campaign, or the frame lacks what it needs.
     """
-    runs = read_runs(path, are_simulated=True).frame
-    figure = Figure(figsize=(style.WIDTH_IN, 2.7), layout="constrained")
-    left, right = figure.subplots(1, 2, sharey=True)
-    for axes, letter, (metric, title) in zip((left, right), "ab", METRICS.items(), strict=True):
-        end = max(1.0, float(runs[metric].max()) * 1.04)
-        for place, (manager, values) in enumerate(runs.groupby("manager", sort=False)[metric]):
-            colour = style.CYCLE[place % len(style.CYCLE)]
-            shares = np.arange(1, len(values) + 1) / len(values)
-            steps = [0.0, *np.sort(values), end], [0.0, *shares, 1.0]
-            axes.step(*steps, where="post", color=colour, label=f"{manager} (n = {len(values)})")
-            axes.plot(float(values.mean()), 0.0, marker="^", color=colour, ms=5, clip_on=False, zorder=5)
-        axes.set_xlabel(title)
-        axes.set_xlim(0.0, end)
-        axes.set_title(f"{letter}   {title.split(' (')[0].capitalize()}")
-    left.set_ylabel("share of missions at or below")
-    left.set_ylim(0.0, 1.02)
-    handles, labels = left.get_legend_handles_labels()
-    handles.append(Line2D([], [], lw=0, marker="^", ms=5, color=style.GREY))
-    figure.legend(handles, [*labels, "mean"], loc="outside upper right", ncols=4)
-    return figure
+    with style.publication():
+        return _of_missions(missions_of(frame), kind, ())
 
 
-def swept_parameters(folder: Path) -> list[str]:
-    """Find the swept parameters of a campaign: columns of its summary.csv and runs.csv that are not metrics."""
-    try:
-        with (folder / "summary.csv").open(encoding="utf-8", newline="") as file:
-            columns = next(csv.reader(file), [])
-        with (folder / "runs.csv").open(encoding="utf-8", newline="") as file:
-            known = next(csv.reader(file), [])
-    except (OSError, ValueError):
-        return []
-    return [name for name in columns if name in known and name not in MissionMetrics.__dataclass_fields__]
-
-
-def draw_sweep(folder: Path, parameters: Sequence[str]) -> Figure:
-    """Draw means with their 95% intervals over each parameter, the others averaged over, a line for each manager.
-
-    Args:
-        folder: the campaign's.
-        parameters: columns of its runs.csv; the first four are drawn.
-
-    Raises:
-        InputError: its runs.csv cannot be read.
-    """
-    parameters = parameters[:_MOST_PARAMETERS]
-    runs = read_runs(folder / "runs.csv", further=parameters, are_simulated=True)
-    managers = list(runs.managers)
-    width_in = style.WIDTH_IN if len(parameters) > 1 else style.WIDTH_IN / 2
-    figure = Figure(figsize=(width_in, 4.2), layout="constrained")
-    panels = figure.subplots(len(METRICS), len(parameters), sharex="col", sharey="row", squeeze=False)
-    for row, (metric, title) in zip(panels, METRICS.items(), strict=True):
-        for axes, parameter in zip(row, parameters, strict=True):
-            places, words = _places(runs.frame[parameter])
-            apart = _APART * float(places.max() - places.min())
-            for number, manager in enumerate(managers):
-                own = runs.frame["manager"] == manager
-                beside = places[own] + (number - (len(managers) - 1) / 2) * apart
-                _draw_means(axes, beside, runs.frame[metric][own], manager, style.CYCLE[number % len(style.CYCLE)])
-            if words:
-                axes.set_xticks(range(len(words)), words, rotation=15)
-                axes.set_xlim(-0.5, len(words) - 0.5)
-            else:
-                axes.xaxis.set_major_locator(MaxNLocator(5))
-        row[0].set_ylabel(title)
-        row[0].set_ylim(bottom=0.0)
-    for axes, parameter in zip(panels[-1], parameters, strict=True):
-        axes.set_xlabel(parameter)
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper right", ncols=3)
-    return figure
-
-
-def _places(parameter: pandas.Series) -> tuple[pandas.Series[float], list[str]]:
-    """Place missions on the horizontal axis: at the value, or at the number of the word in the order of the sweep."""
-    if pandas.api.types.is_numeric_dtype(parameter):
-        return parameter.astype(float), []
-    codes, words = pandas.factorize(parameter)
-    return pandas.Series(codes, parameter.index, dtype=float), [str(word) for word in words]
-
-
-def _draw_means(axes: Axes, places: pandas.Series, metric: pandas.Series, label: str, colour: str) -> None:
-    """Draw the mean at each place; of very many places, those of equally many missions at their mean place."""
-    key = places
-    if places.nunique() > _MOST_VALUES:
-        key = pandas.qcut(places.rank(method="first"), _BINS, labels=False)
-    found = [estimate(values.tolist()) for _, values in metric.groupby(key)]
-    means = np.array([each.mean for each in found], dtype=float)
-    low, high = np.array([each.mean_interval or (each.mean, each.mean) for each in found], dtype=float).T
-    spans = means - low, high - means
-    look: Mapping[str, Any] = {"marker": "o", "ms": 3, "capsize": 2, "elinewidth": 0.8}
-    axes.errorbar(places.groupby(key).mean().tolist(), means, yerr=spans, color=colour, label=label, **look)
+def _of_missions(missions: Missions, kind: str, parameters: Sequence[str]) -> Figure:
+    if kind == SWEEP or (kind == AUTO and missions.swept):
+        if not missions.swept:
+            raise InputError("nothing is swept in these results", place="kind", remedy="give a campaign with a sweep")
+        return draw_sweep(missions, parameters)
+    if parameters:
+        raise InputError("parameters are those of a sweep", place="parameters", remedy="leave them out")
+    name = "distributions" if kind == AUTO else kind
+    if name not in CAMPAIGN_KINDS:
+        raise InputError(f"the figure {name} is of a mission", place="kind", remedy=did_you_mean(name, CAMPAIGN_KINDS))
+    return CAMPAIGN_KINDS[name](grouped(missions, (), ())[0])

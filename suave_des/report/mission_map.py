@@ -2,109 +2,35 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Container, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import cycle, groupby
-from pathlib import Path
 from string import ascii_uppercase
 from typing import Any
 
 import numpy as np
 import pandas
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 from matplotlib.transforms import Bbox
 
 from suave_des.domain import SEA_BED_Z_M
-from suave_des.errors import InputError
 from suave_des.report import style
+from suave_des.report.mission_record import MissionRecord, adaptations, battery_level
+from suave_des.report.words import mode_words
 
-_NUMBERS = ("t_s", "x_m", "y_m", "z_m", "visibility_m")
-_METRICS = (
-    *("scenario", "manager", "run", "seed", "search_time_s", "pipeline_found"),
-    *("detection_x_m", "detection_y_m"),
-)
-_MISSING = {"visibility_m": [""], "battery_level": [""]}
-_REMEDY = "give the --out folder of suave-des run"
-_IDLE_MODES = ("", "fd_unground")
+_IDLE_MODES = ("", "fd_unground", "inactive")
 _ZOOM_MARGIN_M = 0.6
 _PIPELINE_COLOUR, _PIPELINE_WIDTH = "#CFCFCF", 4.0
-_VISIBILITY_COLOUR = "#A8A8A8"
-_BATTERY, _BATTERY_COLOUR = "battery_level", style.PURPLE
-
-
-@dataclass(frozen=True)
-class MissionRecord:
-    """One mission as its files describe it.
-
-    Attributes:
-        metrics: its row of runs.csv, by column.
-        scenario: the scenario in full.
-        events: events.csv.
-        trajectory: trajectory.csv; mode is empty before the first one.
-    """
-
-    metrics: dict[str, Any]
-    scenario: dict[str, Any]
-    events: pandas.DataFrame
-    trajectory: pandas.DataFrame
-
-
-def read_mission(folder: Path) -> MissionRecord:
-    """Read mission.json, events.csv and trajectory.csv.
-
-    Raises:
-        InputError: one of them is missing, or is not what a mission writes.
-    """
-    path = folder / "mission.json"
-    try:
-        mission = json.loads(path.read_text(encoding="utf-8"))
-        metrics, scenario = mission["metrics"], mission["scenario"]
-        np.array(scenario["pipeline"]["vertices_m"], dtype=float)
-        _check_columns(path, _METRICS, metrics)
-    except FileNotFoundError:
-        raise InputError("no such file", file=path, remedy=_REMEDY) from None
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"is not the record of a mission: {error}", file=path, remedy=_REMEDY) from None
-    events = _table(folder / "events.csv", ("t_s", "source", "event", "detail"))
-    trajectory = _table(
-        folder / "trajectory.csv", ("t_s", "x_m", "y_m", "z_m", "mode", "visibility_m"), optional=(_BATTERY,)
-    )
-    return MissionRecord(metrics, scenario, events, trajectory)
-
-
-def _check_columns(path: Path, needed: Iterable[str], found: Container[str]) -> None:
-    for name in needed:
-        if name not in found:
-            raise InputError(f"{name} is missing", file=path, remedy=_REMEDY)
-
-
-def _table(path: Path, columns: tuple[str, ...], optional: tuple[str, ...] = ()) -> pandas.DataFrame:
-    """Read a table of which `columns` are needed; those of _NUMBERS have finite numbers, the others are text.
-
-    Columns of `optional` have finite numbers where they are there.
-    """
-    text = {name: "str" for name in columns if name not in _NUMBERS}
-    try:
-        # "none" and "nan" may be words here, so that only numbers have something that counts as missing.
-        frame = pandas.read_csv(path, dtype=text, keep_default_na=False, na_values=_MISSING)
-    except FileNotFoundError:
-        raise InputError("no such file", file=path, remedy=_REMEDY) from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"cannot be read: {error}", file=path, remedy=_REMEDY) from None
-    _check_columns(path, columns, frame.columns)
-    if frame.empty:
-        raise InputError("is empty", file=path, remedy=_REMEDY)
-    for name in (*(set(columns) & set(_NUMBERS)), *(set(optional) & set(frame.columns))):
-        is_wrong = ~np.isfinite(pandas.to_numeric(frame[name], errors="coerce")) & frame[name].notna()
-        for row in np.flatnonzero(is_wrong)[:1]:
-            problem = f"{name}: expected a finite number, got {str(frame[name].iloc[row])!r}"
-            raise InputError(problem, file=path, place=f"line {row + 2}", remedy=_REMEDY)
-    return frame
+_VISIBILITY_COLOUR = "#8A8A8A"
+_THRESHOLD_COLOUR = "#B5B5B5"
+_BATTERY_COLOUR = style.GREEN
+_LETTER_OFFSETS = ((4, 4), (-9, 4), (4, -10), (-9, -10), (0, 9), (0, -14), (12, 0), (-16, 0), (12, 10), (-16, 10))
+"""Where a letter may stand beside its point, in points; the first that is free is taken."""
+_LETTER_POINTS = 9.0
+_LETTER_ROW_SHARE = 0.075
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,16 +45,11 @@ class _Mark:
     colour: str
 
 
-def draw(folder: Path) -> Figure:
-    """The map of the mission in a folder.
-
-    Raises:
-        InputError: the folder has no complete record of a mission.
-    """
-    record = read_mission(folder)
-    colours = _mode_colours(record)
+def draw(record: MissionRecord) -> style.Picture:
+    """Draw the map of a mission, with altitude, visibility and battery over time."""
+    colours = mode_colours(record)
     marks = list(_marks(record))
-    figure = Figure(figsize=(style.WIDTH_IN, 5.2), layout="constrained")
+    figure = style.Picture(figsize=(style.WIDTH_IN, 5.2), layout="constrained")
     whole, zoom, time = (
         figure.add_subplot(place)
         for grid in [figure.add_gridspec(2, 2, height_ratios=(1.15, 1.0), width_ratios=(1.0, 1.75))]
@@ -139,37 +60,37 @@ def draw(folder: Path) -> Figure:
     _draw_zoom(zoom, record, colours, marks, search)
     _draw_over_time(time, record, colours, marks)
     metrics = record.metrics
-    whole.set_title(
-        f"a   Mission: {metrics['scenario']}, {metrics['manager']}, run {metrics['run']}, seed {metrics['seed']}"
-    )
+    name = f"{metrics['scenario']}, {metrics['manager']}, run {metrics['run']}, seed {metrics['seed']}"
+    whole.set_title(f"a   Mission: {style.text(name)}")
     zoom.set_title("b   Search")
-    has_battery = _BATTERY in record.trajectory
-    if has_battery:
-        _draw_battery(time, record)
-    time.set_title("c   Altitude, visibility and battery" if has_battery else "c   Altitude and visibility")
-    handles = _legend(colours, marks, has_battery=has_battery)
-    whole.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+    time.set_title("c   Altitude and visibility")
+    whole.legend(
+        handles=_legend(record, colours, marks), loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0
+    )
     return figure
 
 
-def _legend(colours: dict[str, str], marks: list[_Mark], *, has_battery: bool) -> list[Line2D]:
-    named = [(mode, colour) for mode, colour in colours.items() if mode not in _IDLE_MODES]
+def _legend(record: MissionRecord, colours: dict[str, str], marks: list[_Mark]) -> list[Line2D]:
+    named = [(mode_words(mode), mode) for mode in colours if mode not in _IDLE_MODES]
     if len(named) < len(colours):
-        named.append(("no mode that moves it", style.GREY))
-    lines = [Line2D([], [], color=colour, lw=1.6, label=name) for name, colour in named]
+        named.append((mode_words(_IDLE_MODES[1]), _IDLE_MODES[1]))
+    lines = [Line2D([], [], label=style.text(name), **_way_look(colours, mode)) for name, mode in named]
     lines.append(Line2D([], [], color=_PIPELINE_COLOUR, lw=_PIPELINE_WIDTH, label="pipeline"))
-    lines.append(Line2D([], [], color=_VISIBILITY_COLOUR, lw=1.0, label="visibility (c)"))
-    if has_battery:
+    lines.append(Line2D([], [], color=_VISIBILITY_COLOUR, lw=1.0, label="visibility; dotted: thresholds (c)"))
+    if battery_level(record) is not None:
         lines.append(Line2D([], [], color=_BATTERY_COLOUR, lw=1.0, ls="--", label="battery (c)"))
+        lines.append(Line2D([], [], color=_BATTERY_COLOUR, lw=0, marker="P", ms=5, label="recharge station"))
     lines.append(Line2D([], [], color=style.BLACK, lw=0, marker="o", ms=4, label="start"))
+    if adaptations(record):
+        lines.append(Line2D([], [], color=style.BLACK, lw=0, marker="v", ms=4, mfc="white", label="adaptation"))
     for mark in marks:
         symbol = rf"$\mathbf{{{mark.letter}}}$"
         lines.append(Line2D([], [], lw=0, marker=symbol, color=mark.colour, ms=5, label=mark.text))
     return lines
 
 
-def _mode_colours(record: MissionRecord) -> dict[str, str]:
-    """A colour for each mode, in the order of appearance; what does not move the vehicle is grey."""
+def mode_colours(record: MissionRecord) -> dict[str, str]:
+    """Return a colour for each mode, in the order of appearance; what does not move the vehicle is grey."""
     modes = list(dict.fromkeys(record.trajectory["mode"]))
     known = style.MODE_COLOURS | dict.fromkeys(_IDLE_MODES, style.GREY)
     others = zip([mode for mode in modes if mode not in known], cycle(style.OTHER_MODES), strict=False)
@@ -179,12 +100,22 @@ def _mode_colours(record: MissionRecord) -> dict[str, str]:
 
 def _marks(record: MissionRecord) -> Iterator[_Mark]:
     way = record.trajectory
-    for letter, (t_s, text, colour) in zip(ascii_uppercase, _told(record.events), strict=False):
+    for letter, (t_s, text, colour) in zip(ascii_uppercase, _milestones(record.events), strict=False):
         x_m, y_m = (float(np.interp(t_s, way["t_s"], way[axis])) for axis in ("x_m", "y_m"))
         yield _Mark(letter, t_s, x_m, y_m, f"{text}, {t_s:.0f} s", colour)
 
 
-def _told(events: pandas.DataFrame) -> Iterator[tuple[float, str, str]]:
+def _way_look(colours: dict[str, str], mode: str) -> dict[str, Any]:
+    """Return the look of a stretch of the way: in print without colours, the widths tell the search altitudes apart."""
+    dashed = mode not in style.MODE_COLOURS and mode not in _IDLE_MODES
+    return {
+        "color": colours.get(mode, style.GREY),
+        "lw": style.MODE_WIDTHS.get(mode, 1.2),
+        "ls": "--" if dashed else "-",
+    }
+
+
+def _milestones(events: pandas.DataFrame) -> Iterator[tuple[float, str, str]]:
     """Time, words and colour of what is worth a mark: the detection, failures, and recoveries of what had failed."""
     failed: set[str] = set()
     for t_s, event, detail in zip(events["t_s"], events["event"], events["detail"], strict=True):
@@ -192,10 +123,8 @@ def _told(events: pandas.DataFrame) -> Iterator[tuple[float, str, str]]:
         name = component.removeprefix("c_").replace("_", " ")
         if event == "pipeline_detected":
             yield t_s, "pipeline detected", style.BLACK
-        elif event == "battery_crossing" and detail.startswith("falls"):
-            yield t_s, "battery low", _BATTERY_COLOUR
         elif event == "battery_crossing":
-            yield t_s, "recharged", _BATTERY_COLOUR
+            yield t_s, "battery low" if detail.startswith("falls") else "recharged", _BATTERY_COLOUR
         elif event == "component_status" and status == "FALSE":
             failed.add(component)
             yield t_s, f"{name} failed", style.VERMILION
@@ -212,12 +141,12 @@ def _draw_way(axes: Axes, record: MissionRecord, colours: dict[str, str], across
     for mode, points in groupby(modes):
         last = first + len(list(points))
         stretch = way.iloc[first : last + 1]
-        axes.plot(stretch[across], stretch[up], color=colours[mode], solid_capstyle="round")
+        axes.plot(stretch[across], stretch[up], solid_capstyle="round", **_way_look(colours, mode))
         first = last
 
 
 def _draw_plan(axes: Axes, record: MissionRecord, colours: dict[str, str]) -> None:
-    """What both maps show."""
+    """Draw what both maps show."""
     vertices = np.array(record.scenario["pipeline"]["vertices_m"])
     axes.plot(
         vertices[:, 0], vertices[:, 1], color=_PIPELINE_COLOUR, lw=_PIPELINE_WIDTH, solid_capstyle="round", zorder=1.5
@@ -225,26 +154,41 @@ def _draw_plan(axes: Axes, record: MissionRecord, colours: dict[str, str]) -> No
     _draw_way(axes, record, colours, "x_m", "y_m")
     start = record.trajectory.iloc[0]
     axes.plot(start["x_m"], start["y_m"], "o", color=style.BLACK, ms=4)
+    if battery := record.scenario.get("battery"):
+        axes.plot(battery["station_x_m"], battery["station_y_m"], "P", color=_BATTERY_COLOUR, ms=5, zorder=3)
     axes.set_aspect("equal")
     axes.set_xlabel("x, east (m)")
     axes.set_ylabel("y, north (m)")
 
 
-def _draw_letters(axes: Axes, marks: list[_Mark], frame: Bbox) -> None:
+def _draw_letters(axes: Axes, marks: Sequence[_Mark], frame: Bbox) -> None:
+    """Mark events on the map; letters of events at nearly the same place stand apart."""
+    axes.set_xlim(frame.x0, frame.x1)
+    axes.set_ylim(frame.y0, frame.y1)
+    points_per_m = 72.0 * axes.get_position().width * style.WIDTH_IN / frame.width
+    taken: list[tuple[float, float]] = []
     for mark in marks:
         if not frame.contains(mark.x_m, mark.y_m):
             continue
         axes.plot(mark.x_m, mark.y_m, "o", color=mark.colour, ms=3.5, mec="white", mew=0.6, zorder=4)
+        place = mark.x_m * points_per_m, mark.y_m * points_per_m
+        offset = next((each for each in _LETTER_OFFSETS if _is_free(place, each, taken)), _LETTER_OFFSETS[0])
+        taken.append((place[0] + offset[0], place[1] + offset[1]))
         axes.annotate(
             mark.letter,
             (mark.x_m, mark.y_m),
-            xytext=(4, 4),
+            xytext=offset,
             textcoords="offset points",
             color=mark.colour,
             weight="bold",
             fontsize=8,
             zorder=5,
         )
+
+
+def _is_free(place: tuple[float, float], offset: tuple[float, float], taken: Sequence[tuple[float, float]]) -> bool:
+    x, y = place[0] + offset[0], place[1] + offset[1]
+    return all(abs(x - other[0]) > _LETTER_POINTS or abs(y - other[1]) > _LETTER_POINTS for other in taken)
 
 
 def _draw_map(axes: Axes, record: MissionRecord, colours: dict[str, str], frame: Bbox) -> None:
@@ -258,9 +202,8 @@ def _draw_map(axes: Axes, record: MissionRecord, colours: dict[str, str], frame:
 def _draw_zoom(axes: Axes, record: MissionRecord, colours: dict[str, str], marks: list[_Mark], frame: Bbox) -> None:
     """The surroundings of the search."""
     _draw_plan(axes, record, colours)
+    _draw_adaptations(axes, record, colours, "x_m", "y_m")
     _draw_letters(axes, marks, frame)
-    axes.set_xlim(frame.x0, frame.x1)
-    axes.set_ylim(frame.y0, frame.y1)
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     axes.yaxis.set_major_locator(MaxNLocator(5, integer=True))
 
@@ -275,28 +218,32 @@ def _search_frame(record: MissionRecord) -> Bbox:
     return Bbox([search.min(axis=0) - _ZOOM_MARGIN_M, search.max(axis=0) + _ZOOM_MARGIN_M])
 
 
-def _draw_battery(axes: Axes, record: MissionRecord) -> None:
-    """The battery's level over time, on an axis of its own."""
-    level = axes.twinx()
-    level.plot(record.trajectory["t_s"], record.trajectory[_BATTERY], color=_BATTERY_COLOUR, lw=1.0, ls="--")
-    level.grid(visible=False)
-    level.set_ylim(0.0, 1.18)
-    level.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0])
-    level.set_ylabel("battery level", color=_BATTERY_COLOUR)
-    level.tick_params(axis="y", colors=_BATTERY_COLOUR)
-    level.spines["right"].set_visible(True)
+def _draw_adaptations(axes: Axes, record: MissionRecord, colours: dict[str, str], across: str, up: str) -> None:
+    """Mark where or when modes changed, in the colour of the new one."""
+    way = record.trajectory
+    for each in adaptations(record):
+        x, y = (float(np.interp(each.t_s, way["t_s"], way[name])) for name in (across, up))
+        axes.plot(x, y, "v", color=style.BLACK, mfc=colours.get(each.after, "white"), ms=4.5, mew=0.7, zorder=3.5)
 
 
-def _draw_over_time(axes: Axes, record: MissionRecord, colours: dict[str, str], marks: list[_Mark]) -> None:
+def _draw_over_time(axes: Axes, record: MissionRecord, colours: dict[str, str], marks: Sequence[_Mark]) -> None:
+    """Draw altitude, visibility with its thresholds, and battery."""
     way = record.trajectory.assign(altitude_m=record.trajectory["z_m"] - SEA_BED_Z_M)
+    end_s = float(way["t_s"].iloc[-1])
+    for threshold_m in record.scenario.get("reaction_metric", {}).get("visibility_thresholds_m", ()):
+        axes.axhline(threshold_m, color=_THRESHOLD_COLOUR, lw=0.7, ls=":", zorder=1)
     axes.plot(way["t_s"], way["visibility_m"], color=_VISIBILITY_COLOUR, lw=1.0)
-    _draw_way(axes, MissionRecord(record.metrics, record.scenario, record.events, way), colours, "t_s", "altitude_m")
-    top = max(way["altitude_m"].max(), way["visibility_m"].max()) * 1.18
-    for mark in marks:
+    timed = replace(record, trajectory=way)
+    _draw_way(axes, timed, colours, "t_s", "altitude_m")
+    _draw_adaptations(axes, timed, colours, "t_s", "altitude_m")
+    tallest = max(way["altitude_m"].max(), way["visibility_m"].max())
+    rows = _letter_rows(marks, end_s)
+    top = tallest * (1.06 + _LETTER_ROW_SHARE * (max(rows, default=0) + 1))
+    for mark, row in zip(marks, rows, strict=True):
         axes.axvline(mark.t_s, color=mark.colour, lw=0.7, ls=":")
         axes.text(
             mark.t_s,
-            top,
+            top * (1.0 - _LETTER_ROW_SHARE * row),
             mark.letter,
             color=mark.colour,
             weight="bold",
@@ -306,6 +253,27 @@ def _draw_over_time(axes: Axes, record: MissionRecord, colours: dict[str, str], 
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
         )
     axes.set_ylim(0.0, top)
-    axes.set_xlim(0.0, way["t_s"].iloc[-1])
+    axes.set_xlim(0.0, end_s)
     axes.set_xlabel("mission time (s)")
     axes.set_ylabel("altitude; visibility (m)")
+    level = battery_level(record)
+    if level is not None:
+        beside = axes.twinx()
+        beside.plot(way["t_s"], 100.0 * level, color=_BATTERY_COLOUR, lw=1.0, ls="--")
+        beside.set_ylim(0.0, 100.0 * top / tallest)
+        beside.set_yticks((0, 25, 50, 75, 100))
+        beside.grid(False)
+        beside.spines["right"].set_visible(True)
+        beside.set_ylabel("battery (%)")
+
+
+def _letter_rows(marks: Sequence[_Mark], end_s: float) -> list[int]:
+    """Return the row of each letter over time: one that would touch another goes into the next row."""
+    near_s = 0.028 * end_s
+    last_s: list[float] = []
+    rows = []
+    for mark in marks:
+        row = next((row for row, t_s in enumerate(last_s) if mark.t_s - t_s >= near_s), len(last_s))
+        last_s[row : row + 1] = [mark.t_s]
+        rows.append(row)
+    return rows

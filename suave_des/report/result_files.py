@@ -20,6 +20,8 @@ from suave_des.report.runs import COLUMNS, read_runs
 OWN_COLUMNS = tuple(field.name for field in fields(MissionMetrics))
 """Columns of runs.csv that every campaign has."""
 PAPER_ORDER = {"none": 0, "random": 1, "metacontrol": 2}
+_MORE_METRICS = ("adaptations", "mission_duration_s", "detection_time_s", "detection_y_m")
+"""Columns of runs.csv that are read where they are there, besides those of every file."""
 _RUNS_FILE, _STORE_FILE, _MANIFEST_FILE = "runs.csv", "campaign.sqlite", "manifest.json"
 
 
@@ -140,11 +142,11 @@ def _of_runs(path: Path) -> Missions:
         header = []  # read_runs says what is wrong
     is_own = "manager" in header
     others = [name for name in header if name not in OWN_COLUMNS] if is_own and "scenario" in header else []
-    adaptations = ["adaptations"] if is_own and "adaptations" in header else []
-    runs = read_runs(path, further=[*others, *adaptations], are_simulated="scenario" in header)
+    runs = read_runs(path, further=others, where_present=_MORE_METRICS, are_simulated="scenario" in header)
     runs.check_simulated((), None)
     found = _as_floats(runs.frame["pipeline_found"])
-    frame = runs.frame.assign(scenario=next(iter(runs.scenarios), ""), pipeline_found=found)
+    more = {name: _as_floats(pandas.to_numeric(runs.frame[name])) for name in _MORE_METRICS if name in runs.frame}
+    frame = runs.frame.assign(scenario=next(iter(runs.scenarios), ""), pipeline_found=found, **more)
     missions = Missions(frame if runs.scenarios else _in_paper_order(frame), _varying(runs.frame, others))
     _check_once(missions, path)
     return missions

@@ -18,6 +18,9 @@ BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 BLUE, VERMILION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#8A8A8A"
 CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION)
 """For what has no colour of its own, in this order."""
+_DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (6, 1.5, 1, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
+_MARKERS = "osD^v<>PX"
+_HATCHES = ("", "////", "....", "xxxx", "----", "\\\\\\\\")
 
 MODE_COLOURS = {
     "fd_spiral_low": "#7FB8DA",
@@ -25,9 +28,12 @@ MODE_COLOURS = {
     "fd_spiral_high": "#0B3C73",
     "fd_follow_pipeline": ORANGE,
     "__DEFAULT__": PURPLE,
+    "normal": GREEN,
 }
 """The shipped modes: the higher the search, the darker the blue. A mode of one's own gets one of OTHER_MODES."""
-OTHER_MODES = (GREEN, VERMILION, "#6A3D9A", "#B8860B")
+MODE_WIDTHS = {"fd_spiral_low": 0.8, "fd_spiral_medium": 1.4, "fd_spiral_high": 2.0, "fd_follow_pipeline": 1.2}
+"""Widths of lines, in points: the higher the search, the wider, so that they differ in print without colours, too."""
+OTHER_MODES = (VERMILION, "#6A3D9A", "#B8860B")
 
 _SETTINGS: Any = {
     "font.family": "sans-serif",
@@ -54,6 +60,34 @@ _SETTINGS: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "suave-des",  # equal data give equal files
 }
+
+
+def line(number: int) -> dict[str, Any]:
+    """Return the look of the curve of a manager, by its number from 0: no two of thirty are alike, nor six in grey."""
+    return {"color": CYCLE[number % len(CYCLE)], "linestyle": _DASHES[number % len(_DASHES)]}
+
+
+def marker(number: int) -> str:
+    """Return the marker of a manager, by its number from 0."""
+    return _MARKERS[number % len(_MARKERS)]
+
+
+def hatch(number: int) -> str:
+    """Return the hatching of an area, by the number of its manager, for print without colours."""
+    return _HATCHES[number % len(_HATCHES)]
+
+
+def text(name: str) -> str:
+    """Return a name as matplotlib is to show it: without formulas in it, and not hidden for a leading underscore."""
+    return (f" {name}" if name.startswith("_") else name).replace("$", r"\$")
+
+
+class Picture(Figure):
+    """A figure that a notebook shows without further settings."""
+
+    def _repr_png_(self) -> bytes:
+        with publication():
+            return png(self, dpi=160)
 
 
 @contextmanager

@@ -11,6 +11,7 @@ import pytest
 from scipy import stats
 from statsmodels.stats.multitest import multipletests
 
+from suave_des import api
 from suave_des.campaign.campaign import run_campaign
 from suave_des.errors import InputError
 from suave_des.report.compare import Choices, Comparison, Difference, Summary, compare_folders, compare_frame
@@ -233,3 +234,11 @@ def test_a_significant_difference_of_ranks_against_that_of_means_is_told() -> No
 def test_a_choice_that_makes_no_sense_is_refused(choices: Choices, words: str) -> None:
     with pytest.raises(InputError, match=words):
         compare_folders([published_runs()], choices)
+
+
+def test_the_frame_of_a_campaign_is_compared_and_drawn() -> None:
+    frame = api.run_campaign("seams2023", ["none", "bt"], runs=4, progress=False)
+    comparison = frame[frame["run"] > 1].compare(metrics=["distance_inspected_m"])
+    assert [(each.first, each.second, each.n) for each in comparison.differences] == [("none", "bt", (3,))]
+    assert str(comparison).startswith(comparison.conclusion[:60])
+    assert len(frame.figure().axes) == 2

@@ -3,15 +3,33 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
+import pandas
 import pytest
 
 from suave_des.campaign.campaign import run_campaign
 from suave_des.campaign.single import run_mission
 from suave_des.errors import InputError
+from suave_des.estimates import estimate
 from suave_des.report import mission_map
-from suave_des.report.figures import draw_distributions, draw_folder, draw_sweep, swept_parameters
+from suave_des.report.campaign_figures import draw_detections, draw_distributions, draw_rainclouds
+from suave_des.report.figures import CAMPAIGN_KINDS, draw_folder, draw_results
+from suave_des.report.grouping import grouped
+from suave_des.report.mission_record import (
+    MissionRecord,
+    adaptations,
+    battery_level,
+    failure_spans,
+    mode_spans,
+    read_mission,
+)
+from suave_des.report.paper import published_runs
+from suave_des.report.result_files import missions_of, read_missions
+from suave_des.report.sweep_figures import draw_sweep
+from suave_des.report.timeline_figure import draw_timeline
+from suave_des.report.words import key_words
 
 
 @pytest.fixture(scope="module")
@@ -36,21 +54,27 @@ def test_the_ending_says_what_kind_of_picture_it_is(ending: str, begins: bytes, 
 
 
 def test_the_map_shows_every_mode_and_what_happened(mission: Path) -> None:
-    figure = mission_map.draw(mission)
+    figure = mission_map.draw(read_mission(mission))
     legend = figure.axes[0].get_legend()
     assert legend is not None
     told = [text.get_text() for text in legend.get_texts()]
     trajectory = (mission / "trajectory.csv").read_text()
-    for mode in ("fd_spiral_low", "fd_spiral_medium", "__DEFAULT__", "fd_follow_pipeline"):
-        assert (mode in told) == (mode in trajectory)
+    words = {
+        "fd_spiral_low": "search, low",
+        "fd_spiral_medium": "search, medium",
+        "__DEFAULT__": "search, default altitude",
+        "fd_follow_pipeline": "follow the pipeline",
+    }
+    for mode, text in words.items():
+        assert (text in told) == (mode in trajectory)
     assert any(text.startswith("thruster 1 failed, 35") for text in told)
     assert any(text.startswith("pipeline detected, ") for text in told)
 
 
 def test_the_distributions_have_a_curve_for_each_manager_that_reaches_1(campaign: Path) -> None:
-    figure = draw_distributions(campaign / "runs.csv")
+    figure = draw_distributions(grouped(read_missions([campaign]), (), ())[0])
     for axes in figure.axes:
-        curves = [line for line in axes.get_lines() if len(line.get_xdata()) > 1]
+        curves = [line for line in axes.get_lines() if len(line.get_xdata()) > 2]
         assert [line.get_label() for line in curves] == ["none (n = 3)", "random (n = 3)"]
         assert all(line.get_ydata()[-1] == 1.0 for line in curves)
 
@@ -83,23 +107,187 @@ def test_a_campaign_without_missions_is_told(campaign: Path, tmp_path: Path) -> 
 
 def test_a_sweep_is_drawn_with_a_mean_for_each_manager_at_each_value(tmp_path: Path) -> None:
     values = {"visibility.period_s": [40.0, 80.0], "default_modes.f_generate_search_path": ["fd_spiral_low"]}
+    values["default_modes.f_generate_search_path"].append("fd_spiral_medium")
     result = run_campaign("seams2023", ["none", "random"], 3, 1, out=tmp_path / "out", sweep=values)
-    assert swept_parameters(tmp_path / "out") == list(values)
-    figure = draw_sweep(tmp_path / "out", list(values))
+    missions = read_missions([tmp_path / "out"])
+    assert missions.swept == tuple(values)
+    figure = draw_sweep(missions)
     frame = result.frame()
     panel = figure.axes[0]
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["none", "random"]
     for manager, container in zip(("none", "random"), panel.containers, strict=True):
         own = frame[frame["manager"] == manager].groupby("visibility.period_s")["search_time_s"].mean()
         assert list(container[0].get_ydata()) == pytest.approx(list(own))
-    assert [tick.get_text() for tick in figure.axes[3].get_xticklabels()] == ["fd_spiral_low"]
+    assert [tick.get_text() for tick in figure.axes[3].get_xticklabels()] == ["search, low", "search, medium"]
     draw_folder(tmp_path / "out", tmp_path / "sweep.svg")
-    assert b"visibility.period_s" in (tmp_path / "sweep.svg").read_bytes()
+    assert "visibility: period" in (tmp_path / "sweep.svg").read_text()
 
 
-def test_many_values_are_drawn_in_bins_of_equally_many_missions(tmp_path: Path) -> None:
-    values = {"start.x_m": [-18.0 + 0.1 * step for step in range(24)]}
-    run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out", sweep=values)
-    figure = draw_sweep(tmp_path / "out", ["start.x_m"])
+def sweep_frame(points: int, runs: int) -> pandas.DataFrame:
+    """Missions in which the run alone decides the search time, at many points of a sweep."""
+    rows = [
+        {
+            "manager": "a",
+            "seed": 1,
+            "run": run,
+            "search_time_s": 100.0 + 10.0 * run,
+            "distance_inspected_m": 1.0,
+            "pipeline_found": True,
+            "start.x_m": float(point),
+            "start.y_m": float(point % 2),
+        }
+        for point in range(points)
+        for run in range(1, runs + 1)
+    ]
+    return pandas.DataFrame(rows)
+
+
+def test_the_intervals_of_a_sweep_are_those_of_its_runs() -> None:
+    figure = draw_sweep(missions_of(sweep_frame(6, 5)), ["start.y_m"])
+    (container,) = figure.axes[0].containers
+    low, high = container[2][0].get_segments()[0][:, 1]
+    expected = estimate([110.0, 120.0, 130.0, 140.0, 150.0]).mean_interval
+    assert (low, high) == pytest.approx(expected)
+
+
+def test_many_values_are_drawn_in_bins_of_equally_many_missions() -> None:
+    figure = draw_sweep(missions_of(sweep_frame(24, 2)), ["start.x_m"])
     xs = list(figure.axes[0].containers[0][0].get_xdata())
-    assert xs == pytest.approx([-17.9 + 0.3 * number for number in range(8)])
+    assert xs == pytest.approx([1.0 + 3.0 * number for number in range(8)])
+
+
+def test_no_parameter_is_left_out_silently() -> None:
+    frame = sweep_frame(4, 2)
+    for number in range(3, 10):
+        frame[f"key_{number}"] = frame["start.x_m"] * number
+    figure = draw_sweep(missions_of(frame))
+    labels = {axes.get_xlabel().replace("\n", " ") for axes in figure.axes} - {""}
+    assert len(labels) == 9
+    frame["key_10"] = frame["start.x_m"]
+    with pytest.raises(InputError, match=r"10 parameters do not fit .* \(choose 9 or fewer"):
+        draw_sweep(missions_of(frame))
+
+
+def test_more_managers_than_colours_differ_in_their_lines() -> None:
+    names = [f"manager_{number}" for number in range(14)]
+    frame = pandas.DataFrame(
+        {
+            "manager": name,
+            "seed": 1,
+            "run": run,
+            "search_time_s": 10.0 * number + run,
+            "distance_inspected_m": 1.0 * run,
+            "pipeline_found": True,
+        }
+        for number, name in enumerate(names)
+        for run in (1, 2)
+    )
+    figure = draw_distributions(grouped(missions_of(frame), (), ())[0])
+    curves = [line for line in figure.axes[0].get_lines() if len(line.get_xdata()) > 2]
+    assert len({(line.get_color(), str(line._unscaled_dash_pattern)) for line in curves}) == 14
+
+
+def test_missions_that_never_found_the_pipeline_are_named_at_the_time_limit() -> None:
+    figure = draw_distributions(grouped(read_missions([published_runs()]), (), ())[0])
+    (text,) = [text for text in figure.axes[0].texts if "not found" in text.get_text()]
+    assert text.get_position()[0] == 300.0
+
+
+def test_a_raincloud_shows_the_published_runs_beside_the_missions(campaign: Path) -> None:
+    groups = grouped(read_missions([campaign]), (), ())[0]
+    published = grouped(read_missions([published_runs()]), (), ())[0]
+    figure = draw_rainclouds(groups, {group.name: group for group in published[:2]})
+    crosses = [line for line in figure.axes[0].get_lines() if line.get_marker() == "x"]
+    assert [len(line.get_xdata()) for line in crosses] == [20, 20]
+
+
+def test_detections_are_shares_of_all_missions(campaign: Path) -> None:
+    groups = grouped(read_missions([campaign]), (), ())[0]
+    figure = draw_detections(groups)
+    above = figure.subfigs[0].axes[0]
+    found = groups[0].frame["detection_x_m"].notna().mean()
+    assert sum(bar.get_height() for bar in above.patches) == pytest.approx(found)
+
+
+@pytest.mark.parametrize("kind", CAMPAIGN_KINDS)
+def test_every_kind_is_drawn_of_a_single_mission_of_a_manager_with_an_awkward_name(kind: str, tmp_path: Path) -> None:
+    text = "scenario,manager,run,seed,search_time_s,distance_inspected_m,pipeline_found,detection_x_m,adaptations\n"
+    (tmp_path / "runs.csv").write_text(text + "a,_$x^<b>&\\,1,1,300,0,False,,3\n")
+    draw_results([tmp_path], tmp_path / "out.svg", kind)
+    assert "&lt;b&gt;" in (tmp_path / "out.svg").read_text()
+
+
+def test_several_missions_are_drawn_as_paths(mission: Path, tmp_path: Path) -> None:
+    run_mission("seams2023", "none", 1, 1, tmp_path / "none")
+    draw_results([mission, tmp_path / "none"], tmp_path / "paths.svg")
+    text = (tmp_path / "paths.svg").read_text()
+    assert "random: " in text
+    assert "none: " in text
+
+
+class TestTimeline:
+    def test_shows_modes_tasks_failures_and_adaptations(self, mission: Path) -> None:
+        record = read_mission(mission)
+        figure = draw_timeline(record)
+        rows = [tick.get_text() for tick in figure.axes[1].get_yticklabels()]
+        assert rows[:2] == ["task", "search"]
+        assert "thruster 1" in rows
+        listed = [text.get_text() for text in figure.axes[-1].texts]
+        assert len(listed) == len(adaptations(record)) > 3
+        assert listed[0].startswith("A  ")
+
+    def test_names_the_rules_that_are_known(self, mission: Path) -> None:
+        record = read_mission(mission)
+        first = adaptations(record)[0]
+        known = replace(record, rules={(first.t_s, first.function): ("QAWaterVisibility",)})
+        assert "(rule QAWaterVisibility)" in draw_timeline(known).axes[-1].texts[0].get_text()
+
+    def test_a_failure_ends_with_the_recovery(self, tmp_path: Path) -> None:
+        run_mission("seams2023", "metacontrol", 1, 1, tmp_path / "out")
+        (span,) = failure_spans(read_mission(tmp_path / "out"))["c_thruster_1"]
+        assert 35.0 < span.begin_s < 37.0
+        assert 10.0 < span.end_s - span.begin_s < 16.0
+
+
+class TestBattery:
+    @pytest.fixture(scope="class")
+    @staticmethod
+    def record(tmp_path_factory: pytest.TempPathFactory) -> MissionRecord:
+        folder = tmp_path_factory.mktemp("battery")
+        (folder / "battery.yaml").write_text("base: release15\nname: battery\nbattery: {discharge_time_s: 100}\n")
+        run_mission(folder / "battery.yaml", "bt_extended", 1, 1, folder / "out")
+        return read_mission(folder / "out")
+
+    def test_the_mode_is_that_of_the_function_that_moves_the_vehicle(self, record: MissionRecord) -> None:
+        spans = mode_spans(record)["f_generate_search_path"]
+        way = record.trajectory.set_index("t_s")["mode"]
+        for span in spans:
+            if span.what.startswith("fd_spiral"):
+                assert set(way[span.begin_s + 0.1 : span.end_s - 0.1]) == {span.what}
+
+    def test_its_level_falls_and_is_full_at_the_station(self, record: MissionRecord) -> None:
+        level = battery_level(record)
+        assert level is not None
+        assert level.iloc[250] == pytest.approx(1.0 - 50.0 / 100.0)
+        charged = mode_spans(record)["generate_recharge_path"][-2].begin_s
+        assert level[record.trajectory["t_s"] > charged].iloc[0] == 1.0
+
+    def test_it_is_drawn_and_named_as_a_cause(self, record: MissionRecord) -> None:
+        assert any("battery" in axes.get_ylabel() for axes in mission_map.draw(record).axes)
+        causes = {each.cause for each in adaptations(record) if each.function == "generate_recharge_path"}
+        assert "battery recharged" in causes
+        assert any(cause.startswith("battery at 2") for cause in causes)
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("signals.water_visibility.period_s", "water visibility: period (s)"),
+        ("start.x_m", "start: x (m)"),
+        ("calibration.horizontal_speed_limit_m_per_s", "horizontal speed limit (m/s)"),
+        ("thruster_events.0.time_s", "thruster event 1: time (s)"),
+        ("default_modes.f_generate_search_path", "default modes: search"),
+    ],
+)
+def test_keys_become_words_with_units(key: str, words: str) -> None:
+    assert key_words(key).replace("\N{NO-BREAK SPACE}", " ") == words

@@ -1,0 +1,268 @@
+"""Figures of a campaign's missions, with a curve, cloud or panel for each manager."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator, PercentFormatter
+from numpy.typing import NDArray
+
+from suave_des.estimates import t_quantile
+from suave_des.report import style
+from suave_des.report.grouping import Group, time_limit_s
+from suave_des.report.runs import METRICS
+
+_ROW_IN = 0.62
+"""Height of a row of a figure that has one for each manager."""
+_LEGEND_LINE_IN = 0.2
+_DOTS = 400
+"""More missions are drawn as so many, evenly taken in the order of their values."""
+_FEWEST_FOR_CLOUD = 5
+_FEWEST_FOR_INTERVAL = 5
+_LARGEST_AREA = 900.0
+"""Area of a marker, in square points, that would stand for all missions of a manager."""
+_TIME_BIN_S = 5.0
+
+
+def draw_distributions(groups: Sequence[Group]) -> style.Picture:
+    """Draw the empirical distribution functions of search time and inspected distance, a curve for each group."""
+    figure = style.Picture(figsize=(style.WIDTH_IN, 2.5 + _legend_height(len(groups) + 1)), layout="constrained")
+    panels = figure.subplots(1, 2, sharey=True)
+    limit_s = _limit_of_lost(groups)
+    for axes, letter, (metric, title) in zip(panels, "ab", METRICS.items(), strict=True):
+        end = max(1.0, max(float(group.known_values(metric).max()) for group in groups) * 1.06)
+        for number, group in enumerate(groups):
+            values = np.sort(group.known_values(metric))
+            shares = np.arange(1, len(values) + 1) / len(values)
+            look = style.line(number)
+            axes.step([0.0, *values, end], [0.0, *shares, 1.0], where="post", label=_label(group), **look)
+            axes.plot(float(values.mean()), 0.0, marker="^", color=look["color"], ms=5, clip_on=False, zorder=5)
+        axes.set(xlabel=title, xlim=(0.0, end))
+        axes.set_title(f"{letter}   {title.split(' (')[0].capitalize()}")
+        if metric == "search_time_s" and limit_s is not None:
+            _mark_not_found(axes, limit_s)
+    panels[0].set(ylabel="share of missions at or below", ylim=(0.0, 1.02))
+    panels[0].yaxis.set_major_formatter(PercentFormatter(1.0))
+    handles, labels = panels[0].get_legend_handles_labels()
+    handles.append(Line2D([], [], lw=0, marker="^", ms=5, color=style.GREY))
+    _legend(figure, handles, [*labels, "mean"])
+    return figure
+
+
+def _limit_of_lost(groups: Sequence[Group]) -> float | None:
+    """Return when missions ended that never found the pipeline; None if all found it."""
+    return time_limit_s(groups) if any((group.values("pipeline_found") < 1.0).any() for group in groups) else None
+
+
+def _mark_not_found(axes: Axes, limit_s: float) -> None:
+    axes.axvline(limit_s, color=style.GREY, lw=0.7, ls=":", zorder=1)
+    axes.text(limit_s, 0.03, "not found ", color="#555555", fontsize=7, rotation=90, ha="right", va="bottom")
+
+
+def draw_rainclouds(groups: Sequence[Group], published: Mapping[str, Group]) -> style.Picture:
+    """Draw for each group a cloud (density), a box (quartiles, median, mean) and rain (missions).
+
+    Args:
+        groups: to draw, a row for each.
+        published: real missions to show beside a group, by its name.
+    """
+    height = _ROW_IN * len(groups) + 0.55 + _legend_height(4)
+    figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
+    panels = figure.subplots(1, 2, sharey=True)
+    for axes, letter, (metric, title) in zip(panels, "ab", METRICS.items(), strict=True):
+        for number, group in enumerate(groups):
+            _raincloud(axes, number, group, metric, published.get(group.name))
+        axes.set_xlabel(title)
+        axes.set_xlim(left=0.0)
+        axes.set_title(f"{letter}   {title.split(' (')[0].capitalize()}")
+    panels[0].set_yticks(range(len(groups)), [_label(group) for group in groups])
+    panels[0].set_ylim(len(groups) - 0.45, -0.6)
+    limit_s = _limit_of_lost(groups)
+    if limit_s is not None:
+        panels[0].axvline(limit_s, color=style.GREY, lw=0.7, ls=":", zorder=1)
+        panels[0].annotate(
+            "not found",
+            (limit_s, 1.0),
+            (-2, -1),
+            xycoords=("data", "axes fraction"),
+            textcoords="offset points",
+            fontsize=7,
+            color="#555555",
+            ha="right",
+            va="top",
+        )
+    handles: list[Artist] = [
+        Patch(facecolor="#BBBBBB", label="density"),
+        Line2D([], [], color=style.BLACK, lw=4, alpha=0.35, label="quartiles"),
+        Line2D([], [], color=style.BLACK, marker="|", ms=8, lw=0, label="median"),
+        Line2D([], [], color=style.BLACK, marker="D", ms=3, mfc="white", lw=0, label="mean"),
+        Line2D([], [], color=style.GREY, marker="o", ms=2, lw=0, label="mission"),
+    ]
+    if published:
+        handles.append(Line2D([], [], color=style.BLACK, marker="x", ms=4, lw=0, label="published run"))
+    _legend(figure, handles, [str(handle.get_label()) for handle in handles])
+    return figure
+
+
+def _raincloud(axes: Axes, row: int, group: Group, metric: str, published: Group | None) -> None:
+    values = np.sort(group.known_values(metric))
+    colour = style.line(row)["color"]
+    if len(values) >= _FEWEST_FOR_CLOUD and np.ptp(values) > 0.0:
+        from scipy.stats import gaussian_kde
+
+        # A narrow kernel, so that the clusters of search times, a turn of the spiral each, stay apart.
+        density = gaussian_kde(values, bw_method=0.6 * len(values) ** -0.2)
+        grid = np.linspace(values[0], values[-1], 300)
+        heights = density(grid)
+        heights *= 0.38 / heights.max()
+        axes.fill_between(
+            grid, row - 0.12 - heights, row - 0.12, color=colour, alpha=0.55, lw=0, hatch=style.hatch(row)
+        )
+        axes.plot(grid, row - 0.12 - heights, color=colour, lw=0.8)
+    low, median, high = np.percentile(values, (25, 50, 75))
+    axes.plot([low, high], [row, row], color=style.BLACK, lw=4, alpha=0.35, solid_capstyle="butt")
+    axes.plot(median, row, color=style.BLACK, marker="|", ms=8)
+    axes.plot(values.mean(), row, color=style.BLACK, marker="D", ms=3, mfc="white", mew=0.7)
+    rain = values if len(values) <= _DOTS else values[np.linspace(0, len(values) - 1, _DOTS).astype(int)]
+    axes.plot(rain, row + 0.1 + _jitter(len(rain), 0.12), "o", color=colour, ms=1.6, alpha=0.6, mew=0)
+    if published is not None:
+        real = np.sort(published.known_values(metric))
+        axes.plot(real, row + 0.3 + _jitter(len(real), 0.06), "x", color=style.BLACK, ms=2.8, mew=0.7)
+
+
+def _jitter(number: int, height: float) -> NDArray[np.floating]:
+    """Spread points evenly over a height by the golden ratio: no random numbers, equal data give equal figures."""
+    places: NDArray[np.floating] = height * ((np.arange(number) * (math.sqrt(5.0) - 1.0) / 2.0) % 1.0)
+    return places
+
+
+def draw_convergence(groups: Sequence[Group]) -> style.Picture:
+    """Draw the mean of the first n runs and its 95% interval over n, a curve for each group."""
+    figure = style.Picture(figsize=(style.WIDTH_IN, 2.5 + _legend_height(len(groups) + 1)), layout="constrained")
+    panels = figure.subplots(1, 2)
+    for axes, letter, (metric, title) in zip(panels, "ab", METRICS.items(), strict=True):
+        for number, group in enumerate(groups):
+            frame = group.frame.sort_values("run", kind="stable")
+            values = frame[metric].to_numpy(float)
+            values = values[~np.isnan(values)]
+            n = np.arange(1, len(values) + 1)
+            means = values.cumsum() / n
+            look = style.line(number)
+            axes.plot(n, means, label=_label(group), **look)
+            if len(values) > _FEWEST_FOR_INTERVAL:
+                late = n[_FEWEST_FOR_INTERVAL - 1 :]
+                variances = np.maximum((values**2).cumsum() / n - means**2, 0.0)[_FEWEST_FOR_INTERVAL - 1 :] * late
+                halves = _t_quantiles(late - 1) * np.sqrt(variances / (late - 1) / late)
+                middle = means[_FEWEST_FOR_INTERVAL - 1 :]
+                axes.fill_between(late, middle - halves, middle + halves, color=look["color"], alpha=0.18, lw=0)
+        axes.set(xlabel="number of runs", ylabel=f"mean {title}")
+        axes.set_xlim(left=1.0)
+        axes.set_ylim(bottom=0.0)
+        axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
+        axes.set_title(f"{letter}   {title.split(' (')[0].capitalize()}")
+    handles, labels = panels[0].get_legend_handles_labels()
+    _legend(figure, [*handles, Patch(color=style.GREY, alpha=0.3)], [*labels, "95% interval of the mean"])
+    return figure
+
+
+def _t_quantiles(freedoms: NDArray[np.int_]) -> NDArray[np.float64]:
+    return np.array([t_quantile(int(freedom)) for freedom in freedoms])
+
+
+def draw_detections(groups: Sequence[Group]) -> style.Picture:
+    """Draw when missions found the pipeline against the point of it that they saw first, a panel for each group.
+
+    Areas are shares of the group's missions; the bars above are shares by that point.
+    """
+    columns = min(len(groups), 3)
+    rows = math.ceil(len(groups) / columns)
+    width = style.WIDTH_IN if columns > 1 else style.WIDTH_IN / 2
+    figure = style.Picture(figsize=(width, 2.6 * rows + 0.1), layout="constrained")
+    parts = np.atleast_1d(np.array(figure.subfigures(rows, columns, squeeze=False))).ravel()
+    known = pandas.concat([group.frame.loc[group.frame["detection_x_m"].notna()] for group in groups])
+    ends = (
+        [float(known["detection_x_m"].min()) - 0.7, float(known["detection_x_m"].max()) + 0.7] if len(known) else [0, 1]
+    )
+    top_s = max(float(group.known_values("search_time_s").max()) for group in groups) * 1.05
+    for number, (part, group) in enumerate(zip(parts, groups, strict=False)):
+        above, below = part.subplots(2, 1, sharex=True, height_ratios=(1.0, 3.0))
+        _draw_detections(above, below, number, group)
+        above.set_title(f"{_label(group)}", fontsize=8)
+        below.set(xlim=ends, ylim=(0.0, top_s), xlabel="x of the point seen first (m)")
+        if number % columns == 0:
+            below.set_ylabel("search time (s)")
+            above.set_ylabel("share")
+    return figure
+
+
+def _draw_detections(above: Axes, below: Axes, number: int, group: Group) -> None:
+    frame = group.frame[group.frame["detection_x_m"].notna()]
+    colour, n = style.line(number)["color"], len(group.frame)
+    x_m = frame["detection_x_m"].round(2)
+    shares = x_m.value_counts() / n
+    above.bar(shares.index.to_numpy(float), shares.to_numpy(float), width=0.4, color=colour, lw=0)
+    above.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
+    above.yaxis.set_major_locator(MaxNLocator(2))
+    times_s = (frame["search_time_s"] / _TIME_BIN_S).round() * _TIME_BIN_S
+    counts = frame.groupby([x_m, times_s]).size()
+    places = counts.index.to_frame().to_numpy(float)
+    areas = np.maximum(counts.to_numpy(float) / n * _LARGEST_AREA, 1.5)
+    below.scatter(places[:, 0], places[:, 1], s=areas, color=colour, alpha=0.6, lw=0)
+    lost = 1.0 - len(frame) / n
+    below.text(0.03, 0.97, f"not found: {lost:.0%}", transform=below.transAxes, va="top", fontsize=7.5)
+
+
+def draw_reactions(groups: Sequence[Group]) -> style.Picture:
+    """Draw how many adaptations missions have, and how long reactions take, a curve for each group."""
+    figure = style.Picture(figsize=(style.WIDTH_IN, 2.5 + _legend_height(len(groups))), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    for number, group in enumerate(groups):
+        look = style.line(number)
+        if "adaptations" in group.frame and len(counts := group.known_values("adaptations")):
+            numbers, missions = np.unique(counts, return_counts=True)
+            left.plot(numbers, missions / len(counts), marker=style.marker(number), ms=3.5, label=_label(group), **look)
+        times_s = np.sort(group.known_values("mean_reaction_time_s"))
+        if len(times_s):
+            shares = np.arange(1, len(times_s) + 1) / len(times_s)
+            right.step([times_s[0], *times_s], [0.0, *shares], where="post", **look)
+        else:
+            right.plot([], [], **look)
+    left.set(xlabel="adaptations in a mission", ylabel="share of missions")
+    left.set_ylim(bottom=0.0)
+    left.yaxis.set_major_formatter(PercentFormatter(1.0))
+    left.xaxis.set_major_locator(MaxNLocator(8, integer=True))
+    left.set_title("a   Adaptations")
+    right.set(
+        xlabel="mean reaction time, where there was one (s)", ylabel="share of missions at or below", ylim=(0.0, 1.02)
+    )
+    right.set_xlim(left=0.0)
+    right.yaxis.set_major_formatter(PercentFormatter(1.0))
+    right.set_title("b   Reaction time")
+    handles = [
+        Line2D([], [], marker=style.marker(number), ms=3.5, **style.line(number)) for number in range(len(groups))
+    ]
+    _legend(figure, handles, [_label(group) for group in groups])
+    return figure
+
+
+def _label(group: Group) -> str:
+    return style.text(f"{group.name} (n = {len(group.frame):,})")
+
+
+def _legend(figure: style.Picture, handles: Sequence[Artist], labels: Sequence[str]) -> None:
+    figure.legend(handles, labels, loc="outside upper right", ncols=_columns(len(labels)), handlelength=2.8)
+
+
+def _columns(entries: int) -> int:
+    return entries if entries <= 4 else 3
+
+
+def _legend_height(entries: int) -> float:
+    return _LEGEND_LINE_IN * math.ceil(entries / _columns(entries))

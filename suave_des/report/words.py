@@ -1,0 +1,101 @@
+"""What figures call things: words and units in place of names from files."""
+
+from __future__ import annotations
+
+import re
+
+_UNITS = {
+    "_m_per_s": "m/s",
+    "_per_s": "1/s",
+    "_rad": "rad",
+    "_deg": "degrees",
+    "_kg": "kg",
+    "_m3": "m³",
+    "_s": "s",
+    "_m": "m",
+    "_n": "N",
+}
+"""Units by the ending of a key; the longer endings first."""
+_FUNCTIONS = {
+    "f_generate_search_path": "search",
+    "f_follow_pipeline": "follow",
+    "f_maintain_motion": "thrusters",
+    "generate_recharge_path": "recharge",
+}
+_MODES = {
+    "": "before the first mode",
+    "fd_unground": "no function moves it",
+    "__DEFAULT__": "search, default altitude",
+    "fd_spiral_low": "search, low",
+    "fd_spiral_medium": "search, medium",
+    "fd_spiral_high": "search, high",
+    "fd_follow_pipeline": "follow the pipeline",
+    "normal": "to the recharge station",
+    "inactive": "no function moves it",
+}
+"""Modes of the functions that move the vehicle."""
+_OTHER_MODES = {
+    ("f_maintain_motion", "fd_all_thrusters"): "in use",
+    ("f_maintain_motion", "fd_recover_thrusters"): "recovery",
+    ("f_maintain_motion", "__DEFAULT__"): "recovery, default",
+    ("f_follow_pipeline", "__DEFAULT__"): "off",
+    ("f_follow_pipeline", "fd_follow_pipeline"): "on",
+    ("generate_recharge_path", "normal"): "on",
+}
+_OFF = ("fd_unground", "inactive")
+
+
+def key_words(key: str) -> str:
+    """Return what a key of a scenario is called in a figure, with its unit.
+
+    Example:
+        key_words("signals.water_visibility.period_s")  # "water visibility: period (s)"
+    """
+    parts = [part for part in key.split(".") if part not in ("signals", "calibration", "revision")]
+    unit = next((ending for ending in _UNITS if parts and parts[-1].endswith(ending)), "")
+    if unit:
+        parts[-1] = parts[-1].removesuffix(unit)
+    words = []
+    for part in parts:
+        name, _, index = part.partition("[")
+        words.append(_FUNCTIONS.get(name, name).replace("_", " ") + (f" {int(index[:-1]) + 1}" if index else ""))
+        if part.isdecimal():
+            words[-1] = str(int(part) + 1)
+    text = re.sub(r": (\d+)(?=:|$)", r" \1", ": ".join(words))
+    text = text.replace("thruster events", "thruster event")
+    return f"{text}\N{NO-BREAK SPACE}({_UNITS[unit]})" if unit else text
+
+
+def value_words(value: object) -> str:
+    """Return what a value that is a word, such as a mode or a file, is called in a figure."""
+    text = str(value)
+    return _MODES.get(text, plain(text)) if text else "none"
+
+
+def mode_words(mode: str) -> str:
+    """Return what the mode of the function that moves the vehicle is called."""
+    return _MODES.get(mode, plain(mode))
+
+
+def function_words(function: str) -> str:
+    """Return what a function is called."""
+    return _FUNCTIONS.get(function, plain(function.removeprefix("f_")))
+
+
+def function_mode_words(function: str, mode: str) -> str:
+    """Return what a mode is called beside the name of its function."""
+    if mode in _OFF:
+        return "off"
+    text = _OTHER_MODES.get((function, mode)) or _MODES.get(mode, plain(mode))
+    return text.removeprefix(f"{function_words(function)}, ")
+
+
+def is_off(function: str, mode: str) -> bool:
+    """Whether a function does nothing in a mode."""
+    return function_mode_words(function, mode) == "off"
+
+
+def plain(name: str) -> str:
+    """Return a name from a file as words, without what LaTeX or a terminal would take for commands."""
+    text = name.removeprefix("fd_").strip("_").replace("_", " ") or name
+    return text if text.isprintable() else repr(text)[1:-1]
