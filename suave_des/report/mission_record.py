@@ -226,7 +226,7 @@ def _battery_cause(found: Adaptation, record: MissionRecord) -> str:
 
 def battery_level(record: MissionRecord) -> pandas.Series[float] | None:
     """Return the battery's level, 0 to 1, at each point of the trajectory; None without a battery."""
-    return record.trajectory["battery_level"] if "battery_level" in record.trajectory else None
+    return record.trajectory.get("battery_level")
 
 
 def _details(record: MissionRecord, event: str) -> list[tuple[float, str]]:

@@ -20,7 +20,6 @@ from suave_des.report.grouping import grouped
 from suave_des.report.mission_record import (
     MissionRecord,
     adaptations,
-    battery_level,
     failure_spans,
     mode_spans,
     read_mission,
@@ -264,13 +263,6 @@ class TestBattery:
         for span in spans:
             if span.what.startswith("fd_spiral"):
                 assert set(way[span.begin_s + 0.1 : span.end_s - 0.1]) == {span.what}
-
-    def test_its_level_falls_and_is_full_at_the_station(self, record: MissionRecord) -> None:
-        level = battery_level(record)
-        assert level is not None
-        assert level.iloc[250] == pytest.approx(1.0 - 50.0 / 100.0)
-        charged = mode_spans(record)["generate_recharge_path"][-2].begin_s
-        assert level[record.trajectory["t_s"] > charged].iloc[0] == 1.0
 
     def test_it_is_drawn_and_named_as_a_cause(self, record: MissionRecord) -> None:
         assert any("battery" in axes.get_ylabel() for axes in mission_map.draw(record).axes)
