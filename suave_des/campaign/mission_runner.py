@@ -14,7 +14,7 @@ from dataclasses import replace
 from types import FrameType
 
 from suave_des.campaign.knowledge_records import mission_line
-from suave_des.campaign.missions import Failure, Finished, JobSpec, MissionKey, Outcome, row_of
+from suave_des.campaign.missions import Failure, Finished, JobSpec, MissionKey, Outcome, further_of, row_of
 from suave_des.campaign.variation import cell_of
 from suave_des.errors import MissionError
 from suave_des.metrics.result import MissionResult
@@ -67,8 +67,9 @@ class MissionRunner:
             return Failure(error.manager, error.run, error.time_s, error.cause, point=key.point)
         except TimeOut:
             return job.timed_out(key)[1]
-        row = (*row_of(result.metrics), *self._swept, *(result.drawn[path] for path in self._drawn))
-        row = row if member is None else (*row, member)
+        drawn = (result.drawn[path] for path in self._drawn)
+        members = () if member is None else (member,)
+        row = (*row_of(result.metrics), *self._swept, *drawn, *members, *further_of(result))
         return (*row, self._knowledge(key, result)) if job.record_knowledge else row
 
     def _knowledge(self, key: MissionKey, result: MissionResult) -> str:

@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 from suave_des.campaign.output import rounded
 from suave_des.campaign.variation import Variation
 from suave_des.errors import MissionError, SuaveDesError
-from suave_des.metrics.result import MissionMetrics
+from suave_des.metrics.result import MissionMetrics, MissionResult
 from suave_des.scenario.loader import LoadedScenario
 
 
@@ -71,6 +71,11 @@ _cells: Callable[[MissionMetrics], Row] = attrgetter(*COLUMNS)
 def row_of(metrics: MissionMetrics) -> Row:
     """Return the cells of runs.csv, with numbers rounded as in the file, from which all other figures follow."""
     return tuple(rounded(cell) if isinstance(cell, float) else cell for cell in _cells(metrics))
+
+
+def further_of(result: MissionResult) -> Row:
+    """Return the cells of the columns that the scenario asks for, rounded likewise."""
+    return tuple(rounded(cell) if isinstance(cell, float) else cell for cell in result.further.values())
 
 
 class Failure(NamedTuple):

@@ -102,7 +102,7 @@ class CampaignResult:
     @property
     def columns(self) -> tuple[str, ...]:
         """Columns of runs.csv."""
-        return (*COLUMNS, *self.variation.columns)
+        return (*COLUMNS, *self.variation.columns, *self.loaded.scenario.further_columns)
 
     @property
     def summary_columns(self) -> tuple[str, ...]:

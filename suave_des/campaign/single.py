@@ -12,7 +12,7 @@ from typing import Any
 from suave_des.campaign.given import ManagerLike, manager_name
 from suave_des.campaign.knowledge_records import KNOWLEDGE_FILE, knowledge_text
 from suave_des.campaign.manager_inputs import check_managers
-from suave_des.campaign.missions import COLUMNS, row_of
+from suave_des.campaign.missions import COLUMNS, further_of, row_of
 from suave_des.campaign.output import check_output_folder, csv_text, json_text, make_output_folder, write_files
 from suave_des.campaign.provenance import check_knowledge, provenance
 from suave_des.campaign.spec import RUNS_LIMIT, check_range, check_seed
@@ -98,7 +98,7 @@ def _files(
     loaded: LoadedScenario, result: MissionResult, inputs: Mapping[str, str], command: Sequence[str]
 ) -> dict[str, str]:
     mission = {
-        "metrics": dict(zip(COLUMNS, row_of(result.metrics), strict=True)),
+        "metrics": dict(zip((*COLUMNS, *result.further), (*row_of(result.metrics), *further_of(result)), strict=True)),
         "drawn": dict(sorted(result.drawn.items())),
         "scenario": loaded.scenario.model_dump(mode="json"),
         **provenance(loaded, inputs, command),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Container, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
@@ -124,7 +124,7 @@ def print_timeline(console: Console, result: MissionResult) -> None:
     for event in result.events:
         console.print(_event_line(event, sources, names, width), soft_wrap=True)
     console.print()
-    print_trimmed(console, _metrics_table(metrics))
+    print_trimmed(console, _metrics_table(metrics, result.further))
 
 
 def _event_line(event: Event, sources: int, names: int, width: int | None) -> Text:
@@ -142,7 +142,7 @@ def _event_line(event: Event, sources: int, names: int, width: int | None) -> Te
     return text
 
 
-def _metrics_table(metrics: MissionMetrics) -> Table:
+def _metrics_table(metrics: MissionMetrics, further: Mapping[str, float | int | None]) -> Table:
     table = Table.grid(padding=(0, 2))
     table.add_column()
     table.add_column(justify="right")
@@ -157,4 +157,8 @@ def _metrics_table(metrics: MissionMetrics) -> Table:
         table.add_row("mean reaction time", f"{reaction_s:.2f} s")
     table.add_row("adaptations", str(metrics.adaptations))
     table.add_row("mission duration", f"{metrics.mission_duration_s:.1f} s")
+    for column, value in further.items():
+        number = f"{value:.2f}" if isinstance(value, float) else "none" if value is None else str(value)
+        unit = next((f" {unit}" for ending, unit in (("_m2", "m2"), ("_s", "s")) if column.endswith(ending)), "")
+        table.add_row(column.removesuffix("_m2").removesuffix("_s").replace("_", " "), number + unit)
     return table

@@ -22,6 +22,7 @@ class ModeManager:
         nodes: the function's nodes, by function name.
         latency_s: draws the time from a request to its effect.
         listeners: each is called with function and mode when a mode has taken effect.
+        adaptation_listeners: each is called at each adaptation with function, mode before and mode requested.
         adaptations: changes from one mode to another of functions in use; neither a task's first mode of a function nor
             the fd_unground at its end counts.
         requests: requests of another mode than the one before.
@@ -34,6 +35,7 @@ class ModeManager:
     latency_s: Callable[[], float]
     log: Log
     listeners: list[Callable[[str, Mode], None]] = field(default_factory=list)
+    adaptation_listeners: list[Callable[[str, str, str], None]] = field(default_factory=list)
     adaptations: int = 0
     requests: int = 0
     refused: dict[tuple[str, str], int] = field(default_factory=dict)
@@ -65,10 +67,12 @@ class ModeManager:
             self.refused[function, mode] = self.refused.get((function, mode), 0) + 1
             self.log("mode_manager", "refused", self._missing(function, mode))
             return False
-        self._requested[function] = mode
+        before, self._requested[function] = self._requested.get(function, ""), mode
         self.requests += 1
         if function in self._in_use:
             self.adaptations += 1
+            for listener in self.adaptation_listeners:
+                listener(function, before, mode)
         elif mode != UNGROUND_MODE:
             self._in_use.add(function)
         self.log("mode_manager", "mode_requested", f"{function} -> {mode}")

@@ -53,6 +53,7 @@ class ManagedSystem:
         knowledge: gives the knowledge base with its reasoner, opened on the first call.
         record_state: adds a state of knowledge that is reasoned about to the mission's record.
         state_changed: to be called when something that `adapt` depends on has changed of itself, not in a hook.
+        reasoned: to be called with the mission time, s, that reasoning took before an adaptation; a further metric.
         measurements: what monitors have measured, by quality attribute; see `measured`.
         recorded: whether the mission is recorded.
         pose: gives the vehicle's pose now.
@@ -75,6 +76,7 @@ class ManagedSystem:
     knowledge: Callable[[], Deliberation]
     record_state: Callable[[KnowledgeState], None] = lambda state: None
     state_changed: Callable[[], None] = lambda: None
+    reasoned: Callable[[float], None] = lambda duration_s: None
     measurements: Mapping[str, Measured] = field(default_factory=dict)
     recorded: bool = True
     pose: Callable[[], Pose] = _unknown

@@ -124,6 +124,8 @@ class Metacontrol(ManagingSubsystem):
         self._recorded_statuses = conclusion.statuses
         needed = self.objectives.keys() - self._cancelled
         grounded = self._adapter.carry_out(conclusion.plan, self.groundings, needed)
+        if any(self.groundings.get(function) != design for function, design in grounded.items()):
+            self.system.reasoned(latency_s)
         self.groundings |= grounded
         self.objectives |= dict.fromkeys(grounded)
         # From now on a recovered component is as if it had never failed. Kept, its status would make every objective

@@ -99,6 +99,8 @@ class MissionResult:
     """Values drawn for the scenario's distributions in this run, by key path."""
     refused: dict[tuple[str, str], int] = field(default_factory=dict)
     """How many requests of a mode were refused, by function and mode."""
+    further: dict[str, float | int | None] = field(default_factory=dict)
+    """Further metrics and the fulfilment of requirements, if the scenario asks for them, by column."""
 
     def __repr__(self) -> str:
         """Return the metrics as a table, and how much is recorded."""

@@ -10,6 +10,7 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MISSION_FUNCTIONS, SEA_BED_Z_M, SURFACE_Z_M
 from suave_des.errors import shown
+from suave_des.scenario.evaluation import Metrics, Requirement
 from suave_des.scenario.quantities import (
     Coordinate,
     CoordinateDistribution,
@@ -212,6 +213,8 @@ class ReactionMetric(Strict):
     """Fitting altitude for each threshold."""
     battery_limit: Number = 0.25
     """Battery level below which the recharge path is expected to become active."""
+    undone_within_s: Duration = 4.0
+    """An adaptation that is taken back within this time is undone; two cycles of metacontrol in revision 2023."""
 
     @model_validator(mode="after")
     def _paired(self) -> Self:
@@ -334,6 +337,10 @@ class Scenario(Strict):
     """Settings of managing subsystems, by name; an outside manager finds its own under its own name."""
     reaction_metric: ReactionMetric = ReactionMetric()
     """What counts as a reaction."""
+    metrics: Metrics = ()
+    """Further metrics, each with a column of its own; see [further metrics](csv.md#further-metrics)."""
+    requirements: dict[Name, Requirement] = Field(default_factory=dict)
+    """Requirements by name; how far each is fulfilled is a column, requirement_NAME."""
 
     @field_validator("signals", mode="after")
     @classmethod
@@ -351,6 +358,25 @@ class Scenario(Strict):
         """The functions that the mission needs."""
         own = self.mission.functions
         return tuple(dict.fromkeys((*MISSION_FUNCTIONS, *own.lasting, *own.search_pipeline, *own.inspect_pipeline)))
+
+    @property
+    def further_columns(self) -> tuple[str, ...]:
+        """Columns of runs.csv that this scenario has besides those of all."""
+        return (*self.metrics, *(f"requirement_{name}" for name in self.requirements))
+
+    @model_validator(mode="after")
+    def _metrics_fit(self) -> Self:
+        for index, metric in enumerate(self.metrics):
+            if metric in self.metrics[:index]:
+                raise wrong(f"{metric} is given twice", "name each metric once", "metrics")
+        needed = {*self.metrics, *(each.metric for each in self.requirements.values())}
+        if self.battery is None and (missing := [each for each in ("battery_level", "recharges") if each in needed]):
+            raise wrong(f"{missing[0]} needs a battery", "add battery: {}", "metrics")
+        measured = {*self.signals, *(("battery_level",) if self.battery is not None else ())}
+        for name, each in self.requirements.items():
+            if each.attribute is not None and each.attribute not in measured:
+                raise wrong(f"nothing measures {each.attribute} ({name})", "add a signal of that name", "requirements")
+        return self
 
     @model_validator(mode="after")
     def _one_battery(self) -> Self:

@@ -20,6 +20,7 @@ from suave_des.managed.own import FunctionContext, OwnFunction
 from suave_des.managed.recharge import GenerateRechargePath
 from suave_des.managed.search import GenerateSearchPath
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
+from suave_des.metrics.further import Observer
 from suave_des.metrics.reactions import ReactionMeter
 from suave_des.metrics.recording import Recorder
 from suave_des.metrics.result import MissionMetrics, MissionResult
@@ -34,6 +35,7 @@ from suave_des.monitor.monitors import (
     thruster_monitor,
 )
 from suave_des.scenario.models import Battery
+from suave_des.simulation.evaluation import Evaluation
 from suave_des.simulation.host import RAISED, ManagerHost
 from suave_des.simulation.simulator import MissionMemory, Simulator
 from suave_des.vehicle.autopilot import Autopilot
@@ -75,6 +77,9 @@ class MissionRun:
         self._signals = {name: self._measure(name) for name in sorted(self._scenario.signals)}
         self._visibility = self._signals["water_visibility"]
         self._battery = None if self._scenario.battery is None else self._make_battery(self._scenario.battery)
+        self._measured: dict[str, Measured] = {**self._signals}
+        if self._battery is not None:
+            self._measured[self._battery.key] = self._battery
         measured_at_rows(*self._visibility.arrays, memory.visibility_m)
         self._detector = PipelineDetector(
             self.env,
@@ -101,6 +106,16 @@ class MissionRun:
             self._bus.subscribe(self._recorder.diagnostic_of(thresholds_m, battery_limit))
             self.modes.listeners.append(self._recorder.mode_effect)
         self.modes.listeners.append(self._reactions.mode_effect)
+        self._observer: Observer | None = None
+        self._evaluation: Evaluation | None = None
+        if self._scenario.further_columns:
+            undone_within_s = self._scenario.reaction_metric.undone_within_s
+            self._observer = Observer(self.env, undone_within_s, len(simulator.vehicle_model.thrusters))
+            self.modes.listeners.append(self._observer.mode_effect)
+            self.modes.adaptation_listeners.append(self._observer.adapted)
+            self._evaluation = Evaluation(
+                self._scenario, self._observer, self._vehicle, memory.visibility_m, self._measured, self._battery
+            )
         self._coordinator = self._make_coordinator()
         self._host = self._make_host(kind)
         self._coordinator.start(self._host.request, self._host.cancel)
@@ -156,7 +171,8 @@ class MissionRun:
         measured = {} if self._battery is None else {self._battery.key: self._battery}
         trajectory = recorder.trajectory(self._vehicle, self._visibility, measured)
         events, knowledge = tuple(recorder.events), tuple(recorder.knowledge)
-        return MissionResult(metrics, events, trajectory, knowledge, drawn, self.modes.refused)
+        further = {} if self._evaluation is None else self._evaluation.further(metrics, float(self.env.now))
+        return MissionResult(metrics, events, trajectory, knowledge, drawn, self.modes.refused, further)
 
     def _guarded(self, run: Callable[..., object], *arguments: object) -> None:
         try:
@@ -188,6 +204,11 @@ class MissionRun:
             detection_x_m=x_m,
             detection_y_m=y_m,
         )
+
+    def _set_thruster_health(self, t_s: float, thruster: int, health: float) -> None:
+        self._vehicle.set_thruster_health(t_s, thruster, health)
+        if self._observer is not None:
+            self._observer.thrusters_changed(self._vehicle.working_thrusters)
 
     def _make_vehicle(self, memory: MissionMemory) -> Vehicle:
         value, calibration = self._chance.value, self._scenario.calibration
@@ -253,7 +274,7 @@ class MissionRun:
         for n, event in enumerate(self._scenario.thruster_events):
             time_s = self._chance.draw(f"thruster_events.{n}.time_s", event.time_s, least=0.0)
             faults.append(ThrusterFault(event.thruster, event.event == "failure", time_s))
-        monitors, set_health = self._revision.monitors, self._vehicle.set_thruster_health
+        monitors, set_health = self._revision.monitors, self._set_thruster_health
         period_s, after_previous = monitors.thruster_check_period_s, monitors.thruster_event_times == "after_previous"
         phase_s = self._monitor_phase_s("thruster_monitor", period_s)
         self.env.process(thruster_monitor(self.env, self._bus, faults, set_health, phase_s, after_previous, period_s))
@@ -273,7 +294,7 @@ class MissionRun:
         self._follow = FollowPipeline(env, make_sender(follow), revision.follow, self._path)
         nodes: dict[str, FunctionNode] = {
             domain.MAINTAIN_MOTION: MaintainMotion(
-                env, self._bus, revision.recovery, self._vehicle.set_thruster_health, recovery_s
+                env, self._bus, revision.recovery, self._set_thruster_health, recovery_s
             ),
             search: GenerateSearchPath(
                 env, make_sender(search), revision.spiral, self._origin_m, view_tangent, phase_s, ready_s
@@ -329,9 +350,6 @@ class MissionRun:
 
     def _make_host(self, kind: type[ManagingSubsystem] | None) -> ManagerHost:
         name = self._manager
-        measurements: dict[str, Measured] = {**self._signals}
-        if self._battery is not None:
-            measurements[self._battery.key] = self._battery
         system = ManagedSystem(
             env=self.env,
             scenario=self._scenario,
@@ -343,7 +361,8 @@ class MissionRun:
             knowledge=lambda: self._simulator.knowledge,
             record_state=self._recorder.record_state,
             state_changed=lambda: self._host.state_changed(),
-            measurements=measurements,
+            measurements=self._measured,
+            reasoned=(lambda duration_s: None) if self._observer is None else self._observer.reasoned,
             recorded=self._recorder.enabled,
             pose=lambda: self._vehicle.pose(self.env.now),
             distance_inspected_m=lambda: self._follow.distance_m,

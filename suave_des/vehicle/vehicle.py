@@ -132,6 +132,11 @@ class Vehicle:
             self._effectiveness[:] = allocation_matrix(self.model) * self._health
             self._notify(t_s)
 
+    @property
+    def working_thrusters(self) -> int:
+        """How many thrusters give thrust."""
+        return int(np.count_nonzero(self._health))
+
     def queue_waypoints(
         self, t_s: float, waypoints: Array, sent_as_m: Point, check: ArrivalCheck, *, first: int, last: int, send: bool
     ) -> tuple[list[int], int]:

@@ -1,0 +1,118 @@
+"""Further metrics of a mission, for scenarios that ask for them, and to which degree requirements are fulfilled."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import simpy
+
+from suave_des.metrics.result import MissionMetrics
+from suave_des.monitor.measurements import Measured
+from suave_des.scenario.evaluation import Requirement
+from suave_des.scenario.modes import Mode
+
+Value = float | int | None
+
+
+@dataclass(eq=False)
+class Observer:
+    """Notes during the mission what further metrics are computed from.
+
+    Attributes:
+        env: the mission's clock.
+        undone_within_s: a change of mode that is taken back within this time counts as undone.
+        thrusters: how many there are.
+        adaptations_undone: changes of a function's mode that were taken back in time: indecision.
+        reasoning_time_s: mission time that the reasoner took in cycles that changed a function design.
+        surfacing_time_s: from the leak to the surface; none while the vehicle has not surfaced.
+    """
+
+    env: simpy.Environment
+    undone_within_s: float
+    thrusters: int
+    adaptations_undone: int = 0
+    reasoning_time_s: float = 0.0
+    surfacing_time_s: float | None = None
+    _changes: dict[str, tuple[float, str]] = field(default_factory=dict)  # of each function: when, and from which mode
+    _in_force: dict[str, str] = field(default_factory=dict)
+    _in_force_since_s: float = 0.0
+    _configurations: set[frozenset[tuple[str, str]]] = field(default_factory=set)
+    _working: list[tuple[float, int]] = field(default_factory=list)
+
+    def adapted(self, function: str, before: str, after: str) -> None:
+        """Take a change of mode of a function in use."""
+        changed_s, from_mode = self._changes.get(function, (-self.undone_within_s, ""))
+        is_undone = after == from_mode and self.env.now - changed_s <= self.undone_within_s
+        self.adaptations_undone += is_undone
+        # What is taken back is over: changing a third time does not undo the undoing.
+        self._changes[function] = (self.env.now, "" if is_undone else before)
+
+    def mode_effect(self, function: str, mode: Mode) -> None:
+        """Take a mode that takes effect."""
+        self._count_configuration()
+        self._in_force[function] = mode.name
+
+    def _count_configuration(self) -> None:
+        """Count the configuration in force, unless it was only passed through."""
+        if self._in_force and self.env.now > self._in_force_since_s:
+            self._configurations.add(frozenset(self._in_force.items()))
+        self._in_force_since_s = self.env.now
+
+    def reasoned(self, duration_s: float) -> None:
+        """Take the time that the reasoner took in a cycle that changed something."""
+        self.reasoning_time_s += duration_s
+
+    def thrusters_changed(self, working: int) -> None:
+        """Take a change of the number of thrusters that work."""
+        self._working.append((self.env.now, working))
+
+    def configurations(self) -> int:
+        """How many configurations, one mode for each function, have been in force until now."""
+        self._count_configuration()
+        return len(self._configurations)
+
+    def operational_thrusters(self) -> float:
+        """Mean over mission time of the number of thrusters that work."""
+        if self.env.now <= 0.0:
+            return float(self.thrusters)
+        steps = [(0.0, self.thrusters), *self._working, (self.env.now, 0)]
+        return sum((later - since) * count for (since, count), (later, _) in pairwise(steps)) / self.env.now
+
+
+def fulfilments(
+    requirements: Mapping[str, Requirement],
+    metrics: MissionMetrics,
+    further: Mapping[str, Value],
+    measured: Mapping[str, Measured],
+    now_s: float,
+) -> dict[str, float | None]:
+    """To which degree each requirement is fulfilled, from 0 to 1; none where there is no value.
+
+    Args:
+        requirements: by name.
+        metrics, further: of the mission.
+        measured: what monitors have measured, by quality attribute.
+        now_s: mission time.
+    """
+    found: dict[str, float | None] = {}
+    for name, requirement in requirements.items():
+        if requirement.attribute is not None:
+            found[name] = _over_time(requirement, measured[requirement.attribute], now_s)
+            continue
+        metric = str(requirement.metric)
+        value = further[metric] if metric in further else getattr(metrics, metric)
+        found[name] = None if value is None else requirement.fulfilment(float(value))
+    return found
+
+
+def _over_time(requirement: Requirement, measured: Measured, now_s: float) -> float | None:
+    count = measured.published(now_s)
+    times_s, values = measured.times_s[:count], measured.values[:count]
+    if not count or now_s <= times_s[0]:
+        return None
+    ends_s = (*times_s[1:], now_s)
+    shares = zip(times_s, ends_s, values, strict=True)
+    total_s = sum((end_s - since_s) * requirement.fulfilment(value) for since_s, end_s, value in shares)
+    return float(total_s / (now_s - times_s[0]))

@@ -1,0 +1,166 @@
+"""Further metrics: indecision, configurations, reasoning, area, thrusters; and requirements fulfilled in part."""
+
+import math
+
+import numpy as np
+import pytest
+import simpy
+from hypothesis import given
+from hypothesis import strategies as st
+
+from suave_des.errors import InputError
+from suave_des.metrics.further import Observer
+from suave_des.scenario.evaluation import FURTHER_METRICS, Requirement
+from suave_des.scenario.loader import load_scenario
+from suave_des.scenario.modes import Mode
+from suave_des.simulation.simulator import Simulator
+from suave_des.world.coverage import covered_area_m2
+
+TANGENT = math.tan(math.radians(30.0))
+
+
+class Watched:
+    """An observer whose clock is set by the test."""
+
+    def __init__(self) -> None:
+        self.env = simpy.Environment()
+        self.observer = Observer(self.env, undone_within_s=4.0, thrusters=6)
+
+    def at(self, t_s: float) -> Observer:
+        if t_s > self.env.now:
+            self.env.run(until=t_s)
+        return self.observer
+
+
+@pytest.mark.parametrize(
+    ("changes", "undone"),
+    [
+        ([(0.0, "a", "b"), (4.0, "b", "a")], 1),
+        ([(0.0, "a", "b"), (4.5, "b", "a")], 0),
+        ([(0.0, "a", "b"), (2.0, "b", "c")], 0),
+        ([(0.0, "a", "b"), (2.0, "b", "a"), (4.0, "a", "b")], 1),
+        ([(0.0, "a", "b"), (2.0, "b", "a"), (4.0, "a", "b"), (6.0, "b", "a")], 2),
+    ],
+)
+def test_a_change_taken_back_in_time_is_undone(changes: list[tuple[float, str, str]], undone: int) -> None:
+    watched = Watched()
+    for t_s, before, after in changes:
+        watched.at(t_s + 1.0).adapted("f", before, after)
+    assert watched.observer.adaptations_undone == undone
+
+
+def test_changes_of_different_functions_do_not_undo_each_other() -> None:
+    watched = Watched()
+    watched.at(1.0).adapted("f", "a", "b")
+    watched.at(2.0).adapted("g", "b", "a")
+    assert watched.observer.adaptations_undone == 0
+
+
+def test_configurations_are_counted_once_each_and_not_when_passed_through() -> None:
+    watched = Watched()
+    for t_s, function, mode in [(1.0, "f", "a"), (2.0, "g", "x"), (3.0, "f", "b"), (3.0, "g", "y"), (5.0, "f", "a")]:
+        watched.at(t_s).mode_effect(function, Mode(mode, True, {}))
+    watched.at(6.0).mode_effect("g", Mode("x", True, {}))  # f = a, g = x again
+    assert watched.at(7.0).configurations() == len([{"f": "a"}, {"a", "x"}, {"b", "y"}, {"a", "y"}])
+
+
+def test_operational_thrusters_are_a_mean_over_time() -> None:
+    watched = Watched()
+    watched.at(10.0).thrusters_changed(5)
+    watched.at(30.0).thrusters_changed(6)
+    assert watched.at(40.0).operational_thrusters() == pytest.approx((10 * 6 + 20 * 5 + 10 * 6) / 40)
+
+
+def track_of(*places: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
+    rows = np.repeat(np.array(places), 4, axis=0)  # each fourth row counts
+    return rows, np.full(len(rows), 3.0)
+
+
+def test_a_camera_at_rest_has_seen_one_square() -> None:
+    track, visibility_m = track_of((0.0, 0.0, -18.0))
+    side_m = 2 * 2.0 * TANGENT
+    assert covered_area_m2(track, 3, visibility_m, -20.0, TANGENT) == pytest.approx(side_m**2, rel=0.1)
+
+
+def test_what_is_seen_twice_counts_once() -> None:
+    track, visibility_m = track_of((0.0, 0.0, -18.0), (1.0, 0.0, -18.0), (0.0, 0.0, -18.0))
+    side_m = 2 * 2.0 * TANGENT
+    assert covered_area_m2(track, 11, visibility_m, -20.0, TANGENT) == pytest.approx(side_m * (side_m + 1), rel=0.1)
+
+
+@pytest.mark.parametrize("visibility_m", [1.9, math.nan])
+def test_in_murky_water_nothing_is_seen(visibility_m: float) -> None:
+    track, _ = track_of((0.0, 0.0, -18.0))
+    assert covered_area_m2(track, 3, np.full(4, visibility_m), -20.0, TANGENT) == 0.0
+
+
+@given(st.sampled_from(["at_least", "at_most", "close_to"]), st.floats(-9, 9), st.floats(0, 9), st.floats(-99, 99))
+def test_fulfilment_is_a_degree_and_full_where_the_value_is_as_required(relation, value, tolerance, measured) -> None:
+    requirement = Requirement(metric="search_time_s", relation=relation, value=value, tolerance=tolerance)
+    assert 0.0 <= requirement.fulfilment(measured) <= 1.0
+    assert requirement.fulfilment(value) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("relation", "measured", "degree"),
+    [("at_most", 130.0, 0.75), ("at_most", 160.0, 0.0), ("at_least", 90.0, 0.75), ("close_to", 140.0, 0.5)],
+)
+def test_fulfilment_falls_in_a_line_over_the_tolerance(relation: str, measured: float, degree: float) -> None:
+    value = {"at_most": 120.0, "at_least": 100.0, "close_to": 120.0}[relation]
+    requirement = Requirement(metric="search_time_s", relation=relation, value=value, tolerance=40.0)
+    assert requirement.fulfilment(measured) == pytest.approx(degree)
+
+
+@pytest.fixture
+def mission(tmp_path):
+    def fly(text: str, manager: str = "none", run: int = 3):
+        (tmp_path / "mine.yaml").write_text(text, encoding="utf-8")
+        return Simulator(load_scenario(tmp_path / "mine.yaml")).run(manager, run=run, seed=1)
+
+    return fly
+
+
+def test_a_requirement_on_a_measured_value_is_a_mean_over_time(mission) -> None:
+    text = (
+        "base: release15.yaml\n"
+        "signals: {water_visibility: {kind: step, before: 3.0, after: 1.0, time_s: 100}}\n"
+        "requirements: {see: {attribute: water_visibility, relation: at_least, value: 2.0, tolerance: 2.0}}\n"
+    )
+    assert mission(text).further["requirement_see"] == pytest.approx((100 * 1.0 + 200 * 0.5) / 300, abs=0.01)
+
+
+def test_reasoning_takes_the_scenarios_time_in_each_cycle_that_adapts(mission) -> None:
+    text = "base: release15.yaml\nlatencies: {inference_s: 0.5}\nmetrics: [reasoning_time_s]\n"
+    assert mission(text, "metacontrol").further["reasoning_time_s"] % 0.5 == 0.0
+    assert mission(text, "metacontrol").further["reasoning_time_s"] > 0.0
+    assert mission(text, "none").further["reasoning_time_s"] == 0.0
+
+
+def test_all_of_them_leave_the_mission_as_it_is(mission) -> None:
+    metrics = ", ".join(name for name in FURTHER_METRICS if name != "surfacing_time_s")
+    plain = mission("base: extended.yaml\nname: mine\nmetrics: []\n", "metacontrol")
+    observed = mission(f"base: extended.yaml\nname: mine\nmetrics: [{metrics}]\n", "metacontrol")
+    assert observed.metrics == plain.metrics
+    assert set(observed.further) >= set(metrics.split(", "))
+
+
+@pytest.mark.parametrize(
+    ("line", "problem"),
+    [
+        ("metrics: [area]", "'area' is not allowed"),
+        ("metrics: [configurations, configurations]", "configurations is given twice"),
+        ("metrics: [battery_level]", "battery_level needs a battery"),
+        ("requirements: {a: {relation: at_least, value: 1}}", "is about no value, or about two"),
+        ("requirements: {a: {metric: adaptations, relation: above, value: 1}}", "'above' is not allowed"),
+        (
+            "requirements: {a: {attribute: water_current, relation: at_most, value: 1}}",
+            "nothing measures water_current",
+        ),
+        ("requirements: {a: {metric: adaptations, relation: at_most, value: 1, tolerance: -1}}", "-1 is out of range"),
+    ],
+)
+def test_what_cannot_be_evaluated_is_refused(mission, line: str, problem: str) -> None:
+    with pytest.raises(InputError) as caught:
+        mission(f"base: seams2023.yaml\n{line}\n")
+    assert problem in caught.value.problem
+    assert "line 2" in str(caught.value.place)
