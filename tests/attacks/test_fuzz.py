@@ -1,0 +1,152 @@
+"""Damaged input of every kind is refused in one line, or works: never a traceback, never for ever.
+
+    pytest -m slow tests/attacks
+
+runs all of it; SUAVE_DES_FUZZ=20000 sets how many texts of each kind are tried, in place of 400.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from suave_des.campaign.campaign import run_campaign
+from suave_des.errors import InputError, SuaveDesError
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rules.files import RulesFile
+from suave_des.report.figures import draw_folder
+from suave_des.resources import shipped_folder
+from suave_des.scenario.exemplar import ImportOptions, import_config
+from suave_des.scenario.exemplar_releases import RELEASES
+from suave_des.scenario.loader import load_scenario, with_values
+from suave_des.simulation.simulator import Simulator
+from tests.helpers.mutation import damaged
+from tests.scenario.test_import_config import MANAGERS, MISSION_15, MISSION_2023, RUNNER
+
+CASES = int(os.environ.get("SUAVE_DES_FUZZ", "400"))
+LONGEST_S = 60
+SCENARIO = (shipped_folder("scenarios") / "release15.yaml").read_text(encoding="utf-8")
+RULE = """\
+# a comment
+spare: hasQAvalue(?fg, ?q) ^ isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ lessThan(?v, 3.5)
+       -> fd_realisability(fd_spiral_high, false)
+other: Objective(?o) ^ o_status(?o, "UNGROUNDED") ^ swrlb:add(?s, 1, 2) -> o_updatable(?o, true)
+"""
+
+# The cases that once led to a traceback, an endless loop or a wrong answer.
+BAD_VALUES = {
+    "signals.water_visibility.period_s": 5e-324,
+    "revision.coordinator.limit_check_period_s": 1e9,
+    "thruster_events.²": 1,
+    "thruster_events.０": 1,
+    "thruster_events.1_0": 1,
+}
+BAD_EVENTS = ("(１,failure,35)", "(1,failure,1_0)", "(1_0,failure,3)", "(1,failure,٣)")
+
+
+@contextmanager
+def in_time() -> Iterator[None]:
+    """Fail a block that takes too long."""
+
+    def late(*_: object) -> None:
+        raise AssertionError(f"not done after {LONGEST_S} s")
+
+    before = signal.signal(signal.SIGALRM, late)
+    signal.alarm(LONGEST_S)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def refused_in_one_line_or_done(work: Callable[[], object]) -> bool:
+    """Whether it was done; an error must be meant for the user, in one line."""
+    with in_time():
+        try:
+            work()
+        except SuaveDesError as error:
+            assert len(str(error).splitlines()) == 1, str(error)
+            return False
+        return True
+
+
+@pytest.mark.parametrize("path", BAD_VALUES)
+def test_values_that_no_mission_can_have_are_refused(path: str) -> None:
+    with pytest.raises(InputError):
+        with_values(load_scenario("release15"), {path: BAD_VALUES[path]})
+
+
+@pytest.mark.parametrize("event", BAD_EVENTS)
+def test_digits_that_only_python_takes_for_such_are_refused(event: str) -> None:
+    with pytest.raises(InputError, match="expected"):
+        with_values(load_scenario("release15"), {"thruster_events": [event]})
+
+
+@pytest.mark.slow
+def test_scenarios(tmp_path: Path) -> None:
+    path, done = tmp_path / "damaged.yaml", 0
+    for seed in range(CASES):
+        path.write_text(damaged(SCENARIO, seed, ("revision: 2023", "kind: table", "base: seams2023")), encoding="utf-8")
+
+        def mission() -> None:
+            loaded = load_scenario(path)
+            if loaded.scenario.mission.time_limit_s < 1000:
+                Simulator(loaded).run("none", 1, 1)
+
+        done += refused_in_one_line_or_done(mission)
+    assert 0 < done < CASES
+
+
+@pytest.mark.slow
+def test_rules(tmp_path: Path) -> None:
+    path, done, vocabulary = tmp_path / "damaged.swrl", 0, Ontology.load().vocabulary
+    for seed in range(CASES):
+        path.write_text(
+            damaged(RULE, seed, ("->", "^", "?x", "swrlb:equal(?x, ?x)", "sameAs(?a, ?b)")), encoding="utf-8"
+        )
+        done += refused_in_one_line_or_done(lambda: RulesFile.read(path).rules(vocabulary))
+    assert 0 < done < CASES
+
+
+@pytest.mark.slow
+def test_what_is_imported_of_the_exemplar_s_files_can_be_loaded(tmp_path: Path) -> None:
+    mission_file, runner_file, out = tmp_path / "mission.yaml", tmp_path / "runner.yaml", tmp_path / "mine.yaml"
+    campaign, done = tmp_path / "campaign.yaml", 0
+    for seed in range(CASES):
+        mission = (MISSION_2023, MISSION_15)[seed % 2]
+        mission_file.write_text(damaged(mission, seed, ("task_bridge:", "(1,failure,-3)")), encoding="utf-8")
+        runner_file.write_text(damaged(RUNNER, seed + CASES), encoding="utf-8")
+        options = ImportOptions(
+            revision=list(RELEASES)[seed % len(RELEASES)],
+            campaign=campaign,
+            runner_seed=seed if seed % 3 == 0 else None,
+            managers=MANAGERS,
+        )
+        imported = []
+        if not refused_in_one_line_or_done(
+            lambda options=options, imported=imported: imported.append(
+                import_config([mission_file, runner_file], out, options)
+            )
+        ):
+            continue
+        out.write_text(imported[0].scenario, encoding="utf-8")
+        load_scenario(out)  # what import writes is accepted
+        done += 1
+    assert 0 < done < CASES
+
+
+@pytest.mark.slow
+def test_results(tmp_path: Path) -> None:
+    run_campaign("seams2023", ["none", "bt"], 4, 1, out=tmp_path / "out")
+    runs, done = tmp_path / "out" / "runs.csv", 0
+    whole = runs.read_text(encoding="utf-8")
+    for seed in range(min(CASES, 150)):
+        runs.write_text(damaged(whole, seed, ("inf", "-inf", "nan", "-5", '"', "=1+1")), encoding="utf-8")
+        done += refused_in_one_line_or_done(lambda: draw_folder(tmp_path / "out", tmp_path / "out.png"))
+    assert done > 0

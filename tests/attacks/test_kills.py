@@ -1,0 +1,61 @@
+"""Kills at random moments: no mission is lost or counted twice, and no byte differs."""
+
+from __future__ import annotations
+
+import random
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from benchmarks import chaos
+from suave_des.campaign.campaign import run_campaign
+
+FILES = ("runs.csv", "summary.csv", "manifest.json")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+def test_a_campaign_that_is_stopped_again_and_again_has_the_same_bytes(tmp_path: Path, number: signal.Signals) -> None:
+    (tmp_path / "short.yaml").write_text(chaos.SHORT)
+    arguments = ["short.yaml", "--managers", ",".join(chaos.MANAGERS), "--runs", "400"]
+    whole = chaos.start([*arguments, "--out", "whole"], tmp_path)
+    assert chaos.ended(whole)[0] == 0
+    stream = random.Random(number)
+    process = chaos.start([*arguments, "--out", "killed"], tmp_path)
+    for _ in range(12):
+        time.sleep(stream.uniform(0.2, 3.0))
+        process.send_signal(number)
+        status, told = chaos.ended(process)
+        assert status in (0, -number, 128 + number), told
+        assert "Traceback" not in told
+        again = (
+            ["--resume", "killed"]
+            if (tmp_path / "killed" / "campaign.sqlite").is_file()
+            else [*arguments, "--out", "killed"]
+        )
+        process = chaos.start(again, tmp_path)
+    status, told = chaos.ended(process)
+    assert status == 0, told
+    for name in FILES[:2]:
+        assert (tmp_path / "killed" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+@pytest.mark.slow
+def test_an_overwriting_campaign_that_is_killed_leaves_no_results_of_the_old_one(tmp_path: Path) -> None:
+    (tmp_path / "short.yaml").write_text(chaos.SHORT)
+    stream = random.Random(1)
+    for _ in range(12):
+        run_campaign(tmp_path / "short.yaml", ["none"], 5, 1, out=tmp_path / "out", overwrite=True)
+        arguments = ["short.yaml", "--managers", "random", "--runs", "3000", "--out", "out", "--overwrite"]
+        process = chaos.start(arguments, tmp_path)
+        time.sleep(stream.uniform(0.5, 4.0))
+        process.kill()
+        chaos.ended(process)
+        runs = tmp_path / "out" / "runs.csv"
+        if runs.is_file() and (tmp_path / "out" / "campaign.sqlite").is_file():
+            managers = {line.split(",")[1] for line in runs.read_text().splitlines()[1:]}
+            resumed = chaos.start(["--resume", "out"], tmp_path)
+            assert chaos.ended(resumed)[0] == 0
+            assert managers == {line.split(",")[1] for line in runs.read_text().splitlines()[1:]}
