@@ -25,6 +25,9 @@ _FIRST_LINE_S, _LINE_PERIOD_S = 10.0, 30.0
 _RATE_PERIOD_S = 10.0
 """Missions a second are those of this time."""
 _NOTEBOOK_WIDTH = 90
+_WAITS_S = 2.0
+_STARTING = "starting (the first time on this machine, missions are compiled)"
+_WAITING = "Java starts, or missions are long"
 
 
 @contextmanager
@@ -61,6 +64,7 @@ class _Display(RichProgress):
         self.progress: Progress | None = None
         self._groups: tuple[GroupProgress, ...] = ()
         self._due_s = 0.0
+        self._done, self._done_s = 0, time.monotonic()
         self._began_s = time.monotonic()
         super().__init__(
             BarColumn(22),
@@ -79,6 +83,8 @@ class _Display(RichProgress):
     def show(self, progress: Progress) -> None:
         """Take what is known; called for each mission or chunk."""
         now = time.monotonic()
+        if progress.done != self._done:
+            self._done, self._done_s = progress.done, now
         is_first, self.progress = self.progress is None, progress
         if now >= self._due_s:
             self._due_s = now + _UPDATE_PERIOD_S
@@ -101,8 +107,12 @@ class _Display(RichProgress):
     def get_renderables(self) -> Iterator[RenderableType]:
         """Yield what is drawn, from top to bottom."""
         if not self._groups:
-            yield Text(f"{self.label}: starting, {duration(time.monotonic() - self._began_s)}")
+            yield Text(f"{self.label}: {_STARTING}, {duration(time.monotonic() - self._began_s)}")
             return
+        waiting_s = time.monotonic() - self._done_s
+        if waiting_s > _WAITS_S and self.progress is not None and self.progress.done < self.progress.total:
+            # What was left at the rate before says nothing now.
+            self._task.fields["left"] = f"no mission done for {duration(waiting_s)}: {_WAITING}"
         yield Text(self.label, "bold", no_wrap=True, overflow="ellipsis")
         yield self.make_tasks_table(self.tasks)
         table = Table(box=None, padding=(0, 1), pad_edge=False)
@@ -123,7 +133,7 @@ class _Display(RichProgress):
     def line(self) -> str:
         """Return the same in one line."""
         if (progress := self.progress) is None:
-            return f"suave-des: {self.label}: starting"
+            return f"suave-des: {self.label}: {_STARTING}"
         last = self._groups[-1]
         means = [
             f"{self._name(group)} {estimated(group.mean, group.half_width)}"

@@ -21,6 +21,7 @@ from suave_des.errors import InputError
 
 if TYPE_CHECKING:
     from suave_des.campaign.campaign import CampaignResult
+    from suave_des.campaign.missions import Failure
 
 _FAILURES_SHOWN = 20
 _MANAGERS, _RUNS, _SEED = "none,random,metacontrol", "20", "1"
@@ -40,7 +41,7 @@ def campaign(
     scenario: Annotated[
         str | None,
         typer.Argument(
-            metavar="[SCENARIO]",
+            metavar="SCENARIO",
             help="A scenario or campaign file, or the name of a shipped scenario.",
             show_default=False,
         ),
@@ -215,10 +216,15 @@ def exit_telling_failures(result: CampaignResult) -> None:
     if not result.failures:
         return
     console = errors()
-    for failure in result.failures[:_FAILURES_SHOWN]:
-        line = " ".join(str(failure).split())
-        console.print(f"suave-des: failed: {line}", soft_wrap=True, markup=False)
-    more = len(result.failures) - _FAILURES_SHOWN
+    alike: dict[tuple[str, str], list[Failure]] = {}
+    for failure in result.failures:
+        alike.setdefault((failure.manager, failure.cause), []).append(failure)
+    groups = list(alike.values())
+    for first, *others in groups[:_FAILURES_SHOWN]:
+        line = " ".join(str(first).split())
+        count = f" ({len(others) + 1} missions like this)" if others else ""
+        console.print(f"suave-des: failed: {line}{count}", soft_wrap=True, markup=False)
+    more = sum(map(len, groups[_FAILURES_SHOWN:]))
     if more > 0:
         where = "" if result.folder is None else f", all of them in {result.folder}/manifest.json"
         console.print(f"suave-des: failed: {more} more{where}", soft_wrap=True, markup=False)

@@ -25,8 +25,28 @@ BAD_INPUT, MISSIONS_MISSING = 2, 3
 """Exit statuses besides 0 and those of signals; 3: done, but failed missions have no row."""
 
 
+_GROUPS = (
+    ("Run missions", ("reproduce", "run", "campaign")),
+    ("Look at results", ("compare", "figure", "report", "replay", "validate")),
+    ("Knowledge and rules", ("kb",)),
+    ("Files", ("import-config", "scenarios", "schema")),
+)
+"""Headings of the help and their commands; those of packages besides, and what is seldom needed, come last."""
+
+
 class _Commands(TyperGroup):
-    """Handles interruptions before typer does, which would not report what is kept."""
+    """Handles interruptions before typer does, which would not report what is kept; groups commands in the help."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands under headings, each with the whole first line of its help."""
+        names = self.list_commands(ctx)
+        known = [name for _, group in _GROUPS for name in group]
+        for heading, group in (*_GROUPS, ("Other", [name for name in names if name not in known])):
+            commands = [(name, self.get_command(ctx, name)) for name in group if name in names]
+            rows = [(name, command.get_short_help_str(limit=200)) for name, command in commands if command is not None]
+            if rows:
+                with formatter.section(heading):
+                    formatter.write_dl(rows)
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command."""
@@ -54,7 +74,8 @@ def _usage_line(error: Any) -> str:
 app = typer.Typer(
     name="suave-des",
     cls=_Commands,
-    add_completion=False,
+    add_completion=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     help="SUAVE, the self-adaptive underwater vehicle exemplar, as a repeatable discrete-event simulation.",

@@ -79,21 +79,26 @@ def print_comparison(console: Console, comparison: PaperComparison) -> None:
     from suave_des.report.runs import METRICS
 
     for metric, title in METRICS.items():
-        print_table(console, title, _table([figure for figure in comparison.figures if figure.metric == metric]))
+        figures = [figure for figure in comparison.figures if figure.metric == metric]
+        table = _table(figures, " to ")
+        if console.measure(table, options=console.options.update(width=1000)).maximum > console.width:
+            table = _table(figures, "..")
+        print_table(console, title, table)
         console.print()
     for line in comparison.remarks():
         console.print(fill(line, min(console.width, _TEXT_WIDTH)))
 
 
-def _table(figures: Sequence[PaperFigure]) -> Table:
+def _table(figures: Sequence[PaperFigure], between: str) -> Table:
+    """A table of figures, with `between` in the intervals' middle."""
     from suave_des.cli.console import plain_table
 
     table = plain_table()
     table.add_column("manager", min_width=12)
     table.add_column("", min_width=5)
     for heading in ("paper", "95% interval", "here", "95% interval", "difference"):
-        table.add_column(heading, justify="right", min_width=8)
+        table.add_column(heading, justify="right", min_width=8, no_wrap=True)
     table.add_column("")
     for figure in figures:
-        table.add_row(figure.manager, figure.statistic, *figure.cells())
+        table.add_row(figure.manager, figure.statistic, *(cell.replace(" to ", between) for cell in figure.cells()))
     return table

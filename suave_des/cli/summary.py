@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from suave_des.campaign.campaign import CampaignResult
 
 _STOPS_LISTED = 8
+_ROWS_SHOWN = 40
+"""Of a sweep with more, the first ones."""
 
 
 def print_summary(console: Console, result: CampaignResult) -> None:
@@ -28,6 +30,10 @@ def print_summary(console: Console, result: CampaignResult) -> None:
             break
     title = f"{result.loaded.scenario.name}, seed {result.seed}: means ± half their 95% intervals"
     print_table(console, f"{title}, standard deviations" if has_std else title, table)
+    if len(result.summary) > _ROWS_SHOWN:
+        more = len(result.summary) - _ROWS_SHOWN + 1
+        where = "" if result.folder is None else f", all in {result.folder}/summary.csv"
+        console.print(f"... and {more} rows more{where}", soft_wrap=True)
 
 
 def _summary(result: CampaignResult, *, breaks_names: bool, has_std: bool) -> Table:
@@ -41,18 +47,24 @@ def _summary(result: CampaignResult, *, breaks_names: bool, has_std: bool) -> Ta
         table.add_column(METRIC_TITLES[metric], justify="right", no_wrap=True)
         if has_std:
             table.add_column("std", justify="right", no_wrap=True)
-    for row in result.summary:
+    rows = result.summary if len(result.summary) <= _ROWS_SHOWN else result.summary[: _ROWS_SHOWN - 1]
+    for row in rows:
         cells = dict(zip(SUMMARY_COLUMNS, row, strict=False))
         share = cells["found_share"]
         manager = str(cells["manager"])
         table.add_row(
-            *map(str, row[len(SUMMARY_COLUMNS) :]),
+            *map(_shown, row[len(SUMMARY_COLUMNS) :]),
             manager.replace(":", ":\n") if breaks_names else manager,
             str(cells["n"]),
             "" if share is None else f"{float(share):.0%}",
             *(text for metric in METRICS for text in _figures(cells, metric)[: 1 + has_std]),
         )
     return table
+
+
+def _shown(value: object) -> str:
+    """A swept value, rounded for reading; files have all digits."""
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _figures(cells: Mapping[str, object], metric: str) -> tuple[str, str]:

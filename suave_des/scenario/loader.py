@@ -185,6 +185,9 @@ def load_layer(files: Files, layer: Layer, path: Path, **replacements: Unpack[Re
     Raises:
         InputError: as load_scenario does.
     """
+    if "campaign" in layer.data and "scenario" in layer.data:
+        remedy = f"suave-des campaign {path} --out DIR runs it; its scenario is {layer.data['scenario']}"
+        raise layer.error("this is a campaign file, not a scenario", ("campaign",), remedy)
     layer = Layer({**layer.data, "name": _name(layer, path)}, layer.places)
     scenario = validated(layer, Scenario)
     knowledge = scenario.knowledge
