@@ -6,7 +6,15 @@ from operator import attrgetter
 
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.quantities import Distribution, Drawn, draw
-from suave_des.scenario.signal_kinds import ConstantSignal, Signal, SignalTable, SinusoidSignal, StepSignal, TableSignal
+from suave_des.scenario.signal_kinds import (
+    ConstantSignal,
+    Monitor,
+    Signal,
+    SignalTable,
+    SinusoidSignal,
+    StepSignal,
+    TableSignal,
+)
 from suave_des.streams import Streams
 from suave_des.world import signals
 
@@ -49,6 +57,18 @@ class Chance(Streams):
             return lambda: distribution
         stream = self.stream(_stream_name(key, distribution))
         return lambda: draw(distribution, stream)
+
+    def loss(self, key: str, monitor: Monitor) -> Callable[[float], bool] | None:
+        """Whether the message of a monitor at a mission time is lost; none: none is."""
+        if not monitor.loses_messages:
+            return None
+        stream, share, outages_s = self.stream(f"{key}.dropout"), monitor.dropout_probability, monitor.outages_s
+
+        def is_lost(t_s: float) -> bool:
+            by_chance = stream.random() < share
+            return by_chance or any(since_s <= t_s <= to_s for since_s, to_s in outages_s)
+
+        return is_lost
 
     def phase(self, timer: str, period_s: float) -> float:
         """Phase of a timer: arbitrary per node, another one in each run."""

@@ -10,7 +10,9 @@ MAINTAIN_MOTION = "f_maintain_motion"
 GENERATE_SEARCH_PATH = "f_generate_search_path"
 FOLLOW_PIPELINE = "f_follow_pipeline"
 GENERATE_RECHARGE_PATH = "generate_recharge_path"
-MOVING_FUNCTIONS = (GENERATE_SEARCH_PATH, FOLLOW_PIPELINE, GENERATE_RECHARGE_PATH)
+SURFACE, SURFACE_MODE = "f_surface", "fd_surface"
+"""What a leak demands, and how it is done unless a managing subsystem has another design for it."""
+MOVING_FUNCTIONS = (GENERATE_SEARCH_PATH, FOLLOW_PIPELINE, GENERATE_RECHARGE_PATH, SURFACE)
 """Functions that send the vehicle somewhere."""
 MISSION_FUNCTIONS = (MAINTAIN_MOTION, GENERATE_SEARCH_PATH, FOLLOW_PIPELINE)
 """Functions that the mission's two tasks need, so that a modes file must have them."""

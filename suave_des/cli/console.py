@@ -160,5 +160,7 @@ def _metrics_table(metrics: MissionMetrics, further: Mapping[str, float | int | 
     for column, value in further.items():
         number = f"{value:.2f}" if isinstance(value, float) else "none" if value is None else str(value)
         unit = next((f" {unit}" for ending, unit in (("_m2", "m2"), ("_s", "s")) if column.endswith(ending)), "")
-        table.add_row(column.removesuffix("_m2").removesuffix("_s").replace("_", " "), number + unit)
+        table.add_row(
+            column.removesuffix("_m2").removesuffix("_s").replace("_", " "), number + unit * (value is not None)
+        )
     return table

@@ -8,12 +8,12 @@ from typing import NamedTuple
 import simpy
 
 from suave_des.clock import Process, tick_at_or_after, until
-from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOTION, Task
+from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOTION, SURFACE, Task
 from suave_des.managed.detection import PipelineDetector
 from suave_des.managed.follow import FollowPipeline
 from suave_des.managed.node import Log
 from suave_des.monitor.measurements import BatteryLevel
-from suave_des.scenario.models import MissionFunctions
+from suave_des.scenario.additions import MissionFunctions
 from suave_des.scenario.revision import CoordinatorRevision
 
 
@@ -60,7 +60,17 @@ class MissionCoordinator:
         """Start the mission, which calls these to request and to cancel its tasks."""
         self._request, self._cancel = request, cancel
         self.env.process(self._watch_time_limit())
-        self.env.process(self._carry_out_tasks())
+        self._tasks = self.env.process(self._carry_out_tasks())
+
+    def surface_at(self, surfaced: simpy.Event) -> Callable[[], None]:
+        """What is to be called at a leak: everything else is given up, and the mission ends at an event, `surfaced`."""
+        self._surfaced = surfaced
+
+        def leak() -> None:
+            if not self.ended.triggered:
+                self._tasks.interrupt()
+
+        return leak
 
     def end_with(self, battery: BatteryLevel, least_level: float) -> None:
         """End the mission when the battery is at a level, or below it; looked at when the level is measured."""
@@ -71,6 +81,21 @@ class MissionCoordinator:
         return self.timing.time_limit_s if self.search_time_s is None else self.search_time_s
 
     def _carry_out_tasks(self) -> Process:
+        try:
+            yield from self._search_and_inspect()
+        except simpy.Interrupt:
+            yield from self._surface()
+
+    def _surface(self) -> Process:
+        self._end("task_cancelled")
+        self._cancel(Task("lasting_functions", self.lasting_functions))
+        self._begin(Task("surface", (SURFACE,)))
+        yield self._surfaced
+        yield self._next_poll()
+        self._end("task_done")
+        self._finish("the vehicle has surfaced")
+
+    def _search_and_inspect(self) -> Process:
         yield until(self.env, self.timing.start_delay_s)
         self._begin(self._search)
         yield self.detector.detected

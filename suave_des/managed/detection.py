@@ -19,6 +19,9 @@ _MARGIN_ROWS = 2
 
 def measured_at_rows(times_s: Array, values: Array, at_rows: Array) -> None:
     """Write the value measured last at each row of a track into `at_rows`, shape (rows,); nan before the first."""
+    if len(times_s) == 0:  # nothing is ever published
+        at_rows[:] = np.nan
+        return
     first = np.minimum(np.rint(times_s / STEP_S).astype(np.int64), len(at_rows))  # rounded as Vehicle does
     at_rows[: first[0]] = np.nan
     at_rows[first[0] : first[-1]] = np.repeat(values[:-1], first[1:] - first[:-1])

@@ -1,6 +1,6 @@
 """Maintain motion: inactive in normal operation; activating it recovers the thrusters (facts: kas-lab/suave)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 
 import simpy
@@ -20,12 +20,14 @@ class MaintainMotion(FunctionNode):
 
     Attributes:
         delay_s: draws the time from the activation to the recovery of the first thruster.
+        lost_for_good: thrusters that cannot be restored; they are left out, and nothing is reported of them.
     """
 
     bus: DiagnosticsBus
     revision: RecoveryRevision
     set_health: Callable[[float, int, float], None]
     delay_s: Callable[[], float]
+    lost_for_good: Collection[int] = ()
     _recovery: simpy.Process | None = field(default=None, init=False)
 
     def activated(self) -> None:
@@ -43,9 +45,10 @@ class MaintainMotion(FunctionNode):
         try:
             yield self.env.timeout(self.delay_s())
             for thruster in range(1, THRUSTERS + 1):
-                self.set_health(self.env.now, thruster, 1.0)
-                name = thruster_name(thruster)
-                self.bus.publish(Diagnostic(self.env.now, Kind.COMPONENT_STATUS, name, RECOVERED))
+                if thruster not in self.lost_for_good:
+                    self.set_health(self.env.now, thruster, 1.0)
+                    name = thruster_name(thruster)
+                    self.bus.publish(Diagnostic(self.env.now, Kind.COMPONENT_STATUS, name, RECOVERED))
                 yield self.env.timeout(self.revision.thruster_period_s)
             self._recovery = None
         except simpy.Interrupt:

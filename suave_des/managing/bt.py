@@ -7,7 +7,15 @@ conditions and modes; each tick requests, for each function, the mode of the fir
 from collections.abc import Collection, Iterator
 from typing import ClassVar
 
-from suave_des.domain import FOLLOW_PIPELINE, GENERATE_RECHARGE_PATH, GENERATE_SEARCH_PATH, MAINTAIN_MOTION, Task
+from suave_des.domain import (
+    FOLLOW_PIPELINE,
+    GENERATE_RECHARGE_PATH,
+    GENERATE_SEARCH_PATH,
+    MAINTAIN_MOTION,
+    SURFACE,
+    SURFACE_MODE,
+    Task,
+)
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem, Thresholds
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
 from suave_des.scenario.modes import UNGROUND_MODE
@@ -57,6 +65,8 @@ class BehaviourTree(ManagingSubsystem):
             yield MAINTAIN_MOTION, "fd_recover_thrusters" if self._failed else "fd_all_thrusters"
         if GENERATE_SEARCH_PATH in self._functions:
             yield GENERATE_SEARCH_PATH, self._search_mode()
+        if SURFACE in self._functions:
+            yield SURFACE, SURFACE_MODE
         if FOLLOW_PIPELINE in self._functions:
             yield FOLLOW_PIPELINE, self.system.scenario.default_modes.get(FOLLOW_PIPELINE, "fd_follow_pipeline")
 
@@ -82,7 +92,7 @@ class ExtendedBehaviourTree(BehaviourTree):
             return
         # Once on its way the vehicle goes on until the level has risen: the station refills the battery at once.
         level = self.system.measured("battery_level")
-        recharging = level is not None and level < self._settings.battery_limit
+        recharging = level is not None and level < self._settings.battery_limit and SURFACE not in self._functions
         for function, mode in super()._wanted():
             yield function, UNGROUND_MODE if recharging and function != MAINTAIN_MOTION else mode
         yield GENERATE_RECHARGE_PATH, "normal" if recharging else UNGROUND_MODE

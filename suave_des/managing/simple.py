@@ -15,7 +15,7 @@ class NoManager(ManagingSubsystem):
     def task_requested(self, task: Task) -> None:
         """Set the default modes of the task's functions."""
         for function in task.functions:
-            mode = self.system.scenario.default_modes.get(function)
+            mode = self.system.scenario.default_mode(function)
             if mode is not None:
                 self.system.change_mode(function, mode)
 

@@ -64,6 +64,10 @@ class Observer:
         """Take the time that the reasoner took in a cycle that changed something."""
         self.reasoning_time_s += duration_s
 
+    def surfaced(self, leak_s: float) -> None:
+        """Take the moment at which the vehicle has surfaced after a leak."""
+        self.surfacing_time_s = float(self.env.now) - leak_s
+
     def thrusters_changed(self, working: int) -> None:
         """Take a change of the number of thrusters that work."""
         self._working.append((self.env.now, working))

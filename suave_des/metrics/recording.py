@@ -11,7 +11,7 @@ import simpy
 
 from suave_des.domain import MOVING_FUNCTIONS
 from suave_des.metrics.result import Event, KnowledgeRecord, TrajectoryPoint
-from suave_des.monitor.diagnostics import Diagnostic, Kind
+from suave_des.monitor.diagnostics import HULL, Diagnostic, Kind
 from suave_des.monitor.measurements import Measured, Measurements
 from suave_des.scenario.modes import Mode
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
@@ -50,7 +50,8 @@ class Recorder:
 
         def take(diagnostic: Diagnostic) -> None:
             if diagnostic.kind == Kind.COMPONENT_STATUS:
-                self.log("thruster_monitor", "component_status", f"{diagnostic.key} {diagnostic.value}")
+                source = "leak_monitor" if diagnostic.key == HULL else "thruster_monitor"
+                self.log(source, "component_status", f"{diagnostic.key} {diagnostic.value}")
             elif diagnostic.key in edges:
                 value, rising = diagnostic.value, edges[diagnostic.key]
                 assert isinstance(value, float)

@@ -30,6 +30,7 @@ MEASURED_AND_COMPONENTS = (Kind.QA_STATUS, Kind.COMPONENT_STATUS)
 
 FAILED = "FALSE"
 RECOVERED = "RECOVERED"
+HULL, LEAK = "hull", "LEAK"
 
 
 @dataclass(frozen=True, slots=True)

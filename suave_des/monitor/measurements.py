@@ -108,9 +108,23 @@ class Disturbance:
 
 
 def measure(
-    key: str, signal: Signal, duration_s: float, publishing: Publishing, noise: Callable[[], float] | None = None
+    key: str,
+    signal: Signal,
+    duration_s: float,
+    publishing: Publishing,
+    noise: Callable[[], float] | None = None,
+    is_lost: Callable[[float], bool] | None = None,
 ) -> Measurements:
-    """Measure a signal, a quality attribute named `key`, over a mission; `noise` draws the error of one measurement."""
+    """Measure a signal over a mission.
+
+    Args:
+        key: name of the quality attribute.
+        signal: what is measured.
+        duration_s: of the mission.
+        publishing: when it is measured.
+        noise: draws the error of one measurement.
+        is_lost: whether the message at a mission time is not published.
+    """
     period_s, phase_s = publishing.period_s, publishing.phase_s
     messages = max(0, math.floor((duration_s - phase_s) / period_s)) + 1
     times: Array = phase_s + period_s * np.arange(messages, dtype=np.float64)
@@ -121,6 +135,9 @@ def measure(
     values = _values_at(signal, read_at.tobytes())
     if noise is not None:
         values = values + np.array([noise() for _ in range(len(times))])
+    if is_lost is not None:
+        kept = [not is_lost(t_s) for t_s in times.tolist()]
+        times, values = times[kept], values[kept]
     places = _changes(values.tobytes())
     times, values = times[places], values[places]
     return Measurements(key, tuple(times.tolist()), tuple(values.tolist()), phase_s, period_s, (times, values))

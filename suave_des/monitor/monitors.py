@@ -1,13 +1,13 @@
 """Monitors: processes that watch signals, thrusters and battery, and publish diagnostics (facts: kas-lab/suave)."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import simpy
 
 from suave_des.clock import Process, tick_at_or_after, until
 from suave_des.domain import thruster_name
-from suave_des.monitor.diagnostics import FAILED, RECOVERED, Diagnostic, DiagnosticsBus, Kind
+from suave_des.monitor.diagnostics import FAILED, HULL, LEAK, RECOVERED, Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.measurements import BatteryLevel, Measurements
 from suave_des.vehicle.frames import Pose
 
@@ -31,6 +31,32 @@ def battery_monitor(env: simpy.Environment, bus: DiagnosticsBus, level: BatteryL
         yield env.timeout(level.publishing.period_s)
 
 
+def leak_monitor(env: simpy.Environment, bus: DiagnosticsBus, time_s: float, detected: Callable[[], None]) -> Process:
+    """Publish the leak at its time, and call `detected`."""
+    yield until(env, time_s)
+    bus.publish(Diagnostic(env.now, Kind.COMPONENT_STATUS, HULL, LEAK))
+    detected()
+
+
+class Publisher(Protocol):
+    """Where a monitor publishes."""
+
+    def publish(self, diagnostic: Diagnostic) -> None:
+        """Publish a diagnostic."""
+
+
+class LossyPublisher(NamedTuple):
+    """A monitor's connection to the diagnostics bus that loses some of its messages."""
+
+    bus: DiagnosticsBus
+    is_lost: Callable[[float], bool]
+
+    def publish(self, diagnostic: Diagnostic) -> None:
+        """Publish a diagnostic, unless it is lost."""
+        if not self.is_lost(diagnostic.time_s):
+            self.bus.publish(diagnostic)
+
+
 class ThrusterFault(NamedTuple):
     """A thruster that fails or recovers, time in s as the revision counts it."""
 
@@ -41,7 +67,7 @@ class ThrusterFault(NamedTuple):
 
 def thruster_monitor(
     env: simpy.Environment,
-    bus: DiagnosticsBus,
+    bus: Publisher,
     faults: Sequence[ThrusterFault],
     set_health: Callable[[float, int, float], None],
     phase_s: float,

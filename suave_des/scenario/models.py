@@ -8,32 +8,41 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
-from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MISSION_FUNCTIONS, SEA_BED_Z_M, SURFACE_Z_M
+from suave_des.domain import (
+    FOLLOW_PIPELINE,
+    GENERATE_SEARCH_PATH,
+    MISSION_FUNCTIONS,
+    SEA_BED_Z_M,
+    SURFACE,
+    SURFACE_MODE,
+    SURFACE_Z_M,
+)
 from suave_des.errors import shown
+from suave_des.scenario.additions import Current, FunctionSettings, Leak, MissionFunctions
 from suave_des.scenario.evaluation import Metrics, Requirement
 from suave_des.scenario.quantities import (
     Coordinate,
     CoordinateDistribution,
-    CurrentDistribution,
     DelayDistribution,
     Distribution,
     Duration,
     HeadingDistribution,
     Length,
+    Name,
     Number,
     OffsetDistribution,
     Period,
     Speed,
     Strict,
     TimeDistribution,
+    ValueDistribution,
     Within,
     wrong,
 )
 from suave_des.scenario.revision import Revision
-from suave_des.scenario.signal_kinds import Signal
+from suave_des.scenario.signal_kinds import Monitor, Signal
 from suave_des.scenario.vehicle import VehicleDescription
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_.-]*$", max_length=100)]
 FileName = Annotated[str, Field(min_length=1)]
 
 Reasoner = Literal["remembered", "pellet", "owlready2"]
@@ -43,17 +52,6 @@ THRUSTERS = 6
 _LONGEST_MISSION_S = 100_000.0
 
 
-class MissionFunctions(Strict):
-    """Functions that the mission needs besides the exemplar's."""
-
-    lasting: tuple[Name, ...] = ()
-    """Needed from launch to the end."""
-    search_pipeline: tuple[Name, ...] = ()
-    """Needed by the first task."""
-    inspect_pipeline: tuple[Name, ...] = ()
-    """Needed by the second task."""
-
-
 class Mission(Strict):
     """The coordinator's limit, and what its tasks need."""
 
@@ -61,15 +59,6 @@ class Mission(Strict):
     """When the current task is cancelled and the metrics are taken."""
     functions: MissionFunctions = MissionFunctions()
     """Functions that are needed besides the exemplar's."""
-
-
-class FunctionSettings(Strict):
-    """A function of one's own: its class, and whatever settings that has."""
-
-    model_config = ConfigDict(extra="allow")
-
-    node: Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*(:[A-Za-z_]\w*)?$")]
-    """Class of the function's node, as module:Class, or the name under which a package registers it."""
 
 
 class Start(Strict):
@@ -83,17 +72,6 @@ class Start(Strict):
     """Up; the sea bed is at -20, the surface at 0."""
     heading_rad: HeadingDistribution = 0.0
     """Yaw, from east towards north."""
-
-
-class Current(Strict):
-    """Velocity of the water in the world frame, drawn once a run and constant over it."""
-
-    x_m_per_s: CurrentDistribution = 0.0
-    """Towards east."""
-    y_m_per_s: CurrentDistribution = 0.0
-    """Towards north."""
-    z_m_per_s: CurrentDistribution = 0.0
-    """Upwards."""
 
 
 class Pipeline(Strict):
@@ -124,6 +102,8 @@ class ThrusterEvent(Strict):
     """1 to 4 horizontal (front right, front left, rear right, rear left), 5 and 6 vertical (right, left)."""
     event: Literal["failure", "recovery"]
     """What happens to it."""
+    recoverable: bool = True
+    """Whether f_maintain_motion can bring the thruster back after this failure."""
     time_s: TimeDistribution
     """When, drawn once a run; the revision decides whether after the start or after the event before. Below 0 is 0."""
 
@@ -147,7 +127,7 @@ class ThrusterEvent(Strict):
         return parts
 
 
-class Battery(Strict):
+class Battery(Monitor):
     """Battery of revision 1.5: falls linearly from 1.0, recharged at once near the station."""
 
     discharge_time_s: Duration = 200.0
@@ -160,6 +140,8 @@ class Battery(Strict):
     """Recharge station, north."""
     station_radius_m: Length = 0.5
     """Half-width of the box in x and y within which the vehicle counts as docked."""
+    noise: ValueDistribution = 0.0
+    """Added to each measurement of the level, drawn anew each time."""
     approach_altitude_m: Length = 1.25
     """Altitude above the sea bed at which the station is approached."""
     mission_ends_at_level: Annotated[float, Field(strict=True), Within(0.0, lt=1.0)] | None = None
@@ -319,8 +301,12 @@ class Scenario(Strict):
     """What is measured, by the name of its quality attribute; water_visibility (m) is needed."""
     thruster_events: tuple[ThrusterEvent, ...] = ()
     """Failures and recoveries, in order."""
+    thruster_monitor: Monitor = Monitor()
+    """What is wrong with the monitor of the thrusters."""
     battery: Battery | None = None
     """The battery; left out: there is none."""
+    leak: Leak | None = None
+    """A leak; left out: there is none. It needs a function f_surface in the modes file, and designs of it."""
     latencies: Latencies = Latencies()
     """Times that software takes."""
     calibration: Calibration = Calibration()
@@ -354,10 +340,16 @@ class Scenario(Strict):
     def _over_the_defaults(cls, value: dict[str, str]) -> dict[str, str]:
         return {**_DEFAULT_MODES, **value}
 
+    def default_mode(self, function: str) -> str | None:
+        """The mode that the manager none sets for a function."""
+        return self.default_modes.get(function, SURFACE_MODE if function == SURFACE else None)
+
     def needed_functions(self) -> tuple[str, ...]:
         """The functions that the mission needs."""
-        own = self.mission.functions
-        return tuple(dict.fromkeys((*MISSION_FUNCTIONS, *own.lasting, *own.search_pipeline, *own.inspect_pipeline)))
+        own, surface = self.mission.functions, (SURFACE,) if self.leak is not None else ()
+        return tuple(
+            dict.fromkeys((*MISSION_FUNCTIONS, *own.lasting, *own.search_pipeline, *own.inspect_pipeline, *surface))
+        )
 
     @property
     def further_columns(self) -> tuple[str, ...]:
@@ -370,6 +362,8 @@ class Scenario(Strict):
             if metric in self.metrics[:index]:
                 raise wrong(f"{metric} is given twice", "name each metric once", "metrics")
         needed = {*self.metrics, *(each.metric for each in self.requirements.values())}
+        if self.leak is None and "surfacing_time_s" in needed:
+            raise wrong("surfacing_time_s needs a leak", "add leak: {time_s: 100}", "metrics")
         if self.battery is None and (missing := [each for each in ("battery_level", "recharges") if each in needed]):
             raise wrong(f"{missing[0]} needs a battery", "add battery: {}", "metrics")
         measured = {*self.signals, *(("battery_level",) if self.battery is not None else ())}

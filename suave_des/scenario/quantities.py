@@ -120,6 +120,7 @@ class Within:
 
 _Float = Annotated[float, Field(strict=True)]
 """A number written as one: "80" in quotes and true are none."""
+Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_.-]*$", max_length=100)]
 Number = Annotated[_Float, Within(-LARGEST, LARGEST)]
 NotNegative = Annotated[_Float, Within(0, LARGEST)]
 Coordinate = Annotated[_Float, Within(-FARTHEST_M, FARTHEST_M, unit="m")]

@@ -9,7 +9,7 @@ import math
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from suave_des.errors import InputError, shown
 from suave_des.scenario.quantities import (
@@ -21,12 +21,34 @@ from suave_des.scenario.quantities import (
     ShiftDistribution,
     Strict,
     ValueDistribution,
+    Within,
     ordered,
 )
 from suave_des.scenario.yamlfile import decode, read_bytes
 
 
-class _Signal(Strict):
+class Monitor(Strict):
+    """What can be wrong with any monitor."""
+
+    dropout_probability: Annotated[float, Field(strict=True), Within(0.0, 1.0)] = 0.0
+    """Chance that a message is lost, each for itself."""
+    outages_s: tuple[tuple[NotNegative, NotNegative], ...] = ()
+    """Intervals of mission time, [from, to], in which every message is lost."""
+
+    @field_validator("outages_s", mode="after")
+    @classmethod
+    def _are_in_order(cls, value: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+        for since_s, to_s in value:
+            ordered(since_s, to_s)
+        return value
+
+    @property
+    def loses_messages(self) -> bool:
+        """Whether any message can be lost."""
+        return self.dropout_probability > 0.0 or bool(self.outages_s)
+
+
+class _Signal(Monitor):
     publishing_period_s: Period | None = None
     """Period of the monitor that measures it; left out: the revision's visibility_publishing_period_s."""
     time_step_s: NotNegative = 1.0

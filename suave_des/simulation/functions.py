@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from suave_des.domain import GENERATE_RECHARGE_PATH, MISSION_FUNCTIONS
+from suave_des.domain import GENERATE_RECHARGE_PATH, MISSION_FUNCTIONS, SURFACE
 from suave_des.errors import did_you_mean
 from suave_des.registry import FUNCTION_GROUP, function_class, registered_functions
 from suave_des.scenario.loader import LoadedScenario
@@ -16,7 +16,8 @@ if TYPE_CHECKING:  # or a process that only hands out missions would load the ve
 
 def built_in_functions(scenario: Scenario) -> tuple[str, ...]:
     """The functions that the exemplar has, in a mission of this scenario."""
-    return MISSION_FUNCTIONS if scenario.battery is None else (*MISSION_FUNCTIONS, GENERATE_RECHARGE_PATH)
+    recharge = () if scenario.battery is None else (GENERATE_RECHARGE_PATH,)
+    return *MISSION_FUNCTIONS, *recharge, *(() if scenario.leak is None else (SURFACE,))
 
 
 def own_functions(loaded: LoadedScenario) -> dict[str, type[OwnFunction]]:

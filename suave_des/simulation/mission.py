@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
+from math import cos, sin
 
 import simpy
 from simpy.core import StopSimulation
@@ -19,17 +20,20 @@ from suave_des.managed.node import FunctionNode
 from suave_des.managed.own import FunctionContext, OwnFunction
 from suave_des.managed.recharge import GenerateRechargePath
 from suave_des.managed.search import GenerateSearchPath
+from suave_des.managed.surface import Surface
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
 from suave_des.metrics.further import Observer
 from suave_des.metrics.reactions import ReactionMeter
 from suave_des.metrics.recording import Recorder
 from suave_des.metrics.result import MissionMetrics, MissionResult
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
-from suave_des.monitor.measurements import BatteryLevel, Measured, Measurements, Publishing, measure
+from suave_des.monitor.measurements import BatteryLevel, Disturbance, Measured, Measurements, Publishing, measure
 from suave_des.monitor.monitors import (
+    LossyPublisher,
     ThrusterFault,
     battery_monitor,
     distance_monitor,
+    leak_monitor,
     pose_monitor,
     signal_monitor,
     thruster_monitor,
@@ -41,7 +45,7 @@ from suave_des.simulation.simulator import MissionMemory, Simulator
 from suave_des.vehicle.autopilot import Autopilot
 from suave_des.vehicle.frames import Pose
 from suave_des.vehicle.guidance import SetPointSender
-from suave_des.vehicle.vehicle import Vehicle
+from suave_des.vehicle.vehicle import CurrentWave, Point, Vehicle
 from suave_des.world.signals import Signal
 
 _DELIVERY_S = 0.01
@@ -71,6 +75,8 @@ class MissionRun:
         self.env = simpy.Environment()
         self._recorder = Recorder(self.env, enabled=record)
         self._bus = DiagnosticsBus()
+        self._lost_for_good: set[int] = set()
+        self._faults_happened = 0
 
         self._vehicle = self._make_vehicle(memory)
         self._true_signals: dict[str, Signal] = {}
@@ -205,6 +211,13 @@ class MissionRun:
             detection_y_m=y_m,
         )
 
+    def _make_fault(self, t_s: float, thruster: int, health: float) -> None:
+        """Let the next of the scenario's thruster events happen."""
+        event = self._scenario.thruster_events[self._faults_happened]
+        self._faults_happened += 1
+        (self._lost_for_good.discard if health or event.recoverable else self._lost_for_good.add)(thruster)
+        self._set_thruster_health(t_s, thruster, health)
+
     def _set_thruster_health(self, t_s: float, thruster: int, health: float) -> None:
         self._vehicle.set_thruster_health(t_s, thruster, health)
         if self._observer is not None:
@@ -224,16 +237,29 @@ class MissionRun:
             value("calibration.altitude_deadband_m"),
         )
         start = Pose(*self._origin_m, z_m, 0.0, 0.0, heading_rad)
+        current_m_per_s, wave = self._current()
         return Vehicle(
             self._simulator.vehicle_model,
             autopilot,
             start,
             self._simulator.duration_s,
-            current_m_per_s=(value("current.x_m_per_s"), value("current.y_m_per_s"), value("current.z_m_per_s")),
+            current_m_per_s=current_m_per_s,
+            current_wave=wave,
             time_scale=1.0 / (1.0 + value("calibration.real_time_factor_loss")),
             z_limits_m=(domain.SEA_BED_Z_M, domain.SURFACE_Z_M),
             memory=memory.track,
         )
+
+    def _current(self) -> tuple[Point, CurrentWave]:
+        """The constant part of the current, and the one that varies over time."""
+        value, wave = self._chance.value, self._scenario.current.wave
+        x, y, z = (value(f"current.{axis}_m_per_s") for axis in "xyz")
+        if wave is None:
+            return (x, y, z), CurrentWave()
+        east, north = cos(direction_rad := value("current.wave.direction_rad")), sin(direction_rad)
+        mean, amplitude = value("current.wave.mean_m_per_s"), value("current.wave.amplitude_m_per_s")
+        varying = CurrentWave((amplitude * east, amplitude * north), wave.period_s, value("current.wave.shift_s"))
+        return (x + mean * east, y + mean * north, z), varying
 
     def _measure(self, name: str) -> Measurements:
         signal, chance = self._scenario.signals[name], self._chance
@@ -241,7 +267,8 @@ class MissionRun:
         publishing = Publishing(period_s, self._monitor_phase_s(f"signals.{name}", period_s), signal.time_step_s)
         noise = chance.sampler(f"signals.{name}.noise", signal.noise) if signal.noise != 0.0 else None
         described = self._true_signals[name] = chance.signal(name, signal, self._simulator.loaded.tables)
-        return measure(name, described, self._simulator.duration_s, publishing, noise)
+        lost = chance.loss(f"signals.{name}", signal)
+        return measure(name, described, self._simulator.duration_s, publishing, noise, lost)
 
     def _monitor_phase_s(self, monitor: str, period_s: float) -> float:
         """Mission time of a monitor's first message."""
@@ -256,7 +283,9 @@ class MissionRun:
 
         period_s = battery.publishing_period_s
         publishing = Publishing(period_s, self._monitor_phase_s("battery_monitor", period_s))
-        return BatteryLevel(is_at_station, battery.discharge_time_s, publishing)
+        error = self._chance.sampler("battery.noise", battery.noise)
+        disturbance = Disturbance(error, self._chance.loss("battery", battery) or Disturbance().is_lost)
+        return BatteryLevel(is_at_station, battery.discharge_time_s, publishing, disturbance)
 
     def _start_monitors(self) -> None:
         if self._bus.has_subscribers(Kind.QA_STATUS):  # to look values up, the measurements are enough
@@ -274,10 +303,12 @@ class MissionRun:
         for n, event in enumerate(self._scenario.thruster_events):
             time_s = self._chance.draw(f"thruster_events.{n}.time_s", event.time_s, least=0.0)
             faults.append(ThrusterFault(event.thruster, event.event == "failure", time_s))
-        monitors, set_health = self._revision.monitors, self._set_thruster_health
+        monitors = self._revision.monitors
         period_s, after_previous = monitors.thruster_check_period_s, monitors.thruster_event_times == "after_previous"
         phase_s = self._monitor_phase_s("thruster_monitor", period_s)
-        self.env.process(thruster_monitor(self.env, self._bus, faults, set_health, phase_s, after_previous, period_s))
+        lost = self._chance.loss("thruster_monitor", self._scenario.thruster_monitor)
+        bus = self._bus if lost is None else LossyPublisher(self._bus, lost)
+        self.env.process(thruster_monitor(self.env, bus, faults, self._make_fault, phase_s, after_previous, period_s))
 
     def _publish_detection(self, _: simpy.Event) -> None:
         point = float(self._detector.first_point or 0)
@@ -294,7 +325,7 @@ class MissionRun:
         self._follow = FollowPipeline(env, make_sender(follow), revision.follow, self._path)
         nodes: dict[str, FunctionNode] = {
             domain.MAINTAIN_MOTION: MaintainMotion(
-                env, self._bus, revision.recovery, self._set_thruster_health, recovery_s
+                env, self._bus, revision.recovery, self._set_thruster_health, recovery_s, self._lost_for_good
             ),
             search: GenerateSearchPath(
                 env, make_sender(search), revision.spiral, self._origin_m, view_tangent, phase_s, ready_s
@@ -304,6 +335,9 @@ class MissionRun:
         if (battery := self._scenario.battery) is not None:
             station_m = battery.station_x_m, battery.station_y_m, domain.SEA_BED_Z_M + battery.approach_altitude_m
             nodes[recharge] = GenerateRechargePath(env, make_sender(recharge), station_m, battery.resend_period_s)
+        if self._scenario.leak is not None:
+            self._surface = Surface(env, make_sender(domain.SURFACE))
+            nodes[domain.SURFACE] = self._surface
         for name, kind in self._simulator.own_functions.items():
             nodes[name] = self._make_own_function(name, kind, make_sender(name))
         return nodes
@@ -346,6 +380,12 @@ class MissionRun:
         battery = self._scenario.battery
         if self._battery is not None and battery is not None and battery.mission_ends_at_level is not None:
             coordinator.end_with(self._battery, battery.mission_ends_at_level)
+        if self._scenario.leak is not None:
+            leak_s = self._chance.value("leak.time_s")
+            leak = coordinator.surface_at(self._surface.surfaced)
+            self.env.process(leak_monitor(self.env, self._bus, leak_s, leak))
+            if (observer := self._observer) is not None:
+                self._surface.surfaced.callbacks.append(lambda event: observer.surfaced(leak_s))
         return coordinator
 
     def _make_host(self, kind: type[ManagingSubsystem] | None) -> ManagerHost:

@@ -27,6 +27,9 @@ VELOCITY_GAIN, VELOCITY_INTEGRAL_GAIN, INTEGRAL_LIMIT = range(17, 20)
 ATTITUDE_GAIN, RATE_GAIN, HEADING_INTEGRAL_GAIN, HEADING_INTEGRAL_LIMIT = range(20, 24)
 CURRENT, FLOOR, CEILING = 24, 27, 28
 
+WAVE_X, WAVE_Y, WAVE_RATE, WAVE_PHASE = CEILING + 1, CEILING + 2, CEILING + 3, CEILING + 4
+"""After those: the varying part of the current, east and north in m/s, its angle per row and at row 0 in rad."""
+
 Dynamics = tuple[float, Array, Array, Array, Array]
 """What moves the vehicle, besides its state:
 
@@ -136,9 +139,13 @@ def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
         t4 += prm[RIGHTING] * r20
 
         # M nu' = tau - C(nu) nu - D(nu_r) nu_r, drag taken implicitly: it stays stable at any speed.
-        cu = r00 * prm[CURRENT] + r10 * prm[CURRENT + 1] + r20 * prm[CURRENT + 2]
-        cv = r01 * prm[CURRENT] + r11 * prm[CURRENT + 1] + r21 * prm[CURRENT + 2]
-        cw = r02 * prm[CURRENT] + r12 * prm[CURRENT + 1] + r22 * prm[CURRENT + 2]
+        cx, cy, cz = prm[CURRENT], prm[CURRENT + 1], prm[CURRENT + 2]
+        if prm[WAVE_RATE] != 0.0:  # the current varies over time, which the row counts
+            wave = math.sin(prm[WAVE_RATE] * row + prm[WAVE_PHASE])
+            cx, cy = cx + prm[WAVE_X] * wave, cy + prm[WAVE_Y] * wave
+        cu = r00 * cx + r10 * cy + r20 * cz
+        cv = r01 * cx + r11 * cy + r21 * cz
+        cw = r02 * cx + r12 * cy + r22 * cz
         au = t0 * inverse_mass - (q * w - r * v)
         av = t1 * inverse_mass - (r * u - p * w)
         aw = t2 * inverse_mass - (p * v - q * u)

@@ -64,6 +64,28 @@ class _Queue(NamedTuple):
         return bisect_right(self.ticks, self.check.last_tick_until(t_s))
 
 
+class CurrentWave(NamedTuple):
+    """The part of the water's velocity that varies over time: amplitude sin(2 pi (t + shift) / period).
+
+    Attributes:
+        amplitude_m_per_s: east and north.
+        period_s: time from one greatest velocity to the next.
+        shift_s: added to mission time.
+    """
+
+    amplitude_m_per_s: tuple[float, float] = (0.0, 0.0)
+    period_s: float = math.inf
+    shift_s: float = 0.0
+
+    def parameters(self) -> tuple[float, float, float, float]:
+        """What `kernel.advance` needs of it: east and north, angle per row of the track, and at row 0."""
+        rate = 2.0 * math.pi / self.period_s
+        return *self.amplitude_m_per_s, rate * STEP_S, rate * self.shift_s
+
+
+STEADY = CurrentWave()
+
+
 @dataclass(eq=False)
 class Vehicle:
     """The vehicle of one mission.
@@ -79,6 +101,7 @@ class Vehicle:
         start: pose at t = 0, at rest; the autopilot's first set-point is this place with heading 0.
         duration_s: length of the mission; nothing can be read beyond it.
         current_m_per_s: velocity of the water, world frame.
+        current_wave: its part that varies over time.
         time_scale: simulated seconds that pass in a second of mission time (the simulator's real-time factor).
         z_limits_m: sea bed and surface, which stop the vehicle.
         memory: where to keep the track, instead of memory of its own; see `track_rows`.
@@ -97,6 +120,7 @@ class Vehicle:
     duration_s: float
     _: KW_ONLY
     current_m_per_s: Point = (0.0, 0.0, 0.0)
+    current_wave: CurrentWave = STEADY
     time_scale: float = 1.0
     z_limits_m: tuple[float, float] = (-math.inf, math.inf)
     memory: InitVar[Array | None] = None
@@ -114,7 +138,8 @@ class Vehicle:
         self._health = np.array([1.0] * len(model.thrusters))
         self._effectiveness = allocation_matrix(model).copy()
         self._set_point = np.array([*start[:3], 1.0, 0.0])  # heading 0
-        parameters = kernel_parameters(model, self.autopilot, self.current_m_per_s, self.z_limits_m)
+        constants = kernel_parameters(model, self.autopilot, self.current_m_per_s, self.z_limits_m)
+        parameters = np.array((*constants, *self.current_wave.parameters()))
         step_s, allocation = STEP_S * self.time_scale, autopilot_allocation(model)
         self._dynamics = step_s, self._set_point, parameters, allocation, self._effectiveness
 

@@ -1,0 +1,53 @@
+"""Surface: goes straight up, as a leak demands."""
+
+from dataclasses import dataclass, field
+
+import simpy
+
+from suave_des.clock import Process
+from suave_des.domain import SURFACE_Z_M
+from suave_des.managed.node import FunctionNode
+from suave_des.vehicle.guidance import SetPointSender
+
+ABOVE_M = 3.0
+"""How far above the surface the set-point is: an autopilot that stops short of it is up nevertheless."""
+SURFACED_M = 0.1
+CHECKS_A_SECOND = 2
+RESEND_CHECKS = 20
+
+
+@dataclass(eq=False)
+class Surface(FunctionNode):
+    """The surface function: while active, the set-point is above the place of activation, sent again every 10 s.
+
+    Attributes:
+        surfaced: the event that the vehicle is at the surface; it is looked at twice a second.
+    """
+
+    sender: SetPointSender
+    _going: simpy.Process | None = field(default=None, init=False)
+
+    def __post_init__(self) -> None:
+        self.surfaced: simpy.Event = self.env.event()
+
+    def activated(self) -> None:
+        """Set off for the surface."""
+        self._going = self.env.process(self._go())
+
+    def deactivated(self) -> None:
+        """Leave the autopilot to other functions."""
+        if self._going is not None and self._going.is_alive:
+            self._going.interrupt()
+
+    def _go(self) -> Process:
+        x_m, y_m, _ = self.sender.vehicle.position(self.env.now)
+        try:
+            while True:
+                self.sender.send(x_m, y_m, SURFACE_Z_M + ABOVE_M)
+                for _ in range(RESEND_CHECKS):
+                    if self.sender.vehicle.position(self.env.now)[2] >= SURFACE_Z_M - SURFACED_M:
+                        self.surfaced.succeed()
+                        return
+                    yield self.env.timeout(1.0 / CHECKS_A_SECOND)
+        except simpy.Interrupt:
+            return
