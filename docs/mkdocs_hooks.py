@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import posixpath
 import re
 from pathlib import Path
+from typing import Any
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
@@ -14,6 +16,7 @@ _PAGES = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGE
 """Pages of the repository's root, and their names on the site."""
 _LINK = re.compile(r"\]\(([^)#\s]+)((?:#[^)\s]*)?)\)")
 _FENCE = re.compile(r"^```(\w+) (.+)$", re.MULTILINE)
+_STYLE = re.compile(r"<style scoped>.*?</style>", re.DOTALL)
 _TITLE = re.compile(r'(title|insert)=("[^"]*"|\S+)')
 
 
@@ -27,6 +30,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     root = _root(config)
     for source, page in _PAGES.items():
         files.append(File.generated(config, page, content=(root / source).read_text(encoding="utf-8")))
+    for path in sorted((root / "docs" / "notebooks").glob("*.ipynb")):
+        page = f"notebooks/{path.stem}.md"
+        files.append(File.generated(config, page, content=notebook_markdown(json.loads(path.read_text("utf-8")))))
     for file in files.documentation_pages():
         for target, _ in _LINK.findall(file.content_string):
             path = _in_repository(target, file.src_uri)
@@ -51,9 +57,37 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
         if path is None:
             return found[0]
         on_site = _PAGES.get(path, path.removeprefix("docs/"))
+        if on_site.startswith("notebooks/"):
+            on_site = on_site.replace(".ipynb", ".md")
         return f"]({posixpath.relpath(on_site, posixpath.dirname(own) or '.')}{found[2]})"
 
     return _FENCE.sub(_title, _LINK.sub(link, markdown))
+
+
+def notebook_markdown(notebook: dict[str, Any]) -> str:
+    """Turn a notebook with its outputs into Markdown: pictures are in the page, data frames are tables."""
+    parts = []
+    for cell in notebook["cells"]:
+        source = "".join(cell["source"])
+        if cell["cell_type"] == "markdown":
+            parts.append(source)
+            continue
+        parts.append(f"```python\n{source}\n```")
+        parts += [_output(each) for each in cell["outputs"]]
+    return "\n\n".join(parts) + "\n"
+
+
+def _output(output: dict[str, Any]) -> str:
+    """What a cell shows, as Markdown."""
+    if output["output_type"] == "stream":
+        return f"```text\n{''.join(output['text']).rstrip()}\n```"
+    data = output.get("data", {})
+    if "image/png" in data:
+        return f"![](data:image/png;base64,{''.join(data['image/png']).replace(chr(10), '')})"
+    if "text/html" in data:
+        html = _STYLE.sub("", "".join(data["text/html"]))
+        return "\n".join(line.strip() for line in html.splitlines() if line.strip())
+    return f"```text\n{''.join(data.get('text/plain', ''))}\n```"
 
 
 def _root(config: MkDocsConfig) -> Path:

@@ -24,7 +24,7 @@ const plain = (text) => String(text).replace(/&/g, '&amp;').replace(/</g, '&lt;'
 function layoutOf(x, y, more = {}) {
   const axis = (title) => ({
     title: { text: title, font: { size: 12, color: colour('--soft') }, standoff: 8 }, gridcolor: colour('--line'),
-    zerolinecolor: colour('--line'), linecolor: colour('--faint'), tickfont: { size: 11 }, automargin: true,
+    zerolinecolor: colour('--line'), linecolor: colour('--faint'), tickfont: { size: 11 },
   });
   const { xaxis, yaxis, ...rest } = more;
   return {

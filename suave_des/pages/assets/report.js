@@ -76,7 +76,7 @@ function drawSpread() {
   }
   byId('spread-title').textContent = `Spread: ${titles[state.metric]}; box: quartiles, diamond: mean`;
   show('spread', traces, layoutOf(titles[state.metric], '', {
-    yaxis: { tickvals: shownGroups(), ticktext: shownGroups().map((number) => plain(short(groups[number]))), zeroline: false, showgrid: false,
+    yaxis: { tickvals: shownGroups(), ticktext: shownGroups().map((number) => plain(short(groups[number]))), zeroline: false, showgrid: false, automargin: true,
       range: [Math.min(...shownGroups()) - 0.55, Math.max(...shownGroups()) + 0.85] },
   }));
   byId('spread').removeAllListeners?.('plotly_click');
@@ -381,6 +381,7 @@ async function start() {
   startTheme(byId('theme'));
   [state.group, state.run] = firstShown();
   await startPlotly();
+  await new Promise(requestAnimationFrame); // the text is read while the charts are drawn
   refresh();
   colourSwatches();
   const alone = [...document.querySelectorAll('#charts > figure:not(.wide)')].filter((each) => !each.hidden);

@@ -1,0 +1,120 @@
+"""suave-des replay and report: what they take, and what they say where they cannot."""
+
+import json
+
+import pytest
+
+from suave_des.campaign.campaign import run_campaign
+from suave_des.campaign.single import run_mission
+from suave_des.cli.main import main
+from suave_des.pages.recorded import read_recorded
+from suave_des.pages.replay import mission_on_page
+from suave_des.pages.sources import Chosen, missions_in
+
+
+def status(*arguments):
+    with pytest.raises(SystemExit) as ended:
+        main([str(each) for each in arguments])
+    return ended.value.code or 0
+
+
+@pytest.fixture(scope="module")
+def mission(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("missions") / "bt"
+    run_mission("seams2023", "bt", 2, 1, folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("campaigns") / "two"
+    run_campaign("seams2023", ["none", "bt"], runs=2, out=folder)
+    return folder
+
+
+def test_a_mission_of_a_campaign_is_the_one_that_run_records(campaign, mission):
+    (again,) = missions_in([campaign], Chosen(("bt",), run=2))
+    recorded = read_recorded(mission)
+    assert again.metrics["search_time_s"] == recorded.metrics["search_time_s"]
+    assert again.track["x_m"] == pytest.approx(recorded.track["x_m"], abs=1e-6)
+
+
+def test_what_was_inspected_adds_up_to_the_metric_of_the_mission(tmp_path):
+    run_mission("seams2023", "none", 1, 1, tmp_path / "mission")
+    recorded = read_recorded(tmp_path / "mission")
+    page = mission_on_page(recorded)
+    _, _, distance_m = page.inspected[-1]
+    assert distance_m == pytest.approx(recorded.metrics["distance_inspected_m"], abs=1.5)
+    assert [t_s for t_s, _, _ in page.inspected] == sorted(t_s for t_s, _, _ in page.inspected)
+
+
+def test_decisions_of_metacontrol_are_explained_as_they_were_made(tmp_path):
+    run_mission("seams2023", "metacontrol", 1, 1, tmp_path / "mission")
+    page = mission_on_page(read_recorded(tmp_path / "mission"))
+    decided = [(each.function, each.before, each.chosen) for cycle in page.cycles.cycles for each in cycle.decided]
+    grounded = [detail for _, _, event, detail in page.events if event == "adaptation"]
+    changes = {(function, before, chosen) for function, before, chosen in decided if before != chosen}
+    for detail in grounded:
+        function, _, change = detail.partition(": ")
+        before, _, rest = change.partition(" -> ")
+        assert (function, None if before == "ungrounded" else before, rest.partition(":")[0]) in changes
+    rules = {fact.rule for inferred in page.cycles.inferences for fact in inferred.facts if fact.rule}
+    assert rules <= page.cycles.rules.keys()
+
+
+def test_a_mission_whose_ontology_is_gone_is_played_without_explanations(tmp_path):
+    folder = tmp_path / "mission"
+    run_mission("seams2023", "metacontrol", 1, 1, folder)
+    record = json.loads((folder / "mission.json").read_text(encoding="utf-8"))
+    record["scenario"]["knowledge"]["ontologies"] = ["gone.owl"]
+    (folder / "mission.json").write_text(json.dumps(record), encoding="utf-8")
+    page = mission_on_page(read_recorded(folder))
+    assert "gone.owl" in page.cycles.note
+    assert page.cycles.cycles[0].measured
+
+
+def test_two_missions_are_written_side_by_side(mission, tmp_path, capsys):
+    assert status("replay", mission, mission, "--out", tmp_path / "page.html") == 0
+    assert "page.html" in capsys.readouterr().out
+    assert (tmp_path / "page.html").stat().st_size < 2_000_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ((), "nothing to play is given"),
+        (("gone",), "no such folder"),
+        (("{mission}", "--seed", "3"), "--seed has no use with DIR"),
+        (("{mission}", "--scenario", "seams2023"), "both DIR and --scenario"),
+        (("{campaign}", "--run", "9"), "it has runs 1 to 2"),
+        (("{campaign}", "--managers", "bd"), "its managers: none, bt"),
+        (("{campaign}", "--point", "4"), "no point 4"),
+        (("--scenario", "seams2023", "--managers", "none,bt,random"), "2 side by side at most"),
+        (("--scenario", "seams2023", "--run", "0"), "run: 0 is out of range"),
+        (("--scenario", "seams2023", "--out", "no/where.html"), "no/where.html"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+)
+def test_replay_says_what_is_wrong(arguments, told, mission, campaign, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    given = [each.format(mission=mission, campaign=campaign) for each in arguments]
+    assert status("replay", *given) == 2
+    assert told in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        ("", "has no column"),
+        ("a,b\n1,2\n", "has no column"),
+        ("manager,search_time_s,distance_inspected_m\n", "no missions"),
+        ("manager,search_time_s,distance_inspected_m\nbt,nan,1\n", "expected a finite number"),
+    ],
+    ids=["empty", "foreign", "no missions", "nan"],
+)
+def test_report_says_what_is_wrong(content, told, tmp_path, capsys):
+    (tmp_path / "runs.csv").write_text(content, encoding="utf-8")
+    assert status("report", tmp_path) == 2
+    assert told in capsys.readouterr().err
+    assert not (tmp_path / "report.html").exists()

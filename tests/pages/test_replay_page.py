@@ -1,0 +1,155 @@
+"""The replay, opened in a browser as a reader would."""
+
+import pytest
+
+from suave_des.pages.recorded import recorded_result
+from suave_des.pages.replay import replay_page
+from suave_des.scenario.loader import load_scenario
+from suave_des.simulation.simulator import Simulator
+from tests.helpers.browser import DESKTOP, PHONE, chromium, opened
+
+SEED = 1
+FAILURE_S = 36.0  # when metacontrol has seen the thruster's failure of seams2023
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def missions():
+    loaded = load_scenario("seams2023")
+    simulator = Simulator(loaded)
+    return {
+        name: recorded_result(loaded, simulator.run(name, 1, SEED, record=True)) for name in ("metacontrol", "none")
+    }
+
+
+@pytest.fixture(scope="module")
+def one(missions, tmp_path_factory):
+    file = tmp_path_factory.mktemp("one") / "replay.html"
+    file.write_text(replay_page([missions["metacontrol"]]), encoding="utf-8")
+    return file
+
+
+@pytest.fixture(scope="module")
+def both(missions, tmp_path_factory):
+    file = tmp_path_factory.mktemp("both") / "replay.html"
+    file.write_text(replay_page([missions["metacontrol"], missions["none"]]), encoding="utf-8")
+    return file
+
+
+def place(found, pane=0):
+    return found.value(f"Object.values(document.querySelectorAll('.pane')[{pane}].dataset).map(Number)")
+
+
+def mission_time(found):
+    return float(found.value("document.body.dataset.time"))
+
+
+def colours(found, canvas):
+    """How many different colours a canvas shows."""
+    return found.value(
+        f"""(() => {{ const c = document.querySelector('{canvas}'), d = c.getContext('2d');
+        const p = d.getImageData(0, 0, c.width, c.height).data, seen = new Set();
+        for (let i = 0; i < p.length; i += 4 * 7) seen.add((p[i] << 16) | (p[i + 1] << 8) | p[i + 2]);
+        return seen.size; }})()"""
+    )
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
+@pytest.mark.parametrize("name", ["one", "both"])
+def test_it_opens_without_complaint_or_request_and_fits_the_window(name, size, browser, request):
+    file = request.getfixturevalue(name)
+    with opened(browser, file, size, f"#t={FAILURE_S}") as found:
+        assert found.complaints == []
+        assert found.outside(file) == []
+        assert found.value("document.documentElement.scrollWidth") <= size[0]
+        for canvas, fewest in (("canvas.scene", 300), ("canvas.map", 10), ("canvas.profile", 10), ("#timeline", 10)):
+            assert colours(found, canvas) > fewest, canvas
+
+
+def test_it_opens_within_a_second(one, browser):
+    """By the main thread's own time: other programs may be using the machine."""
+    with opened(browser, one) as found:
+        metrics = found.page.context.new_cdp_session(found.page)
+        metrics.send("Performance.enable", {"timeDomain": "threadTicks"})
+        found.page.reload()
+        taken = {each["name"]: each["value"] for each in metrics.send("Performance.getMetrics")["metrics"]}
+        assert 0.0 < taken["TaskDuration"] < 1.0
+
+
+def test_playing_moves_the_vehicle_until_it_is_paused(one, browser):
+    with opened(browser, one, hash_="#t=10") as found:
+        start = place(found)
+        found.page.click("#play")
+        found.wait_until("Number(document.body.dataset.time) > 12")
+        assert place(found) != start
+        found.page.click("#play")
+        paused = mission_time(found)
+        found.page.wait_for_timeout(150)
+        assert mission_time(found) == pytest.approx(paused, abs=0.2)
+
+
+def test_scrubbing_shows_the_vehicle_where_it_was_then(one, missions, browser):
+    track = missions["metacontrol"].track
+    index = track["t_s"].index(50.0)
+    with opened(browser, one) as found:
+        found.page.evaluate(
+            "(s => { s.value = 50; s.dispatchEvent(new Event('input')); })(document.querySelector('#scrub'))"
+        )
+        found.wait_until("document.body.dataset.time === '50.00'")
+        assert place(found) == pytest.approx([track[name][index] for name in ("x_m", "y_m", "z_m")], abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("key", "expected_s"), [("ArrowRight", 101.0), ("Shift+ArrowLeft", 90.0), ("End", 300.0), ("Home", 0.0)]
+)
+def test_keys_move_through_time(key, expected_s, one, browser):
+    with opened(browser, one, hash_="#t=100") as found:
+        found.page.keyboard.press(key)
+        found.wait_until(f"Math.abs(Number(document.body.dataset.time) - {expected_s}) < 0.5")
+
+
+def test_the_space_bar_plays_and_pauses_even_after_a_click_on_the_button(one, browser):
+    with opened(browser, one) as found:
+        found.page.keyboard.press(" ")
+        assert found.value("document.body.classList.contains('playing')")
+        found.page.focus("#play")
+        found.page.keyboard.press(" ")
+        assert not found.value("document.body.classList.contains('playing')")
+
+
+def test_the_panel_shows_rule_bindings_and_designs_of_an_adaptation(one, browser):
+    with opened(browser, one, hash_=f"#t={FAILURE_S}") as found:
+        analyze, plan = (found.page.text_content(f".{phase}") for phase in ("analyze", "plan"))
+        assert "IN_ERROR_COMPONENT" in analyze
+        assert "by rule compErrFG" in analyze
+        assert "?c = c_thruster_1" in analyze
+        assert found.page.text_content(".designs .chosen .name") == "fd_recover_thrusters"
+        assert "left out: not realisable" in plan
+        assert found.value("document.querySelectorAll('.lamps .dead').length") == 1
+
+
+def test_two_managers_play_side_by_side_on_the_same_numbers(both, browser):
+    with opened(browser, both, hash_="#t=0.0") as found:
+        assert place(found, 0) == place(found, 1)
+        assert "the same random numbers" in found.page.text_content("#subtitle")
+        found.page.keyboard.press("End")
+        found.wait_until("Number(document.body.dataset.time) > 299")
+        assert place(found, 0) != place(found, 1)
+
+
+def test_names_are_text_never_markup(missions, tmp_path, browser):
+    from dataclasses import replace
+
+    name = "</script><img src=x onerror=alert(1)><b>mine</b>"
+    mission = replace(missions["none"], metrics={**missions["none"].metrics, "manager": name})
+    file = tmp_path / "replay.html"
+    file.write_text(replay_page([mission]), encoding="utf-8")
+    with opened(browser, file) as found:
+        assert found.complaints == []
+        assert found.page.text_content("h1") == name
+        assert found.value("document.querySelectorAll('img, h1 b').length") == 0

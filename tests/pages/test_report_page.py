@@ -1,0 +1,122 @@
+"""The report, opened in a browser as a reader would."""
+
+import pandas
+import pytest
+
+from suave_des.campaign.campaign import run_campaign
+from suave_des.pages.report import LIMIT_BYTES, report_page
+from tests.helpers.browser import DESKTOP, PHONE, chromium, opened
+
+pytest.importorskip("plotly")
+MARKUP = "<b>mine</b>$x$</script><img/src=x/onerror=alert(1)>"
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("results") / "campaign"
+    run_campaign("seams2023", ["none", "bt"], runs=8, out=folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def report(campaign):
+    file = campaign / "report.html"
+    file.write_text(report_page([campaign], runs=3), encoding="utf-8")
+    return file
+
+
+def ready(found):
+    found.wait_until("document.body.dataset.ready === 'true'")
+    return found
+
+
+def traces(found, chart):
+    return found.value(f"document.getElementById('{chart}').data.map(each => each.name)")
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_it_opens_without_complaint_or_request_and_fits_the_window(theme, size, report, browser):
+    with opened(browser, report, size, theme=theme) as found:
+        ready(found)
+        assert found.complaints == []
+        assert found.outside(report) == []
+        assert found.value("document.documentElement.scrollWidth") <= size[0]
+        assert found.value("document.documentElement.dataset.theme") == theme
+        for chart in ("ecdf", "spread", "paired", "where", "runs", "run-time", "run-map"):
+            drawn = found.value(f"document.querySelectorAll('#{chart} svg path').length")
+            assert drawn > 3, chart
+
+
+def test_it_says_first_what_follows_and_last_how_it_was_made(report, browser):
+    with opened(browser, report) as found:
+        ready(found)
+        assert "none" in found.page.text_content("#conclusion")
+        assert "bt" in found.page.text_content("#conclusion")
+        assert "SHA-256" in found.page.text_content("#how")
+        assert found.page.text_content("#count") == "16 missions"
+
+
+def test_managers_metrics_and_runs_can_be_chosen(report, browser):
+    with opened(browser, report) as found:
+        ready(found)
+        assert traces(found, "ecdf") == ["none", "bt"]
+        found.page.click("#managers button:first-child")
+        assert traces(found, "ecdf") == ["bt"]
+        assert found.page.text_content("#count") == "8 missions"
+        found.page.select_option("#metric", "distance_inspected_m")
+        assert "distance" in found.page.text_content("#ecdf-title")
+        found.page.select_option("#found", "0")
+        assert found.page.text_content("#count") != "8 missions"
+
+
+def test_a_click_on_a_mission_shows_its_numbers_and_way(report, campaign, browser):
+    rows = pandas.read_csv(campaign / "runs.csv")
+    row = rows[(rows.manager == "bt") & (rows.run == 2)].iloc[0]
+    with opened(browser, report) as found:
+        ready(found)
+        found.page.evaluate("document.getElementById('runs').emit('plotly_click', {points: [{customdata: 9}]})")
+        shown = found.page.text_content("#run-table tr[aria-selected=true]")
+        assert f"{row.search_time_s:g}" in shown
+        assert found.page.input_value("#run-number") == "2"
+        assert "--run 2 --managers bt" in found.page.text_content("#run-command")
+
+
+def test_names_are_text_never_markup(campaign, tmp_path, browser):
+    rows = pandas.read_csv(campaign / "runs.csv")
+    rows.assign(manager=rows.manager.replace("bt", MARKUP)).to_csv(tmp_path / "runs.csv", index=False)
+    file = tmp_path / "report.html"
+    file.write_text(report_page([tmp_path]), encoding="utf-8")
+    with opened(browser, file) as found:
+        ready(found)
+        assert found.complaints == []
+        assert MARKUP in found.page.text_content("#managers")
+        assert found.value("document.querySelectorAll('img, #managers b, #conclusion b').length") == 0
+
+
+def test_ten_thousand_missions_make_a_page_that_can_be_sent(campaign, tmp_path):
+    rows = pandas.read_csv(campaign / "runs.csv")
+    many = pandas.concat([rows.assign(run=rows.run + 8 * copy) for copy in range(625)])
+    many.to_csv(tmp_path / "runs.csv", index=False)
+    assert len(report_page([tmp_path]).encode()) < LIMIT_BYTES
+
+
+@pytest.mark.parametrize("case", ["one run", "none found"])
+def test_results_that_leave_little_to_compare_make_a_page(case, campaign, tmp_path, browser):
+    rows = pandas.read_csv(campaign / "runs.csv")
+    if case == "one run":
+        rows = rows[rows.run == 1]
+    else:
+        rows = rows.assign(pipeline_found=False, search_time_s=300.0, detection_x_m=None, mean_reaction_time_s=None)
+    rows.to_csv(tmp_path / "runs.csv", index=False)
+    file = tmp_path / "report.html"
+    file.write_text(report_page([tmp_path]), encoding="utf-8")
+    with opened(browser, file) as found:
+        ready(found)
+        assert found.complaints == []
