@@ -55,7 +55,7 @@ def _take(browser: Browser, file: Path, where: str, size: tuple[int, int]) -> No
         page.wait_for_timeout(100)
     page.wait_for_timeout(1000)
     with Image.open(io.BytesIO(page.screenshot())) as taken:
-        picture = taken.convert("RGB").quantize(_COLOURS, Image.Quantize.MAXCOVERAGE)
+        picture = taken.convert("RGB").quantize(_COLOURS, kmeans=4)
     target = IMAGES / f"{file.stem}.png"
     picture.save(target, optimize=True)
     print(f"{target.name}: {target.stat().st_size / 1000:.0f} kB")
