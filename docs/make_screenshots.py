@@ -11,15 +11,18 @@ import io
 import shutil
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PIL import Image
-from playwright.sync_api import Browser, sync_playwright
 
 from suave_des.campaign.campaign import run_campaign
 from suave_des.pages.replay import replay_page
 from suave_des.pages.report import report_page
 from suave_des.pages.sources import Chosen, missions_run
 from suave_des.scenario.loader import load_scenario
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 IMAGES = Path(__file__).resolve().parent / "images"
 PICTURES = ("replay.png", "replay-two.png", "report.png")
@@ -28,6 +31,8 @@ _COLOURS = 256
 
 def main() -> None:
     """Take all pictures."""
+    from playwright.sync_api import sync_playwright
+
     loaded = load_scenario("seams2023")
     with tempfile.TemporaryDirectory() as name, sync_playwright() as playwright:
         folder = Path(name)
