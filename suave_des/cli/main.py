@@ -15,7 +15,7 @@ import typer
 from typer.core import TyperGroup
 
 from suave_des import __version__
-from suave_des.cli import bench, calibrate, campaign, compare, figure, kb, missions, pages, reproduce, validate
+from suave_des.cli import bench, calibrate, campaign, compare, figure, kb, missions, pages, reproduce, serve, validate
 from suave_des.cli.options import remember_command_line
 from suave_des.cli.terminal import plain, write_what_the_terminal_has
 from suave_des.errors import InputError, SuaveDesError
@@ -88,6 +88,7 @@ app.command("validate")(validate.validate)
 app.command("calibrate")(calibrate.calibrate)
 app.add_typer(kb.app, name="kb")
 app.command("compare")(compare.compare)
+app.command("serve")(serve.serve)
 app.command("figure")(figure.figure)
 app.command("report")(pages.report)
 app.command("replay")(pages.replay)

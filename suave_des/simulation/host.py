@@ -70,7 +70,7 @@ class ManagerHost:
         self._depends_on = [(each, edges[name]) for name, each in self.system.measurements.items() if name in edges]
         self._is_tabulated = all(each.is_tabulated for each, _ in self._depends_on)
         if kind.diagnostic is not ManagingSubsystem.diagnostic:
-            self.bus.subscribe(self._diagnostic, kind.subscribes_to)
+            self.bus.subscribe(self._diagnostic, self.manager.subscribes_to)
         period_s = self.manager.period_s
         if period_s is not None:
             if not period_s > 0.0:

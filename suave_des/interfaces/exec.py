@@ -1,0 +1,267 @@
+"""Managers in other processes and languages: `exec:COMMAND` speaks JSON lines with a program over its stdin and stdout.
+
+Each message is a line, and gets a line as its answer; mission time stands still until then. The program is started once
+in each process that runs missions, and serves one mission after the other. The messages: docs/guides/exec.md.
+"""
+
+from __future__ import annotations
+
+import atexit
+import json
+import os
+import select
+import shlex
+import subprocess
+import time
+from collections.abc import Collection, Mapping
+from dataclasses import asdict
+from functools import cache
+from pathlib import Path
+from typing import Any, ClassVar, Final
+
+from suave_des.domain import Task
+from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.managing.base import ManagedSystem, ManagingSubsystem, Thresholds
+from suave_des.metrics.result import MissionMetrics
+from suave_des.monitor.diagnostics import MEASURED_AND_COMPONENTS, Diagnostic, Kind
+
+PROTOCOL: Final = 1
+"""Version of the messages; a program of another version is refused."""
+LINE_LIMIT_BYTES: Final = 1_000_000
+TIME_OUT_S: Final = 10.0
+"""So long a program may take for an answer; the setting `time_out_s` changes it."""
+_END_S: Final = 1.0
+_READ_BYTES: Final = 65536
+KINDS: Final = {
+    "measured": Kind.QA_STATUS,
+    "component_status": Kind.COMPONENT_STATUS,
+    "pose": Kind.POSE,
+    "distance": Kind.DISTANCE,
+}
+_NAMES: Final = {kind: name for name, kind in KINDS.items()}
+_ANSWER: Final = ("modes", "log")
+_FIRST_ANSWER: Final = ("protocol", "period_s", "starts_s", "subscribes_to", "depends_on", *_ANSWER)
+
+
+class ProgramError(Exception):
+    """A program that ends, does not answer, or answers something else than the protocol says."""
+
+
+class _Program:
+    """A running program."""
+
+    def __init__(self, command: tuple[str, ...]) -> None:
+        try:
+            self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0)
+        except OSError as error:
+            remedy = "give a program that can be run, such as exec:./my_manager or exec:perl my_manager.pl"
+            raise InputError(f"cannot be run: {error.strerror}", file=command[0], remedy=remedy) from None
+        assert self._process.stdin is not None and self._process.stdout is not None
+        self._in, self._out = self._process.stdin.fileno(), self._process.stdout.fileno()
+        self._poll = select.poll()
+        self._poll.register(self._out, select.POLLIN)
+        self._rest = b""
+
+    def ask(self, message: Mapping[str, Any], time_out_s: float) -> dict[str, Any]:
+        """Send a message, and return its answer."""
+        line = json.dumps(message, separators=(",", ":")).encode() + b"\n"
+        try:
+            while line:
+                line = line[os.write(self._in, line) :]
+        except BrokenPipeError:
+            raise self._ended() from None
+        answer = self._line(time_out_s)
+        try:
+            found = json.loads(answer)
+        except (ValueError, RecursionError):
+            raise ProgramError(f"answered {shown(answer[:80].decode(errors='replace'))}, which is not JSON") from None
+        if not isinstance(found, dict):
+            raise ProgramError(f"answered {shown(found)}, which is not an object")
+        return found
+
+    def _line(self, time_out_s: float) -> bytes:
+        due_s = time.monotonic() + time_out_s
+        while b"\n" not in self._rest:
+            if len(self._rest) > LINE_LIMIT_BYTES:
+                raise ProgramError(f"answered with a line of more than {LINE_LIMIT_BYTES:,} bytes")
+            if not self._poll.poll(max(0.0, due_s - time.monotonic()) * 1e3):
+                half = " but half a line" if self._rest else ""
+                raise ProgramError(f"gave no answer{half} within {time_out_s:g} s")
+            if not (part := os.read(self._out, _READ_BYTES)):
+                raise self._ended()
+            self._rest += part
+        line, self._rest = self._rest.split(b"\n", 1)
+        if self._rest:
+            raise ProgramError("answered with more than one line")
+        return line
+
+    def _ended(self) -> ProgramError:
+        try:
+            status = self._process.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            return ProgramError("closed its output")
+        return ProgramError(f"ended with status {status}")
+
+    def end(self) -> None:
+        """End the program: it sees the end of its input, and is killed if that is not enough."""
+        for stream in (self._process.stdin, self._process.stdout):
+            assert stream is not None
+            stream.close()
+        try:
+            self._process.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+
+_programs: dict[tuple[str, ...], _Program] = {}
+"""The programs of this process, by their commands."""
+
+
+@atexit.register
+def end_programs() -> None:
+    """End all programs that this process has started."""
+    while _programs:
+        _programs.popitem()[1].end()
+
+
+class ExecManager(ManagingSubsystem):
+    """exec:COMMAND: a program that is told what happens, and answers with modes."""
+
+    command: ClassVar[str]
+
+    @classmethod
+    def input_files(cls, settings: Mapping[str, Any]) -> Collection[str]:
+        """The files that the command names, and the one that its setting `learned` names."""
+        words = shlex.split(cls.command)
+        return (*(word for word in words if Path(word).is_file()), *super().input_files(settings))
+
+    def __init__(self, system: ManagedSystem) -> None:
+        super().__init__(system)
+        words = shlex.split(self.command)
+        self._command = tuple(str(system.files[word].resolve()) if word in system.files else word for word in words)
+        settings = dict(system.settings)
+        self._time_out_s = float(settings.pop("time_out_s", TIME_OUT_S))
+        self._thresholds: Thresholds | None = None
+        answer = self._ask(
+            "mission_started",
+            protocol=PROTOCOL,
+            scenario=system.scenario.name,
+            time_limit_s=system.scenario.mission.time_limit_s,
+            seed=system.stream("exec").getrandbits(48),
+            settings=settings,
+            learned=_plain(system.learned),
+            attributes=list(system.measurements),
+            functions={function: system.modes.available_modes(function) for function in system.modes.nodes},
+            lasting_functions=system.lasting_functions,
+        )
+        if answer.pop("protocol", PROTOCOL) != PROTOCOL:
+            raise self._error(f"does not speak version {PROTOCOL} of the protocol")
+        try:
+            self._take_settings(answer)
+        except (TypeError, ValueError, AttributeError, KeyError) as error:
+            raise self._error(f"answered {shown(answer)} to mission_started: {error}") from None
+        self._begin = answer
+
+    def _take_settings(self, answer: dict[str, Any]) -> None:
+        period_s = answer.pop("period_s", None)
+        self.period_s = None if period_s is None else float(period_s)
+        self.starts_s = float(answer.pop("starts_s", 0.0))
+        names = answer.pop("subscribes_to", [_NAMES[kind] for kind in MEASURED_AND_COMPONENTS])
+        if unknown := [name for name in names if name not in KINDS]:
+            raise ValueError(f"subscribes_to: {did_you_mean(unknown[0], KINDS)}")
+        self._subscribes_to = tuple(KINDS[name] for name in names)
+        if (edges := answer.pop("depends_on", None)) is not None:
+            self._thresholds = {name: tuple(sorted(map(float, each))) for name, each in edges.items()}
+
+    def mission_started(self) -> None:
+        """Carry out what the program answered when it was told of the mission."""
+        self._carry_out(self._begin)
+
+    def mission_ended(self, metrics: MissionMetrics) -> None:
+        """Tell the program the metrics."""
+        self._ask("mission_ended", metrics={key: value for key, value in asdict(metrics).items() if key != "further"})
+
+    def task_requested(self, task: Task) -> None:
+        """Tell the program of a task that begins."""
+        self._carry_out(self._ask("task_requested", task=task.name, functions=task.functions))
+
+    def task_cancelled(self, task: Task) -> None:
+        """Tell the program of a task that is over; its functions are set to fd_unground first."""
+        super().task_cancelled(task)
+        self._carry_out(self._ask("task_cancelled", task=task.name, functions=task.functions))
+
+    def diagnostic(self, diagnostic: Diagnostic) -> None:
+        """Pass a diagnostic on."""
+        kind = _NAMES.get(diagnostic.kind)
+        if kind is not None:
+            self._carry_out(self._ask("diagnostic", kind=kind, key=diagnostic.key, value=diagnostic.value))
+
+    def adapt(self) -> None:
+        """Have the program adapt, with all that is measured."""
+        measured = self.system.measured
+        self._carry_out(self._ask("adapt", measured={name: measured(name) for name in self.system.measurements}))
+
+    def _ask(self, kind: str, /, **content: Any) -> dict[str, Any]:
+        if (program := _programs.get(self._command)) is None:
+            program = _programs[self._command] = _Program(self._command)
+        try:
+            answer = program.ask({"type": kind, "time_s": self.system.now_s, **content}, self._time_out_s)
+        except BaseException as error:  # a time-out of the mission, too, leaves an answer under way
+            _programs.pop(self._command).end()
+            if isinstance(error, ProgramError):
+                raise self._error(str(error)) from None
+            raise
+        known = _FIRST_ANSWER if kind == "mission_started" else _ANSWER
+        if unknown := [key for key in answer if key not in known]:
+            raise self._error(f"answered {shown(unknown[0])} to {kind}: {did_you_mean(unknown[0], known)}")
+        return answer
+
+    def _carry_out(self, answer: Mapping[str, Any]) -> None:
+        modes, lines = answer.get("modes", {}), answer.get("log", ())
+        if not isinstance(modes, dict) or not isinstance(lines, list | tuple):
+            raise self._error(f"answered {shown(dict(answer))}; modes is an object, log a list of texts")
+        for line in lines:
+            self.system.log("says", str(line))
+        for function, mode in modes.items():
+            if not isinstance(mode, str) or not self.system.change_mode(function, mode):
+                known = self.system.modes.available_modes(function)
+                remedy = (
+                    did_you_mean(mode, known, "its modes")
+                    if known
+                    else did_you_mean(function, self.system.modes.nodes, "functions")
+                )
+                raise self._error(f"requested mode {shown(mode)} of {shown(function)}: {remedy}")
+
+    def _error(self, problem: str) -> ProgramError:
+        return ProgramError(f"{self._command[0]} {problem}")
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _plain(each) for key, each in value.items()}
+    return [_plain(each) for each in value] if isinstance(value, tuple | list) else value
+
+
+@cache
+def exec_manager(command: str) -> type[ManagingSubsystem]:
+    """Make the class of the manager `exec:COMMAND`.
+
+    Raises:
+        InputError: the command is no list of words.
+    """
+    try:
+        words = shlex.split(command)
+    except ValueError as error:
+        raise InputError(f"exec:{command}: {error}", remedy="close the quotes") from None
+    if not words:
+        raise InputError("there is no manager 'exec'", remedy="write exec:COMMAND")
+
+    def thresholds(self: ExecManager) -> Thresholds | None:
+        return self._thresholds
+
+    def kinds(self: ExecManager) -> Collection[Kind]:
+        return self._subscribes_to
+
+    own = {"command": command, "depends_on": property(thresholds), "subscribes_to": property(kinds)}
+    return type("ExecManager", (ExecManager,), own)

@@ -1,0 +1,187 @@
+"""Managers that are programs of their own, in whatever language."""
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from suave_des import InputError, run_campaign, run_mission
+from suave_des.interfaces import exec as programs
+from suave_des.registry import manager_class
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "docs" / "examples" / "exec"
+HEAD = "import json, os, sys, time\nfor number, line in enumerate(sys.stdin):\n    message = json.loads(line)\n"
+
+
+@pytest.fixture(autouse=True)
+def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    yield
+    programs.end_programs()
+
+
+def program(body: str) -> str:
+    """Write a program whose loop over messages has a body; return the manager's name."""
+    Path("program.py").write_text(HEAD + "".join(f"    {line}\n" for line in body.splitlines()))
+    return f"exec:{sys.executable} program.py"
+
+
+def failure(manager: str, **options: object) -> str:
+    with pytest.warns(UserWarning, match="missions failed"):
+        frame = run_campaign("seams2023", ["none", manager], runs=1, **options)  # type: ignore[arg-type]
+    assert len(frame) == 1  # the other manager's mission is there
+    return str(frame.attrs["failures"][0]["cause"])
+
+
+EVERY_PERIOD = """
+answer = {}
+if message["type"] == "mission_started":
+    answer = {"period_s": 2.0, "subscribes_to": ["component_status"]}
+elif message["type"] == "adapt" and (message["measured"]["water_visibility"] or 0.0) >= 3.25:
+    answer = {"modes": {"f_generate_search_path": "fd_spiral_high"}, "log": ["higher"]}
+print(json.dumps(answer), flush=True)
+"""
+
+
+def command(language: str, folder: Path) -> str:
+    if language == "perl":
+        return f"exec:perl {EXAMPLES / 'manager.pl'}"
+    if language == "node":
+        return f"exec:node {EXAMPLES / 'manager.js'}"
+    subprocess.run(["gcc", "-O2", "-o", folder / "manager", EXAMPLES / "manager.c"], check=True)
+    return f"exec:{folder / 'manager'}"
+
+
+@pytest.mark.parametrize(("language", "needs"), [("perl", "perl"), ("node", "node"), ("c", "gcc")])
+def test_the_examples_carry_out_the_same_missions(language: str, needs: str, tmp_path: Path) -> None:
+    if shutil.which(needs) is None:
+        pytest.skip(f"there is no {needs}")
+    (tmp_path / "same.py").write_text(SAME)
+    frame = run_campaign("seams2023", ["same:Same", command(language, tmp_path)], runs=5)
+    one, other = (part.reset_index(drop=True) for _, part in frame.groupby("manager", observed=True))
+    assert (one["search_time_s"] == other["search_time_s"]).all()
+    assert (one["distance_inspected_m"] == other["distance_inspected_m"]).all()
+
+
+SAME = '''
+from suave_des.managing.reference import Threshold
+
+class Same(Threshold):
+    """The examples, in this process."""
+    def __init__(self, system):
+        super().__init__(system)
+        self.starts_s = 0.0
+        self.thresholds_m, self.search_modes = (3.25, 2.25), ("fd_spiral_high", "fd_spiral_medium")
+
+    def wanted(self, visibility_m):
+        for function, mode in super().wanted(visibility_m or 0.0):
+            is_low = function == "f_generate_search_path" and (visibility_m or 0.0) < 2.25
+            yield function, "fd_spiral_low" if is_low else mode
+'''
+
+
+def test_a_program_serves_one_mission_after_the_other() -> None:
+    count = "open('started', 'a').write('x') if number == 0 else None\n"
+    frame = run_campaign("seams2023", [program(count + EVERY_PERIOD)], runs=4)
+    assert len(frame) == 4 and Path("started").read_text() == "x"
+
+
+def test_what_it_says_stands_in_the_timeline() -> None:
+    events = run_mission("seams2023", program(EVERY_PERIOD), 1, 1).events
+    assert next(each.detail for each in events if each.event == "says") == "higher"
+
+
+def test_it_is_told_what_happens() -> None:
+    note = "open('messages', 'a').write(line)\n"
+    run_mission("seams2023", program(note + EVERY_PERIOD), 1, 1)
+    import json
+
+    messages = [json.loads(line) for line in Path("messages").read_text().splitlines()]
+    first, last = messages[0], messages[-1]
+    assert first["type"] == "mission_started" and first["protocol"] == 1
+    assert "fd_spiral_high" in first["functions"]["f_generate_search_path"]
+    assert last["type"] == "mission_ended" and last["metrics"]["run"] == 1
+    assert {"task_requested", "task_cancelled", "adapt", "diagnostic"} <= {each["type"] for each in messages}
+    assert [each["time_s"] for each in messages] == sorted(each["time_s"] for each in messages)
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ("time.sleep(60)", "gave no answer within 0.5 s"),
+        ("print('{', end='', flush=True); time.sleep(60)", "gave no answer but half a line within 0.5 s"),
+        ("sys.exit(7)", "ended with status 7"),
+        ("os.kill(os.getpid(), 9)", "ended with status -9"),
+        ("sys.stdout.close(); os.close(1); time.sleep(60)", "closed its output"),
+        ("print('good morning', flush=True)", "answered 'good morning', which is not JSON"),
+        ("print('[1]', flush=True)", "answered [1], which is not an object"),
+        ("print('[' * 100000, flush=True)", "which is not JSON"),
+        ("print('x' * 10_000_000, flush=True)", "line of more than 1,000,000 bytes"),
+        ("print('{}\\n{}', flush=True)", "more than one line"),
+        ("print('{\"mode\": {}}', flush=True)", "did you mean 'modes'"),
+        ("print('{\"protocol\": 2}', flush=True)", "does not speak version 1"),
+        ('print(\'{"period_s": "often"}\', flush=True)', "to mission_started"),
+        ('print(\'{"subscribes_to": ["poses"]}\', flush=True)', "did you mean 'pose'"),
+        ('print(\'{"modes": {"f_generate_search_path": "fd_spiral_hihg"}}\', flush=True)', "'fd_spiral_high'"),
+        ("print('{\"modes\": [1]}', flush=True)", "modes is an object"),
+    ],
+)
+def test_a_program_that_misbehaves_ends_its_mission_with_a_clear_error(body: str, words: str) -> None:
+    manager = program(body)
+    assert words in failure(manager, manager_options={manager: {"time_out_s": 0.5}})
+
+
+def test_after_a_failure_the_next_mission_begins_with_a_new_program() -> None:
+    once = "if not os.path.exists('once'):\n    open('once', 'w'); sys.exit(1)\n"
+    with pytest.warns(UserWarning, match="1 of 3 missions failed"):
+        frame = run_campaign("seams2023", [program(once + EVERY_PERIOD)], runs=3)
+    assert frame["run"].tolist() == [2, 3]
+
+
+def test_programs_end_with_the_campaign() -> None:
+    note = "open('pid', 'w').write(str(os.getpid()))\n"
+    run_campaign("seams2023", [program(note + EVERY_PERIOD)], runs=2, workers=2)
+    pid = int(Path("pid").read_text())
+    for _ in range(100):
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return
+        time.sleep(0.1)
+    raise AssertionError("the program still runs")
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("exec:", "write exec:COMMAND"),
+        ("exec:./no_such_program", "cannot be run: No such file"),
+        ("exec:'unclosed", "close the quotes"),
+    ],
+)
+def test_a_command_that_cannot_be_run_is_bad_input(name: str, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        run_campaign("seams2023", [name], runs=1)
+
+
+def test_the_programs_files_are_hashed(tmp_path: Path) -> None:
+    run_campaign("seams2023", [program(EVERY_PERIOD)], runs=1, out=tmp_path / "out")
+    assert '"program.py"' in (tmp_path / "out" / "manifest.json").read_text()
+
+
+def test_a_resumed_campaign_runs_no_program_unasked(tmp_path: Path) -> None:
+    from suave_des import resume_campaign
+
+    manager = program(EVERY_PERIOD)
+    run_campaign("seams2023", [manager], runs=1, out=tmp_path / "out")
+    with pytest.raises(InputError, match="would run the code of exec:"):
+        resume_campaign(tmp_path / "out", runs=2)
+    assert len(resume_campaign(tmp_path / "out", runs=2, managers=[manager])) == 2
+
+
+def test_the_class_of_a_command_is_made_once() -> None:
+    assert manager_class("exec:./mine") is manager_class("exec:./mine")

@@ -1,0 +1,177 @@
+"""The mission over HTTP: what UPISAS expects of an exemplar, and what a server may expect of clients."""
+
+import json
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from http.client import HTTPConnection
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from suave_des import InputError, Mission, load_scenario
+from suave_des.interfaces.serve import Server, Session
+from suave_des.simulation.simulator import Simulator
+from tests.helpers.command import suave_des_command
+
+SEARCH = "f_generate_search_path"
+
+
+@pytest.fixture(scope="module")
+def simulator() -> Simulator:
+    return Simulator(load_scenario("seams2023"))
+
+
+@pytest.fixture
+def port(simulator: Simulator) -> Iterator[int]:
+    with Server(Session(simulator), port=0) as server:
+        thread = threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True)
+        thread.start()
+        yield server.server_port
+        server.shutdown()
+
+
+def request(port: int, method: str, path: str, body: object = None) -> tuple[int, bytes]:
+    connection = HTTPConnection("127.0.0.1", port, timeout=10.0)
+    content = None if body is None else body if isinstance(body, bytes) else json.dumps(body).encode()
+    connection.request(method, path, content)
+    answer = connection.getresponse()
+    return answer.status, answer.read()
+
+
+class Strategy:
+    """An adaptation loop as UPISAS has it: schemas first, then monitor, analyze, plan, execute, each validated."""
+
+    def __init__(self, port: int) -> None:
+        self.port, self.seen = port, b""
+        self.schemas = {name: self.get(f"{name}_schema") for name in ("monitor", "execute", "adaptation_options")}
+        self.options = self.get("adaptation_options")
+        jsonschema.validate(self.options, self.schemas["adaptation_options"])
+
+    def get(self, path: str) -> dict:
+        status, body = request(self.port, "GET", f"/{path}")
+        assert status == 200
+        self.seen += body
+        return json.loads(body)
+
+    def monitor(self) -> dict:
+        found = self.get("monitor")
+        jsonschema.validate(found, self.schemas["monitor"])
+        assert not any(isinstance(value, dict | list) for value in found.values())
+        return found
+
+    def execute(self, adaptation: dict) -> None:
+        jsonschema.validate(adaptation, self.schemas["execute"])
+        status, body = request(self.port, "PUT", "/execute", adaptation)
+        assert status == 200
+        self.seen += body
+
+
+def whole_mission(port: int, seed: int) -> tuple[bytes, dict]:
+    request(port, "POST", "/start", {"seed": seed})
+    strategy = Strategy(port)
+    while not (found := strategy.monitor())["is_over"]:
+        adaptation: dict[str, object] = {"advance_s": 4.0}
+        if found["task"] == "search_pipeline":
+            low, medium, high = strategy.options[SEARCH]
+            visibility_m = found["water_visibility"] or 0.0
+            adaptation[SEARCH] = high if visibility_m >= 3.25 else medium if visibility_m >= 2.25 else low
+        strategy.execute(adaptation)
+    return strategy.seen, json.loads(request(port, "GET", "/metrics")[1])
+
+
+def test_a_client_goes_through_a_whole_mission_and_the_same_seed_gives_the_same_bytes(port: int) -> None:
+    first, metrics = whole_mission(port, 3)
+    assert metrics["adaptations"] > 3 and metrics["pipeline_found"] and metrics["seed"] == 3
+    assert whole_mission(port, 4)[0] != first
+    assert whole_mission(port, 3) == (first, metrics)
+
+
+def test_it_is_the_mission_of_that_run(port: int, simulator: Simulator) -> None:
+    request(port, "POST", "/start", {"run": 5, "seed": 2})
+    request(port, "POST", "/advance", {"until_s": 1000})
+    found = json.loads(request(port, "GET", "/metrics")[1])
+    assert found["search_time_s"] == simulator.run("none", 5, 2).metrics.search_time_s
+
+
+def test_time_stands_still_until_a_client_says_so(port: int) -> None:
+    assert request(port, "GET", "/monitor") == request(port, "GET", "/monitor")
+    status, body = request(port, "POST", "/advance", {"advance_s": 2.5})
+    assert status == 200 and json.loads(body)["time_s"] == 2.5
+
+
+def test_time_may_pass_by_a_factor_of_real_time(simulator: Simulator) -> None:
+    session = Session(simulator, real_time_factor=1e6)
+    time.sleep(0.01)
+    assert session.answer("GET", "/monitor", None)["is_over"] is True
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "body", "status", "words"),
+    [
+        ("GET", "/nothing", None, 404, "there is no GET /nothing"),
+        ("PUT", "/monitor", {}, 404, "there is no PUT /monitor"),
+        ("PUT", "/execute", b"{", 400, "not JSON"),
+        ("PUT", "/execute", b"\xff\xfe", 400, "not JSON"),
+        ("PUT", "/execute", b"[" * 50_000, 400, "not JSON"),
+        ("PUT", "/execute", [1], 400, "expected an object"),
+        ("PUT", "/execute", {SEARCH: "fd_spiral_hihg"}, 400, "did you mean 'fd_spiral_high'"),
+        ("PUT", "/execute", {"f_search": "x"}, 400, "there is no function"),
+        ("PUT", "/execute", {SEARCH: ["x"]}, 400, "no mode"),
+        ("PUT", "/execute", {"advance_s": -1}, 400, "no time in s"),
+        ("PUT", "/execute", {"advance_s": "soon"}, 400, "no time in s"),
+        ("POST", "/advance", {"advance_s": 1, "until_s": 2}, 400, "advance_s or until_s"),
+        ("POST", "/advance", {"by": 1}, 400, "unknown key"),
+        ("POST", "/start", {"seed": -3}, 400, "seed"),
+        ("POST", "/start", {"sed": 3}, 400, "unknown key"),
+        ("PUT", "/execute", b" " * 100_001, 413, "more than 100,000 bytes"),
+    ],
+)
+def test_what_it_cannot_use_is_refused_and_changes_nothing(
+    port: int, method: str, path: str, body: object, status: int, words: str
+) -> None:
+    before = request(port, "GET", "/monitor")
+    found, answer = request(port, method, path, body)
+    assert found == status and words in json.loads(answer)["error"]
+    assert request(port, "GET", "/monitor") == before
+
+
+def test_a_body_without_a_length_is_refused(port: int) -> None:
+    with socket.create_connection(("127.0.0.1", port), timeout=10.0) as stream:
+        stream.sendall(b"PUT /execute HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\n")
+        assert b" 400 " in stream.recv(1000)
+
+
+def test_several_clients_at_once_get_whole_answers(port: int) -> None:
+    with ThreadPoolExecutor(8) as pool:
+        answers = list(pool.map(lambda _: request(port, "POST", "/advance", {"advance_s": 0.5}), range(40)))
+    times_s = sorted(json.loads(body)["time_s"] for _, body in answers)
+    assert times_s == [0.5 * number for number in range(1, 41)]
+
+
+def test_it_listens_on_this_machine_alone(port: int, simulator: Simulator) -> None:
+    with Server(Session(simulator), port=0) as server:
+        assert server.server_address[0] == "127.0.0.1"
+
+
+def test_a_port_in_use_is_bad_input(port: int, simulator: Simulator) -> None:
+    with pytest.raises(InputError, match=f"{port} cannot be used"):
+        Server(Session(simulator), port=port)
+
+
+@pytest.mark.parametrize("options", [("--real-time-factor", "-1"), ("--host", "no.such.host.example")])
+def test_options_that_make_no_sense_are_bad_input(tmp_path: Path, options: tuple[str, str]) -> None:
+    done = suave_des_command("serve", "seams2023", "--port", "0", *options, cwd=tmp_path)
+    assert done.returncode == 2 and "Traceback" not in done.stderr
+
+
+def test_monitor_shows_what_the_mission_shows(port: int, simulator: Simulator) -> None:
+    found = json.loads(request(port, "POST", "/advance", {"until_s": 50})[1])
+    mission = Mission(simulator)
+    mission.advance(50.0)
+    assert found["water_visibility"] == mission.measured("water_visibility")
+    assert found["c_thruster_1"] == "FALSE" and found[SEARCH] == mission.current_mode(SEARCH)
+    assert found["x_m"] == mission.pose.x_m
