@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from suave_des.knowledge.content import Terms
 from suave_des.knowledge.inference_cache import InferenceCache, Key
 from suave_des.knowledge.limit import TimeLimit, reasoning_on
 from suave_des.knowledge.ontology import Ontology
@@ -37,16 +38,20 @@ class CachedPellet:
         ontology: the ontology.
         folder: of the cache on disk, in place of the user's cache folder.
         limit: of the time that Pellet may take for one state; None: a minute.
+        terms: what to read after an inference; None: what decisions depend on, and what rules assert.
     """
 
     name = "remembered"
 
-    def __init__(self, ontology: Ontology, folder: Path | None = None, limit: TimeLimit | None = None) -> None:
+    def __init__(
+        self, ontology: Ontology, folder: Path | None = None, limit: TimeLimit | None = None, terms: Terms | None = None
+    ) -> None:
         self._ontology = ontology
+        self._terms = terms
         self._limit = limit or TimeLimit()
         self.regions = regions_of(ontology)
         self._key = self.regions.key
-        self._disk = InferenceCache(cache_digest(ontology), folder)
+        self._disk = InferenceCache(cache_digest(ontology, terms), folder)
         self._cached: dict[Key, frozenset[Fact]] = self._disk.load()
         self._pellet: InProcessPellet | None = None
 
@@ -62,10 +67,10 @@ class CachedPellet:
         return self._ask(state, key) if facts is None else Inference(state, self._ontology.asserted, facts)
 
     def _ask(self, state: KnowledgeState, key: Key) -> Inference:
-        assertions = self._ontology.assertions(state)
-        asserted = self._ontology.asserted(state)
-        entailed = self._limit.run(lambda: self._entailed(assertions), reasoning_on(state))
-        facts = frozenset(facts_of(entailed, self._ontology.names)) - asserted
+        ontology = self._ontology
+        assertions, asserted = ontology.assertions(state), ontology.asserted(state)
+        entailed = self._limit.run(lambda: self._entailed(assertions), reasoning_on(state), ontology.rules)
+        facts = frozenset(facts_of(entailed, ontology.names)) - asserted
         if not self._mentions_measured(state, facts):
             self._cached[key] = facts
             if len(self._cached) > CAPACITY:
@@ -77,7 +82,7 @@ class CachedPellet:
         if self._pellet is None:
             from suave_des.knowledge.pellet import InProcessPellet
 
-            self._pellet = InProcessPellet(self._ontology)
+            self._pellet = InProcessPellet(self._ontology, self._terms)
         return self._pellet.infer(assertions)
 
     def _mentions_measured(self, state: KnowledgeState, facts: frozenset[Fact]) -> bool:
@@ -88,9 +93,9 @@ class CachedPellet:
         return any(isinstance(fact.value, Decimal) and fact.value in inside for fact in facts)
 
 
-def cache_digest(ontology: Ontology) -> str:
+def cache_digest(ontology: Ontology, terms: Terms | None = None) -> str:
     """Identify all that an inference depends on: ontologies, rules, values, libraries, and this package's code."""
-    total = hashlib.sha256(ontology.content_hash.encode())
+    total = hashlib.sha256(f"{ontology.content_hash}{terms or ''}".encode())
     for name in _LIBRARIES:
         total.update(f"{name} {version(name)}\n".encode())
     total.update(f"python {platform.python_version()}\n{_code()}".encode())

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
-from typing import Final
+from typing import Final, NamedTuple
 
 from rdflib import BNode, URIRef
 from rdflib.namespace import OWL as OWL_TERMS
@@ -17,7 +17,7 @@ from rdflib.term import Node
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology_file import OntologyFile, supplies
-from suave_des.knowledge.rdf import Lit, RdfTriple, Triple, n_triple, n_triple_with_nodes, term_of
+from suave_des.knowledge.rdf import Lit, RdfTriple, Triple, is_fact, n_triple, n_triple_with_nodes, term_of
 from suave_des.knowledge.rules.rdf import rules_of
 from suave_des.knowledge.rules.syntax import Rule
 from suave_des.knowledge.vocabulary import (
@@ -38,12 +38,27 @@ from suave_des.knowledge.vocabulary import (
 from suave_des.resources import shipped_folder
 
 _DECLARED: Final = frozenset(OWL + kind for kind in ("ObjectProperty", "DatatypeProperty", "Class"))
+_CLASSES: Final = frozenset((OWL + "Class", RDFS + "Class"))
+_PROPERTIES: Final = frozenset(
+    OWL + kind
+    for kind in (
+        *("ObjectProperty", "DatatypeProperty", "FunctionalProperty", "InverseFunctionalProperty"),
+        *("TransitiveProperty", "SymmetricProperty", "AsymmetricProperty", "ReflexiveProperty", "IrreflexiveProperty"),
+    )
+)
 #: Begins the IRIs given to rules, by which Pellet's warnings and explanations name them.
 RULE_IRI: Final = "urn:suave-des:rule:"
 #: Annotations, which mean nothing for inference.
 _ANNOTATIONS: Final = frozenset(
     (RDFS + "label", RDFS + "comment", RDFS + "seeAlso", RDFS + "isDefinedBy", OWL + "versionInfo")
 ) | {SWRLA + "isRuleEnabled"}
+
+
+class Terms(NamedTuple):
+    """What is read after an inference: the values of properties, and the members of classes; IRIs, sorted."""
+
+    properties: tuple[str, ...]
+    classes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -73,18 +88,29 @@ class Content:
         """Classes that an enabled rule can assert membership in."""
         return frozenset(name for rule in self.enabled_rules for name in rule.head_classes)
 
-    def properties_to_read(self) -> tuple[str, ...]:
-        """Properties whose values are read after inference.
-
-        Those that a rule can assert, with their super-properties and inverses, and all that decisions depend on.
-        """
+    def decision_terms(self) -> Terms:
+        """What decisions depend on, and what rules assert, with super-properties and inverses."""
         wanted = set(self.head_properties()) | set(DECISION_PROPERTIES)
         both_ways = (OWL + "inverseOf", OWL + "equivalentProperty")
         edges = [(s, o) for s, p, o in self.triples if p in (RDFS + "subPropertyOf", *both_ways)]
         edges += [(o, s) for s, p, o in self.triples if p in both_ways and isinstance(o, str)]
         while more := {str(end) for start, end in edges if start in wanted} - wanted:
             wanted |= more
-        return tuple(sorted(name for name in wanted if not name.startswith(LANGUAGE_NAMESPACES)))
+        return Terms(_named(wanted), tuple(sorted(self.head_classes())))
+
+    def all_terms(self) -> Terms:
+        """Every property and class: any of them can be concluded by some axiom."""
+        kinds: dict[str, set[str]] = {}
+        for subject, predicate, value in self.triples:
+            if predicate == RDF_TYPE and isinstance(value, str):
+                kinds.setdefault(value, set()).add(subject)
+        facts = [triple for triple in self.triples if is_fact(triple)]
+        decisions = self.decision_terms()
+        properties = {*decisions.properties, *(name for _, name, _ in facts)}
+        properties = properties.union(*(kinds.get(kind, ()) for kind in _PROPERTIES))
+        classes = {*decisions.classes, *(str(kind) for _, name, kind in facts if name == RDF_TYPE)}
+        classes = classes.union(*(kinds.get(kind, ()) for kind in _CLASSES))
+        return Terms(_named(properties - kinds.get(OWL + "AnnotationProperty", set())), _named(classes))
 
     def n_triples(self, rules: Sequence[Rule] | None = None) -> str:
         """Write all of it for a reasoner, with the enabled rules or those given."""
@@ -95,6 +121,10 @@ class Content:
         for rule in chosen:
             lines += _rule_lines(rule, self.rules.index(rule))
         return "".join(lines)
+
+
+def _named(iris: Iterable[str]) -> tuple[str, ...]:
+    return tuple(sorted(iri for iri in iris if not iri.startswith(LANGUAGE_NAMESPACES)))
 
 
 def merge(sources: Sequence[OntologyFile], values: Mapping[str, Decimal]) -> Content:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 import queue
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from typing import Any, Final, TypeVar
 
 from suave_des.errors import KnowledgeError
+from suave_des.knowledge.rules.checks import recursing_rules
+from suave_des.knowledge.rules.syntax import Rule
 from suave_des.knowledge.state import KnowledgeState
 
 #: What a reasoner may take for one state by default, in s.
@@ -50,12 +52,13 @@ class TimeLimit:
         self._process = 0
         self._stuck: str | None = None
 
-    def run(self, work: Callable[[], _Result], doing: str) -> _Result:
+    def run(self, work: Callable[[], _Result], doing: str, rules: Iterable[Rule] = ()) -> _Result:
         """Do a piece of work and return its result.
 
         Args:
             work: what to do.
             doing: what it is, for the message: "reasoning on the state ...".
+            rules: those that it takes into account, so that the message can name one that never comes to an end.
 
         Raises:
             KnowledgeError: it took longer, or an earlier one still has not ended.
@@ -76,15 +79,20 @@ class TimeLimit:
             if not isinstance(error, TimeoutError):  # Ctrl-C: Java crashes if the process ends as usual meanwhile
                 raise
             self._stuck = doing
-            raise self.exceeded(doing) from None
+            raise self.exceeded(doing, rules) from None
 
-    def exceeded(self, doing: str) -> KnowledgeError:
+    def exceeded(self, doing: str, rules: Iterable[Rule] = ()) -> KnowledgeError:
         """The error for work that took too long."""
         more = f", or allow more with {self._option}" if self._option else ""
-        return KnowledgeError(
+        problem, remedy = (
             f"{doing}: not done after {self.seconds:g} s",
-            remedy=f"look for a rule that matches too many combinations{more}",
+            "look for a rule that matches too many combinations",
         )
+        for rule in recursing_rules(rules):
+            problem += f"; rule {rule.name} computes ever new values from what it concludes itself"
+            remedy = f"give rule {rule.name} another property to conclude, or a bound in its body"
+            return KnowledgeError(problem, file=rule.file, place=rule.place, remedy=remedy)
+        return KnowledgeError(problem, remedy=f"{remedy}{more}")
 
 
 def _do_all(jobs: _Jobs) -> None:

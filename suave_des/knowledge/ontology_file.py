@@ -62,8 +62,9 @@ class OntologyFile:
 
     def line_of(self, name: str) -> str | None:
         """Place of the first line that describes the thing of that name, as "line 12"."""
-        # about="...#name", about="&suave;name" or ID="name"
-        described = re.compile(rf"""(?:about|ID)=["'](?:[^"']*[#;/])?{re.escape(name)}["']""")
+        # about="...#name", about="&suave;name", ID="name", or the label of a rule
+        own = re.escape(name)
+        described = re.compile(rf"""(?:about|ID)=["'](?:[^"']*[#;/])?{own}["']|label(?: [^>]*)?>\s*{own}\s*<""")
         for number, line in enumerate(self.content.decode("utf-8", "replace").splitlines(), start=1):
             if described.search(line):
                 return f"line {number}"

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge import jvm
-from suave_des.knowledge.content import RULE_IRI
+from suave_des.knowledge.content import RULE_IRI, Terms
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import Lit, Triple, canonical, facts_of, n_triple
 from suave_des.knowledge.rules.syntax import Rule
@@ -60,19 +60,24 @@ class InProcessPellet:
         pellet = InProcessPellet(ontology)
         pellet.infer(ontology.assertions(state))  # values and members, as triples
 
+    Args:
+        ontology: the ontology.
+        terms: what to read after an inference; None: what decisions depend on, and what rules assert.
+
     Raises:
         KnowledgeError: the ontologies are inconsistent by themselves, or Pellet drops one of the rules.
     """
 
-    def __init__(self, ontology: Ontology) -> None:
+    def __init__(self, ontology: Ontology, terms: Terms | None = None) -> None:
         self._ontology = ontology
+        terms = terms or ontology.content.decision_terms()
         with one_at_a_time, _java_errors(ontology):
             jvm.start()
             self._terms = jvm.java_class(_PELLET + "utils.ATermUtils")
             self._term = cache(self._terms.makeTermAppl)
             self._base = load_n_triples(ontology.content.n_triples())
-            self._properties = [(name, self._term(name)) for name in ontology.content.properties_to_read()]
-            self._classes = [(name, self._term(name)) for name in sorted(ontology.content.head_classes())]
+            self._properties = [(name, self._term(name)) for name in terms.properties]
+            self._classes = [(name, self._term(name)) for name in terms.classes]
             if not self._base.isConsistent():
                 raise contradiction(ontology, ())
             # A copy, because Pellet compiles the rules of a knowledge base when it first reasons on it.
@@ -168,7 +173,8 @@ def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> Knowledge
     finally:
         options.USE_TRACING = False
         jvm.take_warnings()
-    rules = sorted({ontology.content.rules[int(n)].name for axiom in axioms for n in _RULE.findall(axiom)[:1]})
+    numbers = {int(number) for axiom in axioms for number in _RULE.findall(axiom)[:1]}
+    rules = sorted(_rule_with_place(ontology, ontology.content.rules[number]) for number in numbers)
     facts = [
         str(fact)
         for triple in assertions
@@ -177,7 +183,7 @@ def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> Knowledge
     ]
     problem = re.sub(r"https?://[^\s,()]+", lambda iri: ontology.names.short(iri.group()), reason)
     if rules:
-        problem += f", by the rules {', '.join(rules)}"
+        problem += f", by the rule{'s' if len(rules) > 1 else ''} {', '.join(rules)}"
     if facts:
         problem += f", in the state {', '.join(facts)}"
     return KnowledgeError(
@@ -185,6 +191,13 @@ def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> Knowledge
         file=_files(ontology),
         remedy="change a rule, so that no two of these hold at once" if rules else "correct the ontology",
     )
+
+
+def _rule_with_place(ontology: Ontology, rule: Rule) -> str:
+    """A rule's name with its file and line, as far as the file shows where it is."""
+    files = {source.path: source for source in ontology.sources}
+    place = rule.place or (files[rule.file].line_of(rule.name) if rule.file in files else None)
+    return f"{rule.name} ({', '.join(filter(None, (rule.file.name, place)))})"
 
 
 def _dropped(rule: Rule, warning: str) -> KnowledgeError:

@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import Final, Protocol
 
 from suave_des.errors import InputError
+from suave_des.knowledge.content import Terms
 from suave_des.knowledge.limit import LOADING, TimeLimit, reasoning_on
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import Triple, facts_of
@@ -66,50 +67,56 @@ class _StateCache:
         return Inference(state, asserted, frozenset(entailed) - asserted)
 
 
-def _pellet(ontology: Ontology, limit: TimeLimit) -> Reasoner:
+def _pellet(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Reasoner:
     from suave_des.knowledge.pellet import InProcessPellet
 
-    pellet = limit.run(lambda: InProcessPellet(ontology), LOADING)
+    pellet = limit.run(lambda: InProcessPellet(ontology, terms), LOADING, ontology.rules)
 
     def entailed(state: KnowledgeState, assertions: tuple[Triple, ...]) -> Iterable[Triple]:
-        return limit.run(lambda: pellet.infer(assertions), reasoning_on(state))
+        return limit.run(lambda: pellet.infer(assertions), reasoning_on(state), ontology.rules)
 
     return _StateCache("pellet", ontology, entailed)
 
 
-def _owlready2(ontology: Ontology, limit: TimeLimit) -> Reasoner:
+def _owlready2(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Reasoner:
     from suave_des.knowledge.pellet import InProcessPellet
     from suave_des.knowledge.stock import StockPellet
 
-    stock = StockPellet(ontology)
+    stock = StockPellet(ontology, terms)
     checker: list[InProcessPellet] = []
 
     def entailed(state: KnowledgeState, assertions: tuple[Triple, ...]) -> Iterable[Triple]:
         # owlready2 discards Pellet's log, which alone reports dropped rules and explains contradictions. The Pellet
         # in this process does so: once at the start, and for contradictions.
         if not checker:
-            checker.append(limit.run(lambda: InProcessPellet(ontology), reasoning_on(state)))
+            checker.append(limit.run(lambda: InProcessPellet(ontology, terms), reasoning_on(state), ontology.rules))
         try:
             found = stock.infer(assertions, limit.seconds)
         except TimeoutError:
-            raise limit.exceeded(reasoning_on(state)) from None
-        return limit.run(lambda: checker[0].infer(assertions), reasoning_on(state)) if found is None else found
+            raise limit.exceeded(reasoning_on(state), ontology.rules) from None
+        return (
+            limit.run(lambda: checker[0].infer(assertions), reasoning_on(state), ontology.rules)
+            if found is None
+            else found
+        )
 
     return _StateCache("owlready2", ontology, entailed)
 
 
-def _remembered(ontology: Ontology, limit: TimeLimit) -> Reasoner:
+def _remembered(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Reasoner:
     from suave_des.knowledge.cached_pellet import CachedPellet
 
-    return CachedPellet(ontology, limit=limit)
+    return CachedPellet(ontology, limit=limit, terms=terms)
 
 
-BACKENDS: Final[Mapping[str, Callable[[Ontology, TimeLimit], Reasoner]]] = MappingProxyType(
+BACKENDS: Final[Mapping[str, Callable[[Ontology, TimeLimit, Terms | None], Reasoner]]] = MappingProxyType(
     {"owlready2": _owlready2, "pellet": _pellet, "remembered": _remembered}
 )
 
 
-def make_reasoner(name: str, ontology: Ontology, limit: TimeLimit | None = None) -> Reasoner:
+def make_reasoner(
+    name: str, ontology: Ontology, limit: TimeLimit | None = None, terms: Terms | None = None
+) -> Reasoner:
     """Make a reasoner by name.
 
     Args:
@@ -117,6 +124,7 @@ def make_reasoner(name: str, ontology: Ontology, limit: TimeLimit | None = None)
             apart), "pellet" (kept running in this process) or "owlready2" (stock, the reference).
         ontology: the ontology.
         limit: of the time that Pellet may take for one state, or to load the ontologies; None: a minute.
+        terms: what an inference tells of; None: what decisions depend on, and what rules assert.
 
     Raises:
         InputError: the name is unknown, or there is no usable Java.
@@ -125,4 +133,4 @@ def make_reasoner(name: str, ontology: Ontology, limit: TimeLimit | None = None)
     make = BACKENDS.get(name)
     if make is None:
         raise InputError(f"there is no reasoner {name!r}", remedy=f"one of {', '.join(sorted(BACKENDS))}")
-    return make(ontology, limit or TimeLimit())
+    return make(ontology, limit or TimeLimit(), terms)

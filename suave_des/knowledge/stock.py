@@ -20,6 +20,7 @@ from rdflib.namespace import OWL, RDF, RDFS
 from rdflib.term import Node
 
 from suave_des.errors import KnowledgeError
+from suave_des.knowledge.content import Terms
 from suave_des.knowledge.java import java_executable, without_options_of_others
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import unescape
@@ -34,10 +35,9 @@ _STATE_IRI: Final = "urn:suave-des:state"
 class StockPellet:
     """owlready2, which starts Pellet in a Java process of its own."""
 
-    def __init__(self, ontology: Ontology) -> None:
+    def __init__(self, ontology: Ontology, terms: Terms | None = None) -> None:
         self._text = ontology.content.n_triples()
-        self._properties = ontology.content.properties_to_read()
-        self._classes = sorted(ontology.content.head_classes())
+        self._properties, self._classes = terms or ontology.content.decision_terms()
 
     def infer(self, assertions: Sequence[Triple], limit_s: float | None = None) -> frozenset[Triple] | None:
         """Return the values and members of the properties and classes to read; None for a contradiction.

@@ -134,7 +134,7 @@ def explain(base: Ontology, state: KnowledgeState, question: str, improves_excee
     if question.strip() and not why and not atom:
         raise InputError(f"{shown(question)} is not a question about a state", remedy=_FORMS)
     tracer = Tracer(base, state)
-    reasoner = make_reasoner("pellet", base)
+    reasoner = make_reasoner("pellet", base, terms=base.content.all_terms())
     try:
         conclusion = Deliberation(base, reasoner).analyze_and_plan(state, improve_exceeded=improves_exceeded)
     except KnowledgeError:

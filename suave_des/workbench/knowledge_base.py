@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 from suave_des.knowledge.deliberation import Conclusion, Deliberation
@@ -47,7 +48,6 @@ class KnowledgeBase:
     settings: ManagingSettings
     reasoner: str
     limit: TimeLimit = field(repr=False)
-    _deliberation: Deliberation = field(repr=False)
 
     @classmethod
     def load(
@@ -89,7 +89,26 @@ class KnowledgeBase:
     @classmethod
     def of(cls, base: Ontology, settings: ManagingSettings, reasoner: str, limit: TimeLimit) -> KnowledgeBase:
         """Start a reasoner on ontologies that are loaded already."""
-        return cls(base, settings, reasoner, limit, Deliberation(base, make_reasoner(reasoner, base, limit)))
+        made = cls(base, settings, reasoner, limit)
+        _ = made._deliberation  # what cannot be reasoned with is reported here
+        return made
+
+    @cached_property
+    def _deliberation(self) -> Deliberation:
+        return Deliberation(self.base, make_reasoner(self.reasoner, self.base, self.limit))
+
+    @cached_property
+    def _with_all_terms(self) -> Deliberation:
+        terms = self.base.content.all_terms()
+        return Deliberation(self.base, make_reasoner(self.reasoner, self.base, self.limit, terms))
+
+    def decide(self, state: KnowledgeState) -> Conclusion:
+        """Decide as a mission does: infer what decisions depend on and what rules assert, and plan on it.
+
+        Raises:
+            KnowledgeError: the state contradicts the ontologies, or the reasoner takes too long.
+        """
+        return self._deliberation.analyze_and_plan(state, improve_exceeded=self.settings.improves_exceeded)
 
     def state(
         self,
@@ -131,12 +150,12 @@ class KnowledgeBase:
         return builder.state()
 
     def infer(self, state: KnowledgeState) -> Conclusion:
-        """Infer what follows in a state, and plan on it.
+        """Infer all that follows in a state, from rules and axioms, and plan on it.
 
         Raises:
             KnowledgeError: the state contradicts the ontologies, or the reasoner takes too long.
         """
-        return self._deliberation.analyze_and_plan(state, improve_exceeded=self.settings.improves_exceeded)
+        return self._with_all_terms.analyze_and_plan(state, improve_exceeded=self.settings.improves_exceeded)
 
     def explain(self, state: KnowledgeState, question: str = "") -> Explanation:
         """Explain why a fact or a decision follows in a state, or why the state contradicts itself.
@@ -151,7 +170,9 @@ class KnowledgeBase:
             KnowledgeError: the reasoner takes too long.
         """
         doing = f"explaining the state {state}"
-        return self.limit.run(lambda: explain(self.base, state, question, self.settings.improves_exceeded), doing)
+        return self.limit.run(
+            lambda: explain(self.base, state, question, self.settings.improves_exceeded), doing, self.base.rules
+        )
 
     def policy(self, max_failed: int = 2) -> Policy:
         """Decide every state, with at most so many components that report anything.
@@ -160,7 +181,7 @@ class KnowledgeBase:
             InputError: there would be too many states.
             KnowledgeError: the reasoner takes too long for one of them.
         """
-        return make_policy(self.base, self.settings, self.infer, max_failed)
+        return make_policy(self.base, self.settings, self.decide, max_failed)
 
     def diff(self, other: KnowledgeBase, max_failed: int = 2) -> PolicyDifference:
         """Find the states that another knowledge base decides differently, over all that either of them tells apart.
@@ -171,8 +192,8 @@ class KnowledgeBase:
         """
         space = PolicySpace.of(self.base, self.settings).common(PolicySpace.of(other.base, other.settings))
         return compare(
-            make_policy(self.base, self.settings, self.infer, max_failed, space),
-            make_policy(other.base, other.settings, other.infer, max_failed, space),
+            make_policy(self.base, self.settings, self.decide, max_failed, space),
+            make_policy(other.base, other.settings, other.decide, max_failed, space),
         )
 
     def query(self, text: str, state: KnowledgeState | None = None, *, inferred: bool = False) -> QueryResult:
@@ -187,5 +208,6 @@ class KnowledgeBase:
             InputError: it is not a query.
             KnowledgeError: the state contradicts itself, or it takes too long.
         """
-        graph = self.limit.run(lambda: graph_of(self.base, state, inferred=inferred), "answering the query")
+        rules = self.base.rules
+        graph = self.limit.run(lambda: graph_of(self.base, state, inferred=inferred), "answering the query", rules)
         return answer(graph, text)

@@ -56,7 +56,7 @@ def graph_of(base: Ontology, state: KnowledgeState | None, *, inferred: bool) ->
         KnowledgeError: the state contradicts itself.
     """
     situation = () if state is None else base.assertions(state)
-    more: Iterable[Triple] = InProcessPellet(base).infer(situation) if inferred else ()
+    more: Iterable[Triple] = InProcessPellet(base, base.content.all_terms()).infer(situation) if inferred else ()
     content = replace(base.content, structure=_with_fixed_names(base.content.structure))
     graph = rdflib.Graph("SimpleMemory")  # goes through triples in the order in which they came
     lines = content.n_triples(content.rules) + "".join(map(n_triple, (*situation, *more)))

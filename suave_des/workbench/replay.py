@@ -254,7 +254,7 @@ class _Comparison:
         then, contradiction = _decisions(self.after, state)
         if contradiction is not None:
             return ReplayedCycle(record.t_s, state, (), (), contradiction)
-        without = self.without_rule.infer(state).inference
+        without = self.without_rule.decide(state).inference
         tracer = Tracer(self.with_rule.base, state)
         firings = tuple(
             Firing(facts, bindings, is_new=not (without.facts | without.asserted).issuperset(facts))
@@ -284,7 +284,7 @@ def _changed(base: Ontology, change: RuleChange) -> Ontology:
 def _decisions(bench: KnowledgeBase, state: KnowledgeState) -> tuple[dict[str, str | None], str | None]:
     """Groundings that would be changed, by function; and the contradiction in a state that has one."""
     try:
-        decisions = bench.infer(state).plan.decisions
+        decisions = bench.decide(state).plan.decisions
     except KnowledgeError as error:
         if not error.problem.startswith("contradiction"):
             raise

@@ -65,7 +65,7 @@ class Tracer:
         Raises:
             KnowledgeError: the state contradicts itself.
         """
-        return InProcessPellet(self.base).infer(self.situation) | self.asserted
+        return InProcessPellet(self.base, self.base.content.all_terms()).infer(self.situation) | self.asserted
 
     @cached_property
     def known(self) -> tuple[Triple, ...]:

@@ -126,7 +126,6 @@ def test_after_a_mistake_the_other_rules_are_read() -> None:
         ("hasValue(?f, 2) -> Role(?f)", 17, "write 2.0"),
         ("hasValue(?q, ?v) ^ Role(?v) -> Role(?q)", 28, "?v stands for an individual and for a value"),
         ("Role(?x) -> lessThan(1, 2)", 16, "occurs in the head"),
-        ("Role(?x) ^ differentFrom(?x, energy) -> Role(?x)", 15, "makes Pellet lose"),
         ("<http://x.org/#a>(?x) -> Role(?x)", 4, "class a is not defined"),
         ("Role(<http://x.org/#i>) -> Role(energy)", 9, "individual i is not defined"),
     ],

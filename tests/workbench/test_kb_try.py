@@ -90,7 +90,8 @@ def test_a_rule_that_contradicts_others_is_told_with_its_time(mission, command):
     (trial,) = try_rule(folder, RuleChange(clash))
     problems = [moment for moment in trial.moments if moment.contradiction]
     assert problems
-    assert all("by the rules QAWaterVisibility, clash" in moment.contradiction for moment in problems)
+    assert all("by the rules QAWaterVisibility (" in moment.contradiction for moment in problems)
+    assert all(", clash (" in moment.contradiction for moment in problems)
     status, text, _ = command("try", clash, "--on", folder)
     assert status == 0
     assert f"states that would contradict themselves: {len(problems)}" in text

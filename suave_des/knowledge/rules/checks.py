@@ -92,9 +92,6 @@ def _check_atom(atom: Atom, vocabulary: Vocabulary, *, is_head: bool) -> Iterato
     if atom.kind == "" or not atom.predicate:
         yield RuleProblem("an atom without a kind that SWRL knows, or without a name", atom.place())
         return
-    if atom.kind == "different":
-        problem = "differentFrom makes Pellet lose what other rules infer"
-        yield RuleProblem(problem, atom.place(), "distinguish individuals by a property")
     if atom.kind == "range":
         if not atom.predicate.startswith(XSD) and "datatype" not in vocabulary.kinds.get(atom.predicate, ()):
             yield RuleProblem(f"datatype {name} is not defined", atom.place())
@@ -229,3 +226,27 @@ def _computed(builtins: Iterable[Atom], bound: set[str]) -> set[str]:
         for first, *others in (atom.arguments for atom in builtins if atom.predicate not in TESTERS)
         if isinstance(first, Variable) and all(not isinstance(term, Variable) or term.name in bound for term in others)
     }
+
+
+def recursing_rules(rules: Iterable[Rule]) -> list[Rule]:
+    """Find rules that compute values from what, by whatever rules, follows from the values that they compute."""
+    enabled = [rule for rule in rules if rule.enabled]
+    follows: dict[str, set[str]] = {}  # properties and classes that a rule concludes from one
+    for rule in enabled:
+        for atom in rule.body:
+            follows.setdefault(atom.predicate, set()).update(head.predicate for head in rule.head)
+    found = []
+    for rule in enabled:
+        reached = _computed_properties(rule)
+        while more := set[str]().union(*(follows.get(name, ()) for name in reached)) - reached:
+            reached |= more
+        if any(atom.predicate in reached for atom in rule.body):
+            found.append(rule)
+    return found
+
+
+def _computed_properties(rule: Rule) -> set[str]:
+    """Properties of which a rule concludes a value that it computes."""
+    bound = {name for atom in rule.body if atom.kind != "builtin" for name in atom.variables()}
+    computed = {name for atom in rule.body if atom.kind == "builtin" for name in atom.variables()} - bound
+    return {atom.predicate for atom in rule.head if atom.kind == "data" and computed.intersection(atom.variables())}
