@@ -50,7 +50,7 @@ def page() -> str:
             f"### distribution: {kind(each, 'distribution')}\n\n{lead(each)}\n\n{table(each)}" for each in DISTRIBUTIONS
         ),
         "managers": parts(ManagerSettings, "managers.", set()),
-        "revision": parts(Revision, "revision.", set(DISTRIBUTIONS)),
+        "revision": table(Revision) + "\n" + parts(Revision, "revision.", set(DISTRIBUTIONS)),
         "vehicle": table(VehicleDescription) + "\n" + parts(VehicleDescription, "vehicle.", set()),
     }
     for name, content in tables.items():

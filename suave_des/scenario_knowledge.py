@@ -25,7 +25,11 @@ def open_base(loaded: LoadedScenario) -> Ontology:
     values = {name: Decimal(repr(value)) for name, value in knowledge.values.items()}
     try:
         return Ontology.load(
-            loaded.ontologies, values=values, rules=loaded.rules, disabled_rules=knowledge.disabled_rules
+            loaded.ontologies,
+            values=values,
+            rules=loaded.rules,
+            disabled_rules=knowledge.disabled_rules,
+            operators=loaded.scenario.revision.comparison_operators,
         )
     except KnowledgeError as error:
         raise loaded.located(error) from None
@@ -40,7 +44,8 @@ def open_knowledge(loaded: LoadedScenario) -> Deliberation:
     """
     # What was inferred stays true in scenarios that differ in other things, while the files' hashes are the same.
     knowledge = loaded.scenario.knowledge.model_dump_json(), tuple(sorted(loaded.inputs.items()))
-    same = *knowledge, loaded.ontologies, loaded.rules
+    operators = tuple(sorted(loaded.scenario.revision.comparison_operators.items()))
+    same = *knowledge, loaded.ontologies, loaded.rules, operators
     deliberation = _opened.get(same)
     if deliberation is None:
         base = open_base(loaded)

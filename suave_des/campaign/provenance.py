@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import inspect
 import json
+import logging
 import platform
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -92,6 +93,8 @@ def check_knowledge(loaded: LoadedScenario, managers: Sequence[str], *, given: b
 
         knowledge = open_knowledge(loaded)
         knowledge.analyze_and_plan(KnowledgeState())
+        for assumption in knowledge.base.assumptions:
+            logging.getLogger("suave_des").warning("note: %s", assumption)
         for path in knowledge.base.files:
             files.ontology(path)
     return {**loaded.inputs, **functions, **files.inputs}

@@ -48,6 +48,7 @@ def check(
         FailOn.ERROR
     ),
     time_limit: TimeLimitS = 60.0,
+    verbose: Annotated[bool, typer.Option("--verbose", help="Show all notes on the shipped ontologies, too.")] = False,
     form: Annotated[FindingsFormat, typer.Option("--format", help="How to print.")] = FindingsFormat.TEXT,
 ) -> None:
     """Check ontologies and rules: names, arguments, variables, model, shapes, contradictions.
@@ -55,10 +56,11 @@ def check(
     Exit status: 0 no findings of the level of --fail-on; 1 such findings; 2 something cannot be read.
     """
     from suave_des.domain import MISSION_FUNCTIONS
+    from suave_des.resources import shipped_folder
     from suave_des.scenario.loader import load_scenario
     from suave_des.workbench.check import Subject
     from suave_des.workbench.check import check as run_checks
-    from suave_des.workbench.findings import Level, has_level, summary
+    from suave_des.workbench.findings import Level, folded, has_level, summary
 
     loaded = load_scenario(sources.scenario, **(sources.replacements | {"modes_file": modes}))
     findings = run_checks(
@@ -73,16 +75,17 @@ def check(
             time_limit_s=time_limit,
         )
     )
+    shown = findings if verbose else folded(findings, shipped_folder("ontology"))
     if form is FindingsFormat.JSON:
         print_json(findings)
     elif form is FindingsFormat.MARKDOWN:
         print("| level | where | what | remedy |\n| --- | --- | --- | --- |")
-        for finding in findings:
+        for finding in shown:
             cells = (finding.level, finding.where, finding.message, finding.remedy or "")
             print(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
         print(f"\n{summary(findings)}")
     else:
-        print(*findings, summary(findings), sep="\n")
+        print(*shown, summary(findings), sep="\n")
     if has_level(findings, Level(fail_on.upper())):
         raise typer.Exit(FOUND)
 

@@ -227,6 +227,17 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
     return model, replace(content, triples=kept)
 
 
+def with_operators(content: Content, model: Model, operators: Mapping[str, str]) -> tuple[Content, dict[str, str]]:
+    """Add the comparison operators of quality attribute types that have none; return those that were added, by name."""
+    present = {subject for subject, predicate, _ in content.triples if predicate == _OPERATOR}
+    added = {name: sign for name, sign in sorted(operators.items()) if model.attributes.get(name, "") not in present}
+    added = {name: sign for name, sign in added.items() if name in model.attributes}
+    if not added:
+        return content, {}
+    more = [(model.attributes[name], _OPERATOR, Lit(sign, XSD + "string")) for name, sign in added.items()]
+    return replace(content, triples=tuple(sorted((*content.triples, *more), key=str))), added
+
+
 def _members(triples: Iterable[Triple], name: str) -> set[str]:
     """Individuals of a class of TOMASys or of its subclasses."""
     classes = {TOMASYS + name}

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.content import Content, merge, with_rules
-from suave_des.knowledge.model import Model, build_model, check_values, expectations
-from suave_des.knowledge.ontology_file import OntologyFile, collect
+from suave_des.knowledge.model import Model, build_model, check_values, expectations, with_operators
+from suave_des.knowledge.ontology_file import OntologyFile, collect, enumerated_texts
 from suave_des.knowledge.rdf import Names, Triple, facts_of
 from suave_des.knowledge.rules.checks import check_property_use
 from suave_des.knowledge.rules.files import RulesFile, hash_with_rules
@@ -40,6 +40,7 @@ class Ontology:
         model: the functions, designs, components and quality attributes.
         vocabulary: the names that rules may use.
         sources: the ontology files with their graphs.
+        assumptions: what was added to the ontologies, in words.
     """
 
     files: tuple[Path, ...]
@@ -51,6 +52,7 @@ class Ontology:
     model: Model = field(repr=False)
     vocabulary: Vocabulary = field(repr=False)
     sources: tuple[OntologyFile, ...] = field(repr=False)
+    assumptions: tuple[str, ...]
     _designs: Mapping[str, tuple[str, ...]] = field(repr=False)
     _expected: Mapping[str, Mapping[str, Decimal]] = field(repr=False)
 
@@ -62,6 +64,7 @@ class Ontology:
         values: Mapping[str, Decimal] | None = None,
         rules: Sequence[Path | str] = (),
         disabled_rules: Collection[str] = (),
+        operators: Mapping[str, str] | None = None,
     ) -> Ontology:
         """Read ontologies, in any order, and their imports; without any, the shipped suave.owl.
 
@@ -70,6 +73,7 @@ class Ontology:
             values: replaces the hasValue of a named QAvalue individual, such as qa_water_visibility_low.
             rules: files of rules as text; each rule replaces those of its name that were read before.
             disabled_rules: names of rules to disable.
+            operators: qa_comparison_operator of quality attribute types that have none, by name.
 
         Raises:
             KnowledgeError: a file or an import cannot be used, a value names no QAvalue, or there is no such rule to
@@ -81,7 +85,9 @@ class Ontology:
         check_values(merged, sources)
         names = Names(merged.triples)
         model, content = build_model(merged, sources)
-        vocabulary = Vocabulary.of(merged.triples, (individual.iri for individual in model.individuals()))
+        content, added = with_operators(content, model, operators or {})
+        individuals = (individual.iri for individual in model.individuals())
+        vocabulary = Vocabulary.of(merged.triples, individuals, enumerated_texts(sources))
         files = [RulesFile.read(Path(path)) for path in rules]
         content = with_rules(content, [file.rules(vocabulary) for file in files], disabled_rules)
         check_property_use(merged.triples, content.enabled_rules)
@@ -92,7 +98,7 @@ class Ontology:
                 designs[str(fact.value)].append(fact.subject)
         return cls(
             files=(*sorted(source.path for source in sources), *(file.path for file in files)),
-            content_hash=hash_with_rules(_content_hash(sources, values or {}), files, disabled_rules),
+            content_hash=hash_with_rules(_content_hash(sources, values or {}, added), files, disabled_rules),
             rules=content.rules,
             facts=facts,
             content=content,
@@ -100,6 +106,10 @@ class Ontology:
             model=model,
             vocabulary=vocabulary,
             sources=sources,
+            assumptions=tuple(
+                f"{name} has no qa_comparison_operator in the ontologies: {sign} is assumed, as in the revision's code"
+                for name, sign in added.items()
+            ),
             _designs={name: tuple(sorted(found)) for name, found in designs.items()},
             _expected=expectations(content, model),
         )
@@ -161,10 +171,12 @@ class Ontology:
                 )
 
 
-def _content_hash(sources: Sequence[OntologyFile], values: Mapping[str, Decimal]) -> str:
+def _content_hash(sources: Sequence[OntologyFile], values: Mapping[str, Decimal], operators: Mapping[str, str]) -> str:
     total = hashlib.sha256()
     for digest in sorted(hashlib.sha256(source.content).hexdigest() for source in sources):
         total.update(digest.encode())
     for name, value in sorted(values.items()):
         total.update(f"{name}={format(value.normalize(), 'f')}\n".encode())
+    for name, sign in operators.items():
+        total.update(f"{name} {sign}\n".encode())
     return total.hexdigest()

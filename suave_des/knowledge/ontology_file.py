@@ -1,4 +1,6 @@
-"""Read ontology files in RDF/XML, and resolve their imports to local files. Nothing is ever fetched.
+"""Read ontology files, and resolve their imports to local files. Nothing is ever fetched.
+
+Files are in RDF/XML, or by their endings in Turtle, N-Triples or JSON-LD.
 
 lxml reads the XML first: it stops at entities that expand too far, reads no other file, and knows line numbers. Simple
 internal entities, as Protégé writes them, are accepted.
@@ -23,8 +25,11 @@ from xml.sax import SAXParseException
 import rdflib
 from lxml import etree
 from rdflib import Graph, URIRef
+from rdflib.collection import Collection
 from rdflib.namespace import OWL as OWL_TERMS
 from rdflib.namespace import RDF as RDF_TERMS
+from rdflib.namespace import RDFS as RDFS_TERMS
+from rdflib.plugins.parsers.notation3 import BadSyntax
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.vocabulary import MROS, OWL, RDF, local_name
@@ -35,7 +40,8 @@ _BASE: Final = "{http://www.w3.org/XML/1998/namespace}base"
 _SAVE_AS: Final = "an OWL ontology in RDF/XML is expected, as Protégé saves it"
 #: Characters that no IRI may contain (RFC 3987) and that would break the N-Triples given to a reasoner.
 _NOT_IN_IRI: Final = frozenset('<>"{}|\\^`') | {chr(code) for code in range(0x21)}
-_ENDINGS: Final = (".owl", ".rdf", ".xml")
+_FORMATS: Final = {".ttl": ("turtle", "Turtle"), ".nt": ("nt", "N-Triples"), ".jsonld": ("json-ld", "JSON-LD")}
+_ENDINGS: Final = (".owl", ".rdf", ".xml", *_FORMATS)
 #: The shipped tomasys.owl also holds the terms that the exemplar keeps in mros.owl.
 _SHIPPED: Final = {"tomasys": "tomasys.owl", "mros": "tomasys.owl", "suave": "suave.owl"}
 
@@ -48,7 +54,7 @@ class OntologyFile:
         path: where it is.
         content: its bytes.
         iris: the IRIs of the ontology (empty for an anonymous one), without a trailing '#'.
-        base: xml:base of the document, if it has one.
+        base: xml:base of the document, if it is RDF/XML and has one.
         imports: (imported IRI, line) in the order of the file.
         graph: all its triples.
     """
@@ -60,15 +66,33 @@ class OntologyFile:
     imports: tuple[tuple[str, int], ...]
     graph: Graph = field(repr=False, compare=False)
 
+    @property
+    def is_xml(self) -> bool:
+        """Whether the file is RDF/XML."""
+        return self.path.suffix not in _FORMATS
+
     def line_of(self, name: str) -> str | None:
         """Place of the first line that describes the thing of that name, as "line 12"."""
         # about="...#name", about="&suave;name", ID="name", or the label of a rule
         own = re.escape(name)
         described = re.compile(rf"""(?:about|ID)=["'](?:[^"']*[#;/])?{own}["']|label(?: [^>]*)?>\s*{own}\s*<""")
-        for number, line in enumerate(self.content.decode("utf-8", "replace").splitlines(), start=1):
+        if self.path.suffix in _FORMATS:  # mine:name, <...#name>, or "...#name"
+            described = re.compile(rf"""(?:^|[\s"])[\w.-]*:{own}(?=[\s"])|[<"][^<>"]*[#/]{own}[>"]|label\s+"{own}\"""")
+        for number, line in enumerate(text_of(self.content).splitlines(), start=1):
             if described.search(line):
                 return f"line {number}"
         return None
+
+
+def text_of(content: bytes) -> str:
+    """Decode a file by its byte order mark or XML declaration, else as UTF-8; wrong bytes are replaced."""
+    declared = re.search(rb"^\s*<\?xml[^>]*\bencoding\s*=\s*[\"']([\w.-]+)[\"']", content[:200])
+    marked = content.startswith((b"\xff\xfe", b"\xfe\xff"))
+    encoding = "utf-16" if marked else declared.group(1).decode() if declared else "utf-8-sig"
+    try:
+        return content.decode(encoding, "replace")
+    except LookupError:
+        return content.decode("utf-8", "replace")
 
 
 def read_ontology(path: Path, content: bytes | None = None) -> OntologyFile:
@@ -84,14 +108,14 @@ def read_ontology(path: Path, content: bytes | None = None) -> OntologyFile:
     """
     if content is None:
         content = _read_bytes(path)
-    root: Any = _parse_xml(path, content)  # lxml-stubs lack sourceline
+    root: Any = None if path.suffix in _FORMATS else _parse_xml(path, content)  # lxml-stubs lack sourceline
     graph = _parse_rdf(path, content)
     ontologies = sorted(graph.subjects(RDF_TERMS.type, OWL_TERMS.Ontology), key=str)
     if not ontologies:
         raise KnowledgeError("not OWL: there is no owl:Ontology in it", file=path, remedy=_SAVE_AS)
-    base = root.get(_BASE)
+    base = None if root is None else root.get(_BASE)
     lines: dict[str, int] = {}
-    for element in root.iter(f"{{{OWL}}}imports"):
+    for element in () if root is None else root.iter(f"{{{OWL}}}imports"):
         iri = urljoin(base or "", element.get(f"{{{RDF}}}resource", ""))
         lines.setdefault(iri, element.sourceline or 0)
     imports = {str(iri): lines.get(str(iri), 0) for iri in graph.objects(None, OWL_TERMS.imports)}
@@ -201,20 +225,40 @@ def _literals_as_written() -> Iterator[None]:
 
 def _parse_rdf(path: Path, content: bytes) -> Graph:
     graph = Graph()
+    form, name = _FORMATS.get(path.suffix, ("xml", "RDF/XML"))
+    if form == "json-ld" and re.search(rb'"@(context|import)"\s*:\s*(\[[^\]]*)?"', content):
+        problem = "its @context is elsewhere, and nothing is fetched from the network"
+        raise KnowledgeError(problem, file=path, remedy="write the @context out in the file")
+    if form == "xml":  # as UTF-8, which is all that rdflib reads
+        text = re.sub(r"^\s*<\?xml[^>]*\?>", "", text_of(content), count=1)
+        content = text.encode()
     try:
         with _literals_as_written():
             # A file without xml:base gets a base that reveals nothing of this machine's folders.
-            graph.parse(data=content, format="xml", publicID=f"http://ontology.invalid/{path.stem}")
-    except Exception as error:  # the parser raises many kinds; each means that this file is not RDF/XML
+            graph.parse(data=content, format=form, publicID=f"http://ontology.invalid/{path.stem}")
+    except Exception as error:  # the parser raises many kinds; each means that this file is not of its format
         text = error.getMessage() if isinstance(error, SAXParseException) else str(error)
         place = f"line {error.getLineNumber()}" if isinstance(error, SAXParseException) else None
-        problem = f"not RDF/XML: {' '.join(text.split())}"
-        raise KnowledgeError(problem, file=path, place=place, remedy=_SAVE_AS) from error
+        if isinstance(error, BadSyntax):
+            place, text = f"line {error.lines + 1}", str(error._why)
+        remedy = _SAVE_AS if form == "xml" else f"by its ending the file is {name}"
+        raise KnowledgeError(f"not {name}: {' '.join(text.split())}", file=path, place=place, remedy=remedy) from error
     for triple in graph:
         for term in triple:
             if isinstance(term, URIRef) and not _NOT_IN_IRI.isdisjoint(term):
                 raise KnowledgeError(f"{str(term)!r} is not an IRI", file=path, remedy='no spaces or <>"{}|\\^`')
     return graph
+
+
+def enumerated_texts(files: Iterable[OntologyFile]) -> dict[str, frozenset[str]]:
+    """The texts that data properties can have as values, by property, where the range lists them (owl:oneOf)."""
+    found: dict[str, frozenset[str]] = {}
+    for file in files:
+        for name, kind in file.graph.subject_objects(RDFS_TERMS.range):
+            values = file.graph.value(kind, OWL_TERMS.oneOf)
+            if values is not None:
+                found[str(name)] = frozenset(map(str, Collection(file.graph, values)))
+    return found
 
 
 def collect(given: Sequence[Path]) -> tuple[OntologyFile, ...]:
@@ -284,7 +328,9 @@ def _beside(file: OntologyFile, iri: str) -> OntologyFile | None:
     for path in (folder / (_name(iri) + ending) for ending in _ENDINGS):
         if path.is_file() and path.resolve() != file.path.resolve():
             return read_ontology(path)
-    for path in sorted(entry for entry in folder.iterdir() if entry.suffix in _ENDINGS[:2] and entry.is_file()):
+    for path in sorted(
+        entry for entry in folder.iterdir() if entry.suffix in (*_ENDINGS[:2], *_FORMATS) and entry.is_file()
+    ):
         try:
             if _name(iri).encode() not in path.read_bytes():
                 continue

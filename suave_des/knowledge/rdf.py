@@ -34,7 +34,8 @@ _WHOLE: Final = (
 )
 #: Datatypes of exact numbers.
 EXACT: Final = frozenset(XSD + name for name in ("decimal", *_WHOLE))
-_NUMERIC: Final = EXACT | {XSD + "float", XSD + "double"}
+#: Datatypes of numbers.
+NUMERIC: Final = EXACT | {XSD + "float", XSD + "double"}
 _DECIMAL: Final = re.compile(r"([+-]?)(?=\.?[0-9])([0-9]*)\.?([0-9]*)")
 _ESCAPES: Final = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"})
 
@@ -43,7 +44,9 @@ def literal(term: Literal) -> Lit:
     """Convert a literal of rdflib; plain text is xsd:string (RDF 1.1)."""
     if term.language:
         return Lit(str(term), f"@{term.language}")
-    return Lit(str(term), str(term.datatype) if term.datatype is not None else XSD + "string")
+    datatype = XSD + "string" if term.datatype is None else str(term.datatype)
+    # owlready2 saves rdf:datatype="xsd:string", with a prefix that RDF/XML does not know in attributes.
+    return Lit(str(term), XSD + datatype.removeprefix("xsd:") if datatype.startswith("xsd:") else datatype)
 
 
 def term_of(term: Node) -> str | Lit:
@@ -120,7 +123,7 @@ def value_of(value: str | Lit, names: Names) -> Value:
         return names.short(value)
     if value.datatype == XSD + "boolean":
         return value.text.strip() in ("true", "1")
-    if value.datatype in _NUMERIC:
+    if value.datatype in NUMERIC:
         try:
             return Decimal(value.text.strip())
         except InvalidOperation:

@@ -177,5 +177,7 @@ class Revision(Strict):
     """How set-points reach the autopilot."""
     random: RandomRevision
     """The random manager."""
+    comparison_operators: dict[str, Literal["<", "<=", ">", ">="]]
+    """How a measured value is worse than an expected one, for attributes whose ontology has no operator."""
     metacontrol: MetacontrolRevision
     """The metacontrol manager."""

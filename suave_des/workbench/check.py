@@ -16,7 +16,7 @@ from suave_des.knowledge.content import Content, merge, with_rules
 from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.model import Model, build_model, check_values
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.ontology_file import OntologyFile, collect
+from suave_des.knowledge.ontology_file import OntologyFile, collect, enumerated_texts
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.regions import regions_of
 from suave_des.knowledge.rules.checks import check_rule
@@ -69,7 +69,7 @@ class Subject:
 def check(subject: Subject) -> tuple[Finding, ...]:
     """Check a knowledge base.
 
-    Pellet is asked at the end, and only if nothing before was an ERROR.
+    Pellet is asked at the end, after an ERROR too, unless it keeps the knowledge base from being loaded.
 
     Returns:
         all findings, the worst first.
@@ -94,7 +94,8 @@ def check(subject: Subject) -> tuple[Finding, ...]:
     built: list[Model] = []
     attempt(lambda: built.append(build_model(content, sources)[0]))
     model = built[0] if built else None
-    vocabulary = Vocabulary.of(content.triples, [] if model is None else [each.iri for each in model.individuals()])
+    individuals = [] if model is None else [each.iri for each in model.individuals()]
+    vocabulary = Vocabulary.of(content.triples, individuals, enumerated_texts(sources))
     findings += undefined_names(content, model, vocabulary, sources)
     groups = [_rules_from_text(file, vocabulary, findings) for file in files]
     whole = with_rules(content, groups, subject.disabled_rules)
@@ -108,8 +109,7 @@ def check(subject: Subject) -> tuple[Finding, ...]:
         if values_are_right:
             findings += designs_without_performance(whole, model, sources)
     findings += check_shapes(sources, subject.shapes)
-    if not has_level(findings, Level.ERROR):
-        attempt(lambda: findings.extend(_ask_pellet(subject)))
+    findings += _ask_pellet(subject, findings)
     return ordered(replace(one, file=relative_path(one.file) if one.file else None) for one in findings)
 
 
@@ -147,7 +147,7 @@ def _replacing_rules(rules: Sequence[Rule], groups: Sequence[Sequence[Rule]]) ->
             old = before.get(rule.name)
             if old is not None and (old.text, old.enabled) != (rule.text, rule.enabled):
                 message = f"takes the place of the rule of this name in {relative_path(old.file)}"
-                yield _RuleFinding(rule, {})(Level.INFO, message)
+                yield _RuleFinding(rule, {})(Level.WARN, message, "give it a name of its own, unless that is meant")
         before |= {rule.name: rule for rule in group}
 
 
@@ -192,11 +192,19 @@ class _RuleFinding:
         return int(place.removeprefix("line ")) if place else None
 
 
-def _ask_pellet(subject: Subject) -> Iterator[Finding]:
+def _ask_pellet(subject: Subject, before: Sequence[Finding]) -> Iterator[Finding]:
     """Use the knowledge base: this brings up contradictions, and rules that Pellet drops."""
-    base = Ontology.load(
-        subject.ontologies, values=subject.values, rules=subject.rules, disabled_rules=subject.disabled_rules
-    )
+    is_wrong = has_level(before, Level.ERROR)
+    try:
+        base = Ontology.load(
+            subject.ontologies, values=subject.values, rules=subject.rules, disabled_rules=subject.disabled_rules
+        )
+    except KnowledgeError as error:
+        message = (
+            "Pellet was not asked for contradictions: the ontologies cannot be loaded until the errors are corrected"
+        )
+        yield Finding(Level.INFO, message) if is_wrong else finding_from(error)
+        return
     for reason in regions_of(base).reasons:
         yield Finding(Level.INFO, f"inferences are cached for equal measured values only, which is slower: {reason}")
     try:
@@ -204,7 +212,14 @@ def _ask_pellet(subject: Subject) -> Iterator[Finding]:
         for state in islice(_simple_states(base), MAX_STATES):
             pellet.infer(state)
     except InputError as error:
-        yield finding_from(error)
+        found = finding_from(error)
+        if found.rule not in {one.rule for one in before if one.rule and one.level is Level.ERROR}:
+            yield found
+        else:
+            message = (
+                f"Pellet was not asked for contradictions: it does not use rule {found.rule} before it is corrected"
+            )
+            yield Finding(Level.INFO, message)
 
 
 def _simple_states(base: Ontology) -> Iterator[KnowledgeState]:

@@ -100,6 +100,19 @@ def has_level(findings: Sequence[Finding], least: Level) -> bool:
     return any(_SEVERITY[one.level] <= _SEVERITY[least] for one in findings)
 
 
+def folded(findings: Sequence[Finding], folder: Path) -> tuple[Finding, ...]:
+    """Replace the notes on files of a folder, such as that of the shipped ontologies, by one that counts them."""
+
+    def is_folded(one: Finding) -> bool:
+        return one.level is Level.INFO and one.file is not None and Path(one.file).absolute().is_relative_to(folder)
+
+    kept = [one for one in findings if not is_folded(one)]
+    if notes := len(findings) - len(kept):
+        message = f"{notes} note{'s' if notes > 1 else ''} on the shipped ontologies, most on rules for other models"
+        kept.append(Finding(Level.INFO, message, remedy="--verbose shows them"))
+    return tuple(kept)
+
+
 def summary(findings: Sequence[Finding]) -> str:
     """Count the findings of each level: "1 error, 0 warnings, 14 notes"."""
     counts = {noun: sum(one.level is level for one in findings) for level, noun in _NOUNS.items()}

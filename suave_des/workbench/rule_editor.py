@@ -62,6 +62,11 @@ class _Document:
     """The elements directly under the root of an RDF/XML file, with their places in its bytes."""
 
     def __init__(self, file: OntologyFile) -> None:
+        if not file.is_xml:
+            raise InputError(
+                "only RDF/XML is edited in place", file=file.path, remedy="keep rules as text, for --rules"
+            )
+        self.newline = b"\r\n" if b"\r\n" in file.content else b"\n"
         parser = etree.XMLParser(huge_tree=True, no_network=True)  # read_ontology has refused entity bombs
         root = etree.fromstring(file.content, parser)
         if (root.getroottree().docinfo.encoding or "UTF-8").upper() not in _ENCODINGS:
@@ -139,8 +144,9 @@ def _rule_name(element: etree._Element) -> str | None:
 def _declares(element: etree._Element) -> str | None:
     """The IRI that an element only declares, as add_rule declares variables and built-ins; None for another element."""
     iri = element.get(_ABOUT)
-    alone = element.tag == _DESCRIPTION and len(element.attrib) == len(element) == len(_types(element)) == 1
-    return iri if iri is not None and alone and _is_declaration(iri, _types(element)[0]) else None
+    types = _types(element) if element.tag == _DESCRIPTION else [re.sub("[{}]", "", str(element.tag)), *_types(element)]
+    alone = len(element.attrib) == 1 and len(element) == len(_types(element)) and len(types) == 1
+    return iri if iri is not None and alone and _is_declaration(iri, types[0]) else None
 
 
 def _is_declaration(iri: str, kind: str) -> bool:
@@ -169,7 +175,7 @@ def add_rule(path: Path, text: str) -> Rule:
         )
     document = _Document(file)
     known = {str(subject) for subject in file.graph.subjects(RDF.type, None)}
-    added = _rule_xml(rule, document.prefixes, known)
+    added = _rule_xml(rule, document.prefixes, known).replace(b"\n", document.newline)
     at = file.content.rfind(b"\n", 0, document.closing) + 1
     if file.content[at : document.closing].strip():
         at = document.closing
@@ -216,7 +222,8 @@ def set_enabled(path: Path, name: str, *, enabled: bool) -> bool:
         if not marks:
             tag = _TAG.match(changed)
             at = tag.end() if tag else 0
-            changed = changed[:at] + _mark_xml(document.prefixes, enabled=enabled) + changed[at:]
+            mark = _mark_xml(document.prefixes, enabled=enabled).replace(b"\n", document.newline)
+            changed = changed[:at] + mark + changed[at:]
         content = content[:start] + changed + content[end:]
     _replace(file, content, lambda said: [(each[0], enabled, each[2]) if each[0] == name else each for each in said])
     return True

@@ -213,7 +213,7 @@ def test_a_number_with_a_comma(tmp_path: Path) -> None:
 
 def test_a_rule_as_text_that_takes_the_place_of_another_is_told(tmp_path: Path) -> None:
     finding = only(found(tmp_path, "S1a: Role(?q) -> Role(?q)"), "takes the place of the rule of this name in")
-    assert (finding.level, finding.rule, finding.line) == (Level.INFO, "S1a", 1)
+    assert (finding.level, finding.rule, finding.line) == (Level.WARN, "S1a", 1)
     assert finding.message.endswith("tomasys.owl")
     same = 'S1a: FunctionGrounding(?fg) ^ fg_status(?fg, "IN_ERROR_COMPONENT") ^ solvesO(?fg, ?o)'
     findings = found(tmp_path, f'{same} -> o_status(?o, "IN_ERROR_COMPONENT")')
@@ -355,3 +355,76 @@ def test_values_of_the_scenario_are_used(tmp_path: Path) -> None:
 def test_a_reasoner_that_takes_too_long_is_given_up_on(tmp_path: Path) -> None:
     findings = found(tmp_path, time_limit_s=1e-6)
     assert "not done after" in errors(findings)[0].message
+
+
+class TestBeforeItRuns:
+    """What no reasoner would report: it is seen in the rules themselves."""
+
+    @pytest.mark.parametrize(
+        ("rule", "column", "consequence"),
+        [
+            ('A: FunctionGrounding(?g) -> fg_status(?g, "IN_EROR_NFR")', 43, "contradicts whatever it is concluded of"),
+            ('A: o_status(?o, "IN_EROR_NFR") -> o_updatable(?o, true)', 17, "never matches"),
+        ],
+    )
+    def test_a_status_outside_its_range_is_an_error(
+        self, rule: str, column: int, consequence: str, tmp_path: Path
+    ) -> None:
+        (error,) = errors(found(tmp_path, rule))
+        assert error.column == column
+        assert error.message.endswith(consequence)
+        assert error.remedy == "did you mean IN_ERROR_NFR?"
+
+    @pytest.mark.parametrize(
+        "body",
+        [
+            'greaterThan(?v, "3")',
+            "lessThan(?v, 1) ^ greaterThan(?v, 2)",
+            "lessThan(?v, 2) ^ equal(?v, 2.0)",
+            "lessThan(2, ?v) ^ lessThanOrEqual(?v, 2)",
+        ],
+    )
+    def test_comparisons_that_no_value_satisfies_are_warnings(self, body: str, tmp_path: Path) -> None:
+        findings = found(tmp_path, f"A: hasValue(?q, ?v) ^ {body} -> QAvalue(?q)")
+        (warning,) = [one for one in findings if one.level is Level.WARN]
+        assert warning.rule == "A"
+        assert warning.column
+        assert "never" in warning.message
+
+    @pytest.mark.parametrize("body", ["lessThan(1, ?v) ^ lessThan(?v, 2)", "equal(?v, 2) ^ lessThanOrEqual(?v, 2)"])
+    def test_comparisons_that_some_value_satisfies_are_not(self, body: str, tmp_path: Path) -> None:
+        findings = found(tmp_path, f"A: hasValue(?q, ?v) ^ {body} -> QAvalue(?q)")
+        assert not has_level(findings, Level.WARN)
+
+    def test_pellet_is_asked_after_an_error_that_does_not_stop_loading(self, tmp_path: Path) -> None:
+        kind = f'<rdf:type rdf:resource="{SUAVE}Nowhere"/>'
+        misspelt = f'<owl:NamedIndividual rdf:about="{SUAVE}x">{kind}</owl:NamedIndividual>'
+        rules = 'A: Component(?c) -> c_status(?c, "x") ^ c_status(?c, "y")'
+        messages = [one.message for one in errors(found(tmp_path, rules, extra=misspelt))]
+        assert any("class Nowhere is not defined" in message for message in messages)
+        assert any("contradiction" in message for message in messages)
+
+    def test_what_was_skipped_is_said(self, tmp_path: Path) -> None:
+        findings = found(tmp_path, "A: Role(?x) -> Role(?y)")
+        assert only(findings, "Pellet was not asked").level is Level.INFO
+
+    def test_notes_on_shipped_files_are_one_line(self, capsys: pytest.CaptureFixture[str]) -> None:
+        assert main(["kb", "check"]) == 0
+        assert len(capsys.readouterr().out.splitlines()) == 2
+        assert main(["kb", "check", "--verbose"]) == 0
+        assert len(capsys.readouterr().out.splitlines()) > 5
+
+    def test_individuals_can_be_the_same_or_different(self, tmp_path: Path) -> None:
+        rules = "A: FunctionDesign(?x) ^ FunctionDesign(?y) ^ differentFrom(?x, ?y) -> Role(?x)\n"
+        assert not has_level(found(tmp_path, rules + "B: sameAs(?x, ?y) ^ Role(?x) -> Role(?y)"), Level.WARN)
+
+
+def test_a_rule_that_never_comes_to_an_end_is_named(tmp_path: Path) -> None:
+    rules = "ever: fd_efficacy(?d, ?v) ^ add(?w, ?v, 1) -> fd_efficacy(?d, ?w)\n"
+    start = (
+        f'<rdf:Description rdf:about="{SUAVE}fd_spiral_low"><tomasys:fd_efficacy '
+        'rdf:datatype="http://www.w3.org/2001/XMLSchema#decimal">1</tomasys:fd_efficacy></rdf:Description>'
+    )
+    (error,) = errors(found(tmp_path, rules, extra=start, time_limit_s=3.0))
+    assert "rule ever computes ever new values from what it concludes itself" in error.message
+    assert (error.file, error.line) == (str(tmp_path / "mine.swrl"), 1)

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.errors import InputError
+from suave_des.resources import shipped_folder
 from suave_des.workbench import KnowledgeBase
 from suave_des.workbench.tracing import Tracer
 
@@ -220,3 +221,41 @@ def test_the_command_prints_the_tree_and_the_same_as_json(command, tmp_path):
     status, text, _ = command("explain", *words, "--rules", rules)
     assert status == 0
     assert "fg_status of fg_spiral_high would have 2 values:" in text
+
+
+SCHEMA = """
+<owl:Class rdf:about="http://www.metacontrol.org/suave#FailedComponent"><owl:equivalentClass><owl:Restriction>
+  <owl:onProperty rdf:resource="http://metacontrol.org/tomasys#c_status"/><owl:hasValue>FALSE</owl:hasValue>
+</owl:Restriction></owl:equivalentClass></owl:Class>
+<owl:TransitiveProperty rdf:about="http://www.metacontrol.org/suave#partOf">
+  <rdf:type rdf:resource="http://www.w3.org/2002/07/owl#ObjectProperty"/>
+</owl:TransitiveProperty>
+<owl:ObjectProperty rdf:about="http://www.metacontrol.org/suave#hasPart">
+  <owl:inverseOf rdf:resource="http://www.metacontrol.org/suave#partOf"/>
+</owl:ObjectProperty>
+<owl:NamedIndividual rdf:about="http://www.metacontrol.org/suave#motor">
+  <partOf xmlns="http://www.metacontrol.org/suave#" rdf:resource="http://www.metacontrol.org/suave#c_thruster_1"/>
+</owl:NamedIndividual>
+<rdf:Description rdf:about="http://www.metacontrol.org/suave#c_thruster_1">
+  <partOf xmlns="http://www.metacontrol.org/suave#" rdf:resource="http://www.metacontrol.org/suave#hull"/>
+</rdf:Description>
+<owl:NamedIndividual rdf:about="http://www.metacontrol.org/suave#hull"/>
+"""
+
+
+def test_what_axioms_conclude_is_explained_inferred_and_queried(tmp_path):
+    shipped = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
+    owl = tmp_path / "suave.owl"
+    owl.write_text(shipped.replace("</rdf:RDF>", SCHEMA + "</rdf:RDF>"), encoding="utf-8")
+    knowledge = KnowledgeBase.load(owl)
+    state = knowledge.state(components={"c_thruster_3": "FALSE"})
+    inferred = {str(fact) for fact in knowledge.infer(state).inference.facts}
+    wanted = ["FailedComponent(c_thruster_3)", "partOf(motor, hull)", "hasPart(hull, motor)"]
+    assert inferred.issuperset(wanted)
+    for fact in wanted:
+        (derivation,) = knowledge.explain(state, fact).facts
+        assert derivation.source == "axioms"
+        assert derivation.axioms
+    result = knowledge.query("SELECT ?p WHERE { suave:hull suave:hasPart ?p }", state, inferred=True)
+    assert result.rows == (("suave:c_thruster_1",), ("suave:motor",))
+    assert knowledge.decide(state).plan == knowledge.infer(state).plan

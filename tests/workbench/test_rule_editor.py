@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import stat
 from pathlib import Path
 
@@ -226,3 +227,35 @@ def test_a_rule_of_a_thousand_atoms(owl: Path) -> None:
     assert new[1].count("hasValue") == 1000
     remove_rule(owl, "Long")
     assert said(owl) == before
+
+
+def test_line_ends_of_the_file_are_kept(owl: Path) -> None:
+    before = owl.read_bytes().replace(b"\n", b"\r\n")
+    owl.write_bytes(before)
+    add_rule(owl, BATTERY)
+    set_enabled(owl, "Battery", enabled=False)
+    assert owl.read_bytes().count(b"\n") == owl.read_bytes().count(b"\r\n")
+    remove_rule(owl, "Battery")
+    assert owl.read_bytes() == before
+
+
+def test_declarations_as_protege_writes_them_go_with_their_rule(owl: Path) -> None:
+    before = owl.read_bytes()
+    add_rule(owl, BATTERY)
+    text = owl.read_text(encoding="utf-8")
+    typed = re.sub(
+        r'<rdf:Description rdf:about="([^"]*)">\s*<rdf:type rdf:resource="[^"]*swrl#Variable"/>\s*</rdf:Description>',
+        r'<swrl:Variable xmlns:swrl="http://www.w3.org/2003/11/swrl#" rdf:about="\1"/>',
+        text,
+    )
+    assert typed.count("<swrl:Variable ") == 3
+    owl.write_text(typed, encoding="utf-8")
+    remove_rule(owl, "Battery")
+    assert owl.read_bytes() == before
+
+
+def test_other_formats_are_not_edited(owl: Path) -> None:
+    turtle = owl.with_suffix(".ttl")
+    turtle.write_text(Graph().parse(owl, format="xml").serialize(format="turtle"), encoding="utf-8")
+    with pytest.raises(InputError, match="only RDF/XML is edited in place"):
+        add_rule(turtle, BATTERY)

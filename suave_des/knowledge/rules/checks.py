@@ -8,10 +8,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from decimal import Decimal
+from operator import gt, lt
 from typing import Final
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.rdf import Lit, Triple
+from suave_des.knowledge.rdf import NUMERIC, Lit, Triple
 from suave_des.knowledge.rules.names import BUILTINS, TESTERS, Vocabulary
 from suave_des.knowledge.rules.syntax import EXPRESSION, Atom, Named, Place, Rule, RuleError, Term, Variable
 from suave_des.knowledge.rules.writer import literal_text
@@ -19,6 +21,16 @@ from suave_des.knowledge.vocabulary import OWL, RDF_TYPE, XSD, local_name, neare
 
 _DECLARED_AS: Final = {"class": "class", "object": "object property", "data": "data property"}
 _ARGUMENTS: Final = {"class": 1, "range": 1, "object": 2, "data": 2, "same": 2, "different": 2}
+_BOUNDS: Final = {
+    "equal": (">=", "<="),
+    **{"lessThan": ("<",), "lessThanOrEqual": ("<=",), "greaterThan": (">",), "greaterThanOrEqual": (">=",)},
+}
+"""What a comparison with a number says of the value on its left."""
+_MIRRORED: Final = {
+    "equal": "equal",
+    **{"lessThan": "greaterThan", "greaterThan": "lessThan"},
+    **{"lessThanOrEqual": "greaterThanOrEqual", "greaterThanOrEqual": "lessThanOrEqual"},
+}
 _DOUBLE: Final = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?INF|NaN")
 _LEXICAL: Final = {
     XSD + "boolean": re.compile(r"true|false|0|1"),
@@ -51,6 +63,7 @@ def check_rule(rule: Rule, vocabulary: Vocabulary) -> list[RuleProblem]:
     problems = list(_check_variables(rule))
     for number, atom in enumerate(rule.atoms):
         problems += _check_atom(atom, vocabulary, is_head=number >= len(rule.body))
+    problems += _check_comparisons(rule, vocabulary)
     if not rule.head:
         problems.append(RuleProblem("the rule concludes nothing", None, "write at least one atom after ->"))
     return sorted(problems, key=lambda problem: (problem.place or Place(0, 0), problem.message))
@@ -163,6 +176,47 @@ def _check_argument(
             consequence = "contradicts whatever it is concluded of" if is_head else "never matches"
             problem = f"{literal_text(term)} is not {_a(wanted)}, the range of {name}: it {consequence}"
             yield RuleProblem(problem, place, f"write {term.text}.0" if whole else f"a value of {wanted}")
+        elif term.text not in (values := vocabulary.enumerations.get(atom.predicate, frozenset({term.text}))):
+            consequence = "contradicts whatever it is concluded of" if is_head else "never matches"
+            problem = f"{literal_text(term)} is not among the values of {name}: it {consequence}"
+            yield RuleProblem(problem, place, nearest(term.text, values) or f"one of {', '.join(sorted(values))}")
+
+
+def _check_comparisons(rule: Rule, vocabulary: Vocabulary) -> Iterator[RuleProblem]:
+    """Find comparisons that no value satisfies, by themselves or together: the rule then never fires."""
+    holders = {
+        atom.arguments[1].name: atom.predicate
+        for atom in rule.body
+        if atom.kind == "data" and len(atom.arguments) == 2 and isinstance(atom.arguments[1], Variable)
+    }
+    least: dict[str, tuple[Decimal, bool, str]] = {}  # number, whether it is excluded, how it is written
+    most: dict[str, tuple[Decimal, bool, str]] = {}
+    for atom in rule.body:
+        name = local_name(atom.predicate)
+        if atom.kind != "builtin" or name not in _BOUNDS or len(atom.arguments) != 2:
+            continue
+        one, other = atom.arguments
+        if isinstance(one, Lit) and isinstance(other, Variable):
+            one, other, name = other, one, _MIRRORED[name]
+        if not (isinstance(one, Variable) and isinstance(other, Lit)):
+            continue
+        ranges = vocabulary.ranges.get(holders.get(one.name, ""), frozenset())
+        if ranges and ranges <= NUMERIC and other.datatype not in NUMERIC:
+            problem = f"{name} compares ?{one.name}, a number, with the text {literal_text(other)}: it never holds"
+            yield RuleProblem(problem, atom.place(), f"write {other.text} without quotes", is_fatal=False)
+        elif other.datatype in NUMERIC and _LEXICAL[XSD + "decimal"].fullmatch(other.text.strip()):
+            number = Decimal(other.text.strip())
+            for side in _BOUNDS[name]:
+                bounds, is_tighter = (least, gt) if side[0] == ">" else (most, lt)
+                bound = number, "=" not in side, f"{'=' if name == 'equal' else side} {other.text}"
+                known = bounds.get(one.name)
+                if known is None or is_tighter(number, known[0]) or (number == known[0] and bound[1]):
+                    bounds[one.name] = bound
+            if one.name in least and one.name in most:
+                low, high = least[one.name], most[one.name]
+                if low[0] > high[0] or (low[0] == high[0] and (low[1] or high[1])):
+                    problem = f"no value of ?{one.name} is {low[2]} and {high[2]}: the rule never fires"
+                    yield RuleProblem(problem, atom.place(), "turn one of the comparisons", is_fatal=False)
 
 
 def _check_builtin(atom: Atom, name: str, *, is_head: bool) -> Iterator[RuleProblem]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
@@ -89,15 +89,28 @@ class Vocabulary:
             datatype, individual.
         by_name: IRIs by their last part.
         ranges: datatypes that the values of a data property can have, where that is one datatype or a choice of them.
+        enumerations: the values that a data property can have, where its range lists them.
     """
 
     kinds: Mapping[str, frozenset[str]]
     by_name: Mapping[str, tuple[str, ...]]
     ranges: Mapping[str, frozenset[str]]
+    enumerations: Mapping[str, frozenset[str]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, triples: Collection[Triple], individuals: Iterable[str] = ()) -> Vocabulary:
-        """Collect the names in triples, and those of further individuals (that exist only in states)."""
+    def of(
+        cls,
+        triples: Collection[Triple],
+        individuals: Iterable[str] = (),
+        enumerations: Mapping[str, frozenset[str]] | None = None,
+    ) -> Vocabulary:
+        """Collect the names in triples.
+
+        Args:
+            triples: of the ontologies.
+            individuals: further ones, that exist only in states.
+            enumerations: the values that data properties can have, where their ranges list them.
+        """
         kinds: dict[str, set[str]] = defaultdict(set, {OWL + "Thing": {"class"}, OWL + "Nothing": {"class"}})
         ranges: dict[str, set[str]] = defaultdict(set)
         by_name: dict[str, list[str]] = defaultdict(list)
@@ -119,7 +132,9 @@ class Vocabulary:
             {iri: frozenset(found) for iri, found in kinds.items()},
             {name: tuple(found) for name, found in by_name.items()},
             # All ranges of a property hold at once; which values several of them leave is not worked out.
-            {name: frozenset(found) for name, found in ranges.items() if len(found) == 1},
+            {name: frozenset(found) for name, found in ranges.items() if len(found) == 1}
+            | dict.fromkeys(enumerations or (), frozenset((XSD + "string",))),
+            enumerations or {},
         )
 
     def candidates(self, name: str) -> tuple[str, ...]:

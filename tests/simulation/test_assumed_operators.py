@@ -1,0 +1,24 @@
+"""Ontologies of 2023 without qa_comparison_operator: the revision says how values compare, as its code did."""
+
+from pathlib import Path
+
+import pytest
+
+from suave_des.campaign.provenance import check_knowledge
+from suave_des.resources import shipped_folder
+from suave_des.scenario.loader import load_scenario
+from suave_des.simulation.simulator import Simulator
+
+
+def test_missions_are_those_with_the_operator_written_in(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
+    operator = "<tomasys:qa_comparison_operator>&lt;</tomasys:qa_comparison_operator>"
+    assert operator in text
+    owl = tmp_path / "suave.owl"
+    owl.write_text(text.replace(operator, ""), encoding="utf-8")
+    loaded = load_scenario("seams2023", ontologies=[owl])
+    check_knowledge(loaded, ["metacontrol"], given=True)
+    assert caplog.text.count("water_visibility has no qa_comparison_operator in the ontologies: < is assumed") == 1
+    without, with_operator = Simulator(loaded), Simulator(load_scenario("seams2023"))
+    for run in range(1, 4):
+        assert without.run("metacontrol", run, 1, record=True) == with_operator.run("metacontrol", run, 1, record=True)
