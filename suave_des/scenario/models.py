@@ -32,7 +32,6 @@ from suave_des.scenario.quantities import (
     Number,
     OffsetDistribution,
     Period,
-    Speed,
     Strict,
     TimeDistribution,
     ValueDistribution,
@@ -62,7 +61,7 @@ class Mission(Strict):
 
 
 class Start(Strict):
-    """Pose at t = 0, in the world frame (x east, y north, z up; the sea bed is the plane z = -20)."""
+    """Where the vehicle is placed, in the world frame (x east, y north, z up; the sea bed is the plane z = -20)."""
 
     x_m: CoordinateDistribution = -17.0
     """East."""
@@ -166,21 +165,27 @@ class Latencies(Strict):
 class Calibration(Strict):
     """Parameters of vehicle, autopilot and simulator that the sources leave open, alike for every manager."""
 
-    position_gain_per_s: Annotated[float, Field(strict=True), Within(gt=0, le=100, unit="1/s")] = 0.48
-    """Commanded speed for each metre to the set-point."""
-    horizontal_speed_limit_m_per_s: Speed = 0.34
-    """Greatest horizontal speed that the autopilot commands."""
-    vertical_speed_limit_m_per_s: Speed = 0.36
-    """Greatest vertical speed that the autopilot commands."""
-    velocity_time_constant_s: Annotated[float, Field(strict=True), Within(0.15, 1000, unit="s")] = 0.5
-    """Lag of the velocity behind the commanded one."""
+    position_gain_per_s: Annotated[float, Field(strict=True), Within(gt=0, le=100, unit="1/s")] = 1.0
+    """Horizontal velocity demanded for each metre of position error; ArduSub's default."""
+    jerk_m_per_s3: Annotated[float, Field(strict=True), Within(gt=0, le=1000, unit="m/s^3")] = 0.5
+    """Jerk with which the autopilot's target moves along a leg to a set-point."""
+    velocity_gain_per_s: Annotated[float, Field(strict=True), Within(gt=0, le=10, unit="1/s")] = 4.0
+    """Horizontal acceleration demanded for each m/s of velocity error."""
+    velocity_integral_gain_per_s2: Annotated[float, Field(strict=True), Within(0, 10, unit="1/s^2")] = 1.2
+    """Horizontal acceleration demanded for each metre that the velocity error sums up to; each new leg starts anew."""
+    heading_frequency_rad_per_s: Annotated[float, Field(strict=True), Within(gt=0, le=10, unit="rad/s")] = 4.5
+    """Natural frequency of heading control."""
+    heading_integral_gain_per_s3: Annotated[float, Field(strict=True), Within(0, 100, unit="1/s^3")] = 0.0
+    """Angular acceleration demanded for each rad s that the heading error sums up to."""
     altitude_error_m: OffsetDistribution = 0.0
-    """Steady error of the autopilot's altitude, drawn once a run: it holds its set-point plus this."""
-    altitude_deadband_m: Annotated[Distribution, Within(0.0, 100.0, unit="m", is_floor=True)] = 0.0
-    """Distance short of its altitude set-point at which the autopilot stops, drawn once a run."""
+    """Steady error of the held altitude whose cause is not explained, drawn once a run: set-point plus this."""
     drift_x_m: CoordinateDistribution = 0.0
-    """Way east from the spawning place to where guided mode begins, the origin of the local frame."""
+    """Way east from the start to where guided mode begins, drawn once a run."""
     drift_y_m: CoordinateDistribution = 0.0
+    """The same, north."""
+    origin_x_m: OffsetDistribution = 0.0
+    """Way east from where guided mode begins to the local frame's origin, the spiral's centre; drawn once a run."""
+    origin_y_m: OffsetDistribution = 0.0
     """The same, north."""
     real_time_factor_loss: Annotated[Distribution, Within(0.0, 1000.0, is_floor=True)] = 0.0
     """The simulated world runs 1 / (1 + loss) as fast as the software's clock; drawn once a run."""
@@ -292,7 +297,7 @@ class Scenario(Strict):
     mission: Mission = Mission()
     """The coordinator's limit, and what its tasks need."""
     start: Start = Start()
-    """Pose at t = 0, each part drawn once a run."""
+    """Pose before the drift, each part drawn once a run."""
     pipeline: Pipeline = Pipeline()
     """The pipeline on the sea bed."""
     current: Current = Current()

@@ -128,7 +128,6 @@ Length = Annotated[_Float, Within(gt=0, le=FARTHEST_M, unit="m")]
 Duration = Annotated[_Float, Within(gt=0, le=LONGEST_S, unit="s")]
 Period = Annotated[_Float, Within(0.001, LONGEST_S, unit="s")]
 """Period of something that happens in mission time; the lower limit keeps a slip from stopping the clock."""
-Speed = Annotated[_Float, Within(gt=0, le=100, unit="m/s")]
 
 
 _StreamName = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_.-]*$", max_length=100)]

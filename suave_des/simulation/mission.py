@@ -190,7 +190,7 @@ class MissionRun:
 
     def metrics(self) -> MissionMetrics:
         """The metrics, as of now if the mission is not over."""
-        coordinator, detector, drawn = self._coordinator, self._detector, self._chance.drawn
+        coordinator, detector = self._coordinator, self._detector
         found = coordinator.search_time_s is not None
         x_m, y_m = self._simulator.points[detector.first_point, :2].tolist() if found else (None, None)
         return MissionMetrics(
@@ -198,8 +198,8 @@ class MissionRun:
             manager=self._manager,
             run=self._run_number,
             seed=self._seed,
-            initial_x_m=drawn["start.x_m"],
-            initial_y_m=drawn["start.y_m"],
+            initial_x_m=self._initial_m[0],
+            initial_y_m=self._initial_m[1],
             mission_duration_s=float(self.env.now),
             pipeline_found=found,
             search_time_s=coordinator.search_time_or_limit_s(),
@@ -225,18 +225,20 @@ class MissionRun:
 
     def _make_vehicle(self, memory: MissionMemory) -> Vehicle:
         value, calibration = self._chance.value, self._scenario.calibration
-        x_m, y_m = value("start.x_m"), value("start.y_m")
-        self._origin_m = x_m + value("calibration.drift_x_m"), y_m + value("calibration.drift_y_m")
+        x_m, y_m = (value(f"start.{axis}_m") + value(f"calibration.drift_{axis}_m") for axis in "xy")
+        self._initial_m = x_m, y_m
+        self._origin_m = x_m + value("calibration.origin_x_m"), y_m + value("calibration.origin_y_m")
         z_m, heading_rad = value("start.z_m"), value("start.heading_rad")
         autopilot = Autopilot(
             calibration.position_gain_per_s,
-            calibration.horizontal_speed_limit_m_per_s,
-            calibration.vertical_speed_limit_m_per_s,
-            calibration.velocity_time_constant_s,
+            calibration.jerk_m_per_s3,
+            calibration.velocity_gain_per_s,
+            calibration.velocity_integral_gain_per_s2,
+            calibration.heading_frequency_rad_per_s,
+            calibration.heading_integral_gain_per_s3,
             value("calibration.altitude_error_m"),
-            value("calibration.altitude_deadband_m"),
         )
-        start = Pose(*self._origin_m, z_m, 0.0, 0.0, heading_rad)
+        start = Pose(x_m, y_m, z_m, 0.0, 0.0, heading_rad)
         current_m_per_s, wave = self._current()
         return Vehicle(
             self._simulator.vehicle_model,

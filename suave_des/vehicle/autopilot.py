@@ -11,39 +11,53 @@ from suave_des.vehicle.model import VehicleModel
 
 
 class Autopilot(NamedTuple):
-    """The guided controller: ArduSub's cascade of position, velocity and attitude loops, in its simplest form.
+    """The guided controller of ArduSub: legs from set-point to set-point, and loops that follow the target on them.
+
+    A new set-point is the end of a leg; a target moves along it, from rest to rest with a limited jerk. Position errors
+    to the target demand a velocity, velocity errors a force (ArduPilot, AC_WPNav, SCurve and AC_PosControl). Its limits
+    of a leg's speed and acceleration are left out: only legs of more than 30 m, or 2 m up or down, would reach them.
 
     Attributes:
-        position_gain_per_s: velocity demanded for each metre of position error.
-        horizontal_speed_limit_m_per_s: limit of the demanded horizontal velocity.
-        vertical_speed_limit_m_per_s: limit of the demanded vertical velocity.
-        velocity_time_constant_s: how fast the velocity follows its demand; the integral gain makes the loop critically
-            damped for a body without drag.
+        position_gain_per_s: horizontal velocity demanded for each metre of position error; ArduSub's default is 1.0.
+        jerk_m_per_s3: of a leg. ArduSub's default is 1.0, but its legs change the jerk gradually and take longer; 0.5
+            at once is about as slow on legs of some 0.3 m.
+        velocity_gain_per_s: horizontal acceleration demanded for each m/s of velocity error.
+        velocity_integral_gain_per_s2: the same for each metre that the error of the velocity sums up to.
+        heading_frequency_rad_per_s: natural frequency of heading control, critically damped.
+        heading_integral_gain_per_s3: angular acceleration demanded for each rad s that the heading error sums up to.
         altitude_error_m: steady error: the autopilot holds its altitude set-point plus this.
-        altitude_deadband_m: the autopilot stops this far short of its altitude set-point.
-        attitude_frequency_rad_per_s: natural frequency of roll and heading control, as of a BlueROV2's angle
-            controller; missions are not sensitive to it.
+        vertical_position_gain_per_s: as the horizontal one; ArduSub's default is 3.0.
+        vertical_velocity_gain_per_s, vertical_velocity_integral_gain_per_s2: as the horizontal ones.
+        roll_frequency_rad_per_s: natural frequency of roll control; missions are not sensitive to it.
     """
 
-    position_gain_per_s: float
-    horizontal_speed_limit_m_per_s: float
-    vertical_speed_limit_m_per_s: float
-    velocity_time_constant_s: float
+    position_gain_per_s: float = 1.0
+    jerk_m_per_s3: float = 0.5
+    velocity_gain_per_s: float = 4.0
+    velocity_integral_gain_per_s2: float = 1.2
+    heading_frequency_rad_per_s: float = 4.5
+    heading_integral_gain_per_s3: float = 0.0
     altitude_error_m: float = 0.0
-    altitude_deadband_m: float = 0.0
-    attitude_frequency_rad_per_s: float = 3.0
+    vertical_position_gain_per_s: float = 3.0
+    vertical_velocity_gain_per_s: float = 4.0
+    vertical_velocity_integral_gain_per_s2: float = 1.0
+    roll_frequency_rad_per_s: float = 3.0
 
 
 def kernel_parameters(
     model: VehicleModel, autopilot: Autopilot, current_m_per_s: Iterable[float], z_limits_m: Iterable[float]
 ) -> Array:
-    """Constants of vehicle, autopilot and water, in the order of the places that `kernel` names, shape (29,)."""
-    rate, omega = 1.0 / autopilot.velocity_time_constant_s, autopilot.attitude_frequency_rad_per_s
+    """Constants of vehicle, autopilot and water, in the order of the places that `kernel` names, shape (32,)."""
+    ap = autopilot
     # An integral may ask for as much as the four horizontal thrusters together give along one axis, and no more.
     integral_limit = 4.0 * model.thrust_limit_n * math.sqrt(0.5) / model.mass_kg
     forces = model.buoyancy_n - model.weight_n, model.buoyancy_n * model.centre_of_buoyancy_m, *model.quadratic_drag
-    limits = model.thrust_limit_n, *autopilot[:3], autopilot.altitude_deadband_m
-    velocity = rate, rate * rate / 4.0, integral_limit
-    attitude = omega * omega, 2.0 * omega, omega**3 / 8.0, 4.0 * omega * omega
+    legs = model.thrust_limit_n, ap.position_gain_per_s, ap.vertical_position_gain_per_s, ap.jerk_m_per_s3
+    horizontal = ap.velocity_gain_per_s, ap.velocity_integral_gain_per_s2
+    vertical = ap.vertical_velocity_gain_per_s, ap.vertical_velocity_integral_gain_per_s2
+    roll, heading = ap.roll_frequency_rad_per_s, ap.heading_frequency_rad_per_s
+    attitude = roll * roll, 2.0 * roll, heading * heading, 2.0 * heading
+    turning = ap.heading_integral_gain_per_s3, 4.0 * heading * heading
     body = model.mass_kg, *model.inertia_kg_m2, *forces
-    return np.array((*body, *limits, *velocity, *attitude, *current_m_per_s, *z_limits_m))
+    loops = *horizontal, *vertical, integral_limit, *attitude, *turning
+    return np.array((*body, *legs, *loops, *current_m_per_s, *z_limits_m))

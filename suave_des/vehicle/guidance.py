@@ -8,6 +8,7 @@ earlier, it counts the ticks until then, and plans again from there.
 
 from __future__ import annotations
 
+import math
 import random
 from bisect import bisect_right
 from collections.abc import Callable
@@ -69,6 +70,10 @@ class SetPointSender:
     frame_error_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     loss_probability: float = 0.0
     stream: random.Random | None = None
+    _before_loss: int = field(default=0, init=False)  # messages that arrive before the next one that is lost
+
+    def __post_init__(self) -> None:
+        self._before_loss = self._draw()
 
     def send(self, x_m: float, y_m: float, z_m: float) -> None:
         """Send a set-point, world frame; the sender does not learn whether it arrived."""
@@ -79,16 +84,28 @@ class SetPointSender:
     def queue(
         self, waypoints: Array, z_m: float, check: ArrivalCheck, *, first: int, last: int, send: bool
     ) -> tuple[list[int], int]:
-        """Send and queue set-points, see `Vehicle.queue_waypoints`; where messages can be lost, none is queued."""
+        """Send and queue set-points, see `Vehicle.queue_waypoints`; none from one on whose message will be lost."""
         if self.stream is not None and self.loss_probability > 0.0:
-            waypoints = waypoints[:1]
             send = send and not self._is_lost()
+            waypoints = waypoints[: 1 + self._before_loss]
         sent_as_m = *self.frame_error_m[:2], z_m + self.frame_error_m[2]
         now_s = self.now_s()
         return self.vehicle.queue_waypoints(now_s, waypoints, sent_as_m, check, first=first, last=last, send=send)
 
+    def queued_were_sent(self, count: int) -> None:
+        """Take note that so many queued set-points have been sent."""
+        self._before_loss -= count
+
     def _is_lost(self) -> bool:
-        return self.stream is not None and self.stream.random() < self.loss_probability
+        is_lost = self.stream is not None and self.loss_probability > 0.0 and self._before_loss == 0
+        self._before_loss = self._draw() if is_lost else self._before_loss - 1
+        return is_lost
+
+    def _draw(self) -> int:
+        """How many messages arrive until one is lost: the geometric distribution, by inversion."""
+        if self.stream is None or self.loss_probability == 0.0:
+            return 0
+        return int(math.log(1.0 - self.stream.random()) / math.log(1.0 - self.loss_probability))
 
 
 @dataclass(eq=False)
@@ -209,6 +226,8 @@ class Guidance:
         if reached:
             self._sent = self._arrivals[reached - 1]
             del self._arrivals[:reached]
+            is_sent_separately = self._is_due and not self._arrivals  # the set-point after the last one planned
+            self.sender.queued_were_sent(reached - is_sent_separately)
             self._is_repeated = False
             self._flown += reached
             self.source.reached(reached)

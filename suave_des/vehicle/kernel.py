@@ -7,6 +7,10 @@ One row of the track holds everything that the next step needs:
     7:13  nu, body frame, m/s and rad/s
     13:16 integral of the velocity error, world frame, as an acceleration, m/s^2
     16    integral of the heading error, as an angular acceleration, rad/s^2
+    17:20 start of the leg that the autopilot flies, world frame, m
+    20:23 its end, the set-point, m
+    23    time on the leg, s
+    24    number of the set-point
 
 Attitude is a quaternion (Handbook, 2.2.2): no trigonometry in the loop, and no singularity for a vehicle that tumbles.
 """
@@ -17,15 +21,20 @@ import numpy as np
 
 from suave_des.compiling import Array, Ticks, compiled
 
-ROW = 17
+ROW = 25
 POSITION, ATTITUDE, VELOCITY, INTEGRAL = slice(0, 3), slice(3, 7), slice(7, 13), slice(13, 17)
+LEG_START, LEG_END = slice(17, 20), slice(20, 23)
 
 # Places in the parameter vector, see `autopilot.kernel_parameters`. Drag takes six, the current three.
 MASS, IXX, IYY, IZZ, NET_BUOYANCY, RIGHTING, DRAG = range(7)
-THRUST_LIMIT, POSITION_GAIN, SPEED_LIMIT_XY, SPEED_LIMIT_Z, ALTITUDE_DEADBAND = range(12, 17)
-VELOCITY_GAIN, VELOCITY_INTEGRAL_GAIN, INTEGRAL_LIMIT = range(17, 20)
-ATTITUDE_GAIN, RATE_GAIN, HEADING_INTEGRAL_GAIN, HEADING_INTEGRAL_LIMIT = range(20, 24)
-CURRENT, FLOOR, CEILING = 24, 27, 28
+THRUST_LIMIT, POSITION_GAIN, POSITION_GAIN_Z, JERK = range(12, 16)
+VELOCITY_GAIN, VELOCITY_INTEGRAL_GAIN, VELOCITY_GAIN_Z, VELOCITY_INTEGRAL_GAIN_Z, INTEGRAL_LIMIT = range(16, 21)
+ROLL_GAIN, ROLL_RATE_GAIN = 21, 22
+HEADING_GAIN, HEADING_RATE_GAIN, HEADING_INTEGRAL_GAIN, HEADING_INTEGRAL_LIMIT = range(23, 27)
+CURRENT, FLOOR, CEILING = 27, 30, 31
+
+ARRIVED_M = 2.0
+"""ArduPilot's WPNAV_RADIUS: a leg is completed when its time is over and the vehicle is as near as this to its end."""
 
 WAVE_X, WAVE_Y, WAVE_RATE, WAVE_PHASE = CEILING + 1, CEILING + 2, CEILING + 3, CEILING + 4
 """After those: the varying part of the current, east and north in m/s, its angle per row and at row 0 in rad."""
@@ -34,7 +43,7 @@ Dynamics = tuple[float, Array, Array, Array, Array]
 """What moves the vehicle, besides its state:
 
 - the time between rows, as the simulated world counts it, s;
-- set-point: x, y, z in m, and cosine and sine of half the heading, world frame, shape (5,);
+- set-point: x, y, z in m, cosine and sine of half the heading, world frame, and its number, shape (6,);
 - parameters: constants in the places named above;
 - allocation: thrusts for a demanded wrench, shape (6 thrusters, 6);
 - effectiveness: wrench for thrusts, each thruster's health included, shape (6, 6 thrusters).
@@ -42,11 +51,45 @@ Dynamics = tuple[float, Array, Array, Array, Array]
 
 
 @compiled
+def quarter_of_leg(length: float, jerk: float) -> float:
+    """Time of a quarter of a leg from rest to rest, flown with a constant jerk that changes its sign twice."""
+    return float((length / (2.0 * jerk)) ** (1.0 / 3.0))
+
+
+@compiled
+def begin_leg(track: Array, row: int, prm: Array) -> tuple[float, float, float, float, float]:
+    """Begin the leg to a new set-point, as ArduPilot's waypoint controller does (AC_WPNav, set_wp_destination).
+
+    If the leg before is completed, the new one starts at its end. If not, the controller starts anew: from the stopping
+    point of the vehicle, without the integral that it had built up.
+
+    Returns:
+        Where the leg starts, x, y and z in m; the integral in x and y.
+    """
+    x, y, z = track[row, 0], track[row, 1], track[row, 2]
+    to_x, to_y, to_z = track[row, 20], track[row, 21], track[row, 22]
+    leg_x, leg_y, leg_z = to_x - track[row, 17], to_y - track[row, 18], to_z - track[row, 19]
+    length = math.sqrt(leg_x * leg_x + leg_y * leg_y + leg_z * leg_z)
+    is_over = track[row, 23] >= 4.0 * quarter_of_leg(length, prm[JERK])
+    if is_over and (to_x - x) ** 2 + (to_y - y) ** 2 + (to_z - z) ** 2 <= ARRIVED_M * ARRIVED_M:
+        return to_x, to_y, to_z, track[row, 13], track[row, 14]
+    qw, qx, qy, qz = track[row, 3], track[row, 4], track[row, 5], track[row, 6]
+    u, v, w = track[row, 7], track[row, 8], track[row, 9]
+    # R nu as q nu q*: nu + 2 qw (e x nu) + 2 e x (e x nu), with the vector part e of q (Handbook, 2.2.2).
+    cx, cy, cz = qy * w - qz * v, qz * u - qx * w, qx * v - qy * u
+    wx = u + 2.0 * (qw * cx + qy * cz - qz * cy)
+    wy = v + 2.0 * (qw * cy + qz * cx - qx * cz)
+    wz = w + 2.0 * (qw * cz + qx * cy - qy * cx)
+    from_x, from_y = x + wx / prm[POSITION_GAIN], y + wy / prm[POSITION_GAIN]
+    return from_x, from_y, z + wz / prm[POSITION_GAIN_Z], 0.0, 0.0
+
+
+@compiled
 def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
     """Fill rows first + 1 .. last of the track from row `first`, with one set-point and thruster health throughout.
 
     Args:
-        track: shape (rows, 17), see above; written in place.
+        track: shape (rows, 25), see above; written in place.
         first: row to start from.
         last: last row to fill.
         dynamics: time step, set-point and constants.
@@ -60,6 +103,18 @@ def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
     u, v, w = track[first, 7], track[first, 8], track[first, 9]
     p, q, r = track[first, 10], track[first, 11], track[first, 12]
     ix, iy, iz, ir = track[first, 13], track[first, 14], track[first, 15], track[first, 16]
+    from_x, from_y, from_z = track[first, 17], track[first, 18], track[first, 19]
+    to_x, to_y, to_z = track[first, 20], track[first, 21], track[first, 22]
+    leg_time = track[first, 23]
+    if track[first, 24] != set_point[5]:
+        from_x, from_y, from_z, ix, iy = begin_leg(track, first, prm)
+        to_x, to_y, to_z, leg_time = set_point[0], set_point[1], set_point[2], 0.0
+    along_x, along_y, along_z = to_x - from_x, to_y - from_y, to_z - from_z
+    length = math.sqrt(along_x * along_x + along_y * along_y + along_z * along_z)
+    if length > 0.0:
+        along_x, along_y, along_z = along_x / length, along_y / length, along_z / length
+    quarter = quarter_of_leg(length, prm[JERK])
+    top_speed = prm[JERK] * quarter * quarter
     # To multiply takes a fraction of the time of a division.
     inverse_mass, inverse_ixx, inverse_iyy, inverse_izz = 1.0 / mass, 1.0 / ixx, 1.0 / iyy, 1.0 / izz
     drag_u, drag_v, drag_w = prm[DRAG] / mass, prm[DRAG + 1] / mass, prm[DRAG + 2] / mass
@@ -76,36 +131,38 @@ def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
         r21 = 2.0 * (qy * qz + qx * qw)
         r22 = 1.0 - 2.0 * (qx * qx + qy * qy)
 
-        # Guided autopilot, outer loop: position error to velocity set-point, limited in the horizontal and vertical.
-        vx_sp = prm[POSITION_GAIN] * (set_point[0] - x)
-        vy_sp = prm[POSITION_GAIN] * (set_point[1] - y)
-        ez = set_point[2] - z
-        dead = prm[ALTITUDE_DEADBAND]
-        vz_sp = prm[POSITION_GAIN] * (ez - min(max(ez, -dead), dead))
-        speed_sp = math.sqrt(vx_sp * vx_sp + vy_sp * vy_sp)
-        if speed_sp > prm[SPEED_LIMIT_XY]:
-            vx_sp *= prm[SPEED_LIMIT_XY] / speed_sp
-            vy_sp *= prm[SPEED_LIMIT_XY] / speed_sp
-        vz_sp = min(max(vz_sp, -prm[SPEED_LIMIT_Z]), prm[SPEED_LIMIT_Z])
-
-        # Inner loop: proportional-integral on the velocity in the world frame, demanded as a force in the body frame.
-        ex = vx_sp - (r00 * u + r01 * v + r02 * w)
-        ey = vy_sp - (r10 * u + r11 * v + r12 * w)
-        ez = vz_sp - (r20 * u + r21 * v + r22 * w)
+        # Guided autopilot. Its target moves along the leg: jerk +, -, -, + for a quarter of the leg's time each.
+        wx, wy, wz = r00 * u + r01 * v + r02 * w, r10 * u + r11 * v + r12 * w, r20 * u + r21 * v + r22 * w
+        leg_time += h
+        way, speed = length, 0.0
+        left = min(leg_time, 4.0 * quarter - leg_time)  # time to the nearer end
+        if left > 0.0:
+            if left < quarter:
+                speed = 0.5 * prm[JERK] * left * left
+                way = speed * left / 3.0
+            else:
+                left = 2.0 * quarter - left  # time to the middle
+                way = left * left * prm[JERK]
+                speed = top_speed - 0.5 * way
+                way = 0.5 * length - left * (top_speed - way / 6.0)
+            if leg_time > 2.0 * quarter:
+                way = length - way
+        ex, ey, ez = from_x + way * along_x - x, from_y + way * along_y - y, from_z + way * along_z - z
+        # Outer loop: position error to velocity, besides the target's own. Inner loop: proportional-integral on the
+        # velocity's error in the world frame, demanded as a force in the body frame.
+        ex = prm[POSITION_GAIN] * ex + along_x * speed - wx
+        ey = prm[POSITION_GAIN] * ey + along_y * speed - wy
+        ez = prm[POSITION_GAIN_Z] * ez + along_z * speed - wz
         bound = prm[INTEGRAL_LIMIT]
         ix = min(max(ix + h * prm[VELOCITY_INTEGRAL_GAIN] * ex, -bound), bound)
         iy = min(max(iy + h * prm[VELOCITY_INTEGRAL_GAIN] * ey, -bound), bound)
-        iz = min(max(iz + h * prm[VELOCITY_INTEGRAL_GAIN] * ez, -bound), bound)
+        iz = min(max(iz + h * prm[VELOCITY_INTEGRAL_GAIN_Z] * ez, -bound), bound)
         fx = mass * (prm[VELOCITY_GAIN] * ex + ix)
         fy = mass * (prm[VELOCITY_GAIN] * ey + iy)
-        fz = mass * (prm[VELOCITY_GAIN] * ez + iz)
-        # Fed forward: the thrust that holds the wanted velocity in still water; the loop corrects what is left.
-        u_sp = r00 * vx_sp + r10 * vy_sp + r20 * vz_sp
-        v_sp = r01 * vx_sp + r11 * vy_sp + r21 * vz_sp
-        w_sp = r02 * vx_sp + r12 * vy_sp + r22 * vz_sp
-        d0 = r00 * fx + r10 * fy + r20 * fz + prm[DRAG] * abs(u_sp) * u_sp
-        d1 = r01 * fx + r11 * fy + r21 * fz + prm[DRAG + 1] * abs(v_sp) * v_sp
-        d2 = r02 * fx + r12 * fy + r22 * fz + prm[DRAG + 2] * abs(w_sp) * w_sp
+        fz = mass * (prm[VELOCITY_GAIN_Z] * ez + iz)
+        d0 = r00 * fx + r10 * fy + r20 * fz
+        d1 = r01 * fx + r11 * fy + r21 * fz
+        d2 = r02 * fx + r12 * fy + r22 * fz
 
         # Attitude: the vector part of conj(q) * q_heading is half the turn that is left, in the body frame.
         ew = qw * heading_w + qz * heading_z
@@ -114,8 +171,8 @@ def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
         e_yaw = sign * (-qz * heading_w + qw * heading_z)
         bound = prm[HEADING_INTEGRAL_LIMIT]
         ir = min(max(ir + h * prm[HEADING_INTEGRAL_GAIN] * e_yaw, -bound), bound)
-        d3 = ixx * (prm[ATTITUDE_GAIN] * e_roll - prm[RATE_GAIN] * p)
-        d5 = izz * (prm[ATTITUDE_GAIN] * e_yaw - prm[RATE_GAIN] * r + ir)
+        d3 = ixx * (prm[ROLL_GAIN] * e_roll - prm[ROLL_RATE_GAIN] * p)
+        d5 = izz * (prm[HEADING_GAIN] * e_yaw - prm[HEADING_RATE_GAIN] * r + ir)
 
         # Thrusters: allocate as if all worked, limit each, and get what the working ones give.
         t0 = t1 = t2 = t3 = t4 = t5 = 0.0
@@ -188,6 +245,9 @@ def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
         track[row, 7], track[row, 8], track[row, 9] = u, v, w
         track[row, 10], track[row, 11], track[row, 12] = p, q, r
         track[row, 13], track[row, 14], track[row, 15], track[row, 16] = ix, iy, iz, ir
+        track[row, 17], track[row, 18], track[row, 19] = from_x, from_y, from_z
+        track[row, 20], track[row, 21], track[row, 22] = to_x, to_y, to_z
+        track[row, 23], track[row, 24] = leg_time, set_point[5]
 
 
 @compiled
@@ -244,6 +304,7 @@ def fly_waypoints(
         set_point[0] = waypoints[reached, 0] + sent_as[0]
         set_point[1] = waypoints[reached, 1] + sent_as[1]
         set_point[2] = sent_as[2]
+        set_point[5] += 1.0
         computed = row  # rows beyond it were flown to another set-point
         last = tick + most
         tick += fewest

@@ -133,11 +133,11 @@ class Vehicle:
         self.last_row = rows - 1
         self.track: Array = np.empty((rows, kernel.ROW)) if memory is None else memory
         self.track[0] = 0.0
-        self.track[0, kernel.POSITION] = start[:3]
+        self.track[0, kernel.POSITION] = self.track[0, kernel.LEG_START] = self.track[0, kernel.LEG_END] = start[:3]
         self.track[0, kernel.ATTITUDE] = quaternion(*start[3:])
         self._health = np.array([1.0] * len(model.thrusters))
         self._effectiveness = allocation_matrix(model).copy()
-        self._set_point = np.array([*start[:3], 1.0, 0.0])  # heading 0
+        self._set_point = np.array([*start[:3], 1.0, 0.0, 0.0])  # heading 0, number 0
         constants = kernel_parameters(model, self.autopilot, self.current_m_per_s, self.z_limits_m)
         parameters = np.array((*constants, *self.current_wave.parameters()))
         step_s, allocation = STEP_S * self.time_scale, autopilot_allocation(model)
@@ -147,6 +147,7 @@ class Vehicle:
         """Give the autopilot a new position set-point; it replaces the one before."""
         self._cancel_after(t_s)
         self._set_point[:3] = x_m, y_m, z_m + self.autopilot.altitude_error_m
+        self._set_point[5] += 1.0
         self._notify(t_s)
 
     def set_thruster_health(self, t_s: float, thruster: int, health: float) -> None:
@@ -186,7 +187,7 @@ class Vehicle:
         sent_as_m = *sent_as_m[:2], sent_as_m[2] + self.autopilot.altitude_error_m
         if send:
             self._cancel_after(t_s)
-            self._take(waypoints, 0, sent_as_m)
+            self._take(waypoints, 0, sent_as_m, new=1)
         elif self._queue is not None and self._queue.sent_until(t_s) < len(self._queue.ticks):
             waypoints = waypoints[:1]
         count, before = len(waypoints), self._set_point.copy()
@@ -242,8 +243,9 @@ class Vehicle:
         self.look_ahead(row)
         return row
 
-    def _take(self, waypoints: Array, place: int, sent_as_m: Point) -> None:
+    def _take(self, waypoints: Array, place: int, sent_as_m: Point, *, new: int) -> None:
         x_m, y_m, z_m = sent_as_m
+        self._set_point[5] += new
         self._set_point[:3] = waypoints.item(place, 0) + x_m, waypoints.item(place, 1) + y_m, z_m
 
     def _cancel_after(self, t_s: float) -> None:
@@ -253,7 +255,7 @@ class Vehicle:
         if queue is not None:
             self._set_point[:] = queue.before
             if sent := queue.sent_until(t_s):
-                self._take(queue.waypoints, sent, queue.sent_as_m)
+                self._take(queue.waypoints, sent, queue.sent_as_m, new=sent)
 
     def _notify(self, t_s: float) -> None:
         row = row_at(t_s)

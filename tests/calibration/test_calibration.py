@@ -30,6 +30,7 @@ from suave_des.scenario.loader import load_scenario, value_at, with_values
 from suave_des.simulation.simulator import Simulator
 
 GAIN = "calibration.position_gain_per_s"
+ORIGIN = "calibration.origin_y_m"
 
 
 def test_energy_distance_of_two_pairs_of_points_by_hand() -> None:
@@ -67,27 +68,27 @@ def test_coordinates_outside_the_bounds_are_reflected(unit: float, value: float)
     assert FreeParameter(GAIN, 1.0, 3.0, 2.0).value(unit) == pytest.approx(value)
 
 
-def planted(gain: float, runs: int = 40) -> dict:
-    loaded = with_values(load_scenario("seams2023"), {GAIN: gain})
+def planted(origin_y_m: float, runs: int = 40) -> dict:
+    loaded = with_values(load_scenario("seams2023"), {ORIGIN: origin_y_m})
     return {"none": as_vectors(simulate(Simulator(loaded), "none", runs, 99))}
 
 
 def test_the_fit_finds_what_was_planted() -> None:
-    problem = Problem(load_scenario("seams2023"), (FreeParameter(GAIN, 0.2, 1.2, 0.95),), planted(0.4), 25, 1)
+    problem = Problem(load_scenario("seams2023"), (FreeParameter(ORIGIN, -0.5, 0.3, 0.2),), planted(-0.2), 25, 1)
     tried = fit(problem, 30, workers=1, seed=1)
     best = min(tried, key=lambda each: each.loss)
-    assert best.values[0] == pytest.approx(0.4, abs=0.08)
-    assert best.loss < evaluate(problem, [0.95]).loss / 3.0
+    assert best.values[0] == pytest.approx(-0.2, abs=0.08)
+    assert best.loss < evaluate(problem, [0.2]).loss / 3.0
 
 
 def test_the_same_fit_twice_is_the_same() -> None:
-    problem = Problem(load_scenario("seams2023"), (FreeParameter(GAIN, 0.2, 1.2, 0.6),), planted(0.4, 10), 5, 1)
+    problem = Problem(load_scenario("seams2023"), (FreeParameter(ORIGIN, -0.5, 0.3, 0.0),), planted(-0.2, 10), 5, 1)
     assert fit(problem, 8, workers=1, seed=3) == fit(problem, 8, workers=1, seed=3)
 
 
 def test_the_spread_of_the_loss_repeats_with_its_seed() -> None:
-    problem = Problem(load_scenario("seams2023"), (FreeParameter(GAIN, 0.2, 1.2, 0.6),), planted(0.4, 10), 5, 1)
-    best = evaluate(problem, [0.4])
+    problem = Problem(load_scenario("seams2023"), (FreeParameter(ORIGIN, -0.5, 0.3, 0.0),), planted(-0.2, 10), 5, 1)
+    best = evaluate(problem, [-0.2])
     assert 0.0 < resampling_spread(problem, best, 1) == resampling_spread(problem, best, 1) < best.loss
 
 
@@ -145,7 +146,7 @@ def test_the_command_writes_a_scenario_a_report_and_the_profiles(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     free = tmp_path / "free.yaml"
-    free.write_text(f"free:\n  - {{path: {GAIN}, lower: 0.3, upper: 0.9}}\n")
+    free.write_text(f"free:\n  - {{path: {GAIN}, lower: 0.5, upper: 1.5}}\n")
     out = tmp_path / "fit"
     arguments = ["calibrate", "seams2023", "--parameters", str(free), "--managers", "none", "--runs", "3"]
     with pytest.raises(SystemExit) as ended:

@@ -27,7 +27,7 @@ class Sight:
 
     def __init__(self, commands: list, visibility_m: float = 3.0, readings: tuple[float, ...] = ()) -> None:
         self.env = simpy.Environment()
-        autopilot = Autopilot(0.48, 0.34, 0.36, 0.5)
+        autopilot = Autopilot()
         self.vehicle = Vehicle(BLUEROV2, autopilot, Pose(-17.0, 4.0, -18.0, 0.0, 0.0, 0.0), DURATION_S)
         self.visibility_m = np.full(self.vehicle.last_row + 1, visibility_m)
         self.logged: list[tuple[float, str]] = []
@@ -79,14 +79,14 @@ def test_detection_is_recorded_at_its_own_time() -> None:
 
 def test_vehicle_that_starts_over_the_pipeline_sees_it_at_once() -> None:
     env = simpy.Environment()
-    vehicle = Vehicle(BLUEROV2, Autopilot(0.48, 0.34, 0.36, 0.5), Pose(-17.0, 0.0, -18.0, 0, 0, 0), 10.0)
+    vehicle = Vehicle(BLUEROV2, Autopilot(), Pose(-17.0, 0.0, -18.0, 0, 0, 0), 10.0)
     detector = PipelineDetector(env, vehicle, np.full(vehicle.last_row + 1, 3.0), POINTS, VIEW_TANGENT, silent)
     env.run(until=1.0)
     assert detector.detected_s == 0.0
 
 
 def test_a_command_in_time_turns_the_vehicle_away_before_it_sees_anything() -> None:
-    sight = Sight([*TO_THE_PIPELINE, (10.0, (-17.0, 4.0, -18.0))])
+    sight = Sight([*TO_THE_PIPELINE, (5.0, (-17.0, 4.0, -18.0))])
     assert sight.run() == (math.inf, None)
 
 

@@ -358,7 +358,7 @@ X, U = "start: {x_m: ", "distribution: uniform"
         ("signals: {water_visibility: {noise: 1e13}}", "signals.water_visibility.noise", "1", "at most 1e+12"),
         ("signals: {water_visibility: {period_s: 1e10}}", "signals.water_visibility.period_s", "1", "at most 1e+09"),
         ("signals: {water_visibility: {publishing_period_s: 1e10}}", "signals.", "1", "at most 1e+09"),
-        ("calibration: {horizontal_speed_limit_m_per_s: 1e3}", "calibration.", "1000", "at most 100"),
+        ("calibration: {jerk_m_per_s3: 1e4}", "calibration.", "10000", "at most 1000"),
         ("calibration: {altitude_error_m: 1e3}", "calibration.altitude_error_m", "1000", "at most 100 m"),
         ("calibration: {drift_x_m: 1e5}", "calibration.drift_x_m", "100000", "at most 10000 m"),
         ("knowledge: {values: {qa_performance_low: 1e300}}", "knowledge.values.qa_performance_low", "1e+300", "1e+12"),

@@ -94,7 +94,7 @@ def test_looking_ahead_changes_nothing(name: str, condition: str, manager: str) 
     latency_s=st.floats(0.0, 3.0),
     failures_s=st.lists(st.floats(0.0, 100.0), max_size=4),
     poll_s=st.sampled_from([0.1, 0.2, 0.37, 2.0]),
-    deadband_m=st.floats(0.0, 0.5),
+    error_m=st.floats(-0.2, 1.0),
     slower=st.floats(0.0, 1.0),
 )
 @settings(max_examples=10)
@@ -107,7 +107,7 @@ def test_looking_ahead_changes_nothing_whatever_the_scenario(
     latency_s: float,
     failures_s: list[float],
     poll_s: float,
-    deadband_m: float,
+    error_m: float,
     slower: float,
 ) -> None:
     values = {
@@ -115,7 +115,7 @@ def test_looking_ahead_changes_nothing_whatever_the_scenario(
         "revision.follow.poll_period_s": poll_s,
         "signals.water_visibility.period_s": period_s,
         "latencies.mode_change_s": latency_s,
-        "calibration.altitude_deadband_m": deadband_m,
+        "calibration.altitude_error_m": error_m,
         "calibration.real_time_factor_loss": slower,
         **faults(*((1 + number, "failure", t_s) for number, t_s in enumerate(failures_s))),
     }

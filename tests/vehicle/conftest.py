@@ -23,7 +23,7 @@ def make_vehicle() -> MakeVehicle:
         altitude_error_m: float = 0.0,
         **options: object,
     ) -> Vehicle:
-        autopilot = Autopilot(0.48, 0.34, 0.36, 0.5, altitude_error_m)
+        autopilot = Autopilot(altitude_error_m=altitude_error_m)
         vehicle = Vehicle(BLUEROV2, autopilot, start, duration_s, **options)  # type: ignore[arg-type]
         for thruster in lost:
             vehicle.set_thruster_health(0.0, thruster, 0.0)

@@ -1,0 +1,101 @@
+"""Legs of the guided controller: how its target moves, and when a new set-point starts it anew."""
+
+import numpy as np
+import pytest
+
+from suave_des.vehicle import kernel
+from suave_des.vehicle.autopilot import Autopilot
+from suave_des.vehicle.frames import Pose
+from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at
+from tests.helpers.vehicles import BLUEROV2
+
+START = Pose(0.0, 0.0, -18.0, 0.0, 0.0, 0.0)
+STIFF = Autopilot(
+    jerk_m_per_s3=1.0, position_gain_per_s=3.0, velocity_gain_per_s=10.0, velocity_integral_gain_per_s2=0.0
+)
+TO_HALF_A_METRE = (0.5, 0.0, -18.0)
+
+
+def leg_start(vehicle: Vehicle, t_s: float) -> tuple[float, float, float]:
+    vehicle.position(t_s)
+    return tuple(vehicle.track[row_at(t_s), kernel.LEG_START].tolist())
+
+
+@pytest.mark.parametrize(("distance_m", "time_s"), [(0.1, 1.474), (0.3, 2.125), (0.5, 2.520)])
+def test_a_leg_from_rest_to_rest_takes_four_times_the_cube_root_of_distance_over_two_jerks(
+    distance_m: float, time_s: float
+) -> None:
+    """At its half time the target is half-way; a stiff vehicle is close behind it, and at the end stands at the end."""
+    vehicle = Vehicle(BLUEROV2, STIFF, START, 30.0)
+    vehicle.command(0.0, distance_m, 0.0, -18.0)
+    assert 4.0 * kernel.quarter_of_leg(distance_m, 1.0) == pytest.approx(time_s, abs=1e-3)
+    assert vehicle.position(time_s / 2)[0] == pytest.approx(distance_m / 2, rel=0.2)
+    assert vehicle.position(time_s + 1.0)[0] == pytest.approx(distance_m, rel=0.06)
+
+
+def test_the_targets_way_has_no_jumps_and_ends_at_the_set_point() -> None:
+    """Where the four parts of the leg meet, way and speed go on; the speed is greatest in the middle."""
+    vehicle = Vehicle(BLUEROV2, STIFF, START, 30.0)
+    vehicle.command(0.0, *TO_HALF_A_METRE)
+    vehicle.look_ahead(row_at(5.0))
+    way_m = vehicle.track[: row_at(5.0), 0]
+    speed_m_per_s = np.diff(way_m) / STEP_S
+    assert np.abs(np.diff(speed_m_per_s)).max() < 0.06  # no more than an acceleration of 1.2 m/s^2
+    assert 1.0 < np.argmax(speed_m_per_s) * STEP_S < 1.8
+    assert speed_m_per_s.max() == pytest.approx(0.4, rel=0.15)  # j q^2, with q = 0.63 s
+
+
+def test_an_interrupted_leg_starts_anew_from_the_stopping_point() -> None:
+    vehicle = Vehicle(BLUEROV2, Autopilot(), START, 30.0)
+    vehicle.command(0.0, 3.0, 0.0, -18.0)
+    x_m, y_m, z_m = vehicle.position(2.0)
+    u_m_per_s = vehicle.nu(2.0)[0]
+    vehicle.command(2.0, 3.0, 1.0, -18.0)
+    assert leg_start(vehicle, 2.1) == pytest.approx((x_m + u_m_per_s, y_m, z_m), abs=1e-3)  # the position gain is 1 / s
+
+
+def test_an_interrupted_leg_loses_the_integral() -> None:
+    vehicle = Vehicle(BLUEROV2, Autopilot(), START, 30.0, current_m_per_s=(-0.3, 0.0, 0.0))
+    vehicle.command(0.0, 3.0, 0.0, -18.0)
+    vehicle.position(2.5)
+    assert vehicle.track[row_at(2.0), kernel.INTEGRAL][0] > 0.1
+    vehicle.command(2.0, 3.0, 1.0, -18.0)
+    vehicle.position(2.5)
+    assert abs(vehicle.track[row_at(2.0) + 1, kernel.INTEGRAL][0]) < 0.05
+
+
+def test_after_a_completed_leg_the_next_one_starts_at_the_last_set_point() -> None:
+    vehicle = Vehicle(BLUEROV2, Autopilot(), START, 30.0)
+    vehicle.command(0.0, *TO_HALF_A_METRE)
+    vehicle.command(10.0, 1.0, 0.0, -18.0)
+    assert leg_start(vehicle, 10.1) == pytest.approx(TO_HALF_A_METRE)
+
+
+def test_sending_the_set_point_of_a_completed_leg_again_changes_nothing_of_its_motion() -> None:
+    once, again = (Vehicle(BLUEROV2, Autopilot(), START, 30.0) for _ in range(2))
+    for vehicle in (once, again):
+        vehicle.command(0.0, *TO_HALF_A_METRE)
+    again.command(8.0, *TO_HALF_A_METRE)
+    assert again.position(20.0) == pytest.approx(once.position(20.0), abs=1e-6)
+
+
+def test_a_set_point_a_second_slows_it_down() -> None:
+    """The same metre in one leg, and in ten of which each interrupts the one before."""
+    whole, interrupted = (Vehicle(BLUEROV2, Autopilot(), START, 30.0) for _ in range(2))
+    whole.command(0.0, 1.0, 0.0, -18.0)
+    for n in range(1, 11):
+        interrupted.command(n - 1.0, 0.1 * n, 0.0, -18.0)
+    assert whole.position(4.0)[0] > 0.8
+    assert interrupted.position(4.0)[0] < 0.5
+
+
+def test_a_new_leg_is_the_same_in_whatever_pieces_the_track_is_filled() -> None:
+    at_once, in_pieces = (Vehicle(BLUEROV2, Autopilot(), START, 20.0) for _ in range(2))
+    for vehicle in (at_once, in_pieces):
+        vehicle.command(0.0, *TO_HALF_A_METRE)
+    for n in range(40):
+        in_pieces.position(0.1 * n)
+    for vehicle in (at_once, in_pieces):
+        vehicle.command(1.0, 0.6, 0.2, -17.0)
+        vehicle.look_ahead(row_at(15.0))
+    assert np.array_equal(at_once.track[: row_at(15.0)], in_pieces.track[: row_at(15.0)])
