@@ -276,7 +276,7 @@ class TestBattery:
     [
         ("signals.water_visibility.period_s", "water visibility: period (s)"),
         ("start.x_m", "start: x (m)"),
-        ("calibration.jerk_m_per_s3", "jerk (m/s³)"),
+        ("calibration.origin_y_m", "origin y (m)"),
         ("thruster_events.0.time_s", "thruster event 1: time (s)"),
         ("default_modes.f_generate_search_path", "default modes: search"),
     ],
