@@ -5,20 +5,24 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
+from rich.progress import Progress
 from rich.text import Text
 
 from suave_des.cli.console import output
-from suave_des.cli.kb_options import TimeLimitS
+from suave_des.cli.kb_options import MaxFailed, TimeLimitS
 from suave_des.cli.options import KnowledgeFiles, grouped_options
+from suave_des.errors import InputError, shown
 
 if TYPE_CHECKING:
     from suave_des.workbench import KnowledgeBase
     from suave_des.workbench.testing.run import TestResult
+    from suave_des.workbench.testing.suite import KnowledgeFiles as About
     from suave_des.workbench.testing.suite import RuleTest, TestFile
 
 FAILED = 1
@@ -47,6 +51,25 @@ def test(
     junit_xml: Annotated[
         Path | None, typer.Option("--junit-xml", "--junitxml", metavar="FILE", help="Write the results as JUnit XML.")
     ] = None,
+    coverage: Annotated[
+        bool, typer.Option("--coverage", help="Show what the tests cover of rules, atoms and comparisons.")
+    ] = False,
+    mutate: Annotated[
+        bool,
+        typer.Option("--mutate", help="Change rules and data by small mistakes, and see which ones no test notices."),
+    ] = False,
+    mutants: Annotated[
+        int | None, typer.Option("--mutants", min=1, metavar="N", help="So many mutants, instead of all.")
+    ] = None,
+    from_mission: Annotated[
+        Path | None,
+        typer.Option("--from-mission", metavar="DIR", help="Write the decisions of a recorded mission as tests."),
+    ] = None,
+    write: Annotated[
+        Path | None,
+        typer.Option("--write", metavar="FILE", help="Where --from-mission and --coverage write tests."),
+    ] = None,
+    max_failed: MaxFailed = 1,
     time_limit: TimeLimitS = 60.0,
 ) -> None:
     """Test rules: what must follow in a state, what must not, and what is decided.
@@ -55,8 +78,13 @@ def test(
     """
     from suave_des.campaign.output import check_output_file, write_files
 
-    if junit_xml is not None:
-        check_output_file(junit_xml, overwrite=True)
+    for file in filter(None, (junit_xml, write)):
+        check_output_file(file, overwrite=file == junit_xml)
+    if from_mission is not None:
+        _write_mission(from_mission, write, knowledge, time_limit)
+        return
+    if write is not None and not coverage:
+        raise InputError("nothing to write", place="--write", remedy="with --from-mission DIR, or --coverage")
     began = time.perf_counter()
     suites = _suites(knowledge, files or (), time_limit)
     console = output()
@@ -67,8 +95,77 @@ def test(
 
         write_files(junit_xml.parent, {junit_xml.name: written(results)})
     _print_summary(console, results, time.perf_counter() - began)
+    if coverage:
+        _cover(console, suites, max_failed, write)
+    if mutate or mutants is not None:
+        _mutate(console, suites, results, mutants, max_failed)
     if not all(result.passed for result in results):
         raise typer.Exit(FAILED)
+
+
+def _write_mission(folder: Path, file: Path | None, knowledge: Tested, time_limit_s: float) -> None:
+    """Write a recorded mission's decisions as tests, or print them."""
+    from suave_des.campaign.output import write_files
+    from suave_des.workbench.testing.situation import Prover
+    from suave_des.workbench.testing.writing import mission_knowledge, mission_states, tests_text
+
+    about = mission_knowledge(folder).with_replacements(knowledge.scenario, knowledge.replacements)
+    bench = about.load(time_limit_s)
+    states = list(mission_states(folder, bench))
+    comment = f"Decisions of the mission recorded in {folder}, one for each kind of state in it."
+    text = tests_text(about, Prover.of(bench), states, comment)
+    if file is None:
+        print(text, end="")
+        return
+    write_files(file.parent, {file.name: text})
+    print(f"{len(states)} tests are in {file}: suave-des kb test {file}")
+
+
+def _cover(console: Console, suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
+    """Show what the tests of each knowledge base cover, and write tests of what they do not."""
+    from suave_des.campaign.output import write_files
+    from suave_des.cli.kb_test_reports import print_coverage
+    from suave_des.workbench.testing.coverage import measure_coverage
+    from suave_des.workbench.testing.situation import Prover
+    from suave_des.workbench.testing.writing import NamedState, tests_text
+
+    benches = {id(suite.bench): suite for suite in suites}
+    if file is not None and len(benches) > 1:
+        remedy = "give files of tests of one knowledge base"
+        raise InputError("the tests are about several knowledge bases", place="--write", remedy=remedy)
+    for one, suite in benches.items():
+        tests = [test for each in suites if id(each.bench) == one for test in each.tests]
+        situations = [situation for test in tests for situation in test.situations]
+        found = measure_coverage(suite.bench, situations, max_failed)
+        print_coverage(console, found)
+        if file is not None:
+            states = [NamedState(str(goals[0]), state) for state, goals in found.proposed]
+            text = tests_text(suite.about, Prover.of(suite.bench), states, "States that other tests do not cover.")
+            if states:
+                write_files(file.parent, {file.name: text})
+            print(
+                f"{len(states)} tests are in {file}; read them before you keep them" if states else "nothing to write"
+            )
+
+
+def _mutate(
+    console: Console, suites: Sequence[Suite], results: Sequence[TestResult], most: int | None, max_failed: int
+) -> None:
+    """Show which mutants of each knowledge base the tests kill."""
+    from suave_des.cli.kb_test_reports import print_mutation
+    from suave_des.workbench.testing.mutants import mutants_of, sample
+    from suave_des.workbench.testing.mutation import mutate
+
+    if not all(result.passed for result in results):
+        console.print("no mutants while a test fails: each of them would count as killed", soft_wrap=True)
+        return
+    for one, suite in {id(suite.bench): suite for suite in suites}.items():
+        tests = [test for each in suites if id(each.bench) == one for test in each.tests]
+        chosen = sample(mutants_of(suite.bench.base), most)
+        with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+            task = progress.add_task("mutants", total=len(chosen))
+            report = mutate(suite.bench, tests, chosen, max_failed, partial(progress.advance, task))
+        print_mutation(console, report)
 
 
 @dataclass(frozen=True)
@@ -76,13 +173,13 @@ class Suite:
     """A file of tests with its knowledge base."""
 
     file: TestFile
+    about: About
     bench: KnowledgeBase
     tests: tuple[RuleTest, ...]
 
 
 def _suites(knowledge: Tested, files: Sequence[Path], time_limit_s: float) -> list[Suite]:
     """Read all files before anything runs, so that a mistake in the last one comes first."""
-    from suave_des.workbench.testing.suite import KnowledgeFiles as About
     from suave_des.workbench.testing.suite import TestFile, shipped_tests
 
     benches: dict[About, KnowledgeBase] = {}
@@ -91,12 +188,11 @@ def _suites(knowledge: Tested, files: Sequence[Path], time_limit_s: float) -> li
         about = file.knowledge.with_replacements(knowledge.scenario, knowledge.replacements)
         if about not in benches:
             benches[about] = about.load(time_limit_s)
-        suites.append(Suite(file, benches[about], file.tests(benches[about])))
+        suites.append(Suite(file, about, benches[about], file.tests(benches[about])))
     return suites
 
 
 def _run(console: Console, suites: Iterable[Suite], select: str | None) -> list[TestResult]:
-    from suave_des.errors import InputError, shown
     from suave_des.workbench.testing.run import Runner
 
     chosen = [

@@ -118,7 +118,7 @@ class NearestFinder:
             for number, atom in enumerate(body)
             if atom.kind in FACT_KINDS and next(self.facts.matches(atom, self.start), None) is None
         )
-        order = [number for number in _testable_order(body) if number not in hopeless]
+        order = [number for number in testable_order(body) if number not in hopeless]
         complete = True
         for allowed in range(len(order) + 1):
             self._ways = 0
@@ -201,8 +201,8 @@ def _comparable_atom(atom: Atom) -> Atom:
     return replace(atom, arguments=arguments)  # type: ignore[arg-type]
 
 
-def _testable_order(body: Sequence[Atom]) -> list[int]:
-    """Atoms in the order of the rule, but those that test or compute after all that bind their variables."""
+def testable_order(body: Sequence[Atom]) -> list[int]:
+    """Order atoms as the rule does, but those that test or compute after all that bind their variables."""
     waiting = list(range(len(body)))
     bound: set[str] = set()
     order: list[int] = []

@@ -159,29 +159,9 @@ def make_policy(
     space = space or PolicySpace.of(base, settings)
     attributes = space.attributes
     between = ranges_between(space.numbers)
-    combinations = list(component_reports(space.alike, space.statuses, max_failed))
-    tasks = list(_tasks(base))
-    total = len(between) ** len(attributes) * len(combinations) * len(tasks)
-    if total > LARGEST:
-        raise InputError(
-            f"the policy has {total:,} kinds of states, which is too many",
-            remedy=f"at most {LARGEST:,}; lower --max-failed, or give a scenario that measures less",
-        )
     cases: list[PolicyCase] = []
-    for ranges in itertools.product(between, repeat=len(attributes)):
-        for values in values_in(ranges):
-            known = {name: value for name, value in zip(attributes, values, strict=True) if value is not None}
-            for each in combinations:
-                part = []
-                for asked, groundings in tasks:
-                    state = KnowledgeState.of(
-                        [settings.objective(function, groundings.get(function)) for function in asked],
-                        groundings=groundings,
-                        components=dict(each.components),
-                        measurements=known,
-                    )
-                    part.append(_decide(PolicyCase(ranges, state, each, asked), infer))
-                cases += _with_flip_flops(part)
+    for kinds in kinds_of_states(base, settings, max_failed, space):
+        cases += _with_flip_flops([_decide(case, infer) for case in kinds])
     return Policy(
         attributes=attributes,
         ranges=dict.fromkeys(attributes, between),
@@ -191,6 +171,39 @@ def make_policy(
         computing=rules_that_compute(base),
         max_failed=max_failed,
     )
+
+
+def kinds_of_states(
+    base: Ontology, settings: ManagingSettings, max_failed: int, space: PolicySpace
+) -> Iterator[list[PolicyCase]]:
+    """Give every kind of state, undecided, in groups that differ in what is asked for and grounded only.
+
+    Raises:
+        InputError: there would be too many states.
+    """
+    between = ranges_between(space.numbers)
+    combinations = list(component_reports(space.alike, space.statuses, max_failed))
+    tasks = list(_tasks(base))
+    total = len(between) ** len(space.attributes) * len(combinations) * len(tasks)
+    if total > LARGEST:
+        raise InputError(
+            f"the policy has {total:,} kinds of states, which is too many",
+            remedy=f"at most {LARGEST:,}; lower --max-failed, or give a scenario that measures less",
+        )
+    for ranges in itertools.product(between, repeat=len(space.attributes)):
+        for values in values_in(ranges):
+            known = {name: value for name, value in zip(space.attributes, values, strict=True) if value is not None}
+            for each in combinations:
+                part = []
+                for asked, groundings in tasks:
+                    state = KnowledgeState.of(
+                        [settings.objective(function, groundings.get(function)) for function in asked],
+                        groundings=groundings,
+                        components=dict(each.components),
+                        measurements=known,
+                    )
+                    part.append(PolicyCase(ranges, state, each, asked))
+                yield part
 
 
 def _tasks(base: Ontology) -> Iterator[tuple[tuple[str, ...], dict[str, str]]]:

@@ -209,6 +209,15 @@ def _recorded_missions(folder: Path) -> Iterator[_RecordedMission]:
         )
 
 
+def mission_scenario(folder: Path) -> Scenario:
+    """The scenario of a recorded mission, or of a campaign's first one.
+
+    Raises:
+        InputError: there is none.
+    """
+    return next(_recorded_missions(folder)).scenario
+
+
 def _scenario(path: Path) -> Scenario:
     try:
         return Scenario.model_validate(json.loads(path.read_text(encoding="utf-8"))["scenario"])

@@ -12,7 +12,7 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.state import Fact
 from suave_des.workbench.explain import explain
 from suave_des.workbench.knowledge_base import KnowledgeBase
-from suave_des.workbench.testing.situation import STAYS, Outcome, Prover, Situation, with_content, with_facts
+from suave_des.workbench.testing.situation import STAYS, Concluder, Outcome, Prover, Situation, with_content, with_facts
 from suave_des.workbench.testing.suite import RuleTest
 from suave_des.workbench.why_not import RuleQuestions
 
@@ -75,7 +75,7 @@ class Runner:
     """
 
     bench: KnowledgeBase
-    prover: Prover
+    prover: Concluder
     _without: dict[tuple[str, ...], Prover] = field(default_factory=dict, repr=False)
 
     @classmethod

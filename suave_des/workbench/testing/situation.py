@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Final
+from typing import Final, Protocol
 
 from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
 from suave_des.knowledge.content import Content
@@ -81,6 +81,25 @@ def _outcome(decision: Decision, state: KnowledgeState) -> str:
     if decision.design is None:
         return NONE_LEFT
     return STAYS if decision.design == state.grounded(decision.function) else decision.design
+
+
+class Concluder(Protocol):
+    """Concludes what follows in situations.
+
+    Attributes:
+        base: ontologies and rules.
+        improves_exceeded: as ManagingSettings has it.
+    """
+
+    @property
+    def base(self) -> Ontology: ...  # noqa: D102
+
+    @property
+    def improves_exceeded(self) -> bool: ...  # noqa: D102
+
+    def outcome(self, situation: Situation) -> Outcome:
+        """Conclude what follows."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)

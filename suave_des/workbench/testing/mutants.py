@@ -1,0 +1,338 @@
+"""Mutants: rules and data with one small mistake each, as an author could make it.
+
+Each operator is a function from a knowledge base to its mutants; OPERATORS lists them by name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from decimal import Decimal
+from types import MappingProxyType
+from typing import Final
+
+from suave_des.knowledge.content import Content
+from suave_des.knowledge.model import build_model, expectations
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rdf import EXACT, Lit, Names, Triple, facts_of
+from suave_des.knowledge.rules.checks import check_rule
+from suave_des.knowledge.rules.rdf import with_triples
+from suave_des.knowledge.rules.syntax import Atom, Named, Rule, Term, Variable
+from suave_des.knowledge.rules.writer import literal_text, write_atom
+from suave_des.knowledge.vocabulary import HAS_VALUE, LANGUAGE_NAMESPACES, RDF_TYPE, SWRLB, TOMASYS, XSD, local_name
+
+_TURNED: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        SWRLB + one: SWRLB + other
+        for one, other in (
+            *(("lessThan", "greaterThan"), ("greaterThan", "lessThan")),
+            *(("lessThanOrEqual", "greaterThanOrEqual"), ("greaterThanOrEqual", "lessThanOrEqual")),
+            *(("equal", "notEqual"), ("notEqual", "equal")),
+        )
+    }
+)
+_SHIFTED: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        SWRLB + one: SWRLB + other
+        for one, other in (
+            *(("lessThan", "lessThanOrEqual"), ("lessThanOrEqual", "lessThan")),
+            *(("greaterThan", "greaterThanOrEqual"), ("greaterThanOrEqual", "greaterThan")),
+        )
+    }
+)
+#: By how much thresholds are moved, up and down.
+_MOVED: Final = (Decimal("1.1"), Decimal("0.9"))
+#: Properties whose values are thresholds, and those that connect individuals of the model.
+_LINKS: Final = tuple(TOMASYS + name for name in ("solvesF", "hasQAestimation", "isQAtype"))
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """A knowledge base with one change.
+
+    Attributes:
+        operator: name of the kind of change.
+        text: what is changed, in one line.
+        old: the rule that is replaced; None for a change of data.
+        new: the rule in its place; None where the rule is removed, or for a change of data.
+        removed, added: the fact that is replaced, and the one in its place.
+    """
+
+    operator: str
+    text: str
+    old: Rule | None = field(default=None, repr=False)
+    new: Rule | None = field(default=None, repr=False)
+    removed: Triple | None = None
+    added: Triple | None = None
+
+    @property
+    def name(self) -> str:
+        """The rule, or the individual, that is changed."""
+        if self.old is not None:
+            return self.old.name
+        return local_name(self.removed[0]) if self.removed is not None else ""
+
+    def __str__(self) -> str:
+        """As reports have it."""
+        return f"{self.name}: {self.operator}: {self.text}"
+
+    def applied(self, base: Ontology) -> Ontology:
+        """The knowledge base with the change."""
+        if self.old is not None:
+            rules = tuple(
+                self.new if rule is self.old else rule
+                for rule in base.rules
+                if rule is not self.old or self.new is not None
+            )
+            content: Content = replace(base.content, rules=rules)  # type: ignore[arg-type]
+            return replace(base, content=content, rules=content.rules)
+        triples = tuple(self.added if triple == self.removed else triple for triple in base.content.triples)
+        return _with_triples(base, triples)  # type: ignore[arg-type]
+
+    @property
+    def generalises(self) -> bool:
+        """Whether the new rule fires wherever the old one does, with the same head."""
+        return (
+            self.old is not None
+            and self.new is not None
+            and self.new.head == self.old.head
+            and set(self.new.body) <= set(self.old.body)
+        )
+
+
+def _with_triples(base: Ontology, triples: tuple[Triple, ...]) -> Ontology:
+    """The ontology with other facts: what was read from them is read again."""
+    own = [triple for individual in base.model.individuals() for triple in individual.own]
+    initial = [triple for each in base.model.initial.values() for triple in each]
+    whole = replace(base.content, triples=(*triples, *own, *initial))
+    model, content = build_model(whole, base.sources)
+    names = Names(whole.triples)
+    facts = frozenset(facts_of(content.triples, names))
+    designs: dict[str, list[str]] = {name: [] for name in model.functions}
+    for fact in sorted(facts, key=str):
+        if fact.property == "solvesF" and fact.value in designs and fact.subject in model.designs:
+            designs[str(fact.value)].append(fact.subject)
+    return replace(
+        base,
+        content=content,
+        facts=facts,
+        model=model,
+        names=names,
+        _designs={name: tuple(sorted(found)) for name, found in designs.items()},
+        _expected=expectations(content, model),
+    )
+
+
+def mutants_of(base: Ontology) -> tuple[Mutant, ...]:
+    """All mutants of a knowledge base, by rule and operator; those that no reasoner could use are left out."""
+    found: dict[tuple[object, ...], Mutant] = {}
+    for name, operator in OPERATORS.items():
+        for mutant in operator(base):
+            if mutant.new is not None and any(problem.is_fatal for problem in check_rule(mutant.new, base.vocabulary)):
+                continue
+            if mutant.new is not None and mutant.old is not None:
+                same = set(mutant.new.body) == set(mutant.old.body) and mutant.new.head == mutant.old.head
+                if same:
+                    continue
+            body = None if mutant.new is None else (mutant.new.body, mutant.new.head)
+            found.setdefault((mutant.name, body, mutant.removed, mutant.added), replace(mutant, operator=name))
+    order = list(OPERATORS)
+    return tuple(sorted(found.values(), key=lambda one: (one.old is None, one.name, order.index(one.operator))))
+
+
+def _rules(base: Ontology) -> Iterator[Rule]:
+    yield from base.content.enabled_rules
+
+
+def _changed(rule: Rule, body: Sequence[Atom], head: Sequence[Atom], text: str) -> Mutant:
+    new = with_triples(replace(rule, body=tuple(body), head=tuple(head)))
+    return Mutant("", text, rule, new)
+
+
+def _with_atom(rule: Rule, number: int, atom: Atom) -> Mutant:
+    """The rule with another atom in a place of its body or head."""
+    atoms = list(rule.atoms)
+    text = f"{write_atom(atoms[number])} becomes {write_atom(atom)}"
+    atoms[number] = replace(atom, places=())
+    return _changed(rule, atoms[: len(rule.body)], atoms[len(rule.body) :], text)
+
+
+def _exchanged_comparisons(base: Ontology, table: Mapping[str, str]) -> Iterator[Mutant]:
+    for rule in _rules(base):
+        for number, atom in enumerate(rule.body):
+            if atom.predicate in table:
+                yield _with_atom(rule, number, replace(atom, predicate=table[atom.predicate]))
+
+
+def _turned(base: Ontology) -> Iterator[Mutant]:
+    yield from _exchanged_comparisons(base, _TURNED)
+
+
+def _shifted(base: Ontology) -> Iterator[Mutant]:
+    yield from _exchanged_comparisons(base, _SHIFTED)
+
+
+def _dropped(base: Ontology) -> Iterator[Mutant]:
+    for rule in _rules(base):
+        for number, atom in enumerate(rule.body):
+            body = (*rule.body[:number], *rule.body[number + 1 :])
+            if body:
+                yield _changed(rule, body, rule.head, f"{write_atom(atom)} is left out")
+
+
+def _variables_exchanged(base: Ontology) -> Iterator[Mutant]:
+    """Each variable of an atom of the body, exchanged for the next one of the rule that stands for the same kind."""
+    for rule in _rules(base):
+        values = {
+            term
+            for atom in rule.atoms
+            for number, term in enumerate(atom.arguments)
+            if isinstance(term, Variable) and (atom.kind == "builtin" or (atom.kind == "data" and number == 1))
+        }
+        ordered = list(
+            dict.fromkeys(term for atom in rule.atoms for term in atom.arguments if isinstance(term, Variable))
+        )
+        for number, atom in enumerate(rule.body):
+            for place, term in enumerate(atom.arguments):
+                others = [other for other in ordered if other != term and (other in values) == (term in values)]
+                if not isinstance(term, Variable) or not others:
+                    continue
+                following = [other for other in others if ordered.index(other) > ordered.index(term)]
+                arguments = list(atom.arguments)
+                arguments[place] = (following or others)[0]
+                yield _with_atom(rule, number, replace(atom, arguments=tuple(arguments)))
+
+
+def _literals(rule: Rule, places: Sequence[int], known: Mapping[str, Sequence[Lit]]) -> Iterator[Mutant]:
+    """The literals of some atoms of a rule, each exchanged for another one that rules know of the same property."""
+    for number in places:
+        atom = rule.atoms[number]
+        last = atom.arguments[-1]
+        if atom.kind != "data" or not isinstance(last, Lit):
+            continue
+        if last.datatype == XSD + "boolean":
+            others = [Lit("false" if last.text in ("true", "1") else "true", last.datatype)]
+        else:
+            others = [each for each in known.get(atom.predicate, ()) if each != last and each.datatype == last.datatype]
+        for other in others:
+            yield _with_atom(rule, number, replace(atom, arguments=(*atom.arguments[:-1], other)))
+
+
+def _known_literals(base: Ontology) -> dict[str, list[Lit]]:
+    """Values that rules mention of each data property, without numbers."""
+    found: dict[str, set[Lit]] = {}
+    for rule in _rules(base):
+        for atom in rule.atoms:
+            last = atom.arguments[-1] if atom.arguments else None
+            if atom.kind == "data" and isinstance(last, Lit) and last.datatype not in EXACT:
+                found.setdefault(atom.predicate, set()).add(last)
+    return {name: sorted(values) for name, values in found.items()}
+
+
+def _conclusions(base: Ontology) -> Iterator[Mutant]:
+    known = _known_literals(base)
+    for rule in _rules(base):
+        yield from _literals(rule, range(len(rule.body), len(rule.atoms)), known)
+
+
+def _statuses(base: Ontology) -> Iterator[Mutant]:
+    known = _known_literals(base)
+    for rule in _rules(base):
+        yield from _literals(rule, range(len(rule.body)), known)
+    yield from _operators_of_attributes(base)
+
+
+def _operators_of_attributes(base: Ontology) -> Iterator[Mutant]:
+    """The comparison operator of each quality attribute, turned."""
+    turned = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
+    for triple in base.content.triples:
+        subject, predicate, value = triple
+        if predicate == TOMASYS + "qa_comparison_operator" and isinstance(value, Lit) and value.text in turned:
+            yield _data(triple, (subject, predicate, Lit(turned[value.text], value.datatype)))
+
+
+def _removed(base: Ontology) -> Iterator[Mutant]:
+    for rule in _rules(base):
+        yield Mutant("", "the rule is removed", rule)
+
+
+def _moved(base: Ontology) -> Iterator[Mutant]:
+    """Each number of a rule, and each value of an individual, moved up and down by a tenth."""
+    for rule in _rules(base):
+        for number, atom in enumerate(rule.atoms):
+            for place, term in enumerate(atom.arguments):
+                if isinstance(term, Lit) and term.datatype in EXACT:
+                    for moved in _tenths(term):
+                        arguments = (*atom.arguments[:place], moved, *atom.arguments[place + 1 :])
+                        yield _with_atom(rule, number, replace(atom, arguments=arguments))
+    for triple in base.content.triples:
+        subject, predicate, value = triple
+        if predicate == HAS_VALUE and isinstance(value, Lit):
+            for moved in _tenths(value):
+                yield _data(triple, (subject, predicate, moved))
+
+
+def _tenths(value: Lit) -> Iterator[Lit]:
+    number = Decimal(value.text.strip())
+    for factor in _MOVED:
+        moved = number * factor if number else factor - 1
+        yield Lit(format(moved.normalize(), "f"), XSD + "decimal")
+
+
+def _data(removed: Triple, added: Triple) -> Mutant:
+    def shown(value: str | Lit) -> str:
+        return literal_text(value) if isinstance(value, Lit) else local_name(value)
+
+    text = f"{local_name(removed[1])} {shown(removed[2])} becomes {shown(added[2])}"
+    return Mutant("", text, removed=removed, added=added)
+
+
+def _individuals(base: Ontology) -> Iterator[Mutant]:
+    """Each individual that a rule names, and each one that a fact leads to, exchanged for the next of its class."""
+    classes: dict[str, list[str]] = {}
+    for subject, predicate, value in base.content.triples:
+        if predicate == RDF_TYPE and isinstance(value, str) and not value.startswith(LANGUAGE_NAMESPACES):
+            classes.setdefault(value, []).append(subject)
+
+    def next_one(iri: str) -> str | None:
+        for members in classes.values():
+            if iri in members and len(members) > 1:
+                return members[(members.index(iri) + 1) % len(members)]
+        return None
+
+    for rule in _rules(base):
+        for number, atom in enumerate(rule.atoms):
+            for place, term in enumerate(atom.arguments):
+                other = next_one(term.iri) if isinstance(term, Named) else None
+                if other is not None:
+                    arguments: tuple[Term, ...] = (*atom.arguments[:place], Named(other), *atom.arguments[place + 1 :])
+                    yield _with_atom(rule, number, replace(atom, arguments=arguments))
+    for triple in base.content.triples:
+        subject, predicate, value = triple
+        if isinstance(value, str) and (predicate in _LINKS or predicate.endswith("requiredBy")):
+            other = next_one(value)
+            if other is not None:
+                yield _data(triple, (subject, predicate, other))
+
+
+#: Kinds of changes, by name.
+OPERATORS: Final[Mapping[str, Callable[[Ontology], Iterator[Mutant]]]] = MappingProxyType(
+    {
+        "comparison turned": _turned,
+        "comparison shifted": _shifted,
+        "atom dropped": _dropped,
+        "variable exchanged": _variables_exchanged,
+        "conclusion changed": _conclusions,
+        "rule removed": _removed,
+        "threshold moved": _moved,
+        "status exchanged": _statuses,
+        "individual exchanged": _individuals,
+    }
+)
+
+
+def sample(mutants: Sequence[Mutant], most: int | None) -> tuple[Mutant, ...]:
+    """Take at most so many mutants, spread evenly over rules and operators; the same ones each time."""
+    if most is None or most >= len(mutants):
+        return tuple(mutants)
+    return tuple(mutants[number * len(mutants) // most] for number in range(most))

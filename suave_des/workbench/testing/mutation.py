@@ -1,0 +1,416 @@
+"""Mutation: whether tests notice small mistakes in rules and data.
+
+A mutant is killed when a test fails. One that no test kills is equivalent when nothing that follows, and nothing that
+is decided, differs in any state of the policy: over all regions of measured values, all groundings, and reports of
+components. The others survive, each with a state that tells it apart.
+
+Pellet is asked once in each state for all mutants, with a probe for each: where neither the old rule nor the new one
+fires, a mutant changes nothing, as entailment with Horn axioms is monotonic. Where one of them fires, the mutant itself
+is loaded and asked. An ontology with axioms that are not Horn (unions, complements, cardinalities) gets no such
+shortcut.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Final
+
+from suave_des.errors import KnowledgeError
+from suave_des.knowledge.deliberation import Conclusion, Deliberation
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rdf import Lit, Triple, facts_of
+from suave_des.knowledge.rules.syntax import Atom, Named, Term, Variable
+from suave_des.knowledge.state import Fact, Inference, KnowledgeState
+from suave_des.knowledge.vocabulary import DECISION_PROPERTIES, HAS_VALUE, OWL, RDF_TYPE, RDFS, TOMASYS, XSD, local_name
+from suave_des.workbench.derivations import FACT_KINDS, Binding, matched
+from suave_des.workbench.knowledge_base import KnowledgeBase
+from suave_des.workbench.policy import kinds_of_states
+from suave_des.workbench.policy_space import PolicySpace, numbers_in
+from suave_des.workbench.testing.mutants import Mutant
+from suave_des.workbench.testing.probes import Body, Probes
+from suave_des.workbench.testing.run import Runner
+from suave_des.workbench.testing.situation import Outcome, Prover, Situation
+from suave_des.workbench.testing.suite import RuleTest
+
+KILLED, EQUIVALENT, SURVIVED = "killed", "equivalent", "survived"
+_NOT_HORN: Final = (
+    *("unionOf", "complementOf", "oneOf", "disjointUnionOf", "maxCardinality", "maxQualifiedCardinality"),
+    *("cardinality", "qualifiedCardinality", "minQualifiedCardinality", "minCardinality", "allValuesFrom"),
+)
+_FROZEN: Final = "urn:suave-des:any#"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of a mutant.
+
+    Attributes:
+        mutant: the mutant.
+        result: "killed", "equivalent" or "survived".
+        reason: the test that kills it, why it is equivalent, or what differs.
+        state: for a survivor, a state that tells it apart.
+    """
+
+    mutant: Mutant
+    result: str
+    reason: str
+    state: KnowledgeState | None = None
+
+
+@dataclass(frozen=True)
+class MutationReport:
+    """What became of all mutants.
+
+    Attributes:
+        verdicts: one for each.
+        states: number of kinds of states in which those that no test kills were compared.
+        max_failed: with at most so many components that report anything.
+        duration_s: of all of it.
+    """
+
+    verdicts: tuple[Verdict, ...]
+    states: int
+    max_failed: int
+    duration_s: float = field(compare=False)
+
+    def of(self, result: str) -> tuple[Verdict, ...]:
+        """Verdicts with a result."""
+        return tuple(each for each in self.verdicts if each.result == result)
+
+    @property
+    def score(self) -> float:
+        """Share of the mutants that are killed, of those that are not equivalent."""
+        killed, survived = len(self.of(KILLED)), len(self.of(SURVIVED))
+        return killed / (killed + survived) if killed + survived else 1.0
+
+
+@dataclass
+class _Original:
+    """The knowledge base that mutants are made of, with a probe for each of them.
+
+    Attributes:
+        bench: the knowledge base.
+        probes: for all mutants.
+        touched_by: numbers of the probes of a mutant, by its number.
+        is_horn: whether a mutant changes nothing where none of its probes holds.
+    """
+
+    bench: KnowledgeBase
+    mutants: Sequence[Mutant]
+
+    def __post_init__(self) -> None:
+        base = self.bench.base
+        numbers: dict[Body, int] = {}
+        self.touched_by: list[frozenset[int] | None] = []
+        for mutant in self.mutants:
+            bodies = list(_touching(base, mutant))
+            if any(not body for body in bodies):  # what is changed alone makes a rule fire
+                self.touched_by.append(None)
+                continue
+            self.touched_by.append(frozenset(numbers.setdefault(body, len(numbers)) for body in bodies))
+        self.probes = Probes.of(base, tuple(numbers), self.bench.limit)
+        self.is_horn = _is_horn(base)
+        self.known = _planning_facts(base)
+        self._found: dict[Situation, tuple[frozenset[Fact], frozenset[int]] | None] = {}
+
+    def conclude(self, situation: Situation) -> tuple[frozenset[Fact], frozenset[int]] | None:
+        """What is inferred, and which probes hold; None for a contradiction."""
+        if situation not in self._found:
+            base, found = self.bench.base, self.probes.conclude(situation)
+            if found is None:
+                self._found[situation] = None
+            else:
+                assertions = (*base.assertions(situation.state), *situation.facts)
+                asserted = base.facts.union(facts_of(assertions, base.names))
+                self._found[situation] = frozenset(facts_of(found[0], base.names)) - asserted, found[1]
+        return self._found[situation]
+
+    def outcome(self, base: Ontology, known: frozenset[Fact], situation: Situation) -> Outcome:
+        """The outcome in a knowledge base with perhaps other data, from which the same is inferred.
+
+        Args:
+            base: the knowledge base.
+            known: of its facts those that planning reads.
+            situation: the situation.
+        """
+        found = self.conclude(situation)
+        if found is None:
+            return Outcome(None)
+        assertions = (*base.assertions(situation.state), *situation.facts)
+        inference = Inference(situation.state, known.union(facts_of(assertions, base.names)), found[0])
+        improves = self.bench.settings.improves_exceeded
+        plan = Deliberation(base, _NoReasoner()).plan(inference, improve_exceeded=improves)
+        return Outcome(Conclusion(inference, plan))
+
+
+def _planning_facts(base: Ontology) -> frozenset[Fact]:
+    names = {local_name(name) for name in DECISION_PROPERTIES}
+    return frozenset(fact for fact in base.facts if fact.property in names)
+
+
+class _NoReasoner:
+    """Stands where a reasoner would, for planning on what is inferred already."""
+
+    name = "none"
+
+    def infer(self, state: KnowledgeState) -> Inference:
+        """Refuse."""
+        raise AssertionError(f"nothing is inferred here: {state}")
+
+
+@dataclass
+class _Changed:
+    """A mutant, which concludes what follows with as little of Pellet as that takes."""
+
+    original: _Original
+    number: int
+
+    @property
+    def mutant(self) -> Mutant:
+        return self.original.mutants[self.number]
+
+    @cached_property
+    def base(self) -> Ontology:
+        return self.mutant.applied(self.original.bench.base)
+
+    @property
+    def improves_exceeded(self) -> bool:
+        return self.original.bench.settings.improves_exceeded
+
+    @cached_property
+    def known(self) -> frozenset[Fact]:
+        return _planning_facts(self.base)
+
+    def is_same(self, situation: Situation) -> bool:
+        """Whether it is plain that the change makes no difference in a situation."""
+        return not self.touches(situation) and self.known == self.original.known
+
+    @cached_property
+    def prover(self) -> Prover:
+        return Prover.of(self.original.bench, self.base)
+
+    def touches(self, situation: Situation) -> bool:
+        """Whether the change can make a difference to what is inferred in a situation."""
+        found, probes = self.original.conclude(situation), self.original.touched_by[self.number]
+        return found is None or probes is None or not self.original.is_horn or not probes.isdisjoint(found[1])
+
+    def outcome(self, situation: Situation) -> Outcome:
+        """Conclude what follows in a situation."""
+        found = self.original.conclude(situation)
+        if found is None or self.touches(situation):
+            return self.prover.outcome(situation)
+        if self.known == self.original.known:
+            return self.original.outcome(self.original.bench.base, self.known, situation)
+        return self.original.outcome(self.base, self.known, situation)
+
+
+def mutate(
+    bench: KnowledgeBase,
+    tests: Sequence[RuleTest],
+    mutants: Sequence[Mutant],
+    max_failed: int,
+    on_verdict: Callable[[], object] = lambda: None,
+) -> MutationReport:
+    """Run tests on mutants, and decide of those that no test kills whether they are equivalent.
+
+    Args:
+        bench: the knowledge base; all tests pass on it.
+        tests: to run.
+        mutants: of the knowledge base.
+        max_failed: for the states that are compared: at most so many components report anything.
+        on_verdict: called after each verdict.
+
+    Raises:
+        InputError: there would be too many states.
+        KnowledgeError: the reasoner takes too long.
+    """
+    began = time.perf_counter()
+    original = _Original(bench, mutants)
+    verdicts: dict[int, Verdict] = {}
+    left: list[_Changed] = []
+    in_order = sorted(tests, key=lambda test: (bool(test.without), len(test.situations)))
+    for number, mutant in enumerate(mutants):
+        changed = _Changed(original, number)
+        killer = _killer(changed, in_order)
+        if killer is None:
+            left.append(changed)
+            continue
+        verdicts[number] = Verdict(mutant, KILLED, killer)
+        on_verdict()
+    situations = list(dict.fromkeys(situation for test in tests for situation in test.situations))
+    states = 0
+    if left:
+        found, states = _compared(original, left, situations, max_failed)
+        for changed in left:
+            verdicts[changed.number] = found[changed.number]
+            on_verdict()
+    ordered = tuple(verdicts[number] for number in range(len(mutants)))
+    return MutationReport(ordered, states, max_failed, time.perf_counter() - began)
+
+
+def _killer(changed: _Changed, tests: Iterable[RuleTest]) -> str | None:
+    """The test that fails, or why the mutant cannot be used; None if all pass."""
+    runner = Runner(changed.original.bench, changed)
+    try:
+        for test in tests:
+            if not all(map(changed.is_same, test.situations)) and not runner.passes(test):
+                return test.name
+    except KnowledgeError as error:
+        if "not done after" in error.problem or "is still" in error.problem:
+            raise
+        return f"it cannot be used: {error.problem}"
+    return None
+
+
+def _compared(
+    original: _Original, left: Sequence[_Changed], situations: Sequence[Situation], max_failed: int
+) -> tuple[dict[int, Verdict], int]:
+    """Compare mutants with the original in the situations of the tests and in every state of the policy."""
+    bench = original.bench
+    verdicts: dict[int, Verdict] = {}
+    for changed in left:
+        if original.is_horn and _follows_anyway(bench, changed.mutant):
+            reason = "what is left out follows from the other atoms by the schema"
+            verdicts[changed.number] = Verdict(changed.mutant, EQUIVALENT, reason)
+    open_ones = [changed for changed in left if changed.number not in verdicts]
+
+    def look(situation: Situation, words: str) -> None:
+        before = original.outcome(bench.base, original.known, situation)
+        for changed in list(open_ones):
+            if changed.is_same(situation):
+                continue
+            difference = _difference(before, changed.outcome(situation))
+            if difference is not None:
+                state = situation.state
+                verdicts[changed.number] = Verdict(changed.mutant, SURVIVED, f"{difference}{words}", state)
+                open_ones.remove(changed)
+
+    for situation in situations:
+        look(situation, ", in a state of a test that does not expect it")
+    space = _space(bench, open_ones)
+    states = 0
+    for kinds in kinds_of_states(bench.base, bench.settings, max_failed, space):
+        states += len(kinds)
+        numbers = [original.touched_by[changed.number] for changed in open_ones]
+        is_rules_only = original.is_horn and all(changed.mutant.old is not None for changed in open_ones)
+        if is_rules_only and None not in numbers:
+            wanted = frozenset[int]().union(*filter(None, numbers))
+            cases = list(original.probes.may_hold(kinds, wanted)) if open_ones else []
+        else:
+            cases = list(kinds)
+        for case in cases:
+            look(Situation(case.state), "")
+    reason = f"nothing differs in {states} kinds of states"
+    for changed in open_ones:
+        verdicts[changed.number] = Verdict(changed.mutant, EQUIVALENT, reason)
+    return verdicts, states
+
+
+def _difference(before: Outcome, after: Outcome) -> str | None:
+    """What a mutant makes different, in words; None: nothing."""
+    if (before.conclusion is None) != (after.conclusion is None):
+        return "it contradicts itself" if after.conclusion is None else "it contradicts itself no more"
+    for function in sorted({name for name, _ in (*before.choices, *after.choices)}):
+        one, other = before.choice(function), after.choice(function)
+        if one != other:
+            return f"{function}: {other}, not {one}"
+    for missing in _sorted(before.inferred - after.inferred):
+        return f"{missing} does not follow"
+    for more in _sorted(after.inferred - before.inferred):
+        return f"{more} follows"
+    return None
+
+
+def _sorted(facts: Iterable[Fact]) -> list[Fact]:
+    return sorted(facts, key=str)
+
+
+def _space(bench: KnowledgeBase, mutants: Iterable[_Changed]) -> PolicySpace:
+    """What the policy tells apart, with the numbers of mutants that can be compared with measured values."""
+    space = PolicySpace.of(bench.base, bench.settings)
+    measured = {bench.base.model.attributes[name] for name in space.attributes}
+    numbers = set(space.numbers)
+    for changed in mutants:
+        removed = changed.mutant.removed
+        if removed is None:
+            numbers |= set(numbers_in(changed.base))
+        elif removed[1] != HAS_VALUE or any(
+            (removed[0], TOMASYS + "isQAtype", each) in bench.base.content.triples for each in measured
+        ):
+            space = space.common(PolicySpace.of(changed.base, bench.settings))
+            numbers |= set(space.numbers)
+    return replace(space, numbers=tuple(sorted(numbers)))
+
+
+def _touching(base: Ontology, mutant: Mutant) -> Iterator[Body]:
+    """Conjunctions of which one holds wherever a mutant can infer something else."""
+    if mutant.old is not None:
+        yield _plain(mutant.old.body)
+        if mutant.new is not None:
+            yield _plain(mutant.new.body)
+        return
+    for triple in (mutant.removed, mutant.added):
+        assert triple is not None
+        for rule in base.content.enabled_rules:
+            for number, atom in enumerate(rule.body):
+                binding = matched(atom, triple, {}) if atom.kind in FACT_KINDS else None
+                if binding is not None:
+                    rest = (*rule.body[:number], *rule.body[number + 1 :])
+                    yield _plain(tuple(_bound(each, binding) for each in rest))
+
+
+def _plain(body: Body) -> Body:
+    return tuple(replace(atom, places=()) for atom in body)
+
+
+def _bound(atom: Atom, binding: Binding) -> Atom:
+    def value(term: Term) -> Term:
+        if not isinstance(term, Variable) or term.name not in binding:
+            return term
+        found = binding[term.name]
+        return found if isinstance(found, Lit) else Named(found)
+
+    return replace(atom, arguments=tuple(map(value, atom.arguments)))
+
+
+def _follows_anyway(bench: KnowledgeBase, mutant: Mutant) -> bool:
+    """Whether an atom that a mutant leaves out follows from the others, whatever the state.
+
+    The other atoms are asserted of individuals of which nothing else is known; what follows then, follows of all.
+    """
+    if mutant.old is None or mutant.new is None or not mutant.generalises:
+        return False
+    dropped = next((atom for atom in mutant.old.body if atom not in mutant.new.body), None)
+    if dropped is None or dropped.kind not in FACT_KINDS:
+        return False
+    free = {name: f"{_FROZEN}{name}" for name in dropped.variables()}
+    facts: list[Triple] = []
+    for atom in mutant.new.body:
+        if atom.kind in ("class", "object"):
+            terms = [
+                term.iri if isinstance(term, Named) else f"{_FROZEN}{term.name}"
+                for term in atom.arguments
+                if isinstance(term, Named | Variable)
+            ]
+            is_class = atom.kind == "class"
+            facts.append((terms[0], RDF_TYPE if is_class else atom.predicate, atom.predicate if is_class else terms[1]))
+        elif atom.kind == "data" and isinstance(atom.arguments[0], Variable) and isinstance(atom.arguments[1], Lit):
+            facts.append((f"{_FROZEN}{atom.arguments[0].name}", atom.predicate, atom.arguments[1]))
+        elif atom.kind == "data" and isinstance(atom.arguments[0], Variable) and atom.predicate == HAS_VALUE:
+            facts.append((f"{_FROZEN}{atom.arguments[0].name}", atom.predicate, Lit("123.456", XSD + "decimal")))
+    asked = _bound(replace(dropped, places=()), free)
+    probes = Probes.of(bench.base, [(asked,)], bench.limit)
+    return probes.holding(Situation(KnowledgeState(), tuple(facts))) == {0}
+
+
+def _is_horn(base: Ontology) -> bool:
+    """Whether no axiom leaves a choice, so that what follows is what the rules and axioms build up step by step."""
+    datatypes = {line.split(" ", 1)[0] for line in base.content.structure if f"<{RDF_TYPE}> <{RDFS}Datatype>" in line}
+    return not any(
+        f"<{OWL}{name}>" in line and line.split(" ", 1)[0] not in datatypes
+        for line in base.content.structure
+        for name in _NOT_HORN
+    )

@@ -1,0 +1,124 @@
+"""Write tests in YAML: of states that would cover more, and of the decisions of a recorded mission."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from suave_des.errors import InputError
+from suave_des.knowledge.regions import regions_of
+from suave_des.knowledge.state import KnowledgeState
+from suave_des.resources import find, shipped_folder
+from suave_des.workbench.knowledge_base import KnowledgeBase
+from suave_des.workbench.replay import mission_scenario
+from suave_des.workbench.state_input import state_dict
+from suave_des.workbench.state_words import recorded_states
+from suave_des.workbench.testing.situation import Prover, Situation
+from suave_des.workbench.testing.suite import KnowledgeFiles
+
+
+@dataclass(frozen=True)
+class NamedState:
+    """A state to be written as a test.
+
+    Attributes:
+        name: of the test.
+        state: the state.
+    """
+
+    name: str
+    state: KnowledgeState
+
+
+def tests_text(about: KnowledgeFiles, prover: Prover, states: Iterable[NamedState], comment: str) -> str:
+    """Write tests that expect what follows in states now.
+
+    Args:
+        about: the knowledge base, as the file names it.
+        prover: the same, in Pellet.
+        states: a test for each.
+        comment: for the head of the file.
+
+    Raises:
+        KnowledgeError: the reasoner takes too long.
+    """
+    head = [f"# {comment}", f"scenario: {json.dumps(about.scenario)}"]
+    for key, files in (("ontologies", about.ontologies), ("rules", about.rules)):
+        if files:
+            head.append(f"{key}: {json.dumps([str(file) for file in files])}")
+    if about.disabled_rules:
+        head.append(f"disabled_rules: {json.dumps(list(about.disabled_rules))}")
+    lines = [*head, "tests:"]
+    for each in states:
+        lines += _test_lines(each, prover)
+    return "\n".join(lines) + "\n"
+
+
+def _test_lines(named: NamedState, prover: Prover) -> Iterator[str]:
+    outcome = prover.outcome(Situation(named.state))
+    yield f"- name: {json.dumps(named.name, ensure_ascii=False)}"
+    yield "  given:"
+    for kind, content in state_dict(named.state).items():
+        if content:
+            yield f"    {kind}: {_flow(content)}"
+    if outcome.conclusion is None:
+        yield "  contradiction: true"
+        return
+    facts = sorted(map(str, outcome.inferred))
+    if facts:
+        yield "  follows:"
+        yield from (f"  - {json.dumps(fact, ensure_ascii=False)}" for fact in facts)
+    asked = [each.function for each in named.state.objectives]
+    yield f"  decides: {_flow({function: outcome.choice(function) for function in asked})}"
+
+
+def _flow(content: Mapping[str, Any]) -> str:
+    """A mapping on one line; numbers that are text, so that they stay exact, are written as numbers."""
+    return "{" + ", ".join(f"{name}: {_scalar(value)}" for name, value in content.items()) + "}"
+
+
+def _scalar(value: Any) -> str:
+    if value is None:
+        return ""
+    return value if value.replace(".", "", 1).replace("_", "").isalnum() else json.dumps(value, ensure_ascii=False)
+
+
+def mission_states(folder: Path, bench: KnowledgeBase, run: int | None = None) -> Iterator[NamedState]:
+    """Give the states of a recorded mission, one of those that the rules cannot tell apart.
+
+    Raises:
+        InputError: there is no recorded mission.
+    """
+    regions = regions_of(bench.base)
+    seen = set()
+    for record in recorded_states(folder, run):
+        key = regions.key(record.state)
+        if key not in seen:
+            seen.add(key)
+            yield NamedState(f"{folder.name} at {record.t_s:.2f} s", record.state)
+
+
+def mission_knowledge(folder: Path) -> KnowledgeFiles:
+    """The knowledge base of a recorded mission, as a file of tests names it.
+
+    Raises:
+        InputError: there is no recorded mission.
+    """
+    scenario = mission_scenario(folder)
+    knowledge = scenario.knowledge
+    try:
+        find(scenario.name, "scenarios")
+        name = scenario.name
+    except InputError:
+        name = KnowledgeFiles.scenario
+    files = [find(each, "ontology") for each in knowledge.ontologies]
+    shipped = shipped_folder("ontology")
+    return KnowledgeFiles(
+        name,
+        () if all(file.parent == shipped for file in files) else tuple(file.absolute() for file in files),
+        tuple(find(each, "ontology").absolute() for each in knowledge.rules),
+        tuple(knowledge.disabled_rules),
+    )
