@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli import kb_rules, kb_test, kb_why_not
+from suave_des.cli import kb_diff, kb_rules, kb_test, kb_why_not
 from suave_des.cli.console import output, plain_table, print_table, print_trimmed
 from suave_des.cli.kb_options import (
     AsFormat,
@@ -197,50 +197,6 @@ def _policy_summary(found: Policy) -> Iterator[str]:
             yield f"  and {len(cases) - _EXAMPLES} more kinds: see --csv"
 
 
-@app.command()
-@grouped_options
-def diff(
-    knowledge: Asked,
-    one: Annotated[
-        Path,
-        typer.Argument(metavar="A", help="An ontology, or a .swrl file of rules besides the other ontologies."),
-    ],
-    other: Annotated[Path, typer.Argument(metavar="B", help="The same.")],
-    max_failed: MaxFailed = 2,
-    form: AsFormat = Format.TEXT,
-) -> None:
-    """Show in which states two ontologies, or two sets of rules, decide differently.
-
-    --ontology, --rules and --disable-rule count for both; an ontology given as A or B takes the place of the
-    scenario's.
-    """
-    difference = knowledge.with_file(one).bench().diff(knowledge.with_file(other).bench(), max_failed)
-    if form is Format.TEXT:
-        print(*difference.lines(), sep="\n")
-        return
-    content = {
-        "compared": difference.compared,
-        "states": difference.states,
-        "other_statuses_only": difference.states_reported,
-        "only_a": difference.only_one,
-        "only_b": difference.only_other,
-        "computing_rules": difference.computing,
-        "cells": [
-            {
-                "regions": pair.one.ranges,
-                "state": pair.one.state,
-                "states": pair.one.reports.combinations,
-                "a": {name: pair.one.outcome(name) for name in pair.one.asked},
-                "b": {name: pair.other.outcome(name) for name in pair.one.asked},
-                "marks_a": pair.one.marks,
-                "marks_b": pair.other.marks,
-            }
-            for pair in difference.differing
-        ],
-    }
-    print_json(content)
-
-
 class TableFormat(StrEnum):
     """How to print a table."""
 
@@ -284,6 +240,7 @@ def query(
             print("no rows")
 
 
+app.command("diff")(kb_diff.diff)
 app.command("test")(kb_test.test)
 app.command("why-not")(kb_why_not.why_not)
 app.command("try")(kb_rules.try_rule)
