@@ -17,10 +17,12 @@ from rich.text import Text
 from suave_des.cli.console import output
 from suave_des.cli.kb_options import MaxFailed, TimeLimitS
 from suave_des.cli.options import KnowledgeFiles, grouped_options
-from suave_des.errors import InputError, shown
+from suave_des.errors import InputError, did_you_mean, shown
 
 if TYPE_CHECKING:
+    from suave_des.knowledge.ontology import Ontology
     from suave_des.workbench import KnowledgeBase
+    from suave_des.workbench.testing.mutants import Mutant
     from suave_des.workbench.testing.run import TestResult
     from suave_des.workbench.testing.suite import KnowledgeFiles as About
     from suave_des.workbench.testing.suite import RuleTest, TestFile
@@ -61,6 +63,10 @@ def test(
     mutants: Annotated[
         int | None, typer.Option("--mutants", min=1, metavar="N", help="So many mutants, instead of all.")
     ] = None,
+    only: Annotated[
+        list[str] | None,
+        typer.Option("--only", metavar="NAME", help="Mutants of this rule or individual only; repeat it for several."),
+    ] = None,
     from_mission: Annotated[
         Path | None,
         typer.Option("--from-mission", metavar="DIR", help="Write the decisions of a recorded mission as tests."),
@@ -98,7 +104,10 @@ def test(
     if coverage:
         _cover(console, suites, max_failed, write)
     if mutate or mutants is not None:
-        _mutate(console, suites, results, mutants, max_failed)
+        if not all(result.passed for result in results):
+            console.print("no mutants while a test fails: each of them would count as killed", soft_wrap=True)
+        else:
+            _mutate(console, suites, _Wanted(tuple(only or ()), mutants), max_failed)
     if not all(result.passed for result in results):
         raise typer.Exit(FAILED)
 
@@ -148,20 +157,34 @@ def _cover(console: Console, suites: Sequence[Suite], max_failed: int, file: Pat
             )
 
 
-def _mutate(
-    console: Console, suites: Sequence[Suite], results: Sequence[TestResult], most: int | None, max_failed: int
-) -> None:
+@dataclass(frozen=True)
+class _Wanted:
+    """Which mutants are wanted: of which rules or individuals, all if there are none, and how many at most."""
+
+    only: tuple[str, ...]
+    most: int | None
+
+    def of(self, base: Ontology) -> tuple[Mutant, ...]:
+        """The mutants of a knowledge base that are wanted."""
+        from suave_des.workbench.testing.mutants import mutants_of, sample
+
+        found = mutants_of(base)
+        names = list(dict.fromkeys(mutant.name for mutant in found))
+        for name in self.only:
+            if name not in names:
+                remedy = did_you_mean(name, names)
+                raise InputError(f"no mutant is of {shown(name)}", place="--only", remedy=remedy)
+        return sample([mutant for mutant in found if not self.only or mutant.name in self.only], self.most)
+
+
+def _mutate(console: Console, suites: Sequence[Suite], wanted: _Wanted, max_failed: int) -> None:
     """Show which mutants of each knowledge base the tests kill."""
     from suave_des.cli.kb_test_reports import print_mutation
-    from suave_des.workbench.testing.mutants import mutants_of, sample
     from suave_des.workbench.testing.mutation import mutate
 
-    if not all(result.passed for result in results):
-        console.print("no mutants while a test fails: each of them would count as killed", soft_wrap=True)
-        return
     for one, suite in {id(suite.bench): suite for suite in suites}.items():
         tests = [test for each in suites if id(each.bench) == one for test in each.tests]
-        chosen = sample(mutants_of(suite.bench.base), most)
+        chosen = wanted.of(suite.bench.base)
         with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
             task = progress.add_task("mutants", total=len(chosen))
             report = mutate(suite.bench, tests, chosen, max_failed, partial(progress.advance, task))
@@ -217,8 +240,12 @@ def _run(console: Console, suites: Iterable[Suite], select: str | None) -> list[
 
 
 def _place(file: Path, line: int | None = None) -> str:
+    from suave_des.resources import shipped_folder
     from suave_des.workbench.findings import relative_path
 
+    shipped = shipped_folder("ontology")
+    if file.is_relative_to(shipped):
+        file = Path("ontology") / file.relative_to(shipped)
     return relative_path(file) + (f":{line}" if line is not None else "")
 
 

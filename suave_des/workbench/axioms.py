@@ -27,7 +27,9 @@ class AxiomDifference:
     added: tuple[str, ...]
 
     def lines(self) -> Iterator[str]:
-        """The difference as `kb diff` prints it."""
+        """The difference as `kb diff` prints it; nothing where there is none."""
+        if not self.removed and not self.added:
+            return
         yield f"axioms and rules: {len(self.removed)} removed, {len(self.added)} added"
         yield from (f"  - {text}" for text in self.removed)
         yield from (f"  + {text}" for text in self.added)

@@ -7,11 +7,14 @@ without a word, values that look equal and are not, names that nothing declares,
 import time
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from suave_des.errors import InputError
 from suave_des.scenario.loader import load_scenario
 from suave_des.workbench.state_input import ManagingSettings, StateBuilder
-from suave_des.workbench.testing.situation import FactReader, with_facts
+from suave_des.workbench.testing.probes import Probes
+from suave_des.workbench.testing.situation import FactReader, Situation, with_facts
 from suave_des.workbench.unusable_rules import open_without_unusable
 from suave_des.workbench.why_not import RuleQuestions
 from tests.helpers.owl_text import SUAVE, TOMASYS, XSD
@@ -204,11 +207,16 @@ def warm(bench):
     RuleQuestions(bench.base).why_not("S1b", bench.state())
 
 
+@pytest.fixture(scope="module")
+def probes(bench):
+    return Probes.of(bench.base, [rule.body for rule in bench.base.rules], bench.limit)
+
+
 @pytest.mark.parametrize("case", CASES.values(), ids=list(CASES))
 def test_recurring_questions_are_answered_in_one_line_within_a_second(case, edited, tmp_path):
-    text, given, extra, answer, *names = case
-    given = dict(given)
-    facts = given.pop("facts", ())
+    text, parts, extra, answer, *names = case
+    parts = dict(parts)
+    facts = parts.pop("facts", ())
     rules = tmp_path / "mine.swrl"
     rules.write_text((text or "") + "\n", encoding="utf-8")
     loaded = load_scenario("seams2023", ontologies=[edited(extra)], rules=[rules])
@@ -217,7 +225,7 @@ def test_recurring_questions_are_answered_in_one_line_within_a_second(case, edit
     reader.declare(facts)
     base = with_facts(base, map(reader.triple, facts))
     builder = StateBuilder(base, ManagingSettings.of(loaded.scenario))
-    for kind, content in given.items():
+    for kind, content in parts.items():
         for name, value in content.items():
             builder.add(kind, name, value)
     began = time.process_time()
@@ -253,3 +261,21 @@ def test_the_command_takes_states_by_name_by_file_and_from_a_mission(command, tm
     status, _, said = command("why-not", "S1a", "--at", "water_visibilty=3.4")
     assert status == 2
     assert "did you mean 'water_visibility'" in said
+
+
+@settings(max_examples=10)
+@given(
+    design=st.sampled_from(["fd_spiral_low", "fd_spiral_medium", "fd_spiral_high"]),
+    statuses=st.lists(st.sampled_from(["FALSE", "RECOVERED"]), max_size=2),
+    visibility=st.sampled_from(["1", "1.25", "2.25", "3.2", "4"]),
+)
+def test_a_rule_fires_where_pellet_says_so(bench, probes, design, statuses, visibility):
+    state = bench.state(
+        groundings={SEARCH: design},
+        components={f"c_thruster_{n}": status for n, status in enumerate(statuses, start=1)},
+        measurements={"water_visibility": visibility},
+    )
+    holding = probes.holding(Situation(state))
+    questions = RuleQuestions(bench.base)
+    answers = {rule.name: questions.of(rule, state).fires for rule in bench.base.rules}
+    assert answers == {rule.name: number in holding for number, rule in enumerate(bench.base.rules)}
