@@ -66,7 +66,7 @@ def print_mutation(console: Console, report: MutationReport) -> None:
         table.add_row(operator, *(str(own.count(result)) for result in results))
     killed, survived, equivalent = (len(report.of(result)) for result in results)
     console.print()
-    title = f"mutation: {killed} of {killed + survived} mutants killed, {report.score:.0%}; {equivalent} are equivalent"
+    title = f"mutation: {killed} of {killed + survived} mutants killed, {report.score:.0%}; {equivalent} equivalent"
     print_table(console, title, table)
     if survived:
         console.print("survivors: no test notices", soft_wrap=True)

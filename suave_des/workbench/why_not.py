@@ -36,6 +36,7 @@ class WhyNot:
         fires: whether its whole body holds.
         atom: the first atom that fails, as the rule writes it; empty where no single atom is the reason.
         bindings: what the variables stand for in the nearest match.
+        failing: number of the atoms that do not hold there; 0 where the answer is not about atoms.
     """
 
     rule: str
@@ -43,6 +44,7 @@ class WhyNot:
     fires: bool = False
     atom: str = ""
     bindings: tuple[tuple[str, Value], ...] = ()
+    failing: int = 0
 
     def __str__(self) -> str:
         """As `kb why-not` prints it."""
@@ -83,8 +85,14 @@ class RuleQuestions:
         answers = [self.of(rule, state) for rule in rules]
         return next((each for each in answers if each.fires), answers[0])
 
-    def of(self, rule: Rule, state: KnowledgeState) -> WhyNot:
-        """Say why a rule, which may have the name of another one, does not fire in a state."""
+    def of(self, rule: Rule, state: KnowledgeState, start: Binding | None = None) -> WhyNot:
+        """Say why a rule, which may have the name of another one, does not fire in a state.
+
+        Args:
+            rule: the rule.
+            state: the state.
+            start: what variables must stand for.
+        """
         if not rule.enabled:
             return WhyNot(rule.name, f"never fires: it is switched off (enable-rule {rule.name}, or no --disable-rule)")
         problem = next(iter(self._problems(rule)), None)
@@ -94,7 +102,7 @@ class RuleQuestions:
         facts = self._known(state)
         if isinstance(facts, str):
             return WhyNot(rule.name, f"nothing follows, as the state contradicts itself: {facts}")
-        match = NearestFinder(rule, facts).find()
+        match = NearestFinder(rule, facts, start or {}).find()
         bindings = self._bindings(match.binding)
         if not match.failing:
             return WhyNot(rule.name, self._fires(rule, match.binding, facts), True, bindings=bindings)
@@ -104,7 +112,9 @@ class RuleQuestions:
         more = f" ({others} more {'atom fails' if others == 1 else 'atoms fail'})" if others else ""
         chain = self._concluder(rule, first, match.binding, facts)
         text = write_atom(first)
-        return WhyNot(rule.name, f"{text} does not hold: {reason}{more}{chain}", atom=text, bindings=bindings)
+        return WhyNot(
+            rule.name, f"{text} does not hold: {reason}{more}{chain}", False, text, bindings, len(match.failing)
+        )
 
     @cached_property
     def _usable(self) -> Ontology:

@@ -5,19 +5,27 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Final
 
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rdf import value_of
+from suave_des.knowledge.rules.syntax import Named, Rule, Variable
 from suave_des.knowledge.state import Fact
+from suave_des.workbench.derivations import Binding
 from suave_des.workbench.explain import explain
 from suave_des.workbench.knowledge_base import KnowledgeBase
-from suave_des.workbench.testing.situation import STAYS, Concluder, Outcome, Prover, Situation, with_content, with_facts
+from suave_des.workbench.testing.situation import (
+    NEW_INDIVIDUAL,
+    STAYS,
+    Concluder,
+    Outcome,
+    Prover,
+    Situation,
+    with_content,
+    with_facts,
+)
 from suave_des.workbench.testing.suite import RuleTest
 from suave_des.workbench.why_not import RuleQuestions
-
-#: Rules that are asked why they did not conclude a missing fact.
-_ASKED: Final = 3
 
 
 @dataclass(frozen=True)
@@ -175,22 +183,35 @@ class Runner:
 def _missing(base: Ontology, situation: Situation, fact: Fact) -> Iterator[str]:
     """Why each rule that could conclude a fact does not."""
     questions = RuleQuestions(base)
-    able = [
-        rule
-        for rule in base.content.enabled_rules
-        if any(
-            (atom.predicate in base.vocabulary.candidates(str(fact.value)) and fact.property == "type")
-            or base.names.short(atom.predicate) == fact.property
-            for atom in rule.head
-        )
-    ]
-    answers = [answer for rule in able if not (answer := questions.of(rule, situation.state)).fires]
-    answers.sort(key=lambda answer: (answer.answer.count("more atom"), len(answer.answer)))
-    for answer in answers[:_ASKED]:
-        yield str(answer)
+    able = [(rule, start) for rule in base.content.enabled_rules if (start := _start(base, rule, fact)) is not None]
+    found = (questions.of(rule, situation.state, start) for rule, start in able)
+    answers = [answer for answer in found if not answer.fires]
+    near = min((answer.failing for answer in answers if answer.failing), default=0)
+    for answer in answers:
+        if answer.failing in (0, near):
+            yield str(answer)
     if not able:
         what = f"membership in {fact.value}" if fact.property == "type" else fact.property
         yield f"no rule concludes {what}"
+
+
+def _start(base: Ontology, rule: Rule, fact: Fact) -> Binding | None:
+    """What variables of a rule must stand for, if it is to conclude a fact; None if it cannot."""
+    named = {base.names.short(iri): iri for iri in base.vocabulary.kinds}
+    subject = named.get(fact.subject, NEW_INDIVIDUAL + fact.subject)
+    for atom in rule.head:
+        first, last = atom.arguments[0], atom.arguments[-1]
+        if atom.kind == "class":
+            says_it = fact.property == "type" and base.names.short(atom.predicate) == fact.value
+        else:
+            term = last.iri if isinstance(last, Named) else last
+            value = None if isinstance(term, Variable) else value_of(term, base.names)
+            says_it = base.names.short(atom.predicate) == fact.property and value in (None, fact.value)
+        if says_it and isinstance(first, Variable):
+            return {first.name: subject}
+        if says_it and first == Named(subject):
+            return {}
+    return None
 
 
 def _same(chosen: str, wanted: str, situation: Situation, function: str) -> bool:
