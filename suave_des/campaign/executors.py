@@ -76,8 +76,9 @@ class LocalWorkers:
     """
 
     def __init__(self, managers: Sequence[str], workers: int) -> None:
-        self._needs_script = any(name.startswith("__main__:") for name in managers)
         self._definitions = main_classes(managers)
+        in_main = any(name.startswith("__main__:") for name in managers)
+        self._needs_script = in_main and self._definitions is None
         self._may_be_killed = all(map(is_built_in, managers))
         self._size = workers
         self._workers: list[_Worker] = []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 import sys
 from collections.abc import Iterable
+from pathlib import Path
 
 from suave_des.registry import manager_class
 
@@ -18,7 +19,8 @@ def main_classes(managers: Iterable[str]) -> bytes | None:
         What `define_in_main` takes; None if there are none, as in a script, which workers import.
     """
     names = [name for name in managers if name.startswith(f"{_MAIN}:")]
-    if not names or hasattr(sys.modules[_MAIN], "__file__"):
+    file = getattr(sys.modules[_MAIN], "__file__", None)
+    if not names or (file is not None and Path(file).is_file()):  # a program from standard input is "<stdin>"
         return None
     import cloudpickle  # takes a class by its content where it cannot be imported
 

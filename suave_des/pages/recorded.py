@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+import pandas
 from pydantic import ValidationError
 
 from suave_des.campaign.knowledge_records import KNOWLEDGE_FILE, read_knowledge
@@ -19,7 +20,8 @@ from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import Scenario
 
 _ANGLES = ("roll_rad", "pitch_rad", "yaw_rad")
-_NUMBERS = tuple(each.name for each in fields(TrajectoryPoint) if each.name != "mode")
+_COLUMNS = tuple(each.name for each in fields(TrajectoryPoint) if each.name != "further")
+_NUMBERS = tuple(name for name in _COLUMNS if name != "mode")
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,7 @@ class Recorded:
         metrics: its row of runs.csv, by column.
         scenario: the scenario in full.
         events: what happened, in order of time.
-        track: columns of trajectory.csv; None where a value is missing.
+        track: columns of trajectory.csv, with further measured values; None where a value is missing.
         knowledge: the states that its manager reasoned about.
         inputs: SHA-256 of each input file, by its name.
         loaded: the scenario with its files, where it was read for this.
@@ -54,7 +56,9 @@ class Recorded:
 def recorded_result(loaded: LoadedScenario, result: MissionResult) -> Recorded:
     """Take a mission that was just run, with its record."""
     points = result.trajectory
-    track = {each.name: [getattr(point, each.name) for point in points] for each in fields(TrajectoryPoint)}
+    further = list(points[0].further) if points else []
+    track = {name: [getattr(point, name) for point in points] for name in _COLUMNS}
+    track |= {name: [point.further[name] for point in points] for name in further}
     metrics = dict(zip(COLUMNS, row_of(result.metrics), strict=True))
     return Recorded(metrics, loaded.scenario, result.events, track, result.knowledge, loaded.inputs, loaded)
 
@@ -77,9 +81,10 @@ def read_recorded(folder: Path) -> Recorded:
     for name in _ANGLES:
         if name not in frame.columns:
             frame[name] = 0.0
-    numbers = frame[list(_NUMBERS)].astype(float)
+    measured = [name for name in frame.columns if name not in _COLUMNS]  # further values, such as the battery's level
+    numbers = frame[[*_NUMBERS, *measured]].apply(pandas.to_numeric, errors="coerce")
     track: dict[str, list[Any]] = {
-        name: [None if value != value else value for value in numbers[name].tolist()] for name in _NUMBERS
+        name: [None if value != value else value for value in numbers[name].tolist()] for name in numbers.columns
     }
     track["mode"] = frame["mode"].tolist()
     times, *texts = (record.events[name].tolist() for name in ("t_s", "source", "event", "detail"))

@@ -47,6 +47,7 @@ function makePanel(play) {
 
   function showMonitor(moment, cycle) {
     const measured = { ...(cycle?.measured ?? {}) };
+    for (const [name, value] of Object.entries(moment.further)) if (typeof value === 'number') measured[name] = value;
     if (moment.visibility !== null) measured.water_visibility = moment.visibility;
     const names = Object.keys(measured);
     const lamps = moment.thrusters.map((works) => (works === false ? 0 : 1)).join('');

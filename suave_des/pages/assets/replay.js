@@ -15,6 +15,8 @@ function prepare(mission) {
     yaw: given.yaw_rad, mode: given.mode, visibility: given.visibility_m,
   };
   const play = { mission, track, manager: String(mission.metrics.manager), duration: track.t.at(-1) };
+  const usual = ['t_s', 'x_m', 'y_m', 'z_m', 'roll_rad', 'pitch_rad', 'yaw_rad', 'mode', 'visibility_m'];
+  play.further = Object.keys(given).filter((name) => !usual.includes(name));
   play.indexAt = (t) => Math.max(0, lastAt(track.t, t, (each) => each));
   const measured = track.visibility.filter((each) => each !== null);
   const clearest = measured.reduce((most, each) => Math.max(most, each), 0.1);
@@ -86,7 +88,7 @@ function momentOf(play, asked) {
   const spread = play.clearest - play.murkiest;
   const atEnd = t >= play.duration - 0.3;
   return {
-    t, index, pose, visibility, thrusters, altitude: Math.max(0, pose.z - BED), mode: track.mode[index],
+    t, index, pose, visibility, thrusters, further: Object.fromEntries(play.further.map((name) => [name, mission.track[name][index]])), altitude: Math.max(0, pose.z - BED), mode: track.mode[index],
     clarity: visibility === null || spread < 0.05 ? 1 : clamp((visibility - play.murkiest) / spread, 0, 1),
     inspectedFrom: inspected?.from ?? Infinity, inspectedTo: inspected?.to ?? -Infinity,
     distance: atEnd ? mission.metrics.distance_inspected_m : (inspected?.distance ?? 0),
