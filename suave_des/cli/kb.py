@@ -29,6 +29,8 @@ from suave_des.errors import InputError
 from suave_des.interrupts import ends_at_once
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from suave_des.workbench.policy import Policy
     from suave_des.workbench.policy_table import FunctionTable
 
@@ -151,29 +153,46 @@ def policy(
 
 
 def _print_function_table(table: FunctionTable) -> None:
+    what = f", by measured {', '.join(table.attributes)}" if table.attributes else ""
+    console = output()
+    if not console.is_terminal and "COLUMNS" not in os.environ:
+        console.width = _WIDE  # names stay whole where there is no window
+    shown = _function_table(table, breaks_names=False)
+    if console.measure(shown, options=console.options.update(width=_WIDE)).maximum > console.width:
+        shown = _function_table(table, breaks_names=True)
+    print_table(console, f"{table.function}{what}", shown)
+    print()
+
+
+def _function_table(table: FunctionTable, *, breaks_names: bool) -> Table:
+    """A function's decisions as a table.
+
+    Args:
+        table: the decisions.
+        breaks_names: whether names of designs go over two lines, broken before their last word.
+    """
     others = [name for name in table.rows[0].groundings if name != table.function]
     with_components = any(row.components for row in table.rows)
     # The last attribute goes across, the others down.
     across = list(dict.fromkeys(column[-1:] for column in table.columns))
     headings = ["now", *others, *(["components"] if with_components else []), *table.attributes[:-1]]
     shown = plain_table([*headings, *(str(last[0]) if last else "then" for last in across)], overflow="fold")
+
+    def name(text: str) -> str:
+        return "_\n".join(text.rsplit("_", 1)) if breaks_names else text
+
     for row in table.rows:
         components = [row.components] if with_components else []
         outcomes = dict(zip(table.columns, row.outcomes, strict=True))
         for down in dict.fromkeys(column[:-1] for column in table.columns):
             shown.add_row(
-                row.groundings.get(table.function, "any"),
-                *(row.groundings[name] for name in others),
+                name(row.groundings.get(table.function, "any")),
+                *(name(row.groundings[other]) for other in others),
                 *components,
                 *map(str, down),
-                *(outcomes[(*down, *last)] for last in across),
+                *(name(outcomes[(*down, *last)]) for last in across),
             )
-    what = f", by measured {', '.join(table.attributes)}" if table.attributes else ""
-    console = output()
-    if not console.is_terminal and "COLUMNS" not in os.environ:
-        console.width = _WIDE  # names stay whole where there is no window
-    print_table(console, f"{table.function}{what}", shown)
-    print()
+    return shown
 
 
 def _policy_summary(found: Policy) -> Iterator[str]:

@@ -80,17 +80,16 @@ def print_comparison(console: Console, comparison: PaperComparison) -> None:
 
     for metric, title in METRICS.items():
         figures = [figure for figure in comparison.figures if figure.metric == metric]
-        table = _table(figures, " to ")
+        table = _table(figures, is_narrow=False)
         if console.measure(table, options=console.options.update(width=1000)).maximum > console.width:
-            table = _table(figures, "..")
+            table = _table(figures, is_narrow=True)
         print_table(console, title, table)
         console.print()
     for line in comparison.remarks():
         console.print(fill(line, min(console.width, _TEXT_WIDTH)))
 
 
-def _table(figures: Sequence[PaperFigure], between: str) -> Table:
-    """A table of figures, with `between` in the intervals' middle."""
+def _table(figures: Sequence[PaperFigure], *, is_narrow: bool) -> Table:
     from suave_des.cli.console import plain_table
 
     table = plain_table()
@@ -98,7 +97,14 @@ def _table(figures: Sequence[PaperFigure], between: str) -> Table:
     table.add_column("", min_width=5)
     for heading in ("paper", "95% interval", "here", "95% interval", "difference"):
         table.add_column(heading, justify="right", min_width=8, no_wrap=True)
-    table.add_column("")
+    if not is_narrow:
+        table.add_column("")
     for figure in figures:
-        table.add_row(figure.manager, figure.statistic, *(cell.replace(" to ", between) for cell in figure.cells()))
+        *cells, difference, mark = figure.cells()
+        if is_narrow:
+            cells = [cell.replace(" to ", "..") for cell in cells]
+            ends = [f"{difference} {mark or ' '}"]
+        else:
+            ends = [difference, mark]
+        table.add_row(figure.manager, figure.statistic, *cells, *ends)
     return table
