@@ -179,7 +179,7 @@ def _function_table(table: FunctionTable, *, breaks_names: bool) -> Table:
     shown = plain_table([*headings, *(str(last[0]) if last else "then" for last in across)], overflow="fold")
 
     def name(text: str) -> str:
-        return "_\n".join(text.rsplit("_", 1)) if breaks_names else text
+        return "\n_".join(text.rsplit("_", 1)) if breaks_names else text
 
     for row in table.rows:
         components = [row.components] if with_components else []
