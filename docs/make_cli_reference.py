@@ -63,7 +63,8 @@ class Parameter:
     def __init__(self, parameter: inspect.Parameter) -> None:
         self.needed = parameter.default is inspect.Parameter.empty
         kind, declared = typing.get_args(parameter.annotation)
-        value = declared.metavar or next(words_of(kind), "NUMBER")
+        is_number = not {int, float}.isdisjoint((kind, *typing.get_args(kind)))
+        value = declared.metavar or next(words_of(kind), "NUMBER" if is_number else parameter.name.upper())
         if isinstance(declared, ArgumentInfo):
             self.written = value
         else:
@@ -73,6 +74,8 @@ class Parameter:
             option = next((each for each in names if each.startswith("--")), f"--{parameter.name}")
             self.written = option if kind is bool else f"{option} {value}"
         default = "needed" if self.needed else f"`{parameter.default}`" if parameter.default else ""
+        if isinstance(declared.show_default, str):
+            default = declared.show_default
         self.row = f"| `{self.written}` | {default} | {declared.help} |"
 
 
@@ -81,6 +84,8 @@ def words_of(kind: Any) -> Iterator[str]:
     for each in typing.get_args(kind) or (kind,):
         if isinstance(each, type) and issubclass(each, Enum):
             yield "|".join(str(word.value) for word in each)
+        elif typing.get_args(each):
+            yield from words_of(each)
 
 
 if __name__ == "__main__":

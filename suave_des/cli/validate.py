@@ -46,7 +46,7 @@ def validate(
     scenario: Annotated[
         str | None,
         typer.Argument(
-            metavar="[SCENARIO]",
+            metavar="SCENARIO",
             help="A scenario or campaign file, or the name of a shipped scenario.",
             show_default=_SCENARIO,
         ),
