@@ -7,6 +7,7 @@ import json
 import os
 import re
 from pathlib import Path
+from typing import IO, Any
 
 import pytest
 
@@ -206,15 +207,16 @@ class TestRefusedBeforeAnythingIsWritten:
 
 
 def test_a_disk_that_fills_up_leaves_nothing_half_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    real = Path.write_bytes
+    real = Path.open
 
-    def full(path: Path, content: bytes) -> int:
-        if "summary.csv" in path.name:
-            real(path, content[:10])
+    def full(path: Path, mode: str = "r", **options: Any) -> IO[Any]:
+        file = real(path, mode, **options)
+        if "summary.csv" in path.name and "x" in mode:
+            file.write(b"0123456789")
             raise OSError(28, "No space left on device")
-        return real(path, content)
+        return file
 
-    monkeypatch.setattr(Path, "write_bytes", full)
+    monkeypatch.setattr(Path, "open", full)
     with pytest.raises(InputError, match=r"No space left on device .*--resume .* writes the files"):
         run_campaign("seams2023", ["none"], 1, 1, out=tmp_path / "out")
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["campaign.sqlite"]
