@@ -15,7 +15,20 @@ import typer
 from typer.core import TyperGroup
 
 from suave_des import __version__
-from suave_des.cli import bench, calibrate, campaign, compare, figure, kb, missions, pages, reproduce, serve, validate
+from suave_des.cli import (
+    bench,
+    calibrate,
+    campaign,
+    compare,
+    figure,
+    kb,
+    missions,
+    pages,
+    reproduce,
+    serve,
+    tree,
+    validate,
+)
 from suave_des.cli.options import remember_command_line
 from suave_des.cli.terminal import plain, write_what_the_terminal_has
 from suave_des.errors import InputError, SuaveDesError
@@ -28,7 +41,7 @@ BAD_INPUT, MISSIONS_MISSING = 2, 3
 _GROUPS = (
     ("Run missions", ("reproduce", "run", "campaign")),
     ("Look at results", ("compare", "figure", "report", "replay", "validate")),
-    ("Knowledge and rules", ("kb",)),
+    ("Knowledge, rules and trees", ("kb", "tree")),
     ("Files", ("import-config", "scenarios", "schema")),
 )
 """Headings of the help and their commands; those of packages besides, and what is seldom needed, come last."""
@@ -96,6 +109,7 @@ app.command("import-config")(missions.import_config)
 app.command("bench")(bench.bench)
 app.command("scenarios")(missions.scenarios)
 app.command("schema")(missions.schema)
+app.command("tree")(tree.tree)
 
 
 def _print_version(wanted: bool) -> None:

@@ -1,10 +1,7 @@
-"""The behaviour tree managers of revision 1.5 (facts: kas-lab/suave, revision 1.5).
+"""The behaviour tree managers of revision 1.5 (facts: kas-lab/suave, revision 1.5)."""
 
-A tree is ticked from its root: a sequence of checks, the most important first. Written out, this is a table of
-conditions and modes; each tick requests, for each function, the mode of the first condition that holds.
-"""
-
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection
+from functools import partial
 from typing import ClassVar
 
 from suave_des.domain import (
@@ -16,13 +13,19 @@ from suave_des.domain import (
     SURFACE_MODE,
     Task,
 )
+from suave_des.managing import behaviours
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem, Thresholds
+from suave_des.managing.behaviours import Behaviour, Condition, Fallback, Parallel, Sequence, SetMode
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
 from suave_des.scenario.modes import UNGROUND_MODE
 
 
 class BehaviourTree(ManagingSubsystem):
-    """bt: recover a failed thruster; search as high as the visibility allows; follow once the pipeline is detected."""
+    """bt: recover a failed thruster; search as high as the visibility allows; follow once the pipeline is detected.
+
+    Attributes:
+        root: of the tree.
+    """
 
     subscribes_to: ClassVar[Collection[Kind]] = (Kind.COMPONENT_STATUS,)
 
@@ -33,6 +36,12 @@ class BehaviourTree(ManagingSubsystem):
         self.starts_s = system.stream("bt/phase").uniform(0.0, self.period_s)
         self._functions = system.lasting_functions
         self._failed: set[str] = set()
+        self._noted = ""
+        self.root = self.make_tree()
+
+    def make_tree(self) -> Behaviour:
+        """Make the tree; called once, before the mission."""
+        return Parallel("mission", self._branches())
 
     def task_requested(self, task: Task) -> None:
         """From now on the tree controls the task's functions, too."""
@@ -52,30 +61,66 @@ class BehaviourTree(ManagingSubsystem):
 
     def adapt(self) -> None:
         """Tick the tree."""
-        for function, mode in self._wanted():
-            self.system.change_mode(function, mode)
+        if not (self.system.recorded and self._settings.records_ticks):
+            self.root.tick()
+            return
+        behaviours.tick(self.root)
+        if (noted := behaviours.last_tick(self.root)) != self._noted:
+            self._noted = noted
+            self.system.log("tick", noted)
+
+    def drawing(self) -> str:
+        """The tree as text."""
+        return behaviours.drawing(self.root)
 
     @property
     def depends_on(self) -> Thresholds:
         """The thresholds between the search modes."""
         return {"water_visibility": tuple(sorted(self._settings.visibility_thresholds_m))}
 
-    def _wanted(self) -> Iterator[tuple[str, str]]:
-        if MAINTAIN_MOTION in self._functions:
-            yield MAINTAIN_MOTION, "fd_recover_thrusters" if self._failed else "fd_all_thrusters"
-        if GENERATE_SEARCH_PATH in self._functions:
-            yield GENERATE_SEARCH_PATH, self._search_mode()
-        if SURFACE in self._functions:
-            yield SURFACE, SURFACE_MODE
-        if FOLLOW_PIPELINE in self._functions:
-            yield FOLLOW_PIPELINE, self.system.scenario.default_modes.get(FOLLOW_PIPELINE, "fd_follow_pipeline")
+    # The branches of the tree, one for each function.
 
-    def _search_mode(self) -> str:
+    def _branches(self) -> tuple[Behaviour, ...]:
+        surface = (self._surface(),) if self.system.scenario.leak is not None else ()
+        return self._motion(), self._search(), *surface, self._follow()
+
+    def _motion(self) -> Behaviour:
+        failed = Condition("a thruster has failed", holds=lambda: bool(self._failed))
+        recover = self._set(MAINTAIN_MOTION, "fd_recover_thrusters")
+        choices = (Sequence("recovery", (failed, recover)), self._set(MAINTAIN_MOTION, "fd_all_thrusters"))
+        return self._while_needed(MAINTAIN_MOTION, Fallback("thrusters", choices))
+
+    def _search(self) -> Behaviour:
         # A visibility that was not measured yet counts as good; below the lowest threshold the lowest altitude is left.
-        visibility_m = self.system.measured("water_visibility")
-        thresholds_m, modes = self._settings.visibility_thresholds_m, self._settings.search_modes
-        pairs = zip(thresholds_m, modes, strict=True)
-        return next((mode for least_m, mode in pairs if visibility_m is None or visibility_m >= least_m), modes[-1])
+        pairs = zip(self._settings.visibility_thresholds_m, self._settings.search_modes, strict=True)
+        heights = [
+            Sequence(mode, (self._is_clear(least_m), self._set(GENERATE_SEARCH_PATH, mode))) for least_m, mode in pairs
+        ]
+        lowest = self._set(GENERATE_SEARCH_PATH, self._settings.search_modes[-1])
+        return self._while_needed(GENERATE_SEARCH_PATH, Fallback("altitude", (*heights, lowest)))
+
+    def _surface(self) -> Behaviour:
+        return self._while_needed(SURFACE, self._set(SURFACE, SURFACE_MODE))
+
+    def _follow(self) -> Behaviour:
+        mode = self.system.scenario.default_modes.get(FOLLOW_PIPELINE, "fd_follow_pipeline")
+        return self._while_needed(FOLLOW_PIPELINE, self._set(FOLLOW_PIPELINE, mode))
+
+    def _while_needed(self, function: str, branch: Behaviour) -> Behaviour:
+        return Sequence(function, (Condition("is needed", holds=self._needs(function)), branch))
+
+    def _needs(self, function: str) -> Callable[[], bool]:
+        return lambda: function in self._functions
+
+    def _is_clear(self, least_m: float) -> Behaviour:
+        def holds() -> bool:
+            visibility_m = self.system.measured("water_visibility")
+            return visibility_m is None or visibility_m >= least_m
+
+        return Condition(f"visibility is at least {least_m:g} m, or unknown", holds=holds)
+
+    def _set(self, function: str, mode: str) -> Behaviour:
+        return SetMode(f"{function} = {mode}", request=partial(self.system.change_mode, function, mode))
 
 
 class ExtendedBehaviourTree(BehaviourTree):
@@ -86,13 +131,24 @@ class ExtendedBehaviourTree(BehaviourTree):
         """The same, and whether the battery is low."""
         return {**super().depends_on, "battery_level": (self._settings.battery_limit,)}
 
-    def _wanted(self) -> Iterator[tuple[str, str]]:
-        if self.system.scenario.battery is None:  # then there is no station to go to
-            yield from super()._wanted()
-            return
+    def make_tree(self) -> Behaviour:
+        """Make the tree; without a battery there is no station to go to."""
+        if self.system.scenario.battery is None:
+            return super().make_tree()
         # Once on its way the vehicle goes on until the level has risen: the station refills the battery at once.
-        level = self.system.measured("battery_level")
-        recharging = level is not None and level < self._settings.battery_limit and SURFACE not in self._functions
-        for function, mode in super()._wanted():
-            yield function, UNGROUND_MODE if recharging and function != MAINTAIN_MOTION else mode
-        yield GENERATE_RECHARGE_PATH, "normal" if recharging else UNGROUND_MODE
+        go = Sequence("low", (self._is_low(), self._set(GENERATE_RECHARGE_PATH, "normal")))
+        recharge = Fallback(GENERATE_RECHARGE_PATH, (go, self._set(GENERATE_RECHARGE_PATH, UNGROUND_MODE)))
+        return Parallel("mission", (*self._branches(), recharge))
+
+    def _while_needed(self, function: str, branch: Behaviour) -> Behaviour:
+        if self.system.scenario.battery is not None and function in (GENERATE_SEARCH_PATH, FOLLOW_PIPELINE):
+            pause = Sequence("pause", (self._is_low(), self._set(function, UNGROUND_MODE)))
+            branch = Fallback("unless the battery is low", (pause, branch))
+        return super()._while_needed(function, branch)
+
+    def _is_low(self) -> Behaviour:
+        def holds() -> bool:
+            level = self.system.measured("battery_level")
+            return level is not None and level < self._settings.battery_limit and SURFACE not in self._functions
+
+        return Condition(f"battery is below {self._settings.battery_limit:g}", holds=holds)

@@ -260,6 +260,8 @@ class BehaviourTreeSettings(Strict):
     """Search modes, one for each threshold."""
     battery_limit: Number = 0.25
     """Battery level below which the extended tree goes to recharge."""
+    records_ticks: bool = False
+    """Whether the timeline of a recorded mission has each tick that came to something else than the one before."""
 
     @model_validator(mode="after")
     def _paired(self) -> Self:

@@ -1,0 +1,103 @@
+"""Managers made of a py_trees tree of one's own (extra bt)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import py_trees
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from suave_des.domain import Task
+from suave_des.managing.base import ManagedSystem, ManagingSubsystem
+
+
+class PyTreesManager(ManagingSubsystem):
+    """Base of managers that tick a tree of py_trees; derive from it, and make the tree.
+
+    The setting `tick_period_s` (0.1 s) under managers: is the period. Each tick that comes to something else than the
+    one before is in the timeline of a recorded mission.
+
+    Attributes:
+        root: of the tree.
+        functions: what the mission needs now.
+
+    Example:
+        >>> class Mine(PyTreesManager):
+        ...     def make_tree(self):
+        ...         root = py_trees.composites.Selector("search", memory=False)
+        ...         clear = self.condition("clear", lambda: (self.system.measured("water_visibility") or 0) > 3.25)
+        ...         high = py_trees.composites.Sequence("high", memory=False)
+        ...         high.add_children([clear, self.set_mode("f_generate_search_path", "fd_spiral_high")])
+        ...         root.add_children([high, self.set_mode("f_generate_search_path", "fd_spiral_low")])
+        ...         return root
+    """
+
+    def __init__(self, system: ManagedSystem) -> None:
+        super().__init__(system)
+        self.period_s = float(system.settings.get("tick_period_s", 0.1))
+        self.starts_s = system.stream("py_trees/phase").uniform(0.0, self.period_s)
+        self.functions = system.lasting_functions
+        self.root = self.make_tree()
+        self._noted = ""
+
+    def make_tree(self) -> Behaviour:
+        """Make the tree; called once, before the mission."""
+        raise NotImplementedError("derive from PyTreesManager, and return the root of your tree from make_tree")
+
+    def condition(self, name: str, holds: Callable[[], bool]) -> Behaviour:
+        """A behaviour that succeeds while something holds."""
+        return _Condition(name, holds)
+
+    def set_mode(self, function: str, mode: str) -> Behaviour:
+        """A behaviour that requests a mode, and succeeds; it fails while nothing needs the function."""
+        return _SetMode(self, function, mode)
+
+    def task_requested(self, task: Task) -> None:
+        """Remember what the task needs."""
+        self.functions += task.functions
+
+    def task_cancelled(self, task: Task) -> None:
+        """Set the task's functions to fd_unground, and forget them."""
+        self.functions = tuple(name for name in self.functions if name not in task.functions)
+        super().task_cancelled(task)
+
+    def adapt(self) -> None:
+        """Tick the tree."""
+        self.root.tick_once()
+        if not self.system.recorded:
+            return
+        ticked = "; ".join(f"{each.name} {each.status.name.lower()}" for each in self.root.iterate() if _tells(each))
+        if ticked != self._noted:
+            self._noted = ticked
+            self.system.log("tick", ticked)
+
+    def drawing(self) -> str:
+        """The tree as text."""
+        text: str = py_trees.display.unicode_tree(self.root)
+        return text.rstrip("\n")
+
+
+def _tells(behaviour: Behaviour) -> bool:
+    """Whether a behaviour was ticked, and is not made of others."""
+    return not behaviour.children and behaviour.status != Status.INVALID
+
+
+class _Condition(Behaviour):
+    def __init__(self, name: str, holds: Callable[[], bool]) -> None:
+        super().__init__(name)
+        self._holds = holds
+
+    def update(self) -> Status:
+        return Status.SUCCESS if self._holds() else Status.FAILURE
+
+
+class _SetMode(Behaviour):
+    def __init__(self, manager: PyTreesManager, function: str, mode: str) -> None:
+        super().__init__(f"{function} = {mode}")
+        self._manager, self._function, self._mode = manager, function, mode
+
+    def update(self) -> Status:
+        if self._function not in self._manager.functions:
+            return Status.FAILURE
+        return Status.SUCCESS if self._manager.system.change_mode(self._function, self._mode) else Status.FAILURE

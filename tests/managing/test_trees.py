@@ -1,0 +1,124 @@
+"""Behaviour trees: their parts, how they are drawn, their ticks in the timeline, and trees of py_trees."""
+
+from itertools import pairwise
+
+import pytest
+from typer.testing import CliRunner
+
+from suave_des.cli.main import app
+from suave_des.managing import behaviours
+from suave_des.managing.behaviours import Condition, Fallback, Parallel, Sequence, SetMode
+from suave_des.metrics.result import MissionResult
+from suave_des.scenario.loader import load_scenario, with_values
+from suave_des.simulation.simulator import Simulator
+
+py_trees = pytest.importorskip("py_trees")
+
+from suave_des.managing.own_trees import PyTreesManager  # noqa: E402
+
+SEARCH, FOLLOW = "f_generate_search_path", "f_follow_pipeline"
+
+
+class Mine(PyTreesManager):
+    """The tree bt without the recovery of thrusters, made of py_trees."""
+
+    def make_tree(self):
+        search = py_trees.composites.Selector("search", memory=False)
+        for mode, least_m in (("high", 3.25), ("medium", 2.25), ("low", -1.0)):
+            branch = py_trees.composites.Sequence(mode, memory=False)
+            clear = self.condition(f"visibility {least_m:g} m", lambda least_m=least_m: self.visibility_m() >= least_m)
+            branch.add_children([clear, self.set_mode(SEARCH, f"fd_spiral_{mode}")])
+            search.add_child(branch)
+        root = py_trees.composites.Selector("mission", memory=False)
+        root.add_children([self.set_mode(FOLLOW, "fd_follow_pipeline"), search])
+        return root
+
+    def visibility_m(self):
+        measured = self.system.measured("water_visibility")
+        return 9.0 if measured is None else measured
+
+
+class Unfinished(PyTreesManager):
+    """Has no tree."""
+
+
+def flown(manager: str, **values: object) -> MissionResult:
+    settings = {path.replace("__", "."): value for path, value in values.items()}
+    loaded = with_values(load_scenario("release15"), {"thruster_events": [], **settings})
+    return Simulator(loaded).run(manager, run=1, seed=1, record=True)
+
+
+def ticked(*outcomes: bool) -> tuple[list[str], list[Condition]]:
+    seen: list[str] = []
+    conditions = [
+        Condition(str(place), holds=lambda place=place, outcome=outcome: seen.append(str(place)) or outcome)
+        for place, outcome in enumerate(outcomes)
+    ]
+    return seen, conditions
+
+
+@pytest.mark.parametrize(
+    ("kind", "outcomes", "visited", "succeeds"),
+    [
+        (Sequence, (True, True), "01", True),
+        (Sequence, (False, True), "0", False),
+        (Fallback, (False, True, True), "01", True),
+        (Fallback, (False, False), "01", False),
+        (Parallel, (False, True), "01", False),
+        (Parallel, (True, True), "01", True),
+    ],
+)
+def test_parts_tick_their_children_as_far_as_they_must(kind, outcomes, visited: str, succeeds: bool) -> None:
+    seen, conditions = ticked(*outcomes)
+    assert behaviours.tick(kind("part", tuple(conditions))) is succeeds
+    assert "".join(seen) == visited
+
+
+def test_a_drawing_has_a_line_for_each_part() -> None:
+    mode = SetMode("f = fd_a", request=lambda: None)
+    tree = Fallback("root", (Sequence("first", (Condition("clear", holds=lambda: True), mode)), Condition("else")))
+    expected = ["? root", "├─ -> first", "│  ├─ clear", "│  └─ ! f = fd_a", "└─ else"]
+    assert behaviours.drawing(tree).splitlines() == expected
+    behaviours.tick(tree)
+    assert behaviours.last_tick(tree) == "f = fd_a (clear)"
+
+
+@pytest.mark.parametrize(("manager", "scenario"), [("bt", "release15"), ("bt_extended", "extended")])
+def test_the_command_draws_the_tree_of_a_manager(manager: str, scenario: str) -> None:
+    shown = CliRunner().invoke(app, ["tree", manager, scenario]).output
+    assert "visibility is at least 3.25 m, or unknown" in shown
+    assert ("battery is below 0.25" in shown) is (manager == "bt_extended")
+
+
+def test_a_manager_without_tree_is_refused() -> None:
+    result = CliRunner().invoke(app, ["tree", "metacontrol"])
+    assert "has no tree" in str(result.exception)
+
+
+def test_ticks_are_in_the_timeline_where_that_is_asked_for_and_change_nothing() -> None:
+    plain, noted = flown("bt"), flown("bt", managers__bt__records_ticks=True)
+    ticks = [event for event in noted.events if event.event == "tick"]
+    assert [event for event in noted.events if event.event != "tick"] == list(plain.events)
+    assert "f_generate_search_path = fd_spiral_high (is needed, visibility is at least 3.25 m" in ticks[0].detail
+    assert all(earlier.detail != later.detail for earlier, later in pairwise(ticks))
+
+
+def test_a_tree_of_py_trees_decides_as_the_same_tree_of_ours() -> None:
+    mine, ours = flown(f"{__name__}:Mine"), flown("bt")
+    modes = [
+        [event.detail for event in result.events if event.event == "mode_set" and "motion" not in event.detail]
+        for result in (mine, ours)
+    ]
+    assert modes[0] == modes[1]
+    assert any(event.event == "tick" and "fd_spiral_high success" in event.detail for event in mine.events)
+
+
+def test_a_tree_of_ones_own_is_drawn(capsys) -> None:
+    shown = CliRunner().invoke(app, ["tree", f"{__name__}:Mine"]).output
+    assert "visibility 3.25 m" in shown
+    assert "f_follow_pipeline = fd_follow_pipeline" in shown
+
+
+def test_a_manager_that_makes_no_tree_is_told_what_to_do() -> None:
+    with pytest.raises(Exception, match="return the root of your tree from make_tree"):
+        flown(f"{__name__}:Unfinished")
