@@ -16,8 +16,8 @@ from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
 
-GAIN = "calibration.position_gain_per_s"
-TWO = f"member,{GAIN},loss\n1,0.66,0.2\n2,0.9,0.21\n"
+GAIN = "calibration.velocity_gain_per_s"
+TWO = f"member,{GAIN},loss\n1,4.0,0.2\n2,2.0,0.21\n"
 
 
 @pytest.fixture
@@ -34,7 +34,7 @@ def test_runs_have_the_members_in_turn_and_managers_have_the_same():
 
 def test_a_run_is_the_mission_of_the_scenario_with_its_members_values(two):
     row = run_campaign("seams2023", ["none"], 2, seed=3, ensemble=two).frame().iloc[1]
-    loaded = with_values(load_scenario("seams2023"), {GAIN: 0.9})
+    loaded = with_values(load_scenario("seams2023"), {GAIN: 2.0})
     alone = Simulator(loaded).run("none", 2, 3).metrics
     assert (row["search_time_s"], row["detection_time_s"]) == (alone.search_time_s, round(alone.detection_time_s, 6))
 
@@ -55,7 +55,7 @@ def test_resuming_gives_the_same_bytes(two, tmp_path):
 
 def test_a_campaign_is_not_resumed_with_another_ensemble(two, tmp_path):
     run_campaign("seams2023", ["none"], 1, out=tmp_path / "out", ensemble=two)
-    two.write_text(TWO.replace("0.66", "0.67"), encoding="utf-8")
+    two.write_text(TWO.replace("4.0", "4.1"), encoding="utf-8")
     with pytest.raises(InputError, match=r"cannot be resumed: files_sha256\.two\.csv"):
         resume_campaign(tmp_path / "out", runs=2)
 
@@ -87,13 +87,13 @@ def test_a_campaign_without_an_ensemble_has_neither_column_nor_file(tmp_path):
         ("", "line 1: has no columns of parameters"),
         ("member,loss\n1,2\n2,3\n", "line 1: has no columns of parameters"),
         (f"{GAIN}\n0.6\n", "line 1: has 1 members"),
-        (f"{GAIN},{GAIN}\n1,1\n1,1\n", "line 1: has column 'calibration.position_gain_per_s' twice"),
-        (f"{GAIN}\n0.6\nfast\n", "line 3: calibration.position_gain_per_s: expected a number, got 'fast'"),
-        (f"{GAIN}\n0.6\nnan\n", "line 3: calibration.position_gain_per_s: expected a number, got 'nan'"),
+        (f"{GAIN},{GAIN}\n1,1\n1,1\n", "line 1: has column 'calibration.velocity_gain_per_s' twice"),
+        (f"{GAIN}\n0.6\nfast\n", "line 3: calibration.velocity_gain_per_s: expected a number, got 'fast'"),
+        (f"{GAIN}\n0.6\nnan\n", "line 3: calibration.velocity_gain_per_s: expected a number, got 'nan'"),
         (f"{GAIN}\n0.6\n0.6,0.7\n", "line 3: has 2 values, but the header has 1"),
         (f"{GAIN}\n0.6\n-4\n", "member 2: "),
         ("calibration.gain\n1\n2\n", "calibration.gain: "),
-        ("start.y_m\n1\n2\n", "start.y_m: expected a number in scenario seams2023"),
+        ("pipeline.vertices_m\n1\n2\n", "pipeline.vertices_m: expected a number in scenario seams2023"),
         ("revision\n1\n2\n", "revision: expected a number"),
     ],
 )
