@@ -12,6 +12,7 @@ from functools import cached_property
 
 from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
 from suave_des.knowledge.content import Content
+from suave_des.knowledge.limit import TimeLimit
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import Lit, Triple, facts_of, value_of
 from suave_des.knowledge.rules.checks import RuleProblem, check_rule
@@ -22,6 +23,8 @@ from suave_des.knowledge.vocabulary import RDF_TYPE
 from suave_des.workbench.atom_failure import describe_failure
 from suave_des.workbench.derivations import FACT_KINDS, Binding
 from suave_des.workbench.nearest_match import Facts, NearestFinder
+from suave_des.workbench.testing.probes import Probes
+from suave_des.workbench.testing.situation import Situation
 from suave_des.workbench.tracing import Tracer
 from suave_des.workbench.unusable_rules import UnusableRule
 
@@ -103,6 +106,9 @@ class RuleQuestions:
         if isinstance(facts, str):
             return WhyNot(rule.name, f"nothing follows, as the state contradicts itself: {facts}")
         match = NearestFinder(rule, facts, start or {}).find()
+        identities = [number for number, atom in enumerate(rule.body) if atom.kind in ("same", "different")]
+        if not match.failing and identities and not self._fires_in_pellet(rule, state):
+            match = replace(match, failing=(identities[0],))
         bindings = self._bindings(match.binding)
         if not match.failing:
             return WhyNot(rule.name, self._fires(rule, match.binding, facts), True, bindings=bindings)
@@ -115,6 +121,10 @@ class RuleQuestions:
         return WhyNot(
             rule.name, f"{text} does not hold: {reason}{more}{chain}", False, text, bindings, len(match.failing)
         )
+
+    def _fires_in_pellet(self, rule: Rule, state: KnowledgeState) -> bool:
+        """Whether a rule fires: what is the same and what is different, Pellet alone knows."""
+        return bool(Probes.of(self._usable, [rule.body], TimeLimit()).holding(Situation(state)))
 
     @cached_property
     def _usable(self) -> Ontology:

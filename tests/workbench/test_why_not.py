@@ -136,7 +136,8 @@ CASES = {
         "r: Component(?a) ^ Component(?b) ^ differentFrom(?a, ?b) -> fd_realisability(fd_spiral_high, false)",
         {},
         "",
-        "differentFrom",
+        "differentFrom(?a, ?b) does not hold: that two names mean different things must be asserted: OWL does not "
+        "assume it",
     ),
     "a variable of the head that the body does not bind": (
         "r: Component(?c) -> requiredBy(?c, ?fd)",
