@@ -66,6 +66,8 @@ def parts(model: type[BaseModel], prefix: str, apart: set[type[BaseModel]]) -> s
         for each in inner:
             suffix = "[]" if typing.get_origin(field.annotation) is tuple else ""
             sections.append(f"### {prefix}{name}{suffix}\n\n{lead(each)}\n\n{table(each)}")
+            if each is not VehicleDescription and (below := parts(each, f"{prefix}{name}.", apart)):
+                sections.append(below)
     return "\n".join(sections)
 
 
