@@ -169,6 +169,8 @@ def _with_progress(
             raise
         result, interrupted = stopped.result, True
         warnings.warn(str(stopped), stacklevel=3)
+    for remark in result.remarks:
+        warnings.warn(remark, stacklevel=3)
     if result.failures:
         problem = f"{len(result.failures)} of {result.planned} missions failed, see attrs['failures']: "
         warnings.warn(f"{problem}{result.failures[0]}", stacklevel=3)

@@ -14,13 +14,19 @@ from dataclasses import replace
 from types import FrameType
 
 from suave_des.campaign.knowledge_records import mission_line
-from suave_des.campaign.missions import Failure, Finished, JobSpec, MissionKey, Outcome, further_of, row_of
+from suave_des.campaign.missions import Failure, Finished, JobSpec, MissionKey, Outcome, Remark, further_of, row_of
 from suave_des.campaign.variation import cell_of
 from suave_des.errors import MissionError
 from suave_des.metrics.result import MissionResult
+from suave_des.registry import is_built_in
 from suave_des.scenario.models import Mission
 from suave_des.simulation.simulator import Simulator
 
+NOT_REPEATABLE = (
+    "a mission that was run again in the same process gave another row: the class keeps something from one mission"
+    " to the next, or uses chance of its own, so its results depend on the number of workers."
+    " To learn, use `suave-des train`; for chance, system.stream"
+)
 _REPEAT_S = 1.0
 """A mission that swallowed the interruption is interrupted again after this time."""
 _POLL_S = 0.1
@@ -42,6 +48,10 @@ class MissionRunner:
         # Load or compile what missions run, before the first one's time counts: a mission of a second does.
         short = job.loaded.scenario.model_copy(update={"mission": Mission(time_limit_s=1.0)})
         Simulator(replace(job.loaded, scenario=short)).run("none", 1, 0)
+        self._is_own = [not is_built_in(name) for name in job.managers]
+        self._first: dict[int, tuple[MissionKey, Outcome]] = {}
+        self._number: dict[int, int] = {}
+        self._refused: dict[tuple[str, str], int] = {}
         self._go_to(0)
 
     def each(self, missions: Iterable[MissionKey]) -> Iterator[Finished]:
@@ -52,7 +62,31 @@ class MissionRunner:
         """
         with _time_limits(self._exit_after_s) as limit:
             for key in missions:
-                yield key, self._outcome(key, limit)
+                outcome = self._outcome(key, limit)
+                yield key, outcome
+                if (
+                    self._is_own[key.manager]
+                    and not isinstance(outcome, Failure)
+                    and self._differs(key, outcome, limit)
+                ):
+                    yield key, Remark(self._job.managers[key.manager], NOT_REPEATABLE)
+                for (function, mode), count in self._refused.items():
+                    yield key, Remark(self._job.managers[key.manager], f"{function} has no mode {mode}", count)
+                self._refused = {}
+
+    def _differs(self, key: MissionKey, outcome: Outcome, limit: _Limit) -> bool:
+        """Whether a manager's first mission in this process gives another outcome when it is run again.
+
+        It is after its 2nd, 4th, 16th, 64th mission and so on: what a class keeps from mission to mission shows, and
+        little time is lost.
+        """
+        first, number = self._first.setdefault(key.manager, (key, outcome)), self._number.get(key.manager, 0) + 1
+        self._number[key.manager] = number
+        if number != 2 and (number < 4 or number & (number - 1) or number.bit_length() % 2 == 0):
+            return False
+        refused, again = self._refused, self._outcome(first[0], limit)
+        self._refused = refused
+        return again != first[1] and not (isinstance(again, Failure) and not again.lasting)
 
     def _outcome(self, key: MissionKey, limit: _Limit) -> Outcome:
         job = self._job
@@ -69,6 +103,8 @@ class MissionRunner:
             return job.timed_out(key)[1]
         drawn = (result.drawn[path] for path in self._drawn)
         members = () if member is None else (member,)
+        if result.refused:
+            self._refused = result.refused
         row = (*row_of(result.metrics), *self._swept, *drawn, *members, *further_of(result))
         return (*row, self._knowledge(key, result)) if job.record_knowledge else row
 

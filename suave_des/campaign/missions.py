@@ -105,7 +105,25 @@ class Failure(NamedTuple):
         return str(MissionError(self.manager, self.run, self.time_s, self.cause))
 
 
-Outcome = Row | Failure
+class Remark(NamedTuple):
+    """Something about a manager that users should know; it comes among the outcomes, and is none.
+
+    Attributes:
+        manager: name of the managing subsystem.
+        text: what.
+        times: how often.
+    """
+
+    manager: str
+    text: str
+    times: int = 1
+
+    def __str__(self) -> str:
+        """Return it in one line."""
+        return f"manager {self.manager}: {self.text}{f' ({self.times} times)' if self.times > 1 else ''}"
+
+
+Outcome = Row | Failure | Remark
 Finished = tuple[MissionKey, Outcome]
 
 

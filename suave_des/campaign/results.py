@@ -57,6 +57,8 @@ class CampaignResult:
         failures: missions that have no row because they failed, in the order of the missions.
         summary: rows of summary.csv: for each manager, at each point that was reached.
         outcomes: reads the outcomes of all missions, in order.
+        remarks: what users should know about managers: whose missions cannot be repeated, or that request modes that
+            there are not.
     """
 
     spec: CampaignSpec
@@ -68,6 +70,7 @@ class CampaignResult:
     failures: tuple[Failure, ...]
     summary: tuple[Row, ...]
     outcomes: Callable[[], Iterator[Finished]]
+    remarks: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """Return the summary as a table, and where the files are."""
@@ -171,6 +174,7 @@ class CampaignResult:
                 "left_out": self.planned - self.done - len(self.failures),
             },
             "until_ci": _until_ci(self),
+            **({"remarks": list(self.remarks)} if self.remarks else {}),
             "failures": [
                 {
                     "manager": failure.manager,

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import ExitStack, closing, suppress
 from dataclasses import replace
 from pathlib import Path
 
 from suave_des.campaign.ensemble import read_ensemble, with_ensemble
 from suave_des.campaign.executors import InProcess, LocalWorkers
-from suave_des.campaign.manager_inputs import check_managers, check_trusted, scenarios_of
-from suave_des.campaign.missions import Executor, Finished, JobSpec, MissionKey, WorkerError, plan
+from suave_des.campaign.manager_inputs import check_managers, check_trusted, scenarios_of, trained_on
+from suave_des.campaign.missions import Executor, Failure, Finished, JobSpec, MissionKey, Remark, WorkerError, plan
 from suave_des.campaign.output import check_output_folder, make_output_folder, remove_parts, remove_results
 from suave_des.campaign.progress import OnProgress, ProgressTracker, parse_until_ci
 from suave_des.campaign.provenance import check_knowledge, check_same, deciding, identity
@@ -39,6 +39,8 @@ TIME_OUT_S = 120.0
 TIME_OUTS_S = {"owlready2": 1800.0}
 """Time that a mission may take with a reasoner, if not TIME_OUT_S: owlready2 takes some two minutes a mission."""
 _TIMED_RUNS = 3
+ALIKE = 20
+"""So many missions of a manager that all fail with the same error stop the campaign."""
 _REASONER = "knowledge.reasoner"
 
 
@@ -159,6 +161,32 @@ def _stored_spec(folder: Path, runs: int | None, until_ci: str | None) -> Campai
         return CampaignSpec.of_stored(store.about("request"), runs=runs, until_ci=until_ci)
 
 
+class _FirstFailures:
+    """Notices that a manager fails in the same way in all its first missions: it would in all others."""
+
+    def __init__(self, managers: Sequence[str]) -> None:
+        self._managers = managers
+        self._causes: dict[int, list[str]] = {}
+        self._works: set[int] = set()
+
+    def check(self, finished: Iterable[Finished]) -> None:
+        """Take outcomes.
+
+        Raises:
+            WorkerError: the first ALIKE missions of a manager have failed with the same error.
+        """
+        for key, outcome in finished:
+            if key.manager in self._works:
+                continue
+            causes = self._causes.setdefault(key.manager, [])
+            if not isinstance(outcome, Failure) or not outcome.lasting or (causes and outcome.cause != causes[0]):
+                self._works.add(key.manager)
+                continue
+            causes.append(outcome.cause)
+            if len(causes) == ALIKE:
+                raise WorkerError(f"manager {self._managers[key.manager]} fails in each mission: {outcome.cause}")
+
+
 class _Campaign:
     """A campaign whose input is read and checked.
 
@@ -186,6 +214,7 @@ class _Campaign:
             self.loaded, self.variation, spec.managers, spec.seed, spec.time_out_s, spec.record_knowledge
         )
         self.tracker = self._new_tracker()
+        self.remarks: tuple[Remark, ...] = ()
 
     def _start_workers(self) -> Executor:
         """Start worker processes at once: they import what they need while this process reads and checks."""
@@ -293,18 +322,28 @@ class _Campaign:
         self, store: Store, executor: Executor, on_progress: OnProgress | None
     ) -> KeyboardInterrupt | SuaveDesError | None:
         """Run missions until all are done; return what stopped the campaign before that."""
-        tracker, spec = self.tracker, self.spec
+        tracker, spec, alike = self.tracker, self.spec, _FirstFailures(self.spec.managers)
+        earlier = store.about("remarks") if store.has_note("remarks") else []
+        remarks: dict[tuple[str, ...], int] = {(manager, text): count for manager, text, count in earlier}
         try:
             tracker.add_earlier(store.outcomes())
             points = self.variation.sweep.points
             missions = plan(points, len(spec.managers), spec.runs, store.settled, tracker.is_over)
             if left := tracker.total - tracker.done:
-                for finished in executor.outcomes(self.job, missions, left):
+                for among in executor.outcomes(self.job, missions, left):
+                    finished = [(key, each) for key, each in among if not isinstance(each, Remark)]
+                    for _, each in among:
+                        if isinstance(each, Remark):
+                            remarks[each[:2]] = remarks.get(each[:2], 0) + each.times
                     store.append(finished)
+                    alike.check(finished)
                     tracker.add(finished)
                     if on_progress is not None:
                         on_progress(tracker.progress())
             store.commit()
+            self.remarks = tuple(Remark(manager, text, count) for (manager, text), count in sorted(remarks.items()))
+            if self.remarks:
+                store.note("remarks", self.remarks)
         except (KeyboardInterrupt, SuaveDesError) as error:
             if not isinstance(error, StoreError):
                 with suppress(StoreError):  # which is reported when the files cannot be written either
@@ -325,6 +364,8 @@ class _Campaign:
             planned=tracker.total,
             stops=tracker.stops(),
         )
+        seen = trained_on(self.loaded, self.spec.managers, self.spec.seed, self.spec.runs)
+        result = replace(result, remarks=(*map(str, self.remarks), *seen))
         if self.spec.out is not None:
             try:
                 write_results(result, self.inputs, identity(deciding(self.spec, self.loaded, self.inputs)))

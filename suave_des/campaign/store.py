@@ -155,6 +155,11 @@ class Store:
             raise _damaged(self.path, f"its {name} is {'missing' if found is None else 'not what was written'}")
         return json.loads(found[0])
 
+    def has_note(self, name: str) -> bool:
+        """Return whether anything was noted under a name."""
+        with _user_errors(self.path):
+            return self._db.execute("SELECT 1 FROM about WHERE name = ?", (name,)).fetchone() is not None
+
     def note(self, name: str, value: Any) -> None:
         """Note something about the campaign, at once and durably."""
         with _user_errors(self.path):

@@ -213,9 +213,11 @@ def exit_telling_failures(result: CampaignResult) -> None:
     """List the missions that have no row, and exit with status 3 if there are any."""
     from suave_des.cli.console import errors
 
+    console = errors()
+    for remark in result.remarks:
+        console.print(f"suave-des: {remark}", soft_wrap=True, markup=False)
     if not result.failures:
         return
-    console = errors()
     alike: dict[tuple[str, str], list[Failure]] = {}
     for failure in result.failures:
         alike.setdefault((failure.manager, failure.cause), []).append(failure)

@@ -27,6 +27,7 @@ from suave_des.cli import (
     reproduce,
     serve,
     tree,
+    train,
     validate,
 )
 from suave_des.cli.options import remember_command_line
@@ -101,6 +102,7 @@ app.command("validate")(validate.validate)
 app.command("calibrate")(calibrate.calibrate)
 app.add_typer(kb.app, name="kb")
 app.command("compare")(compare.compare)
+app.command("train")(train.train)
 app.command("serve")(serve.serve)
 app.command("figure")(figure.figure)
 app.command("report")(pages.report)

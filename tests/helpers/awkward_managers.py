@@ -111,3 +111,23 @@ class Declares(NoManager):
     @classmethod
     def input_files(cls, settings):
         return [settings["table"]]
+
+
+class Remembers(NoManager):
+    """Searches higher the more missions its class has seen."""
+
+    missions = 0
+
+    def task_requested(self, task: Task) -> None:
+        super().task_requested(task)
+        if "f_generate_search_path" in task.functions:
+            Remembers.missions += 1
+            if Remembers.missions > 1:
+                self.system.change_mode("f_generate_search_path", "fd_spiral_high")
+
+
+class Misspells(NoManager):
+    """Requests a mode that there is not."""
+
+    def mission_started(self) -> None:
+        self.system.change_mode("f_generate_search_path", "fd_spiral_hihg")

@@ -1,0 +1,189 @@
+"""Managers that learn: only in training; what a class keeps otherwise is found out."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from suave_des import InputError, run_campaign
+from suave_des.campaign.training import blocks, train
+from tests.helpers import AWKWARD
+from tests.helpers.command import suave_des_command
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "docs" / "examples"
+
+
+@pytest.fixture
+def learner(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.syspath_prepend(EXAMPLES)
+    monkeypatch.chdir(tmp_path)
+    return "learner:Learner"
+
+
+def test_training_gives_the_same_file_each_time(learner: str, tmp_path: Path) -> None:
+    for name in ("one.json", "other.json"):
+        train("seams2023", learner, 12, tmp_path / name)
+    one = (tmp_path / "one.json").read_bytes()
+    assert one == (tmp_path / "other.json").read_bytes()
+    content = json.loads(one)
+    assert sum(missions for missions, _ in content["learned"].values()) == content["missions"] == 12
+    assert "learner.py" in content["inputs_sha256"]
+
+
+def test_training_goes_on_from_a_file(learner: str, tmp_path: Path) -> None:
+    train("seams2023", learner, 9, "first.json")
+    more = train("seams2023", learner, 3, "second.json", start="first.json", seed=5)
+    assert sum(missions for missions, _ in more.learned.values()) == 12
+
+
+def test_a_frozen_policy_gives_the_same_rows_for_any_number_of_workers(learner: str) -> None:
+    train("seams2023", learner, 9, "policy.json")
+    options = {learner: {"learned": "policy.json"}}
+    one, two = (
+        run_campaign("seams2023", [learner], 12, workers=workers, manager_options=options) for workers in (1, 2)
+    )
+    assert one.equals(two) and "remarks" not in one.attrs
+
+
+def test_a_campaign_on_missions_of_the_training_says_so(learner: str) -> None:
+    train("seams2023", learner, 9, "policy.json", seed=1)
+    with pytest.warns(UserWarning, match="runs 1 to 4 are missions that it was trained on"):
+        run_campaign("seams2023", [learner], 4, manager_options={learner: {"learned": "policy.json"}})
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{}", '{"suave_des_learned": 2, "learned": {}}'])
+def test_another_file_is_no_policy(learner: str, content: str) -> None:
+    Path("policy.json").write_text(content)
+    with pytest.raises(InputError, match=r"policy\.json"):
+        run_campaign("seams2023", [learner], 1, manager_options={learner: {"learned": "policy.json"}})
+
+
+def test_a_manager_that_learns_nothing_cannot_be_trained(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="has learned nothing"):
+        train("seams2023", "none", 1, tmp_path / "policy.json")
+    assert not (tmp_path / "policy.json").exists()
+
+
+def test_the_command_prints_how_it_went(learner: str, tmp_path: Path) -> None:
+    options = ("--missions", "12", "--out", "policy.json")
+    done = suave_des_command("train", learner, *options, cwd=tmp_path, PYTHONPATH=str(EXAMPLES))
+    assert done.returncode == 0, done.stderr
+    assert "11 to 12" in done.stdout and (tmp_path / "policy.json").exists()
+
+
+def test_blocks_have_the_means_of_their_missions() -> None:
+    assert blocks([1.0, 3.0, 5.0], 2) == [(1, 2, 2.0), (3, 3, 5.0)]
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_class_that_keeps_something_from_mission_to_mission_is_found_out(workers: int) -> None:
+    with pytest.warns(UserWarning, match="gave another row"):
+        frame = run_campaign("seams2023", [f"{AWKWARD}:Remembers"], 24, workers=workers)
+    assert any("number of workers" in remark for remark in frame.attrs["remarks"])
+
+
+def test_a_class_that_keeps_nothing_is_not() -> None:
+    assert "remarks" not in run_campaign("seams2023", [f"{AWKWARD}:RaisesInHalf"], 1).attrs
+    assert "remarks" not in run_campaign("seams2023", ["tests.helpers.outside_managers:Deliberate"], 20).attrs
+
+
+def test_modes_that_there_are_not_are_counted_and_reported(tmp_path: Path) -> None:
+    with pytest.warns(UserWarning, match="f_generate_search_path has no mode fd_spiral_hihg"):
+        run_campaign("seams2023", [f"{AWKWARD}:Misspells"], 5, out=tmp_path / "out")
+    (remark,) = json.loads((tmp_path / "out" / "manifest.json").read_text())["remarks"]
+    assert remark.endswith("(5 times)")
+
+
+def test_the_same_error_in_the_first_missions_stops_the_campaign_with_one_message(tmp_path: Path) -> None:
+    manager = f"{AWKWARD}:RaisesAlways"
+    done = suave_des_command(
+        "campaign", "seams2023", "--managers", manager, "--runs", "500", "--out", "out", "--quiet", cwd=tmp_path
+    )
+    assert done.returncode == 3 and done.stdout == ""
+    assert done.stderr.count("\n") == 1 and f"manager {manager} fails in each mission: " in done.stderr
+
+
+MISTAKES = """
+from suave_des.managing.base import ManagingSubsystem
+
+class NoSuper(ManagingSubsystem):
+    def __init__(self, system):
+        self.mine = system
+
+class Signature(ManagingSubsystem):
+    def diagnostic(self, kind, value):
+        pass
+
+class Misspelt(ManagingSubsystem):
+    def task_request(self, task):
+        pass
+
+class NoMethod(ManagingSubsystem):
+    adapt = 3
+
+class Loops(ManagingSubsystem):
+    def __init__(self, system):
+        super().__init__(system)
+        self.period_s = 1.0
+
+    def adapt(self):
+        while True:
+            yield self.system.env.timeout(0.0)
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "status", "words"),
+    [
+        ("NoSuper", 3, "NoSuper.__init__ does not begin with super().__init__(system)"),
+        ("Signature", 2, "write def diagnostic(self, diagnostic)"),
+        ("Misspelt", 2, "did you mean task_requested(self, task)?"),
+        ("NoMethod", 2, "adapt is not a method"),
+        ("Loops", 3, "no mission time passed"),
+    ],
+)
+def test_mistakes_in_a_class_are_told_early(tmp_path: Path, name: str, status: int, words: str) -> None:
+    (tmp_path / "mistakes.py").write_text(MISTAKES)
+    done = suave_des_command("run", "seams2023", "--manager", f"mistakes:{name}", cwd=tmp_path)
+    assert done.returncode == status and words in done.stderr and "Traceback" not in done.stderr
+
+
+def test_a_package_registers_its_manager_by_name(tmp_path: Path) -> None:
+    package = EXAMPLES / "suave-cautious"
+    options = ["--no-deps", "--no-build-isolation", "--quiet", "--target", str(tmp_path / "there")]
+    subprocess.run([sys.executable, "-m", "pip", "install", *options, str(package)], check=True)
+    there = {"PYTHONPATH": str(tmp_path / "there")}
+    margin = ("--manager-option", "margin_m=0.25")
+    command = ("campaign", "seams2023", "--managers", "cautious", "--runs", "2", "--out", "out", *margin)
+    done = suave_des_command(*command, cwd=tmp_path, **there)
+    assert done.returncode == 0, done.stderr
+    assert "cautious" in done.stdout
+    inputs = json.loads((tmp_path / "out" / "manifest.json").read_text())["inputs_sha256"]
+    assert "suave_cautious/__init__.py" in inputs
+    done = suave_des_command("campaign", "--resume", "out", "--runs", "3", cwd=tmp_path, **there)
+    assert done.returncode == 0, done.stderr  # what a package registers is installed on purpose
+
+
+def test_an_entry_point_that_does_not_import_is_bad_input(tmp_path: Path) -> None:
+    info = tmp_path / "broken-1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1\n")
+    (info / "entry_points.txt").write_text("[suave_des.managers]\nbroken = no_such_module_at_all:Manager\n")
+    done = suave_des_command("run", "seams2023", "--manager", "broken", cwd=tmp_path, PYTHONPATH=str(tmp_path))
+    assert done.returncode == 2 and "no_such_module_at_all" in done.stderr and "Traceback" not in done.stderr
+
+
+@pytest.mark.slow
+def test_the_example_learns_a_policy_that_beats_bt_on_missions_that_it_has_not_seen(learner: str) -> None:
+    from scipy import stats
+
+    train("seams2023", learner, 300, "policy.json")
+    options = {learner: {"learned": "policy.json"}}
+    frame = run_campaign("seams2023", ["bt", learner], 200, seed=1, manager_options=options)
+    wide = frame.pivot(index="run", columns="manager", values="search_time_s")
+    gain_s = wide["bt"] - wide[learner]
+    interval = stats.bootstrap((gain_s,), lambda values, axis: values.mean(axis=axis), rng=1).confidence_interval
+    print(f"{gain_s.mean():.1f} s sooner, 95% interval {interval.low:.1f} to {interval.high:.1f}")
+    assert interval.low > 10.0
