@@ -26,8 +26,8 @@ from suave_des.cli import (
     pages,
     reproduce,
     serve,
-    tree,
     train,
+    tree,
     validate,
 )
 from suave_des.cli.options import remember_command_line
