@@ -40,7 +40,7 @@ BAD_INPUT, MISSIONS_MISSING = 2, 3
 
 
 _GROUPS = (
-    ("Run missions", ("reproduce", "run", "campaign")),
+    ("Run missions", ("reproduce", "run", "campaign", "train", "serve")),
     ("Look at results", ("compare", "figure", "report", "replay", "validate")),
     ("Knowledge, rules and trees", ("kb", "tree")),
     ("Files", ("import-config", "scenarios", "schema")),
