@@ -269,7 +269,7 @@ def command(*arguments: str) -> int:
 
 def test_formats_and_exit_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rules = tmp_path / "mine.swrl"
-    rules.write_text('A: fg_status(?g, "NEVER") -> Role(?g)', encoding="utf-8")
+    rules.write_text('A: requiresO(?g, ?o) -> Role(?g)', encoding="utf-8")
     assert command("--rules", str(rules)) == 0
     assert f"WARN   {rules}: line 1, rule A, column 4: can never fire" in capsys.readouterr().out
     assert command("--rules", str(rules), "--fail-on", "warn", "--format", "json") == 1
@@ -342,7 +342,7 @@ one: typeFD(?fg, {high}) ^ hasQAvalue(?fg, ?q) ^ hasValue(?q, ?v) ^ lessThan(?v,
 """
     (error,) = errors(found(tmp_path, rules))  # QAWaterVisibility says that it is IN_ERROR_NFR
     assert "contradiction" in error.message
-    rules_in_it = r"by the rules QAWaterVisibility \(suave.owl, line \d+\), one \(mine.swrl, line 1\)"
+    rules_in_it = r"by the rules QAWaterVisibility \(suave.owl, line \d+\), one \(mine.swrl, line \d+\)"
     assert re.search(rules_in_it, error.message)
 
 
