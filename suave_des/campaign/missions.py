@@ -39,7 +39,9 @@ def plan(
     managers: int,
     runs: int,
     settled: Callable[[Group], Collection[int]] = lambda group: (),
-    is_over: Callable[[Group], bool] = lambda group: False,
+    is_over: Callable[[Group, int], bool] = lambda group, run: False,
+    *,
+    run_by_run: bool = False,
 ) -> Iterator[MissionKey]:
     """Yield the missions that are still to be run, in order.
 
@@ -48,15 +50,35 @@ def plan(
         managers: number of managers.
         runs: for each manager at each point.
         settled: returns the runs of a group that need not be run; called once for each group, when its turn comes.
-        is_over: returns whether a group needs no further runs; called before each.
+        is_over: returns whether a group needs neither a run nor later ones; called before each.
+        run_by_run: whether a run is planned under all managers before the next one, so that their difference is known.
     """
+    if run_by_run:
+        yield from _plan_run_by_run(points, managers, runs, settled, is_over)
+        return
     for group in ((point, manager) for point in range(points) for manager in range(managers)):
         known = settled(group)
         for run in range(1, runs + 1):
-            if is_over(group):
+            if is_over(group, run):
                 break
             if run not in known:
                 yield MissionKey(*group, run)
+
+
+def _plan_run_by_run(
+    points: int,
+    managers: int,
+    runs: int,
+    settled: Callable[[Group], Collection[int]],
+    is_over: Callable[[Group, int], bool],
+) -> Iterator[MissionKey]:
+    for point in range(points):
+        known = [settled((point, manager)) for manager in range(managers)]
+        for run in range(1, runs + 1):
+            left = [manager for manager in range(managers) if not is_over((point, manager), run)]
+            if not left:
+                break
+            yield from (MissionKey(point, manager, run) for manager in left if run not in known[manager])
 
 
 COLUMNS = tuple(field.name for field in fields(MissionMetrics))

@@ -9,7 +9,6 @@ import logging
 import platform
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -120,7 +119,7 @@ def deciding(spec: CampaignSpec, loaded: LoadedScenario, inputs: Mapping[str, st
         "runs": spec.runs,
         "time_out_s": spec.time_out_s,
         "record_knowledge": spec.record_knowledge,
-        "until_ci": None if spec.until_ci is None else asdict(parse_until_ci(spec.until_ci)),
+        "until_ci": None if spec.until_ci is None else parse_until_ci(spec.until_ci).plain(),
         "sweep": spec.sweep,
         "perturbations": spec.perturbations,
         "runs_per_draw": spec.runs_per_draw,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from itertools import islice
 from pathlib import Path
@@ -12,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 from suave_des.campaign.ensemble import ENSEMBLE_COLUMNS, ENSEMBLE_FILE, Difference, differences
 from suave_des.campaign.knowledge_records import CAMPAIGN_KNOWLEDGE_FILE, scenario_line
 from suave_des.campaign.missions import COLUMNS, Failure, Finished, Group, Row
-from suave_des.campaign.output import csv_pieces, csv_text, json_text, rounded, write_files
+from suave_des.campaign.output import csv_pieces, csv_text, json_text, make_output_folder, rounded, write_files
 from suave_des.campaign.parquet_format import PARQUET_FILE, parquet_bytes
-from suave_des.campaign.progress import FEWEST_RUNS, GroupProgress, parse_until_ci
+from suave_des.campaign.progress import FEWEST_PAIRS, FEWEST_RUNS, GroupProgress, PairProgress, UntilCi, parse_until_ci
 from suave_des.campaign.provenance import provenance
 from suave_des.campaign.spec import CampaignSpec
-from suave_des.campaign.suave_format import SUAVE_FILE, suave_pieces
+from suave_des.campaign.suave_format import SUAVE_FOLDER, suave_file, suave_pieces
 from suave_des.campaign.variation import Variation, cell_of
 from suave_des.estimates import estimate
 from suave_des.metrics.result import MissionMetrics
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     import pandas
 
 RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE = "runs.csv", "summary.csv", "manifest.json"
-FILES = (RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE, ENSEMBLE_FILE, SUAVE_FILE, PARQUET_FILE, CAMPAIGN_KNOWLEDGE_FILE)
+FILES = (RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE, ENSEMBLE_FILE, PARQUET_FILE, CAMPAIGN_KNOWLEDGE_FILE)
 
 METRICS = ("search_time_s", "distance_inspected_m")
 """Metrics that are summarised: those of the paper's table."""
@@ -54,6 +55,7 @@ class CampaignResult:
         planned: number of missions that were to be run; those of a manager that was stopped early up to there.
         done: number of missions that have a row.
         stops: where each manager ends, if managers were to be stopped early; otherwise empty.
+        pairs: how well a difference is known at each point, if managers were to be stopped by it; otherwise empty.
         failures: missions that have no row because they failed, in the order of the missions.
         summary: rows of summary.csv: for each manager, at each point that was reached.
         outcomes: reads the outcomes of all missions, in order.
@@ -71,6 +73,7 @@ class CampaignResult:
     summary: tuple[Row, ...]
     outcomes: Callable[[], Iterator[Finished]]
     remarks: tuple[str, ...] = ()
+    pairs: tuple[PairProgress, ...] = ()
 
     def __repr__(self) -> str:
         """Return the summary as a table, and where the files are."""
@@ -234,6 +237,7 @@ def gather(
     *,
     planned: int,
     stops: tuple[GroupProgress, ...],
+    pairs: tuple[PairProgress, ...] = (),
 ) -> CampaignResult:
     """Summarise the outcomes of a campaign's missions."""
     failures: list[Failure] = []
@@ -259,7 +263,9 @@ def gather(
             done += 1
             tally.add(outcome)
     summarise_before((reached + 1, 0))
-    return CampaignResult(spec, loaded, variation, planned, done, stops, tuple(failures), tuple(summary), outcomes)
+    return CampaignResult(
+        spec, loaded, variation, planned, done, stops, tuple(failures), tuple(summary), outcomes, pairs=pairs
+    )
 
 
 class _Tally:
@@ -326,13 +332,32 @@ def write_results(result: CampaignResult, inputs: Mapping[str, str], identity: s
         files[ENSEMBLE_FILE] = csv_text(
             (*ENSEMBLE_COLUMNS, *result.variation.sweep.parameters), map(result.difference_row, result.differences())
         )
-    if spec.suave_format:
-        files[SUAVE_FILE] = suave_pieces(scenario.revision.name, _numbered(result), scenario.mission.time_limit_s)
     if spec.parquet:
         files[PARQUET_FILE] = parquet_bytes(result.frame())
     if spec.record_knowledge:
         files[CAMPAIGN_KNOWLEDGE_FILE] = result.knowledge_lines()
     write_files(result.folder, files, stale=FILES)
+    _write_suave_files(result, result.folder / SUAVE_FOLDER)
+
+
+def _write_suave_files(result: CampaignResult, folder: Path) -> None:
+    """Write the exemplar's own files, one for each manager; those of an earlier campaign go."""
+    if not result.spec.suave_format and not folder.is_dir():
+        return
+    revision, limit_s = result.loaded.scenario.revision.name, result.loaded.scenario.mission.time_limit_s
+    stale = [path.name for path in folder.glob("*.csv")]
+    files: dict[str, str | bytes | Iterable[str]] = {}
+    if result.spec.suave_format:
+        make_output_folder(folder)
+        for number, manager in enumerate(result.managers):
+            name = suave_file(revision, manager)
+            if name in files:  # of another manager whose name differs in signs that names of files may not have
+                name = name.replace(".csv", f"_{number + 1}.csv")
+            files[name] = suave_pieces(revision, _numbered(result, number), limit_s)
+    write_files(folder, files, stale=stale)
+    if not files:
+        with suppress(OSError):  # something else is in it
+            folder.rmdir()
 
 
 def _exact(row: Row) -> Row:
@@ -361,7 +386,8 @@ def _until_ci(result: CampaignResult) -> dict[str, Any] | None:
     return {
         "metric": until.metric,
         "half_width": until.half_width,
-        "fewest_runs": FEWEST_RUNS,
+        "fewest_runs": FEWEST_RUNS if until.pair is None else FEWEST_PAIRS,
+        **_pairs(result, until),
         "managers": [
             {
                 "manager": stop.manager,
@@ -377,14 +403,31 @@ def _until_ci(result: CampaignResult) -> dict[str, Any] | None:
     }
 
 
+def _pairs(result: CampaignResult, until: UntilCi) -> dict[str, Any]:
+    """Return the difference at each point; nothing unless managers were to be stopped by one."""
+    if until.pair is None:
+        return {}
+    differences = [
+        {
+            **result.variation.sweep.values(pair.point),
+            "n": pair.n,
+            "difference": None if pair.difference is None else rounded(pair.difference),
+            "half_width": None if pair.half_width is None else rounded(pair.half_width),
+            "is_narrow": pair.is_narrow,
+        }
+        for pair in result.pairs
+    ]
+    return {"pair": list(until.pair), "differences": differences}
+
+
 def _why(stop: GroupProgress) -> str:
     if stop.is_narrow:
         return "the interval is narrow"
     return "all runs are done" if stop.is_complete else "interrupted"
 
 
-def _numbered(result: CampaignResult) -> Iterator[tuple[int, Row]]:
-    """Yield rows with the number of their mission in the campaign, from 1, whether or not those before have a row."""
+def _numbered(result: CampaignResult, manager: int) -> Iterator[tuple[int, Row]]:
+    """Yield a manager's rows with the number of their mission in the campaign, from 1, whether or not all have one."""
     for key, outcome in result.outcomes():
-        if not isinstance(outcome, Failure):
+        if key.manager == manager and not isinstance(outcome, Failure):
             yield (key.point * len(result.managers) + key.manager) * result.runs + key.run, outcome

@@ -28,6 +28,7 @@ from suave_des.campaign.store import (
     remove_store,
     stored_outcomes,
 )
+from suave_des.campaign.suave_format import SUAVE_FOLDER
 from suave_des.campaign.variation import Variation, vary
 from suave_des.errors import InputError, SuaveDesError, did_you_mean
 from suave_des.scenario.layers import Files
@@ -151,7 +152,7 @@ def _check_new(folder: Path, *, overwrite: bool) -> None:
 
 def _is_of_campaign(name: str) -> bool:
     """Whether a file is a campaign's own; without a store it is what is left of one that was killed as it began."""
-    return name in (LOCK_FILE, *FILES) or name.startswith((STORE_FILE, NEW_STORE_FILE))
+    return name in (LOCK_FILE, SUAVE_FOLDER, *FILES) or name.startswith((STORE_FILE, NEW_STORE_FILE))
 
 
 def _stored_spec(folder: Path, runs: int | None, until_ci: str | None) -> CampaignSpec:
@@ -328,7 +329,9 @@ class _Campaign:
         try:
             tracker.add_earlier(store.outcomes())
             points = self.variation.sweep.points
-            missions = plan(points, len(spec.managers), spec.runs, store.settled, tracker.is_over)
+            missions = plan(
+                points, len(spec.managers), spec.runs, store.settled, tracker.is_over, run_by_run=tracker.needs_pairs
+            )
             if left := tracker.total - tracker.done:
                 for among in executor.outcomes(self.job, missions, left):
                     finished = [(key, each) for key, each in among if not isinstance(each, Remark)]
@@ -363,6 +366,7 @@ class _Campaign:
             lambda: tracker.counted(outcomes()),
             planned=tracker.total,
             stops=tracker.stops(),
+            pairs=tracker.pairs(),
         )
         seen = trained_on(self.loaded, self.spec.managers, self.spec.seed, self.spec.runs)
         result = replace(result, remarks=(*map(str, self.remarks), *seen))

@@ -70,7 +70,8 @@ class CampaignSpec:
         seed: of everything that is random.
         time_out_s: wall-clock time that a mission may take.
         until_ci: METRIC:HALF_WIDTH: a manager is stopped, at each point separately, when half the 95% interval of the
-            metric's mean is less; None: never.
+            metric's mean is less. MANAGER - MANAGER: METRIC: HALF_WIDTH: all are stopped after the same run, when half
+            the 95% interval of the difference of these two, run by run, is less. None: never.
         sweep: lists of values by key path of the scenario, each combined with each; or a mapping with `grid` (the
             same), `zip` (lists of which the first values go together, then the second) and `sample` (a sampled design:
             `method` latin_hypercube or sobol, `points`, and `ranges` by key path), which are combined with each other.
@@ -198,7 +199,7 @@ class CampaignSpec:
             remedy = f"give seconds above 0, at most {_LONGEST_TIME_OUT_S:g}"
             raise InputError(f"time-out: {self.time_out_s:g} is out of range", remedy=remedy)
         if self.until_ci is not None:
-            parse_until_ci(self.until_ci)
+            parse_until_ci(self.until_ci).check(self.managers)
 
 
 def check_range(what: str, number: int, least: int, greatest: int) -> None:

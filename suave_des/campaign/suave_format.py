@@ -1,12 +1,15 @@
-"""The exemplar's own results file (kas-lab/suave, revisions 2023 and 1.5), so that its users' scripts read ours.
+"""The exemplar's own results files (kas-lab/suave, revisions 2023 and 1.5), so that its users' scripts read ours.
 
-All managers are in one file, as the mission's name carries the manager's. The exemplar stamps each row with the time of
-day. Ours must be the same each time, so mission number n of the campaign bears the time n seconds after midnight of
-1 January 2000. Seconds and metres are as in runs.csv, but for the search time when the pipeline was not found.
+There is a file for each manager, named as the missions in it, in a folder that has nothing else in it: scripts that
+take all files of a folder, or compare one file with the others, find what they expect. The exemplar stamps each row
+with the time of day. Ours must be the same each time, so mission number n of the campaign bears the time n seconds
+after midnight of 1 January 2000. Seconds and metres are as in runs.csv, but for durations, which are whole seconds, and
+for the search time when the pipeline was not found.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from datetime import datetime, timedelta
 from typing import Any
@@ -14,7 +17,7 @@ from typing import Any
 from suave_des.campaign.missions import COLUMNS, Row
 from suave_des.campaign.output import csv_pieces
 
-SUAVE_FILE = "suave_results.csv"
+SUAVE_FOLDER = "suave"
 
 _FIRST_STAMP = datetime(2000, 1, 1)
 # strftime's %b depends on the user's language; the exemplar's files are in English.
@@ -56,17 +59,28 @@ _LAYOUT_1_5: _Layout = {
     "mission name": lambda mission: f"suave {mission['manager']}",
     "datetime": lambda mission: _day_first(mission["stamp"]),
     "initial pos (x,y)": _position,
-    "mission duration (s)": lambda mission: mission["mission_duration_s"],
+    "mission duration (s)": lambda mission: int(mission["mission_duration_s"]),
     "pipeline found": lambda mission: mission["pipeline_found"],
     # The program writes the mission's duration when the pipeline was not found.
     "time searching pipeline (s)": lambda mission: (
-        _whole(mission["search_time_s"]) if mission["pipeline_found"] else mission["mission_duration_s"]
+        _whole(mission["search_time_s"]) if mission["pipeline_found"] else int(mission["mission_duration_s"])
     ),
     "distance inspected (m)": lambda mission: mission["distance_inspected_m"],
     # The exemplar writes 0.0 when no reaction was completed.
     "mean reaction time (s)": lambda mission: mission["mean_reaction_time_s"] or 0.0,
 }
 _LAYOUTS = {"2023": _LAYOUT_2023}
+_NAMES = {"2023": "time_constrained"}
+_OUTSIDE_NAME = re.compile(r"[^A-Za-z0-9_.-]+")
+
+
+def suave_file(revision: str, manager: str) -> str:
+    """Return the name of a manager's file: the mission's name and the manager's, as in its first column.
+
+    Example:
+        suave_file("1.5", "metacontrol")  # "suave_metacontrol.csv"
+    """
+    return f"{_NAMES.get(revision, 'suave')}_{_OUTSIDE_NAME.sub('_', manager)}.csv"
 
 
 def suave_pieces(revision: str, rows: Iterable[tuple[int, Row]], time_limit_s: float) -> Iterator[str]:

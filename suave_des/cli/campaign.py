@@ -100,14 +100,16 @@ def campaign(
             "--until-ci",
             metavar="METRIC:HALF_WIDTH",
             help="Stop a manager when half the 95% interval of the metric's mean is less, after 20 runs at least, and"
-            " after --runs (then 10000 if left out) at most; for instance search_time_s:5.",
+            " after --runs (then 10000 if left out) at most; for instance search_time_s:5. Stop all when the difference"
+            " of two is known, after 100 runs at least: 'metacontrol - bt: search_time_s: 2'.",
         ),
     ] = None,
     time_out: TimeOut = None,
     also: Annotated[
         list[Format] | None,
         typer.Option(
-            "--format", help="Write the exemplar's own suave_results.csv, or runs.parquet, besides; repeat it for both."
+            "--format",
+            help="Write the exemplar's own files into DIR/suave, or runs.parquet, besides; repeat it for both.",
         ),
     ] = None,
     record_knowledge: Annotated[

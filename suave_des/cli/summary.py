@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from suave_des.campaign.display import estimated
-from suave_des.campaign.progress import GroupProgress, parse_until_ci
+from suave_des.campaign.progress import GroupProgress, UntilCi, parse_until_ci
 from suave_des.campaign.results import METRIC_TITLES, METRICS, SUMMARY_COLUMNS
 from suave_des.campaign.variation import cell_of
 from suave_des.cli.console import number, plain_table, print_table
@@ -78,6 +78,9 @@ def print_stops(console: Console, result: CampaignResult) -> None:
     if result.spec.until_ci is None:
         return
     until = parse_until_ci(result.spec.until_ci)
+    if until.pair is not None:
+        _print_pairs(console, result, until)
+        return
     narrow = [stop for stop in result.stops if stop.is_narrow]
     if narrow:
         listed = ", ".join(f"{_group(result, stop)} after run {stop.runs}" for stop in narrow[:_STOPS_LISTED])
@@ -94,6 +97,23 @@ def print_stops(console: Console, result: CampaignResult) -> None:
     if len(wide) > _STOPS_LISTED:
         console.print(f"not reached: {len(wide) - _STOPS_LISTED} more, all in {result.folder}/manifest.json")
     if wide:
+        console.print(f"more runs: suave-des campaign --resume {result.folder} --runs N", soft_wrap=True)
+
+
+def _print_pairs(console: Console, result: CampaignResult, until: UntilCi) -> None:
+    """Print how well the difference of two managers is known, at each point."""
+    name = " - ".join(until.pair or ())
+    for pair in result.pairs[:_STOPS_LISTED]:
+        values = result.variation.sweep.values(pair.point)
+        where = "".join(f" {key}={cell_of(value)}" for key, value in values.items())
+        known = "no run in both" if pair.difference is None else estimated(pair.difference, pair.half_width)
+        verdict = (
+            f"less than {until.half_width:g}" if pair.is_narrow else f"not reached: not less than {until.half_width:g}"
+        )
+        console.print(f"{name}{where}: {until.metric} {known} ({pair.n} runs in pairs; ± {verdict})", soft_wrap=True)
+    if len(result.pairs) > _STOPS_LISTED:
+        console.print(f"{len(result.pairs) - _STOPS_LISTED} more are in {result.folder}/manifest.json")
+    if not all(pair.is_narrow for pair in result.pairs):
         console.print(f"more runs: suave-des campaign --resume {result.folder} --runs N", soft_wrap=True)
 
 

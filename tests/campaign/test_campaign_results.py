@@ -6,9 +6,11 @@ import csv
 import json
 from pathlib import Path
 
+import pandas
 import pytest
 
 from suave_des.campaign.campaign import run_campaign
+from suave_des.report.result_files import read_missions
 
 FIRST_COLUMNS = [
     *("scenario", "manager", "run", "seed", "initial_x_m", "initial_y_m", "mission_duration_s", "pipeline_found"),
@@ -152,7 +154,10 @@ class TestSuaveFormat:
         scenario = tmp_path / "short.yaml"
         scenario.write_text("base: seams2023.yaml\nmission: {time_limit_s: 150}\n")
         run_campaign(scenario, ["none", "random"], 4, 1, out=tmp_path / "out", suave_format=True)
-        theirs = rows_of(tmp_path / "out" / "suave_results.csv")
+        folder = tmp_path / "out" / "suave"
+        names = ["time_constrained_none.csv", "time_constrained_random.csv"]
+        assert sorted(path.name for path in folder.iterdir()) == names
+        theirs = [row for name in names for row in rows_of(folder / name)]
         ours = rows_of(tmp_path / "out" / "runs.csv")
         assert list(theirs[0]) == [
             *("mission_name", "datetime", "initial pos (x,y)", "time budget (s)", "time search (s)"),
@@ -172,9 +177,25 @@ class TestSuaveFormat:
         assert stamps[0] == "Jan-01-2000-00-00-01"
         assert len(set(stamps)) == 8
 
+    def test_a_later_campaign_without_it_leaves_none_of_an_earlier_one(self, tmp_path: Path) -> None:
+        run_campaign("release15", ["none"], 1, 1, out=tmp_path / "out", suave_format=True)
+        run_campaign("release15", ["bt"], 1, 1, out=tmp_path / "out", suave_format=True, overwrite=True)
+        assert [path.name for path in (tmp_path / "out" / "suave").iterdir()] == ["suave_bt.csv"]
+        run_campaign("release15", ["bt"], 1, 1, out=tmp_path / "out", overwrite=True)
+        assert not (tmp_path / "out" / "suave").exists()
+
+    def test_its_files_are_compared_as_the_campaign_is_but_not_paired(self, tmp_path: Path) -> None:
+        run_campaign("release15", ["none", "bt"], 4, 1, out=tmp_path / "out", suave_format=True)
+        missions = read_missions([tmp_path / "out" / "suave"]).frame
+        ours = pandas.read_csv(tmp_path / "out" / "runs.csv", keep_default_na=False)
+        assert list(missions["distance_inspected_m"]) == list(
+            ours.sort_values(["manager", "run"], key=lambda column: column != "none")["distance_inspected_m"]
+        )
+        assert set(missions["manager"]) == {"none", "bt"}
+
     def test_revision_1_5(self, tmp_path: Path) -> None:
         run_campaign("release15", ["none"], 2, 1, out=tmp_path / "out", suave_format=True)
-        theirs = rows_of(tmp_path / "out" / "suave_results.csv")
+        theirs = rows_of(tmp_path / "out" / "suave" / "suave_none.csv")
         assert list(theirs[0]) == [
             *("mission name", "datetime", "initial pos (x,y)", "mission duration (s)", "pipeline found"),
             *("time searching pipeline (s)", "distance inspected (m)", "mean reaction time (s)"),
@@ -188,8 +209,10 @@ class TestSuaveFormat:
         scenario = tmp_path / "short.yaml"
         scenario.write_text("base: release15.yaml\nmission: {time_limit_s: 20}\n")
         run_campaign(scenario, ["none"], 2, 1, out=tmp_path / "out", suave_format=True)
-        theirs = rows_of(tmp_path / "out" / "suave_results.csv")
+        theirs = rows_of(tmp_path / "out" / "suave" / "suave_none.csv")
         ours = rows_of(tmp_path / "out" / "runs.csv")
         assert [(row["pipeline_found"], row["search_time_s"]) for row in ours] == [("False", "20.0")] * 2
-        assert [row["time searching pipeline (s)"] for row in theirs] == [row["mission_duration_s"] for row in ours]
+        whole = [str(int(float(row["mission_duration_s"]))) for row in ours]
+        assert [row["mission duration (s)"] for row in theirs] == whole
+        assert [row["time searching pipeline (s)"] for row in theirs] == whole
         assert all(float(row["mission_duration_s"]) > 20 for row in ours)

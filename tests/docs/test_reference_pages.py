@@ -57,7 +57,7 @@ def test_columns_are_those_of_the_file(page, heading, names):
 
 @pytest.mark.parametrize(("revision", "place"), [("2023", 0), ("1.5", 1)])
 def test_columns_of_the_exemplar_s_file_are_those_of_its_revision(revision, place):
-    cells = [row[place].strip("`") for row in tables(section(CSV_PAGE, "suave_results.csv"))[0]]
+    cells = [row[place].strip("`") for row in tables(section(CSV_PAGE, "suave/"))[0]]
     header = next(suave_pieces(revision, [], 300.0)).strip().replace('"', "").replace("(x,y)", "(x;y)")
     assert [cell for cell in cells if cell] == [name.replace("(x;y)", "(x,y)") for name in header.split(",")]
 
