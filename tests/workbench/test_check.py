@@ -269,7 +269,7 @@ def command(*arguments: str) -> int:
 
 def test_formats_and_exit_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rules = tmp_path / "mine.swrl"
-    rules.write_text('A: requiresO(?g, ?o) -> Role(?g)', encoding="utf-8")
+    rules.write_text("A: requiresO(?g, ?o) -> Role(?g)", encoding="utf-8")
     assert command("--rules", str(rules)) == 0
     assert f"WARN   {rules}: line 1, rule A, column 4: can never fire" in capsys.readouterr().out
     assert command("--rules", str(rules), "--fail-on", "warn", "--format", "json") == 1
