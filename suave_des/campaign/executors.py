@@ -91,7 +91,7 @@ class LocalWorkers:
         """Start the workers."""
         try:
             for _ in range(self._size):
-                self._workers.append(self._new_worker())
+                self._start_worker(len(self._workers))
         except BaseException:
             self.__exit__()
             raise
@@ -132,10 +132,12 @@ class LocalWorkers:
             yield future.result()
         self._is_done = True
 
-    def _new_worker(self) -> _Worker:
+    def _start_worker(self, place: int) -> _Worker:
+        """Start a worker and note it at its place, before an interruption can come in between."""
         try:
             with _interrupts_held():
-                return _Worker(needs_script=self._needs_script)
+                self._workers[place : place + 1] = [worker := _Worker(needs_script=self._needs_script)]
+            return worker
         except OSError as error:  # the system's limit of processes, files or memory
             problem = f"a worker process cannot be started: {error.strerror}"
             raise WorkerError(f"{problem} (raise the limit, see ulimit -a, or give --workers 1)") from None
@@ -185,7 +187,7 @@ class LocalWorkers:
             cause = f"its worker process ended with status {status}, {attempts} times (killed, or out of memory?)"
             yield [self._job.failed(suspect.chunk[0], cause)]
         self._again.extend(others)
-        self._workers[self._workers.index(worker)] = fresh = self._new_worker()
+        fresh = self._start_worker(self._workers.index(worker))
         fresh.prepare(self._job, self._definitions)
         self._hand_out()
 
