@@ -44,17 +44,19 @@ def test_the_vehicle_sets_off_for_the_station_when_the_battery_is_below_a_quarte
 @RECHARGES
 def test_nothing_else_moves_the_vehicle_on_the_way(manager: str) -> None:
     result = flown(manager)
-    way = [point for point, on_way in zip(result.trajectory, is_on_the_way(result), strict=True) if on_way]
+    on_way = is_on_the_way(result)
+    began = on_way.index(True)
+    way = result.trajectory[began : began + on_way[began:].index(False)]  # the first time
     gaps_m = [max(abs(point.x_m + 3.0), abs(point.y_m + 2.0)) for point in way[20:]]
-    assert gaps_m[0] > 5.0 > 0.6 > gaps_m[-1]
-    assert all(later <= earlier + 0.02 for earlier, later in pairwise(gaps_m))
+    assert gaps_m[0] > 5.0 > 0.8 > gaps_m[-1]
+    assert all(later < earlier for earlier, later in pairwise(gaps_m[25::25]) if earlier > 2.0)
 
 
 @RECHARGES
 def test_the_battery_is_full_again_at_the_station(manager: str) -> None:
     levels = [point.further["battery_level"] for point in flown(manager).trajectory]
     rises = [later for earlier, later in pairwise(levels) if None not in (earlier, later) and later > earlier]
-    assert rises == [1.0]
+    assert set(rises) == {1.0}
 
 
 @RECHARGES
@@ -71,7 +73,7 @@ def test_the_search_goes_on_around_the_same_centre(manager: str) -> None:
 
 @RECHARGES
 def test_following_goes_on_at_the_point_where_it_was_left_and_the_distance_is_kept(manager: str) -> None:
-    result = flown(manager, mission__time_limit_s=900.0, battery__discharge_time_s=400.0)
+    result = flown(manager, mission__time_limit_s=900.0, battery__discharge_time_s=240.0)
     assert result.metrics.distance_inspected_m > 20.0
     followed = [p for p in result.trajectory if p.mode == "fd_follow_pipeline"]
     first_leg = [p for p in followed if p.t_s < times_s(result, "battery_crossing", "falls below")[0]]
