@@ -34,7 +34,7 @@ from suave_des.report.words import key_words
 @pytest.fixture(scope="module")
 def mission(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("mission") / "out"
-    run_mission("seams2023", "random", 1, 1, folder)
+    run_mission("seams2023", "random", 2, 1, folder)
     return folder
 
 
@@ -66,7 +66,7 @@ def test_the_map_shows_every_mode_and_what_happened(mission: Path) -> None:
     }
     for mode, text in words.items():
         assert (text in told) == (mode in trajectory)
-    assert any(text.startswith("thruster 1 failed, 35") for text in told)
+    assert any(text.startswith("thruster 1 failed, 36 s") for text in told)
     assert any(text.startswith("pipeline detected, ") for text in told)
 
 

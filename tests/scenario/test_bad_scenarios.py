@@ -62,7 +62,7 @@ def refused(write, content: str, **options: object) -> InputError:
         (HEAD + "mission: {signals: {}}\n", "line 2, mission.signals", "unknown key", "belongs at the top level"),
         (HEAD + "start: {time_limit_s: 3}\n", "line 2, start.time_limit_s", "unknown key", "belongs under mission"),
         (HEAD + "acceptance_m: 3\n", "line 2, ", "unknown", "under revision.spiral or under revision.follow"),
-        (HEAD + "period_s: 3\n", "line 2, period_s", "unknown key", "belongs under signals.NAME"),
+        (HEAD + "period_s: 3\n", "line 2, period_s", "unknown key", "under signals.NAME"),
         (HEAD + "thruster: 3\n", "line 2, thruster", "unknown key", "belongs under thruster_events[]"),
         (HEAD + "poll_period_s: 3\n", "line 2, ", "unknown", "under revision.coordinator or under revision.follow"),
         (HEAD + "minimum: 3\n", "line 2, minimum", "unknown key 'minimum'", "belongs under signals.NAME"),
@@ -72,8 +72,8 @@ def refused(write, content: str, **options: object) -> InputError:
         (HEAD + "knowledge: {values: {qa: .NaN}}\n", "line 2, knowledge.values.qa", ".nan is not finite", "finite"),
         (HEAD + "pipeline: {points_per_piece: .inf}\n", "line 2, ", "expected a whole number, got .inf", "such as 3"),
         (VISIBILITY + "{noise: {distribution: normal, mean: 0, std: .nan}}\n", "line 3, ", ".nan is not", "finite"),
-        (VISIBILITY + "{period_s: -80}\n", "line 3, signals.water_visibility.period_s", "-80", "greater than 0"),
-        (VISIBILITY + "{period_s: 0}\n", "line 3, signals.water_visibility.period_s", "0 is out of", "greater than 0"),
+        (VISIBILITY + "{period_s: -80}\n", "line 3, signals.water_visibility.period_s", "-80", "at least 0.001"),
+        (VISIBILITY + "{period_s: 0}\n", "line 3, signals.water_visibility.period_s", "0 is out of", "at least 0.001"),
         (VISIBILITY + "{period_s: '80'}\n", "line 3, ", "expected a number, got '80'", "without quotes"),
         (VISIBILITY + "{period_s: true}\n", "line 3, ", "expected a number, got true", "such as"),
         (VISIBILITY + "{period_s: }\n", "line 3, ", "expected a number, got nothing", "such as"),
@@ -397,7 +397,7 @@ def test_a_generous_value_is_taken(write, content):
 
 def test_the_whole_message_is_one_readable_line(write):
     assert str(refused(write, VISIBILITY + "{period_s: -80}\n")) == (
-        "mine.yaml: line 3, signals.water_visibility.period_s: -80 is out of range (must be greater than 0 s)"
+        "mine.yaml: line 3, signals.water_visibility.period_s: -80 is out of range (must be at least 0.001 s)"
     )
 
 

