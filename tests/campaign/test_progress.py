@@ -47,8 +47,8 @@ class TestProgressTracker:
         tracker = ProgressTracker(1, ["none", "random"], 100, UntilCi("search_time_s", 5.0))
         tracker.add(outcome(0, 0, run, 100.0 + run % 2) for run in range(1, 31))
         progress = tracker.progress()
-        assert tracker.is_over((0, 0))
-        assert not tracker.is_over((0, 1))
+        assert tracker.is_over((0, 0), 31)
+        assert not tracker.is_over((0, 1), 1)
         assert (progress.done, progress.total) == (20, 120)
         assert [key.run for key, _ in tracker.counted(outcome(0, 0, run, 1.0) for run in range(18, 24))] == [18, 19, 20]
 

@@ -136,7 +136,7 @@ class TestOverwrite:
     ) -> None:
         found = []
 
-        def killed(*_: object) -> None:
+        def killed(*_: object, **__: object) -> None:
             found.extend(path.name for path in received.iterdir())
             raise InputError("killed here")
 

@@ -148,7 +148,7 @@ class TestInterruptedAtAnAwkwardMoment:
             run_campaign(scenario, ["none"], 2, 1, out=tmp_path / "out")
         assert not (tmp_path / "out").exists()
 
-    def test_before_an_earlier_campaign_is_replaced_it_stays(
+    def test_before_an_earlier_campaign_is_replaced_its_missions_stay(
         self, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         out = tmp_path / "out"
@@ -157,7 +157,11 @@ class TestInterruptedAtAnAwkwardMoment:
         monkeypatch.setattr("suave_des.campaign.store.remove_store", ctrl_c)
         with pytest.raises(KeyboardInterrupt):
             run_campaign(scenario, ["none"], 3, 1, out=out, overwrite=True)
-        assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+        monkeypatch.undo()
+        resume_campaign(out)  # the results went first, so that none stand beside another campaign's missions
+        assert {path.name: path.read_bytes() for path in out.iterdir() if path.suffix == ".csv"} == {
+            name: content for name, content in before.items() if name.endswith(".csv")
+        }
         assert not (out / NEW_STORE_FILE).exists()
 
     def test_while_files_are_written_it_says_how_to_have_them(
