@@ -184,7 +184,7 @@ def test_an_output_folder_that_may_not_be_written(
         (("campaign", "--resume", "file"), "there is no campaign to resume"),
         (("scenarios", "extra"), "extra"),
         (("schema", "extra"), "extra"),
-        (("figure", "file", "--out", "m.png"), "file: has neither"),
+        (("figure", "file", "--out", "m.png"), "file: line 1: has no column 'manager'"),
     ],
 )
 def test_in_place_of_a_number_or_a_name(

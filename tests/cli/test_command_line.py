@@ -231,7 +231,8 @@ class TestRun:
         mission = json.loads((out / "mission.json").read_text())
         assert mission["metrics"]["manager"] == "random"
         assert mission["metrics"]["seed"] == 7
-        assert mission["drawn"]["start.y_m"] == pytest.approx(mission["metrics"]["initial_y_m"], abs=1e-6)
+        recorded_y_m = mission["drawn"]["start.y_m"] + mission["drawn"]["calibration.drift_y_m"]
+        assert recorded_y_m == pytest.approx(mission["metrics"]["initial_y_m"], abs=1e-6)
         assert mission["scenario"]["mission"]["time_limit_s"] == 300.0
         assert mission["command"][:3] == ["suave-des", "run", "seams2023"]
 
@@ -304,7 +305,7 @@ class TestBadInput:
             (["campaign", "seams2023", "--managers", "none", "--out", "no/where"], "no/where: there is no folder no"),
             (["campaign", "seams2023", "--managers", "none", "--out", "/proc/x"], "cannot be written"),
             (["reproduce", "--runs", "0", *OUT], "runs: 0"),
-            (["figure", "nothing", "--out", "map.png"], "nothing: has neither trajectory.csv nor runs.csv"),
+            (["figure", "nothing", "--out", "map.png"], "nothing: no such file"),
             (["figure", ".", "--out", "map.xyz"], "map.xyz: expected a picture, got .xyz"),
             (["campain"], "Did you mean 'campaign'?"),
             (["run", "seams2023", "--mangager", "none"], "--mangager"),
