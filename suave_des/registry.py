@@ -11,6 +11,7 @@ from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
+from weakref import WeakSet
 
 from suave_des.errors import InputError, did_you_mean
 from suave_des.managing.base import ManagingSubsystem
@@ -36,7 +37,7 @@ _FAMILIES = {
     "exec": ("suave_des.interfaces.exec:exec_manager", "exec:COMMAND"),
 }
 """Managers that are named with an argument after a colon: what makes the class of one, and how it is written."""
-_checked: set[type] = set()
+_checked: WeakSet[type] = WeakSet()  # a class that is kept would keep its module open at the end of a worker
 _HOOKS = {
     "__init__": "(self, system)",
     "mission_started": "(self)",
