@@ -9,7 +9,7 @@ import pytest
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.planning import plan
+from suave_des.knowledge.planning import calls, plan
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.knowledge.state import Decision, KnowledgeState, ObjectiveState
 from tests.helpers.knowledge_states import FOLLOW, MOTION, SEARCH, searching
@@ -82,9 +82,9 @@ def test_an_objective_is_adapted_on_request_or_when_always_to_be_improved(kb: On
 
 @pytest.mark.parametrize(
     "status",
-    ["UNGROUNDED", "IN_ERROR_FR", "IN_ERROR_COMPONENT", "IN_ERROR_OF_MINE", "INTERNAL_ERROR", "EXTERNAL_ERROR"],
+    ["UNGROUNDED", "IN_ERROR_FR", "IN_ERROR_COMPONENT", "IN_ERROR_NFR"],
 )
-def test_statuses_of_either_family_call_for_adaptation(kb: Ontology, pellet: Reasoner, status: str) -> None:
+def test_statuses_of_errors_call_for_adaptation(kb: Ontology, pellet: Reasoner, status: str) -> None:
     assert SEARCH in decide(kb, pellet, searching(None, 3.5, status=status))
 
 
@@ -92,8 +92,9 @@ def test_the_older_updatable_status_calls_for_adaptation(kb: Ontology, pellet: R
     assert SEARCH in decide(kb, pellet, searching("fd_spiral_low", 3.5, status="UPDATABLE"))
 
 
-def test_other_statuses_do_not(kb: Ontology, pellet: Reasoner) -> None:
-    assert decide(kb, pellet, searching(None, 3.5, status="OK")) == {}
+def test_statuses_that_other_ontologies_list_call_for_adaptation_too() -> None:
+    assert all(map(calls, ("IN_ERROR_OF_MINE", "INTERNAL_ERROR", "EXTERNAL_ERROR")))
+    assert not calls("OK")
 
 
 def test_a_failed_thruster_is_recovered_and_then_all_thrusters_used_again(kb: Ontology, pellet: Reasoner) -> None:

@@ -177,7 +177,9 @@ def test_a_disabled_rule_does_not_fire(suave_copy: MakeOntology, name: str) -> N
 
 
 def _clash(suave_copy: MakeOntology) -> Path:
-    return suave_copy(rule("alarm", 'FunctionGrounding(?g) ^ typeFD(?g, :fd_spiral_high) -> fg_status(?g, "ALARM")'))
+    return suave_copy(
+        rule("alarm", 'FunctionGrounding(?g) ^ typeFD(?g, :fd_spiral_high) -> fg_status(?g, "IN_ERROR_FR")')
+    )
 
 
 @pytest.mark.parametrize("name", ["pellet", "owlready2"])
@@ -190,7 +192,7 @@ def test_clashing_rules_are_named_with_what_they_clash_on(suave_copy: MakeOntolo
         assert part in message
     assert "\n" not in message
     if name == "pellet":  # and the next state is reasoned on as if nothing had happened
-        assert reasoner.infer(searching("fd_spiral_high", 4.0)).grounding_status(SEARCH) == "ALARM"
+        assert reasoner.infer(searching("fd_spiral_high", 4.0)).grounding_status(SEARCH) == "IN_ERROR_FR"
 
 
 def test_every_kind_of_conclusion_of_an_own_rule_is_read(suave_copy: MakeOntology) -> None:

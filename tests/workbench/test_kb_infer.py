@@ -170,7 +170,7 @@ from suave_des.knowledge import limit, stock
 limit.TimeLimit.__init__.__defaults__ = (1.0, None)
 if {reasoner == "owlready2"}:  # its own limit, without the check by the Pellet in this process
     from suave_des.knowledge import pellet
-    pellet.InProcessPellet.__init__ = lambda self, kb: None
+    pellet.InProcessPellet.__init__ = lambda self, *_: None
 from suave_des.cli.main import main
 main(["run", "seams2023", "--reasoner", {reasoner!r}, "--rules", {str(rules)!r}])
 """
