@@ -31,6 +31,7 @@ FAMILIES: Mapping[str, tuple[str, ...]] = {
         "runs.csv",
         "summary.csv",
         "manifest.json",
+        "ensemble.csv",
         "suave_results.csv",
         "runs.parquet",
         *DERIVED,

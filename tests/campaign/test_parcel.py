@@ -27,6 +27,16 @@ def job(*managers: str, time_out_s: float = 60.0) -> JobSpec:
     return JobSpec(load_scenario("seams2023"), Variation(), managers, 1, time_out_s)
 
 
+@pytest.fixture(autouse=True)
+def modules_as_before() -> Iterator[None]:
+    """Unpacking in this process replaces modules by those unpacked, whose folder then goes."""
+    before = dict(sys.modules)
+    yield
+    for name, module in before.items():
+        if name.partition(".")[0] == "tests":
+            sys.modules[name] = module
+
+
 class TestOwnModules:
     @pytest.fixture
     def folder(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
