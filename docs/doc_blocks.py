@@ -266,7 +266,7 @@ def _run(command: str, status_before: int, workers: str) -> tuple[str, int]:
         return _shell(f"(exit {status_before}); {command}", "")
     own, _, rest = command.partition(" | ")
     words = shlex.split(own)
-    if words[1] in ("campaign", "reproduce") and "--workers" not in words:
+    if words[1] in ("campaign", "reproduce") and not {"--workers", "--scheduler"} & {*words}:
         words += ["--workers", workers]  # the same bytes with any number
     if words[1] in ("campaign", "reproduce", "validate"):
         words.append("--quiet")  # pages show what is printed where that takes less than ten seconds

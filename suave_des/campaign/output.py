@@ -32,6 +32,7 @@ FAMILIES: Mapping[str, tuple[str, ...]] = {
         "summary.csv",
         "manifest.json",
         "ensemble.csv",
+        "validation_conditions.csv",
         "suave_results.csv",
         "runs.parquet",
         *DERIVED,
