@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -86,16 +87,35 @@ def scenarios() -> None:
     console.print(f"They are in {folder.parent}: copy what you want to change.", soft_wrap=True)
 
 
-def schema() -> None:
-    """Print the JSON Schema of scenario files.
+class SchemaOf(StrEnum):
+    """What a JSON Schema is printed of."""
 
-    Editors and other tools use it to complete and check scenarios.
+    SCENARIO = "scenario"
+    EXEC = "exec"
+
+
+def schema(
+    what: Annotated[
+        SchemaOf,
+        typer.Argument(metavar="WHAT", help="scenario: scenario files; exec: messages of managers exec:COMMAND."),
+    ] = SchemaOf.SCENARIO,
+) -> None:
+    """Print the JSON Schema of scenario files, or of messages.
+
+    Editors and other tools use it to complete and check scenarios, and the messages that programs of one's own exchange
+    with missions.
     """
     import json
 
-    from suave_des.scenario.schema import scenario_schema
+    if what is SchemaOf.EXEC:
+        from suave_des.interfaces.exec import messages_schema
 
-    print(json.dumps(scenario_schema(), indent=2))
+        found = messages_schema()
+    else:
+        from suave_des.scenario.schema import scenario_schema
+
+        found = scenario_schema()
+    print(json.dumps(found, indent=2))
 
 
 def import_config(

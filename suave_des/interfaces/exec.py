@@ -1,7 +1,8 @@
 """Managers in other processes and languages: `exec:COMMAND` speaks JSON lines with a program over its stdin and stdout.
 
 Each message is a line, and gets a line as its answer; mission time stands still until then. The program is started once
-in each process that runs missions, and serves one mission after the other. The messages: docs/guides/exec.md.
+in each process that runs missions, and serves one mission after the other. The messages: docs/guides/other-programs.md
+and, as a JSON Schema, exec_messages.schema.json.
 """
 
 from __future__ import annotations
@@ -41,6 +42,15 @@ KINDS: Final = {
 _NAMES: Final = {kind: name for name, kind in KINDS.items()}
 _ANSWER: Final = ("modes", "log")
 _FIRST_ANSWER: Final = ("protocol", "period_s", "starts_s", "subscribes_to", "depends_on", *_ANSWER)
+
+
+def messages_schema() -> dict[str, Any]:
+    """Read the JSON Schema (draft 2020-12) of the messages and their answers.
+
+    Its definitions `message`, `first_answer` (to mission_started) and `answer` are those of single lines.
+    """
+    schema: dict[str, Any] = json.loads(Path(__file__).with_name("exec_messages.schema.json").read_text("utf-8"))
+    return schema
 
 
 class ProgramError(Exception):
@@ -180,7 +190,7 @@ class ExecManager(ManagingSubsystem):
 
     def mission_ended(self, metrics: MissionMetrics) -> None:
         """Tell the program the metrics."""
-        self._ask("mission_ended", metrics={key: value for key, value in asdict(metrics).items() if key != "further"})
+        self._ask("mission_ended", metrics=asdict(metrics))
 
     def task_requested(self, task: Task) -> None:
         """Tell the program of a task that begins."""

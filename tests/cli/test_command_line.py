@@ -399,4 +399,8 @@ def test_scenarios_lists_what_is_shipped(command) -> None:
 def test_schema_is_the_json_schema_of_scenarios(command) -> None:
     from suave_des.scenario.schema import scenario_schema
 
-    assert json.loads(command("schema").out) == scenario_schema()
+    assert json.loads(command("schema").out) == scenario_schema() == json.loads(command("schema", "scenario").out)
+
+
+def test_schema_exec_is_the_json_schema_of_messages(command) -> None:
+    assert json.loads(command("schema", "exec").out)["$id"] == "urn:suave-des:exec:1"
