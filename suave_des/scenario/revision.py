@@ -106,6 +106,15 @@ class MonitorsRevision(Strict):
     """Height above the pipeline's points at which the detection mock-up looks for them."""
 
 
+class ThrusterFailureRevision(Strict):
+    """Whether a thruster failure, which the monitor publishes in any case, reaches the vehicle."""
+
+    effective_from_s: NotNegative = 0.0
+    """A failure before this mission time does not."""
+    loss_probability: Annotated[float, Field(strict=True), Within(0.0, 1.0)] = 0.0
+    """Chance that a later one does not, for each on its own."""
+
+
 class SetPointRevision(Strict):
     """How functions hand set-points to the autopilot."""
 
@@ -173,6 +182,8 @@ class Revision(Strict):
     """Thruster recovery."""
     monitors: MonitorsRevision
     """Monitors and detection."""
+    thruster_failures: ThrusterFailureRevision = ThrusterFailureRevision()
+    """Whether thruster failures reach the vehicle."""
     set_points: SetPointRevision
     """How set-points reach the autopilot."""
     random: RandomRevision

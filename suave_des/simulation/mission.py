@@ -213,10 +213,22 @@ class MissionRun:
 
     def _make_fault(self, t_s: float, thruster: int, health: float) -> None:
         """Let the next of the scenario's thruster events happen."""
-        event = self._scenario.thruster_events[self._faults_happened]
+        n = self._faults_happened
+        event = self._scenario.thruster_events[n]
         self._faults_happened += 1
+        if not health and self._is_without_effect(n, t_s):
+            self._recorder.log("thruster_monitor", "failure_without_effect", f"c_thruster_{thruster}")
+            return
         (self._lost_for_good.discard if health or event.recoverable else self._lost_for_good.add)(thruster)
         self._set_thruster_health(t_s, thruster, health)
+
+    def _is_without_effect(self, n: int, t_s: float) -> bool:
+        """Tell whether a failure, the scenario's thruster event n, does not reach the vehicle."""
+        failures = self._revision.thruster_failures
+        if t_s < failures.effective_from_s:
+            return True
+        chance = failures.loss_probability  # one stream an event: an earlier loss does not move the next draw
+        return chance > 0.0 and self._chance.stream(f"thruster_failures/{n}").random() < chance
 
     def _set_thruster_health(self, t_s: float, thruster: int, health: float) -> None:
         self._vehicle.set_thruster_health(t_s, thruster, health)

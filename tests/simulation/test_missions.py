@@ -201,6 +201,28 @@ def test_initial_position_is_the_one_after_the_drift(simulator) -> None:
     assert (metrics.initial_x_m, metrics.initial_y_m) == (-16.0, 2.5)
 
 
+def test_a_failure_too_early_to_take_effect_is_published_all_the_same(simulator) -> None:
+    def way(effective_from_s: float):
+        failures = {"effective_from_s": effective_from_s, "loss_probability": 0.0}
+        changes = {**NO_ERRORS, "revision": {"thruster_failures": failures}}
+        return simulator(**changes, mission={"time_limit_s": 80.0}).run("none", 1, 1, record=True)
+
+    whole = simulator(**NO_ERRORS, thruster_events=[], mission={"time_limit_s": 80.0}).run("none", 1, 1, record=True)
+    without_effect, failed = way(100.0), way(0.0)
+    assert events(without_effect, "component_status", "c_thruster_1 FALSE")
+    assert events(without_effect, "failure_without_effect") and not events(failed, "failure_without_effect")
+    assert without_effect.trajectory[-1].x_m == whole.trajectory[-1].x_m != failed.trajectory[-1].x_m
+
+
+def test_share_of_failures_without_effect(simulator) -> None:
+    failures = {"effective_from_s": 0.0, "loss_probability": 0.25}
+    failing = [{"thruster": n, "event": "failure", "time_s": 1.0} for n in range(1, 7)]
+    short = simulator(thruster_events=failing, mission={"time_limit_s": 20.0}, revision={"thruster_failures": failures})
+    lost = [len(events(short.run("none", run, 1, record=True), "failure_without_effect")) for run in range(1, 101)]
+    assert 120 <= sum(lost) <= 180  # of 600, each on its own; mean 150, standard deviation 10.6
+    assert len(set(lost)) > 2
+
+
 @SCENARIOS
 def test_lost_set_points_slow_the_spiral_down(simulator, scenario: str) -> None:
     def way_m(loss: float) -> float:
