@@ -18,6 +18,7 @@ from suave_des.cli.console import output, plain_table, print_table, print_trimme
 from suave_des.cli.kb_options import (
     AsFormat,
     Asked,
+    AskedInState,
     Format,
     MaxFailed,
     StateParts,
@@ -52,10 +53,10 @@ def _help(context: typer.Context) -> None:
 
 @app.command()
 @grouped_options
-def infer(knowledge: Asked, parts: StateParts, form: AsFormat = Format.TEXT) -> None:
+def infer(knowledge: AskedInState, parts: StateParts, form: AsFormat = Format.TEXT) -> None:
     """Show what the reasoner infers in a state, and what Metacontrol would do."""
     bench = knowledge.bench()
-    conclusion = bench.infer(parts.build(bench))
+    conclusion = bench.infer(parts.build(bench, knowledge.measured))
     inferred, decisions = sorted(map(str, conclusion.inference.facts)), conclusion.plan.decisions
     state = conclusion.inference.state
     if form is Format.JSON:
@@ -86,7 +87,7 @@ def infer(knowledge: Asked, parts: StateParts, form: AsFormat = Format.TEXT) -> 
 @app.command()
 @grouped_options
 def explain(
-    knowledge: Asked,
+    knowledge: AskedInState,
     parts: StateParts,
     question: Annotated[
         str,
@@ -99,7 +100,7 @@ def explain(
 ) -> None:
     """Explain why a fact follows in a state, why a design is chosen or not, or why the state contradicts itself."""
     bench = knowledge.bench()
-    explanation = bench.explain(parts.build(bench), question)
+    explanation = bench.explain(parts.build(bench, knowledge.measured), question)
     if form is Format.JSON:
         print_json(explanation)
     else:
@@ -227,7 +228,7 @@ class TableFormat(StrEnum):
 @app.command()
 @grouped_options
 def query(
-    knowledge: Asked,
+    knowledge: AskedInState,
     parts: StateParts,
     text: Annotated[
         str, typer.Argument(metavar="QUERY", help="SPARQL; the prefixes suave, tomasys, mros and owl are known.")
@@ -242,7 +243,7 @@ def query(
     from suave_des.campaign.output import csv_text
 
     bench = knowledge.bench()
-    state = parts.build(bench) if parts.is_given else None
+    state = parts.build(bench, knowledge.measured) if parts.is_given or knowledge.measured else None
     late = f"answering the query: not done after {knowledge.time_limit:g} s (allow more with --time-limit)"
     with ends_at_once(knowledge.time_limit, late):
         found = bench.query(text, state, inferred=inferred)

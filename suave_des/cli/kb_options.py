@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
 from enum import StrEnum
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from suave_des.cli.options import KnowledgeFiles, Reasoner
+from suave_des.cli.options import KnowledgeFiles, Reasoner, key_and_value
 
 if TYPE_CHECKING:
     from suave_des.knowledge.state import KnowledgeState
@@ -68,6 +68,7 @@ class Asked(Sources):
             reasoner=self.reasoner,
             rules=self.rules or (),
             disabled_rules=self.disable_rule or (),
+            values=self.values,
             time_limit_s=self.time_limit,
         )
 
@@ -76,6 +77,40 @@ class Asked(Sources):
         if file.suffix == ".swrl":
             return dataclasses.replace(self, rules=[*(self.rules or ()), file])
         return dataclasses.replace(self, ontology=[*(self.ontology or ()), file])
+
+
+@dataclasses.dataclass(frozen=True)
+class InState(KnowledgeFiles):
+    """Options of which one is for values of the scenario and for measured values of a state."""
+
+    set: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="NAME=VALUE",
+            help="Measured value of a quality attribute; or, of a key with a dot, value of the scenario. Repeat it.",
+        ),
+    ] = None
+
+    @property
+    def measured(self) -> list[str]:
+        """The words that give measured values."""
+        return [word for word in self.set or () if "." not in word.partition("=")[0]]
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """New values of the scenario, by key path."""
+        return dict(key_and_value(word, "--set") for word in self.set or () if word not in self.measured)
+
+
+@dataclasses.dataclass(frozen=True)
+class SourcesInState(InState, Sources):
+    """Options that name a scenario, ontologies and rules, and measured values of a state."""
+
+
+@dataclasses.dataclass(frozen=True)
+class AskedInState(InState, Asked):
+    """Options that name ontologies, rules and a reasoner to ask about a state, and its measured values."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,14 +127,11 @@ class Replayed(KnowledgeFiles):
 
 @dataclasses.dataclass(frozen=True)
 class StateParts:
-    """Options that describe a state."""
+    """Options that describe a state, besides its measured values: see `InState`."""
 
     state: Annotated[
         Path | None,
         typer.Option("--state", metavar="FILE", help="YAML: objectives, groundings, components, measurements."),
-    ] = None
-    measured: Annotated[
-        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Measured value of a quality attribute.")
     ] = None
     component: Annotated[
         list[str] | None, typer.Option("--component", metavar="NAME=STATUS", help="Reported c_status of a component.")
@@ -119,21 +151,21 @@ class StateParts:
     @property
     def is_given(self) -> bool:
         """Whether any of the options is given."""
-        return any((self.state, self.measured, self.component, self.ground, self.objective))
+        return any((self.state, self.component, self.ground, self.objective))
 
-    def build(self, bench: KnowledgeBase) -> KnowledgeState:
-        """Build the state; the other options replace what the file says."""
+    def build(self, bench: KnowledgeBase, measured: Sequence[str]) -> KnowledgeState:
+        """Build the state; measured values, as NAME=VALUE, and the other options replace what the file says."""
         from suave_des.workbench.state_input import StateBuilder
 
         builder = StateBuilder(bench.base, bench.settings)
-        self.add_to(builder)
+        self.add_to(builder, measured)
         return builder.state()
 
-    def add_to(self, builder: StateBuilder) -> None:
+    def add_to(self, builder: StateBuilder, measured: Sequence[str]) -> None:
         """Add all parts to a state."""
         if self.state is not None:
             builder.add_file(self.state)
-        builder.add_words("measurements", "--set", self.measured or ())
+        builder.add_words("measurements", "--set", measured)
         builder.add_words("components", "--component", self.component or ())
         builder.add_words("groundings", "--ground", self.ground or ())
         builder.add_words("objectives", "--objective", self.objective or ())

@@ -193,6 +193,7 @@ def try_rule(
         knowledge.disable_rule or (),
         knowledge.reasoner,
         knowledge.time_limit,
+        knowledge.values,
     )
     missions = list(replayed(on, change))
     if form is Format.JSON:

@@ -86,6 +86,9 @@ def test(
 
     for file in filter(None, (junit_xml, write)):
         check_output_file(file, overwrite=file == junit_xml)
+    if knowledge.set and (from_mission is not None or write is not None):
+        remedy = "write a scenario with `base` and these values, and name it with --scenario"
+        raise InputError("tests that are written name a scenario, not values of it", place="--set", remedy=remedy)
     if from_mission is not None:
         _write_mission(from_mission, write, knowledge, time_limit)
         return
@@ -210,7 +213,7 @@ def _suites(knowledge: Tested, files: Sequence[Path], time_limit_s: float) -> li
     for file in [TestFile.read(path) for path in files or shipped_tests()]:
         about = file.knowledge.with_replacements(knowledge.scenario, knowledge.replacements)
         if about not in benches:
-            benches[about] = about.load(time_limit_s)
+            benches[about] = about.load(time_limit_s, knowledge.values)
         suites.append(Suite(file, about, benches[about], file.tests(benches[about])))
     return suites
 

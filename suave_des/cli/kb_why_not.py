@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli.kb_options import AsFormat, Format, Sources, StateParts, TimeLimitS, print_json
+from suave_des.cli.kb_options import AsFormat, Format, Sources, SourcesInState, StateParts, TimeLimitS, print_json
 from suave_des.cli.options import grouped_options
 
 if TYPE_CHECKING:
@@ -31,17 +32,17 @@ class StateAnywhere(StateParts):
         ),
     ] = None
 
-    def add_to(self, builder: StateBuilder) -> None:
+    def add_to(self, builder: StateBuilder, measured: Sequence[str]) -> None:
         """Add all parts; those of --at come first, and the other options replace what they say."""
         from suave_des.workbench.state_words import add_at
 
         add_at(builder, self.at or ())
-        super().add_to(builder)
+        super().add_to(builder, measured)
 
 
 @grouped_options
 def why_not(
-    sources: Sources,
+    sources: SourcesInState,
     parts: StateAnywhere,
     names: Annotated[
         list[str] | None, typer.Argument(metavar="RULE", help="Names of rules; left out: all that do not fire.")
@@ -66,8 +67,8 @@ def why_not(
     reader = FactReader(base)
     reader.declare(facts or ())
     base = with_facts(base, [reader.triple(fact) for fact in facts or ()])
-    builder = StateBuilder(base, ManagingSettings.of(load_scenario(sources.scenario).scenario))
-    parts.add_to(builder)
+    builder = StateBuilder(base, ManagingSettings.of(load_scenario(sources.scenario, **sources.replacements).scenario))
+    parts.add_to(builder, sources.measured)
     state = builder.state()
     questions = RuleQuestions(base, tuple(unusable))
     named = names or sorted({*(rule.name for rule in base.rules), *(each.name for each in unusable)})

@@ -35,6 +35,12 @@ DisabledRules = Annotated[
     list[str] | None,
     typer.Option("--disable-rule", metavar="NAME", help="Switch a rule off for this time; repeat it for several."),
 ]
+SetValues = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Value of the scenario, such as mission.time_limit_s=400; repeat it."
+    ),
+]
 Seed = Annotated[int, typer.Option("--seed", help="Seed of everything that is random.")]
 Workers = Annotated[
     int, typer.Option("--workers", help="Processes that run missions; any number gives the same bytes.")
@@ -56,38 +62,41 @@ Overwrite = Annotated[
 
 @dataclass(frozen=True)
 class KnowledgeFiles:
-    """Options that replace or add to a scenario's ontologies and rules."""
+    """Options that replace or add to a scenario's ontologies, rules and values."""
 
     ontology: Ontologies = None
     rules: RuleFiles = None
     disable_rule: DisabledRules = None
+    set: SetValues = None
 
     @property
     def replacements(self) -> Replacements:
         """What is given, as the loader takes it."""
-        return {"ontologies": self.ontology or (), "rules": self.rules or (), "disabled_rules": self.disable_rule or ()}
+        changed: Replacements = {"values": self.values} if self.values else {}
+        return {
+            "ontologies": self.ontology or (),
+            "rules": self.rules or (),
+            "disabled_rules": self.disable_rule or (),
+            **changed,
+        }
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """New values of the scenario, by key path."""
+        return dict(key_and_value(word, "--set") for word in self.set or ())
 
 
 @dataclass(frozen=True)
 class Files(KnowledgeFiles):
-    """Options that replace or add to a scenario's files and values."""
+    """Options that replace or add to all of a scenario's files and values."""
 
     modes: Modes = None
     reasoner: Reasoner = None
-    set: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set", metavar="KEY=VALUE", help="Value of the scenario, such as mission.time_limit_s=400; repeat it."
-        ),
-    ] = None
 
     @property
     def replacements(self) -> Replacements:
         """What is given, as the loader takes it."""
-        changed: Replacements = {"modes_file": self.modes, "reasoner": self.reasoner}
-        if self.set:
-            changed["values"] = dict(key_and_value(word, "--set") for word in self.set)
-        return super().replacements | changed
+        return super().replacements | {"modes_file": self.modes, "reasoner": self.reasoner}
 
     def with_options(self, words: Sequence[str] | None, managers: Sequence[str]) -> Replacements:
         """What is given, with settings of managers as `manager_options` reads them."""

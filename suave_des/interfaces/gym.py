@@ -133,28 +133,40 @@ class _Episode:
         assert isinstance(run.manager, _Observing)
         self._works = run.manager.works
         self._t_s = self._now_s = self._searched_s = self._distance_m = 0.0
-        self._adaptations, self._found, self._has_inspected = 0, False, False
+        self._adaptations, self._found, self._has_inspected, self._is_over = 0, False, False, False
         run.advance(1e-9)  # the first task is requested at t = 0
         self._task_changed()
 
     def step(self, action: Sequence[int]) -> tuple[float, bool]:
         """Request modes, and let a period pass; return the reward, and whether the mission is over."""
-        of, run, change_mode = self._of, self._run, self._modes.change_mode
-        for (function, choices, size), choice in zip(of.sized_choices, action, strict=True):
+        run = self._run
+        if action != self._requested:
+            self._request(action)
+        self._t_s += self._of.period_s
+        run.advance(self._t_s)
+        self._now_s, self._is_over = run.env.now, run.is_over
+        if run.task is not self._task:
+            self._task_changed()
+        return self._reward(), self._is_over
+
+    def _request(self, action: Sequence[int]) -> None:
+        for (function, choices, size), choice in zip(self._of.sized_choices, action, strict=True):
             if not 0 <= choice < size:
                 raise InputError(
                     f"action {choice} for {function} is out of range", remedy=f"0 to {size - 1}: {', '.join(choices)}"
                 )
             if function in self._needed:
-                change_mode(function, choices[choice])
-        self._t_s += of.period_s
-        run.advance(self._t_s)
-        self._now_s = run.env.now
-        if run.task is not self._task:
-            self._task_changed()
-        return self._reward(), run.is_over
+                self._modes.change_mode(function, choices[choice])
+        self._requested = action
+        self._read_modes()
+
+    def _read_modes(self) -> None:
+        current_mode = self._modes.current_mode
+        self._mode_indices = [index.get(current_mode(function), -1.0) for function, index in self._of.indices]
 
     def _task_changed(self) -> None:
+        self._requested: Sequence[int] = ()  # a task brings modes of its own
+        self._read_modes()
         self._task = task = self._run.task
         functions = task.functions if task is not None else ()
         # The way to the recharge station belongs to no task: it may be taken at any time.
@@ -181,17 +193,17 @@ class _Episode:
 
     def observation(self) -> Observation:
         """What monitors have measured, and what is known of the mission."""
-        of, measured, current_mode = self._of, self._system.measured, self._modes.current_mode
+        of, measured = self._of, self._system.measured
         values = [NOT_MEASURED if (value := measured(name)) is None else value for name in of.attributes]
         values += self._works
         values += self._inspects, self._distance_m, self._now_s / of.limit_s
-        values += [index.get(current_mode(function), -1.0) for function, index in of.indices]
+        values += self._mode_indices
         return np.array(values, np.float32)
 
     def info(self) -> dict[str, Any]:
         """Mission time and task; at the end the metrics."""
         info: dict[str, Any] = {"time_s": self._now_s, "task": self._task.name if self._task else ""}
-        if self._run.is_over:
+        if self._is_over:
             info["metrics"] = self._run.metrics()
         return info
 

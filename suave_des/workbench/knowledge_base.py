@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from suave_des.knowledge.deliberation import Conclusion, Deliberation
 from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit
@@ -58,6 +59,7 @@ class KnowledgeBase:
         reasoner: str | None = None,
         rules: str | Path | Sequence[str | Path] = (),
         disabled_rules: str | Sequence[str] = (),
+        values: Mapping[str, Any] | None = None,
         time_limit_s: float = TIME_LIMIT_S,
     ) -> KnowledgeBase:
         """Read ontologies and start a reasoner on them.
@@ -69,6 +71,7 @@ class KnowledgeBase:
             reasoner: in place of the scenario's.
             rules: files of rules as text, besides the scenario's.
             disabled_rules: names of rules to switch off.
+            values: new values of the scenario by key path, as of `with_values`.
             time_limit_s: for each inference.
 
         Raises:
@@ -81,6 +84,7 @@ class KnowledgeBase:
             reasoner=reasoner,
             rules=_several(rules),
             disabled_rules=[disabled_rules] if isinstance(disabled_rules, str) else disabled_rules,
+            values=values or {},
         )
         reasoner = loaded.scenario.knowledge.reasoner
         limit = TimeLimit(time_limit_s, "--time-limit")

@@ -91,7 +91,7 @@ def compare_missions(
 
     Args:
         missions: which.
-        one, other: ontologies and rules, as load_scenario takes them.
+        one, other: ontologies, rules and values of the scenario, as load_scenario takes them.
         on_progress: called when missions are done.
 
     Raises:
@@ -109,6 +109,7 @@ def compare_missions(
             ontologies=replacements.get("ontologies", ()),
             rules=replacements.get("rules", ()),
             disabled_rules=replacements.get("disabled_rules", ()),
+            values=replacements.get("values", {}),
         )
         frames.append(result.frame().set_index("run"))
     before, after = frames

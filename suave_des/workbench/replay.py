@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -144,6 +145,7 @@ class RuleChange:
         disabled_rules: names of rules to switch off with and without the change.
         reasoner: in place of the scenario's.
         limit_s: of the reasoner, for one state.
+        values: of that scenario, by key path.
     """
 
     text: str | None = None
@@ -154,6 +156,7 @@ class RuleChange:
     disabled_rules: Sequence[str] = ()
     reasoner: str | None = None
     limit_s: float = TIME_LIMIT_S
+    values: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -233,8 +236,11 @@ class _Comparison:
     def __init__(self, scenario: Scenario, change: RuleChange) -> None:
         self.scenario = scenario
         if change.scenario is not None:
-            loaded = load_scenario(change.scenario)
+            loaded = load_scenario(change.scenario, values=change.values)
             used, ontologies, rules = loaded.scenario, loaded.ontologies, loaded.rules
+        elif change.values:
+            problem = "the scenario that was recorded stays as it is"
+            raise InputError(problem, place="--set", remedy="name one with --scenario")
         else:
             used = scenario
             named = () if change.ontologies else used.knowledge.ontologies

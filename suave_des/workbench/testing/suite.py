@@ -56,8 +56,12 @@ class KnowledgeFiles:
             (*self.disabled_rules, *more.get("disabled_rules", ())),
         )
 
-    def load(self, time_limit_s: float) -> KnowledgeBase:
+    def load(self, time_limit_s: float, values: Mapping[str, Any] | None = None) -> KnowledgeBase:
         """Load the knowledge base.
+
+        Args:
+            time_limit_s: for each inference.
+            values: new values of the scenario, by key path.
 
         Raises:
             InputError: a file or name cannot be used.
@@ -67,6 +71,7 @@ class KnowledgeFiles:
             scenario=self.scenario,
             rules=self.rules,
             disabled_rules=self.disabled_rules,
+            values=values,
             time_limit_s=time_limit_s,
         )
 

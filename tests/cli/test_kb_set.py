@@ -1,0 +1,89 @@
+"""`--set KEY=VALUE` of the kb commands: values of the scenario, and measured values where a state is described."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from suave_des.workbench import KnowledgeBase
+from suave_des.cli.main import main
+
+IMPROVES = "revision.metacontrol.search_improves_when_exceeded"
+STATE = ("--ground", "f_generate_search_path=fd_spiral_low", "--set", "water_visibility=4")
+
+
+@pytest.fixture
+def command(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Runs the command line in this process; returns status, output and errors."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: str) -> tuple[object, str, str]:
+        with pytest.raises(SystemExit) as ended:
+            main(arguments)
+        captured = capsys.readouterr()
+        return ended.value.code, captured.out, captured.err
+
+    return run
+
+
+@pytest.mark.parametrize(("improves", "functions"), [("true", ["f_generate_search_path"]), ("false", [])])
+def test_infer_decides_with_the_values_that_are_set(command, improves: str, functions: list[str]) -> None:
+    _, out, _ = command("kb", "infer", "--format", "json", *STATE, "--set", f"{IMPROVES}={improves}")
+    assert [each["function"] for each in json.loads(out)["plan"]] == functions
+
+
+def test_a_name_without_a_dot_is_a_measured_value(command) -> None:
+    _, out, _ = command("kb", "infer", "--format", "json", *STATE)
+    assert json.loads(out)["state"]["measurements"] == {"water_visibility": "4"}
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("infer",),
+        ("explain",),
+        ("query", "SELECT ?s WHERE { ?s a owl:Class }"),
+        ("why-not",),
+        ("policy",),
+        ("check",),
+        ("rules",),
+        ("diff", "suave.owl", "suave.owl"),
+        ("test",),
+        ("try", "--on", ".", "r: Binding(?b) -> Binding(?b)", "--scenario", "seams2023"),
+    ],
+)
+def test_every_command_that_takes_a_scenario_refuses_an_unknown_key(command, arguments: tuple[str, ...]) -> None:
+    if arguments[0] == "try":
+        command("run", "seams2023", "--out", ".")
+    status, out, err = command("kb", *arguments, "--set", "mission.time_limt_s=9")
+    assert (status, out) == (2, "")
+    assert "--set" in err and "did you mean 'time_limit_s'" in err
+
+
+def test_missions_that_diff_runs_have_the_values_that_are_set(command) -> None:
+    options = ("--missions", "2", "--quiet", "--max-failed", "0", "--format", "json")
+    means = []
+    for limit_s in (20, 300):
+        _, out, _ = command("kb", "diff", "suave.owl", "suave.owl", *options, "--set", f"mission.time_limit_s={limit_s}")
+        metrics = json.loads(out)["missions"]["metrics"]
+        means.append(next(each["one"] for each in metrics if each["metric"] == "search_time_s"))
+    assert means[0] <= 21.0 < means[1]
+
+
+def test_values_of_a_recorded_scenario_stay_as_they_are(command) -> None:
+    command("run", "seams2023", "--out", "mission")
+    status, _, err = command("kb", "try", "--on", "mission", "--disable", "x", "--set", "knowledge.reasoner=pellet")
+    assert status == 2 and "name one with --scenario" in err
+
+
+def test_tests_that_are_written_cannot_have_values_that_are_set(command) -> None:
+    status, _, err = command("kb", "test", "--coverage", "--write", "new.yaml", "--set", "knowledge.reasoner=pellet")
+    assert status == 2 and "name it with --scenario" in err
+    assert not Path("new.yaml").exists()
+
+
+def test_from_python_values_are_an_argument() -> None:
+    base = KnowledgeBase.load(values={IMPROVES: False})
+    assert KnowledgeBase.load().settings.improves_exceeded and not base.settings.improves_exceeded
