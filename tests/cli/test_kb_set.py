@@ -66,7 +66,9 @@ def test_missions_that_diff_runs_have_the_values_that_are_set(command) -> None:
     options = ("--missions", "2", "--quiet", "--max-failed", "0", "--format", "json")
     means = []
     for limit_s in (20, 300):
-        _, out, _ = command("kb", "diff", "suave.owl", "suave.owl", *options, "--set", f"mission.time_limit_s={limit_s}")
+        _, out, _ = command(
+            "kb", "diff", "suave.owl", "suave.owl", *options, "--set", f"mission.time_limit_s={limit_s}"
+        )
         metrics = json.loads(out)["missions"]["metrics"]
         means.append(next(each["one"] for each in metrics if each["metric"] == "search_time_s"))
     assert means[0] <= 21.0 < means[1]
