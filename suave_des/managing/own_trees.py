@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Final
 
 import py_trees
 from py_trees.behaviour import Behaviour
@@ -10,6 +11,9 @@ from py_trees.common import Status
 
 from suave_des.domain import Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
+
+MOST_TICKED: Final = 100_000
+"""So many behaviours a tick may go through; more, and it is taken not to end."""
 
 
 class PyTreesManager(ManagingSubsystem):
@@ -63,8 +67,15 @@ class PyTreesManager(ManagingSubsystem):
         super().task_cancelled(task)
 
     def adapt(self) -> None:
-        """Tick the tree."""
-        self.root.tick_once()
+        """Tick the tree.
+
+        Raises:
+            RuntimeError: the tick does not end.
+        """
+        for ticked_before, behaviour in enumerate(self.root.tick()):
+            if ticked_before >= MOST_TICKED:
+                problem = f"a tick of the tree does not end: {MOST_TICKED:,} behaviours so far"
+                raise RuntimeError(f"{problem}, the last one {behaviour.name!r}")
         if not self.system.recorded:
             return
         ticked = "; ".join(f"{each.name} {each.status.name.lower()}" for each in self.root.iterate() if _tells(each))

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from suave_des.workbench import KnowledgeBase
 from suave_des.cli.main import main
+from suave_des.workbench import KnowledgeBase
 
 IMPROVES = "revision.metacontrol.search_improves_when_exceeded"
 STATE = ("--ground", "f_generate_search_path=fd_spiral_low", "--set", "water_visibility=4")
