@@ -133,6 +133,7 @@ class _Episode:
         assert isinstance(run.manager, _Observing)
         self._works = run.manager.works
         self._t_s = self._now_s = self._searched_s = self._distance_m = 0.0
+        self._requested: Sequence[int] = ()
         self._adaptations, self._found, self._has_inspected, self._is_over = 0, False, False, False
         run.advance(1e-9)  # the first task is requested at t = 0
         self._task_changed()
@@ -165,14 +166,14 @@ class _Episode:
         self._mode_indices = [index.get(current_mode(function), -1.0) for function, index in self._of.indices]
 
     def _task_changed(self) -> None:
-        self._requested: Sequence[int] = ()  # a task brings modes of its own
-        self._read_modes()
+        self._requested = ()  # a task brings modes of its own
         self._task = task = self._run.task
         functions = task.functions if task is not None else ()
         # The way to the recharge station belongs to no task: it may be taken at any time.
         self._needed = frozenset((*self._system.lasting_functions, GENERATE_RECHARGE_PATH, *functions))
         self._inspects = FOLLOW_PIPELINE in functions
         self._has_inspected |= self._inspects
+        self._read_modes()
 
     def _reward(self) -> float:
         weights, found_s = self._of.weights, self._run.found_s

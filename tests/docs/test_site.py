@@ -42,6 +42,8 @@ def test_the_public_api_is_documented(site):
     for page, name in (
         ("missions", "suave_des.run_campaign"),
         ("managers", "suave_des.managing.base.ManagingSubsystem.adapt"),
+        ("interfaces", "suave_des.Mission.advance"),
+        ("interfaces", "suave_des.interfaces.gym.PipelineInspection.step"),
         ("knowledge", "suave_des.workbench.KnowledgeBase.infer"),
     ):
         text = (site / "reference" / "api" / page / "index.html").read_text(encoding="utf-8")
