@@ -17,7 +17,7 @@ from suave_des.errors import KnowledgeError
 from suave_des.knowledge import jvm
 from suave_des.knowledge.content import RULE_IRI, Terms
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import Lit, Triple, canonical, facts_of, n_triple
+from suave_des.knowledge.rdf import Lit, Triple, canonical, facts_of, for_pellet, n_triple
 from suave_des.knowledge.rules.syntax import Rule
 from suave_des.knowledge.vocabulary import RDF_TYPE, XSD
 
@@ -112,7 +112,7 @@ class InProcessPellet:
         individual = self._term(subject)
         knowledge_base.addIndividual(individual)
         if isinstance(value, Lit):
-            value = canonical(value)
+            value = for_pellet(value)
             if value.datatype.startswith("@"):
                 data = self._terms.makePlainLiteral(value.text, value.datatype[1:])
             else:
@@ -222,7 +222,7 @@ def read_term(text: str) -> str | Lit:
         return text
     # Pellet keeps all text as PlainLiteral, without a language as "()".
     datatype = found.group(3) if not found.group(3).endswith("PlainLiteral") else XSD + "string"
-    return Lit(unescape(found.group(1)), datatype)
+    return canonical(Lit(unescape(found.group(1)), datatype))
 
 
 def unescape(text: str) -> str:

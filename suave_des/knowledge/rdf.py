@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
@@ -37,6 +38,8 @@ EXACT: Final = frozenset(XSD + name for name in ("decimal", *_WHOLE))
 #: Datatypes of numbers.
 NUMERIC: Final = EXACT | {XSD + "float", XSD + "double"}
 _DECIMAL: Final = re.compile(r"([+-]?)(?=\.?[0-9])([0-9]*)\.?([0-9]*)")
+_WHOLE_NUMBER: Final = re.compile(r"[+-]?[0-9]{1,400}")
+_FLOAT: Final = re.compile(r"[+-]?(?=\.?[0-9])[0-9]*\.?[0-9]*(?:[eE][+-]?[0-9]+)?")
 _ESCAPES: Final = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"})
 
 
@@ -55,22 +58,40 @@ def term_of(term: Node) -> str | Lit:
 
 
 def canonical(value: Lit) -> Lit:
-    """Return a decimal number in its shortest form.
+    """Return a number in one form for all that Pellet takes for the same value.
 
-    A rule's 2.00 is meant to match a measured 2; Pellet compares texts, and stock owlready2 rewrites some of them.
+    A rule's 2.00 is meant to match a measured 2.0. Whole numbers of all datatypes are compared by value, and never
+    match a decimal; neither of them matches a double.
     """
-    found = _DECIMAL.fullmatch(value.text.strip())
-    if value.datatype != XSD + "decimal" or found is None:
+    text = value.text.strip()
+    if value.datatype == XSD + "decimal" and (found := _DECIMAL.fullmatch(text)):
+        sign, whole, part = found.groups()
+        text = (whole.lstrip("0") or "0") + (f".{part.rstrip('0')}" if part.rstrip("0") else "")
+        return Lit(f"-{text}" if sign == "-" and text != "0" else text, value.datatype)
+    if value.datatype in EXACT and _WHOLE_NUMBER.fullmatch(text):
+        return Lit(str(int(text)), XSD + "integer")
+    if value.datatype in (XSD + "double", XSD + "float") and _FLOAT.fullmatch(text):
+        number = float(text)
+        return Lit(str(number), value.datatype) if math.isfinite(number) else value
+    return value
+
+
+def for_pellet(value: Lit) -> Lit:
+    """Return a literal as Pellet is given it: each decimal number in one form, and always with a decimal place.
+
+    Pellet compares the texts of decimals, and takes one without a decimal place for an integer. Stock owlready2 gives
+    it these forms, too.
+    """
+    if value.datatype != XSD + "decimal" or _DECIMAL.fullmatch(value.text.strip()) is None:
         return value
-    sign, whole, part = found.groups()
-    text = (whole.lstrip("0") or "0") + (f".{part.rstrip('0')}" if part.rstrip("0") else "")
-    return Lit(f"-{text}" if sign == "-" and text != "0" else text, value.datatype)
+    text = canonical(value).text
+    return Lit(text if "." in text else f"{text}.0", value.datatype)
 
 
 def _written(value: str | Lit) -> str:
     if isinstance(value, str):
         return f"<{value}>"
-    value = canonical(value)
+    value = for_pellet(value)
     text = "".join(char if char.isascii() else f"\\U{ord(char):08X}" for char in value.text.translate(_ESCAPES))
     return f'"{text}"{value.datatype}' if value.datatype.startswith("@") else f'"{text}"^^<{value.datatype}>'
 

@@ -16,7 +16,7 @@ from rdflib import BNode
 from suave_des.knowledge import jvm
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.pellet import load_n_triples, one_at_a_time, read_term
-from suave_des.knowledge.rdf import EXACT, Lit, Triple, canonical
+from suave_des.knowledge.rdf import Lit, Triple, canonical
 from suave_des.knowledge.rules.names import TESTERS
 from suave_des.knowledge.rules.rdf import with_triples
 from suave_des.knowledge.rules.syntax import Atom, Named, Rule, Variable
@@ -47,7 +47,7 @@ class Facts:
     """What follows in a state, to be looked up by property and subject."""
 
     def __init__(self, known: Iterable[Triple]) -> None:
-        self.all = tuple((subject, predicate, comparable(value)) for subject, predicate, value in known)
+        self.all = tuple((subject, predicate, _canonical(value)) for subject, predicate, value in known)
         self._by_predicate: dict[str, list[Triple]] = {}
         self._by_subject: dict[tuple[str, str], list[Triple]] = {}
         for triple in self.all:
@@ -78,11 +78,8 @@ class Facts:
         return [triple[0] for triple in self._by_predicate.get(name, ())]
 
 
-def comparable(value: str | Lit) -> str | Lit:
-    """Write a whole number as a decimal: Pellet takes 3 and 3.0 as equal."""
-    if isinstance(value, Lit) and value.datatype in EXACT:
-        return canonical(Lit(value.text, XSD + "decimal"))
-    return value
+def _canonical(value: str | Lit) -> str | Lit:
+    return canonical(value) if isinstance(value, Lit) else value
 
 
 def _key(triple: Triple) -> str:
@@ -112,7 +109,7 @@ class NearestFinder:
         Of several, one where a comparison fails comes before one where a value differs, and that before one where
         nothing is known. Atoms of which there is no fact at all fail in any case.
         """
-        body = tuple(map(_comparable_atom, self.rule.body))
+        body = tuple(map(_canonical_atom, self.rule.body))
         hopeless = frozenset(
             number
             for number, atom in enumerate(body)
@@ -143,7 +140,7 @@ class NearestFinder:
             yield binding, failing
             return
         number, rest = order[0], order[1:]
-        atom = _comparable_atom(self.rule.body[number])
+        atom = _canonical_atom(self.rule.body[number])
         if atom.kind in FACT_KINDS:
             for bound in self.facts.matches(atom, binding):
                 yield from self._ways_to_match(rest, bound, failing, allowed)
@@ -179,7 +176,7 @@ class NearestFinder:
         values = self._answers[asked]
         if computes:
             name = atom.arguments[0].name  # type: ignore[union-attr]
-            return [{**binding, name: comparable(value)} for value in values]
+            return [{**binding, name: _canonical(value)} for value in values]
         return [binding] if values else []
 
     def _distance(self, number: int, binding: Binding) -> tuple[int, int]:
@@ -196,8 +193,8 @@ class NearestFinder:
         return 2, -number
 
 
-def _comparable_atom(atom: Atom) -> Atom:
-    arguments = tuple(comparable(term) if isinstance(term, Lit) else term for term in atom.arguments)
+def _canonical_atom(atom: Atom) -> Atom:
+    arguments = tuple(canonical(term) if isinstance(term, Lit) else term for term in atom.arguments)
     return replace(atom, arguments=arguments)  # type: ignore[arg-type]
 
 

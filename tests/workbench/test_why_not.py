@@ -1,15 +1,20 @@
 """kb why-not: why a rule does not fire, in one line (benchmarks/why_not.py times the answers)."""
 
+import itertools
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.errors import InputError
+from suave_des.knowledge.reasoners import make_reasoner
+from suave_des.knowledge.state import KnowledgeState
 from suave_des.scenario.loader import load_scenario
 from suave_des.workbench.testing.probes import Probes
 from suave_des.workbench.testing.situation import Situation
 from suave_des.workbench.unusable_rules import open_without_unusable
 from suave_des.workbench.why_not import RuleQuestions
+from tests.helpers.number_ontology import NS, NUMBERS, numbers_ontology
 from tests.helpers.rule_questions import CASES, prepared
 
 SEARCH = "f_generate_search_path"
@@ -31,6 +36,18 @@ def test_recurring_questions_are_answered_in_one_line(name, edited, tmp_path):
 def test_a_rule_that_is_not_there_is_refused_with_the_nearest_name(bench):
     with pytest.raises(InputError, match="did you mean 'compError'"):
         RuleQuestions(bench.base).why_not("compEror", bench.state())
+
+
+def test_numbers_match_where_they_do_in_pellet(tmp_path):
+    base = numbers_ontology(tmp_path)
+    found = make_reasoner("pellet", base, terms=base.content.all_terms()).infer(KnowledgeState()).facts
+    questions, rules = RuleQuestions(base), {rule.name: rule for rule in base.rules}
+    answers = {
+        (thing, name)
+        for name, thing in itertools.product(NUMBERS, repeat=2)
+        if questions.of(rules[f"is_{name}"], KnowledgeState(), {"x": NS + thing}).fires
+    }
+    assert answers == {(fact.subject, fact.value) for fact in found if fact.property == "is" and fact.value != "sum"}
 
 
 def test_a_rule_of_an_ontology_that_pellet_would_drop_spoils_no_other_answer(bench, edited):
