@@ -195,7 +195,7 @@ class NearestFinder:
 
 def _canonical_atom(atom: Atom) -> Atom:
     arguments = tuple(canonical(term) if isinstance(term, Lit) else term for term in atom.arguments)
-    return replace(atom, arguments=arguments)  # type: ignore[arg-type]
+    return replace(atom, arguments=arguments)
 
 
 def testable_order(body: Sequence[Atom]) -> list[int]:

@@ -230,22 +230,22 @@ def mutate(
     began = time.perf_counter()
     original = _Original(bench, mutants)
     verdicts: dict[int, Verdict] = {}
-    left: list[_Changed] = []
+    left: list[int] = []
     in_order = sorted(tests, key=lambda test: (bool(test.without), len(test.situations)))
     for number, mutant in enumerate(mutants):
-        changed = _Changed(original, number)
-        killer = _killer(changed, in_order)
+        killer = _killer(_Changed(original, number), in_order)
         if killer is None:
-            left.append(changed)
+            left.append(number)
             continue
         verdicts[number] = Verdict(mutant, KILLED, killer)
         on_verdict()
     situations = list(dict.fromkeys(situation for test in tests for situation in test.situations))
     states = 0
     if left:
-        found, states = _compared(original, left, situations, max_failed)
-        for changed in left:
-            verdicts[changed.number] = found[changed.number]
+        # Pellet takes the longer the more probes there are, and the policy has many more states than the tests.
+        found, states = _compared(_Original(bench, [mutants[number] for number in left]), situations, max_failed)
+        for number, verdict in zip(left, found, strict=True):
+            verdicts[number] = verdict
             on_verdict()
     ordered = tuple(verdicts[number] for number in range(len(mutants)))
     return MutationReport(ordered, states, max_failed, time.perf_counter() - began)
@@ -265,12 +265,11 @@ def _killer(changed: _Changed, tests: Iterable[RuleTest]) -> str | None:
     return None
 
 
-def _compared(
-    original: _Original, left: Sequence[_Changed], situations: Sequence[Situation], max_failed: int
-) -> tuple[dict[int, Verdict], int]:
+def _compared(original: _Original, situations: Sequence[Situation], max_failed: int) -> tuple[list[Verdict], int]:
     """Compare mutants with the original in the situations of the tests and in every state of the policy."""
     bench = original.bench
     verdicts: dict[int, Verdict] = {}
+    left = [_Changed(original, number) for number in range(len(original.mutants))]
     for changed in left:
         if original.is_horn and _follows_anyway(bench, changed.mutant):
             reason = "what is left out follows from the other atoms by the schema"
@@ -306,7 +305,7 @@ def _compared(
     reason = f"nothing differs in {states} kinds of states"
     for changed in open_ones:
         verdicts[changed.number] = Verdict(changed.mutant, EQUIVALENT, reason)
-    return verdicts, states
+    return [verdicts[changed.number] for changed in left], states
 
 
 def _difference(before: Outcome, after: Outcome) -> str | None:
