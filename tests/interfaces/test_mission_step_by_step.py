@@ -1,5 +1,8 @@
 """A mission that its caller advances: the same as any other, whatever the steps."""
 
+import subprocess
+import sys
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -113,3 +116,14 @@ def test_it_does_not_go_back(simulator: Simulator, until: float) -> None:
 def test_a_run_is_a_whole_number(simulator: Simulator, number: object) -> None:
     with pytest.raises(InputError, match="run"):
         Mission(simulator, run=number)  # type: ignore[arg-type]
+
+
+def test_a_mission_loads_nothing_that_draws_learns_or_serves() -> None:
+    program = (
+        "import sys, suave_des\n"
+        "suave_des.Mission('seams2023').advance(5.0)\n"
+        "unused = {'matplotlib', 'plotly', 'gymnasium', 'http.server', 'distributed', 'pandas', 'owlready2', 'jpype'}\n"
+        "print(sorted(unused & set(sys.modules)))"
+    )
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert ended.stdout.strip() == "[]"
