@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from functools import partial
-from math import cos, sin
 
 import simpy
 from simpy.core import StopSimulation
@@ -42,10 +41,8 @@ from suave_des.scenario.models import Battery
 from suave_des.simulation.evaluation import Evaluation
 from suave_des.simulation.host import RAISED, ManagerHost
 from suave_des.simulation.simulator import MissionMemory, Simulator
-from suave_des.vehicle.autopilot import Autopilot
-from suave_des.vehicle.frames import Pose
+from suave_des.simulation.vehicles import draw_start, make_vehicle
 from suave_des.vehicle.guidance import SetPointSender
-from suave_des.vehicle.vehicle import CurrentWave, Point, Vehicle
 from suave_des.world.signals import Signal
 
 _DELIVERY_S = 0.01
@@ -78,7 +75,10 @@ class MissionRun:
         self._lost_for_good: set[int] = set()
         self._faults_happened = 0
 
-        self._vehicle = self._make_vehicle(memory)
+        self._start = draw_start(self._chance)
+        self._vehicle = make_vehicle(
+            self._scenario, simulator.vehicle_model, self._chance, self._start, simulator.duration_s, memory.track
+        )
         self._true_signals: dict[str, Signal] = {}
         self._signals = {name: self._measure(name) for name in sorted(self._scenario.signals)}
         self._visibility = self._signals["water_visibility"]
@@ -198,8 +198,8 @@ class MissionRun:
             manager=self._manager,
             run=self._run_number,
             seed=self._seed,
-            initial_x_m=self._initial_m[0],
-            initial_y_m=self._initial_m[1],
+            initial_x_m=self._start.position_m[0],
+            initial_y_m=self._start.position_m[1],
             mission_duration_s=float(self.env.now),
             pipeline_found=found,
             search_time_s=coordinator.search_time_or_limit_s(),
@@ -234,46 +234,6 @@ class MissionRun:
         self._vehicle.set_thruster_health(t_s, thruster, health)
         if self._observer is not None:
             self._observer.thrusters_changed(self._vehicle.working_thrusters)
-
-    def _make_vehicle(self, memory: MissionMemory) -> Vehicle:
-        value, calibration = self._chance.value, self._scenario.calibration
-        x_m, y_m = (value(f"start.{axis}_m") + value(f"calibration.drift_{axis}_m") for axis in "xy")
-        self._initial_m = x_m, y_m
-        self._origin_m = x_m + value("calibration.origin_x_m"), y_m + value("calibration.origin_y_m")
-        z_m, heading_rad = value("start.z_m"), value("start.heading_rad")
-        autopilot = Autopilot(
-            calibration.position_gain_per_s,
-            calibration.jerk_m_per_s3,
-            calibration.velocity_gain_per_s,
-            calibration.velocity_integral_gain_per_s2,
-            calibration.heading_frequency_rad_per_s,
-            calibration.heading_integral_gain_per_s3,
-            value("calibration.altitude_error_m"),
-        )
-        start = Pose(x_m, y_m, z_m, 0.0, 0.0, heading_rad)
-        current_m_per_s, wave = self._current()
-        return Vehicle(
-            self._simulator.vehicle_model,
-            autopilot,
-            start,
-            self._simulator.duration_s,
-            current_m_per_s=current_m_per_s,
-            current_wave=wave,
-            time_scale=1.0 / (1.0 + value("calibration.real_time_factor_loss")),
-            z_limits_m=(domain.SEA_BED_Z_M, domain.SURFACE_Z_M),
-            memory=memory.track,
-        )
-
-    def _current(self) -> tuple[Point, CurrentWave]:
-        """The constant part of the current, and the one that varies over time."""
-        value, wave = self._chance.value, self._scenario.current.wave
-        x, y, z = (value(f"current.{axis}_m_per_s") for axis in "xyz")
-        if wave is None:
-            return (x, y, z), CurrentWave()
-        east, north = cos(direction_rad := value("current.wave.direction_rad")), sin(direction_rad)
-        mean, amplitude = value("current.wave.mean_m_per_s"), value("current.wave.amplitude_m_per_s")
-        varying = CurrentWave((amplitude * east, amplitude * north), wave.period_s, value("current.wave.shift_s"))
-        return (x + mean * east, y + mean * north, z), varying
 
     def _measure(self, name: str) -> Measurements:
         signal, chance = self._scenario.signals[name], self._chance
@@ -342,7 +302,7 @@ class MissionRun:
                 env, self._bus, revision.recovery, self._set_thruster_health, recovery_s, self._lost_for_good
             ),
             search: GenerateSearchPath(
-                env, make_sender(search), revision.spiral, self._origin_m, view_tangent, phase_s, ready_s
+                env, make_sender(search), revision.spiral, self._start.origin_m, view_tangent, phase_s, ready_s
             ),
             follow: self._follow,
         }

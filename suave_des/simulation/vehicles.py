@@ -1,9 +1,18 @@
-"""The vehicle that a scenario describes."""
+"""The vehicle that a scenario describes, where a mission puts it, and the current it is in."""
 
 from functools import lru_cache
+from math import cos, sin
+from typing import NamedTuple
 
+from suave_des import domain
+from suave_des.chance import Chance
+from suave_des.compiling import Array
+from suave_des.scenario.models import Scenario
 from suave_des.scenario.vehicle import VehicleDescription
+from suave_des.vehicle.autopilot import Autopilot
+from suave_des.vehicle.frames import Pose
 from suave_des.vehicle.model import Thruster, VehicleModel
+from suave_des.vehicle.vehicle import CurrentWave, Point, Vehicle
 
 
 @lru_cache(maxsize=64)
@@ -19,3 +28,72 @@ def vehicle_model(description: VehicleDescription) -> VehicleModel:
         thrust_limit_n=description.thrust_limit_n,
         thrusters=tuple(Thruster(each.position_m, each.direction) for each in description.thrusters),
     )
+
+
+class Start(NamedTuple):
+    """Where a mission begins.
+
+    Attributes:
+        position_m: x and y of the vehicle, world frame.
+        origin_m: x and y of the origin of the search, world frame.
+    """
+
+    position_m: tuple[float, float]
+    origin_m: tuple[float, float]
+
+
+def draw_start(chance: Chance) -> Start:
+    """Draw where the vehicle is put, with what it has drifted before the mission."""
+    value = chance.value
+    x_m, y_m = (value(f"start.{axis}_m") + value(f"calibration.drift_{axis}_m") for axis in "xy")
+    return Start((x_m, y_m), (x_m + value("calibration.origin_x_m"), y_m + value("calibration.origin_y_m")))
+
+
+def make_vehicle(
+    scenario: Scenario, model: VehicleModel, chance: Chance, start: Start, duration_s: float, track: Array
+) -> Vehicle:
+    """Make the vehicle of one mission.
+
+    Args:
+        scenario: has the calibration of the autopilot.
+        model: the vehicle's constants.
+        chance: of the run.
+        start: where the vehicle is put.
+        duration_s: of the mission.
+        track: to be filled with the vehicle's states, a row for each time step.
+    """
+    value, calibration = chance.value, scenario.calibration
+    z_m, heading_rad = value("start.z_m"), value("start.heading_rad")
+    autopilot = Autopilot(
+        calibration.position_gain_per_s,
+        calibration.jerk_m_per_s3,
+        calibration.velocity_gain_per_s,
+        calibration.velocity_integral_gain_per_s2,
+        calibration.heading_frequency_rad_per_s,
+        calibration.heading_integral_gain_per_s3,
+        value("calibration.altitude_error_m"),
+    )
+    current_m_per_s, wave = _current(scenario, chance)
+    return Vehicle(
+        model,
+        autopilot,
+        Pose(*start.position_m, z_m, 0.0, 0.0, heading_rad),
+        duration_s,
+        current_m_per_s=current_m_per_s,
+        current_wave=wave,
+        time_scale=1.0 / (1.0 + value("calibration.real_time_factor_loss")),
+        z_limits_m=(domain.SEA_BED_Z_M, domain.SURFACE_Z_M),
+        memory=track,
+    )
+
+
+def _current(scenario: Scenario, chance: Chance) -> tuple[Point, CurrentWave]:
+    """The constant part of the current, and the one that varies over time."""
+    value, wave = chance.value, scenario.current.wave
+    x, y, z = (value(f"current.{axis}_m_per_s") for axis in "xyz")
+    if wave is None:
+        return (x, y, z), CurrentWave()
+    east, north = cos(direction_rad := value("current.wave.direction_rad")), sin(direction_rad)
+    mean, amplitude = value("current.wave.mean_m_per_s"), value("current.wave.amplitude_m_per_s")
+    varying = CurrentWave((amplitude * east, amplitude * north), wave.period_s, value("current.wave.shift_s"))
+    return (x + mean * east, y + mean * north, z), varying
