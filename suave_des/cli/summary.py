@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -22,49 +23,70 @@ _ROWS_SHOWN = 40
 """Of a sweep with more, the first ones."""
 
 
+@dataclass(frozen=True)
+class _Look:
+    """How wide the summary is.
+
+    Attributes:
+        breaks_after: characters after which a name goes on in a new line.
+        digits: of swept values, significant ones; files have all.
+        has_std: standard deviations are shown.
+    """
+
+    breaks_after: str = ""
+    digits: int = 6
+    has_std: bool = True
+
+    def broken(self, name: str) -> str:
+        """Break a name into lines."""
+        return "".join(f"{letter}\n" if letter in self.breaks_after else letter for letter in name).replace(" \n", "\n")
+
+    def shown(self, value: object) -> str:
+        """Round a swept value for reading."""
+        return f"{value:.{self.digits}g}" if isinstance(value, float) else str(value)
+
+
+_LOOKS = (_Look(), _Look(".:"), _Look(".:", has_std=False), _Look(".:_ ", digits=4, has_std=False))
+"""From the widest on."""
+
+
 def print_summary(console: Console, result: CampaignResult) -> None:
     """Print the rows of summary.csv; what does not fit into the console's width is broken up, then left out."""
-    for breaks_names, has_std in ((False, True), (True, True), (True, False)):
-        table = _summary(result, breaks_names=breaks_names, has_std=has_std)
+    for look in _LOOKS:
+        table = _summary(result, look)
         if console.measure(table, options=console.options.update(width=1000)).maximum <= console.width:
             break
     title = f"{result.loaded.scenario.name}, seed {result.seed}: means ± half their 95% intervals"
-    print_table(console, f"{title}, standard deviations" if has_std else title, table)
+    print_table(console, f"{title}, standard deviations" if look.has_std else title, table)
     if len(result.summary) > _ROWS_SHOWN:
         more = len(result.summary) - _ROWS_SHOWN + 1
         where = "" if result.folder is None else f", all in {result.folder}/summary.csv"
         console.print(f"... and {more} rows more{where}", soft_wrap=True)
 
 
-def _summary(result: CampaignResult, *, breaks_names: bool, has_std: bool) -> Table:
+def _summary(result: CampaignResult, look: _Look) -> Table:
     table = plain_table()
     for parameter in result.variation.sweep.parameters:
-        table.add_column(parameter.replace(".", ".\n") if breaks_names else parameter, justify="right")
+        table.add_column(look.broken(parameter), justify="right", overflow="fold")
     table.add_column("manager", overflow="fold")
     for heading in ("missions", "found"):
-        table.add_column(heading, justify="right")
+        table.add_column(heading, justify="right", no_wrap=True)
     for metric in METRICS:
-        table.add_column(METRIC_TITLES[metric], justify="right", no_wrap=True)
-        if has_std:
+        table.add_column(look.broken(METRIC_TITLES[metric]), justify="right", no_wrap=True)
+        if look.has_std:
             table.add_column("std", justify="right", no_wrap=True)
     rows = result.summary if len(result.summary) <= _ROWS_SHOWN else result.summary[: _ROWS_SHOWN - 1]
     for row in rows:
         cells = dict(zip(SUMMARY_COLUMNS, row, strict=False))
         share = cells["found_share"]
-        manager = str(cells["manager"])
         table.add_row(
-            *map(_shown, row[len(SUMMARY_COLUMNS) :]),
-            manager.replace(":", ":\n") if breaks_names else manager,
+            *map(look.shown, row[len(SUMMARY_COLUMNS) :]),
+            look.broken(str(cells["manager"])),
             str(cells["n"]),
             "" if share is None else f"{float(share):.0%}",
-            *(text for metric in METRICS for text in _figures(cells, metric)[: 1 + has_std]),
+            *(text for metric in METRICS for text in _figures(cells, metric)[: 1 + look.has_std]),
         )
     return table
-
-
-def _shown(value: object) -> str:
-    """A swept value, rounded for reading; files have all digits."""
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _figures(cells: Mapping[str, object], metric: str) -> tuple[str, str]:
