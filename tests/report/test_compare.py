@@ -112,6 +112,44 @@ class TestPublishedRuns:
         assert published.conclusion.startswith("metacontrol finds the pipeline soonest: 80.90 s sooner than none (95%")
 
 
+class TestExemplarsColumns:
+    """Result files as the exemplar writes them, a file for each manager."""
+
+    HEADINGS = {
+        "2023": "mission_name,datetime,initial pos (x;y),time budget (s),time search (s),distance inspected (m)",
+        "1.5": "mission name,datetime,initial pos (x;y),mission duration (s),pipeline found,"
+        "time searching pipeline (s),distance inspected (m),mean reaction time (s)",
+    }
+
+    @staticmethod
+    def line(release: str, manager: str, time_s: float, distance_m: float) -> str:
+        if release == "2023":
+            return f"time constrained {manager},Jan-01-2023-00-00-00,(-17.0; 2.0),300,{time_s},{distance_m}"
+        return f"suave {manager},01-Jan-2025-00-00-00,(-17.0; 2.0),300,True,{time_s},{distance_m},1.5"
+
+    @pytest.mark.parametrize("release", ["2023", "1.5"])
+    def test_p_values_are_scipys(self, release: str, tmp_path: Path) -> None:
+        chance = np.random.default_rng(3)
+        values = {}
+        for manager, mean_s, n in (("none", 180.0, 23), ("random", 160.0, 31), ("metacontrol", 110.0, 20)):
+            times_s = chance.normal(mean_s, 40.0, n).clip(20.0, 290.0).round(0)  # whole seconds: there are ties
+            values[manager] = (times_s, chance.normal(mean_s / 4.0, 9.0, n).clip(0.0).round(2))
+            lines = [self.line(release, manager, *row) for row in zip(*values[manager], strict=True)]
+            (tmp_path / f"{manager}.csv").write_text("\n".join([self.HEADINGS[release], *lines]) + "\n")
+        comparison = compare_folders([tmp_path])
+        for first, second in (("none", "random"), ("none", "metacontrol"), ("random", "metacontrol")):
+            for metric, x, y in zip(
+                ("search_time_s", "distance_inspected_m"), values[first], values[second], strict=True
+            ):
+                tested = difference(comparison, first, second, metric).tested
+                assert tested is not None
+                assert tested.p == pytest.approx(stats.mannwhitneyu(x, y).pvalue, rel=1e-9, abs=1e-12)
+        ps = [each.tested.p for each in comparison.differences if each.tested]
+        assert [each.p_holm for each in comparison.differences if each.tested] == pytest.approx(
+            list(multipletests(ps, method="holm")[1]), rel=1e-9
+        )
+
+
 class TestCampaign:
     def test_runs_with_common_random_numbers_are_paired(self, campaign: Path) -> None:
         comparison = compare_folders([campaign])
