@@ -17,11 +17,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import studies
+from matplotlib.figure import Figure
 from SALib.analyze import morris as analyze_morris
 from SALib.sample import morris as sample_morris
 
 from suave_des import load_scenario, with_values
 from suave_des.calibration.parameters import read_parameters
+from suave_des.report import style
 from suave_des.resources import find
 from suave_des.simulation.simulator import Simulator
 
@@ -41,27 +44,27 @@ def means(loaded: Any, paths: tuple[str, ...], runs: int, values: tuple[float, .
 
 def draw(path: Path, names: list[str], effects: dict[tuple[str, str], np.ndarray]) -> None:
     """One panel a metric: mu* of each parameter and manager, the most important parameters on top."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.0, 4.6), layout="constrained")
-    panels = figure.subplots(1, len(METRICS))
-    colours = {"none": "#7f8c8d", "random": "#d98c21", "metacontrol": "#1f5f99"}
-    for panel, (metric, title) in zip(panels, METRICS.items(), strict=True):
-        order = np.argsort(np.mean([effects[manager, metric] for manager in MANAGERS], axis=0))
-        for offset, manager in zip((-0.26, 0.0, 0.26), MANAGERS, strict=True):
-            panel.barh(
-                np.arange(len(names)) + offset,
-                effects[manager, metric][order],
-                height=0.24,
-                color=colours[manager],
-                label=manager,
-            )
-        panel.set_yticks(range(len(names)), [names[index] for index in order], fontsize=8)
-        panel.set_xlabel(f"effect (mu*) on the {title}", fontsize=8)
-        panel.tick_params(axis="x", labelsize=8)
-        for side in ("top", "right"):
-            panel.spines[side].set_visible(False)
-    panels[0].legend(frameon=False, fontsize=8, loc="lower right")
+    with style.publication():
+        figure = Figure(figsize=(style.WIDTH_IN, 4.2), layout="constrained")
+        panels = figure.subplots(1, len(METRICS))
+        for panel, (metric, title) in zip(panels, METRICS.items(), strict=True):
+            order = np.argsort(np.mean([effects[manager, metric] for manager in MANAGERS], axis=0))
+            for number, (offset, manager) in enumerate(zip((0.26, 0.0, -0.26), MANAGERS, strict=True)):
+                panel.barh(
+                    np.arange(len(names)) + offset,
+                    effects[manager, metric][order],
+                    height=0.24,
+                    facecolor=studies.COLOURS[manager],
+                    edgecolor="white",
+                    linewidth=0.0,
+                    hatch=style.hatch(number),
+                    label=manager,
+                )
+            panel.set_yticks(range(len(names)), [names[index] for index in order])
+            panel.tick_params(axis="y", length=0)
+            panel.grid(axis="y", visible=False)
+            panel.set_xlabel(f"effect (mu*) on the\n{title}")
+        panels[0].legend(loc="lower right")
     figure.savefig(path, dpi=160)
 
 

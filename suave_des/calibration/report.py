@@ -101,21 +101,21 @@ def profiles_png(found: Sequence[Profile], best: Evaluation, threshold: float) -
 
     columns = 4
     rows = -(-len(found) // columns)
-    figure = Figure(figsize=(2.6 * columns, 2.1 * rows), layout="constrained")
-    panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
     top = threshold + 4.0 * (threshold - best.loss)
-    for panel, profile in zip(panels, found, strict=False):
-        panel.axvspan(profile.low, profile.high, color="#cfe3f3", lw=0)
-        panel.axhline(threshold, color="0.6", lw=0.8, ls="--")
-        points = sorted([*zip(profile.values, profile.losses, strict=True), (profile.best, best.loss)])
-        panel.plot([x for x, _ in points], [y for _, y in points], color="#1f5f99", lw=1.2, marker=".", ms=4)
-        panel.plot([profile.best], [best.loss], marker="o", color="#c0392b", ms=5)
-        panel.set_xlim(profile.parameter.lower, profile.parameter.upper)
-        panel.set_ylim(0.0, top)
-        panel.set_title(profile.parameter.path.replace("calibration.", "").replace("latencies.", ""), fontsize=7.5)
-        panel.tick_params(labelsize=7)
-    for panel in panels[len(found) :]:
-        panel.set_visible(False)
-    for row in range(rows):
-        panels[row * columns].set_ylabel("distance to the published runs", fontsize=7)
-    return style.png(figure, dpi=160)
+    with style.publication():
+        figure = Figure(figsize=(style.WIDTH_IN, 1.5 * rows), layout="constrained")
+        panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
+        for panel, profile in zip(panels, found, strict=False):
+            panel.axvspan(profile.low, profile.high, color="#D6E6F2", lw=0)
+            panel.axhline(threshold, color=style.GREY, lw=0.8, ls="--")
+            points = sorted([*zip(profile.values, profile.losses, strict=True), (profile.best, best.loss)])
+            panel.plot([x for x, _ in points], [y for _, y in points], color=style.BLUE, marker=".", ms=4)
+            panel.plot([profile.best], [best.loss], marker="D", color=style.VERMILION, ms=4)
+            panel.set_xlim(profile.parameter.lower, profile.parameter.upper)
+            panel.set_ylim(0.0, top)
+            panel.set_title(profile.parameter.path.replace("calibration.", "").replace("latencies.", ""), fontsize=6.5)
+            panel.tick_params(labelsize=6.5)
+        for panel in panels[len(found) :]:
+            panel.set_visible(False)
+        figure.supylabel("distance to the published runs", fontsize=8)
+        return style.png(figure, dpi=160)

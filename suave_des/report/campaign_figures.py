@@ -43,16 +43,17 @@ def draw_distributions(groups: Sequence[Group]) -> style.Picture:
             shares = np.arange(1, len(values) + 1) / len(values)
             look = style.line(number)
             axes.step([0.0, *values, end], [0.0, *shares, 1.0], where="post", label=_label(group), **look)
-            axes.plot(float(values.mean()), 0.0, marker="^", color=look["color"], ms=5, clip_on=False, zorder=5)
+            mark = {"marker": style.marker(number), "color": look["color"], "ms": 5, "mec": "white", "mew": 0.5}
+            axes.plot(float(values.mean()), 0.0, clip_on=False, zorder=5, **mark)
         axes.set(xlabel=title, xlim=(0.0, end))
         axes.set_title(f"{letter}   {title.split(' (')[0].capitalize()}")
         if metric == "search_time_s" and limit_s is not None:
             _mark_not_found(axes, limit_s)
     panels[0].set(ylabel="share of missions at or below", ylim=(0.0, 1.02))
     panels[0].yaxis.set_major_formatter(PercentFormatter(1.0))
-    handles, labels = panels[0].get_legend_handles_labels()
-    handles.append(Line2D([], [], lw=0, marker="^", ms=5, color=style.GREY))
-    _legend(figure, handles, [*labels, "mean"])
+    labels = [_label(group) for group in groups]
+    handles = [*_handles(groups), Line2D([], [], lw=0, marker="o", mfc="none", ms=4, color=style.GREY)]
+    _legend(figure, handles, [*labels, "marks at 0%: means"])
     return figure
 
 
@@ -245,11 +246,13 @@ def draw_reactions(groups: Sequence[Group]) -> style.Picture:
     right.set_xlim(left=0.0)
     right.yaxis.set_major_formatter(PercentFormatter(1.0))
     right.set_title("b   Reaction time")
-    handles = [
-        Line2D([], [], marker=style.marker(number), ms=3.5, **style.line(number)) for number in range(len(groups))
-    ]
-    _legend(figure, handles, [_label(group) for group in groups])
+    _legend(figure, _handles(groups), [_label(group) for group in groups])
     return figure
+
+
+def _handles(groups: Sequence[Group]) -> list[Artist]:
+    """Make the lines with markers that a legend shows for each group."""
+    return [Line2D([], [], marker=style.marker(number), ms=3.5, **style.line(number)) for number in range(len(groups))]
 
 
 def _label(group: Group) -> str:

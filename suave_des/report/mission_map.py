@@ -24,7 +24,7 @@ from suave_des.report.words import mode_words
 _IDLE_MODES = ("", "fd_unground", "inactive")
 _ZOOM_MARGIN_M = 0.6
 _PIPELINE_COLOUR, _PIPELINE_WIDTH = "#CFCFCF", 4.0
-_VISIBILITY_COLOUR = "#8A8A8A"
+_VISIBILITY: dict[str, Any] = {"color": style.GREY, "lw": 1.0, "ls": (0, (4, 1.5))}
 _THRESHOLD_COLOUR = "#B5B5B5"
 _BATTERY_COLOUR = style.GREEN
 _LETTER_OFFSETS = ((4, 4), (-9, 4), (4, -10), (-9, -10), (0, 9), (0, -14), (12, 0), (-16, 0), (12, 10), (-16, 10))
@@ -76,7 +76,7 @@ def _legend(record: MissionRecord, colours: dict[str, str], marks: list[_Mark]) 
         named.append((mode_words(_IDLE_MODES[1]), _IDLE_MODES[1]))
     lines = [Line2D([], [], label=style.text(name), **_way_look(colours, mode)) for name, mode in named]
     lines.append(Line2D([], [], color=_PIPELINE_COLOUR, lw=_PIPELINE_WIDTH, label="pipeline"))
-    lines.append(Line2D([], [], color=_VISIBILITY_COLOUR, lw=1.0, label="visibility; dotted: thresholds (c)"))
+    lines.append(Line2D([], [], **_VISIBILITY, label="visibility; dotted: thresholds (c)"))
     if battery_level(record) is not None:
         lines.append(Line2D([], [], color=_BATTERY_COLOUR, lw=1.0, ls="--", label="battery (c)"))
         lines.append(Line2D([], [], color=_BATTERY_COLOUR, lw=0, marker="P", ms=5, label="recharge station"))
@@ -195,7 +195,7 @@ def _draw_map(axes: Axes, record: MissionRecord, colours: dict[str, str], frame:
     """The whole mission, with the frame of the search's map."""
     _draw_plan(axes, record, colours)
     axes.add_patch(Rectangle(frame.p0, frame.width, frame.height, fill=False, ec=style.GREY, lw=0.7))
-    axes.annotate("b", (frame.x0, frame.y1), (2, -8), textcoords="offset points", fontsize=7.5, color=style.GREY)
+    axes.annotate("b", (frame.x0, frame.y1), (-3, 0), textcoords="offset points", ha="right", va="top", fontsize=7.5)
     axes.yaxis.set_major_locator(MultipleLocator(5.0))
 
 
@@ -232,7 +232,7 @@ def _draw_over_time(axes: Axes, record: MissionRecord, colours: dict[str, str], 
     end_s = float(way["t_s"].iloc[-1])
     for threshold_m in record.scenario.get("reaction_metric", {}).get("visibility_thresholds_m", ()):
         axes.axhline(threshold_m, color=_THRESHOLD_COLOUR, lw=0.7, ls=":", zorder=1)
-    axes.plot(way["t_s"], way["visibility_m"], color=_VISIBILITY_COLOUR, lw=1.0)
+    axes.plot(way["t_s"], way["visibility_m"], **_VISIBILITY)
     timed = replace(record, trajectory=way)
     _draw_way(axes, timed, colours, "t_s", "altitude_m")
     _draw_adaptations(axes, timed, colours, "t_s", "altitude_m")

@@ -112,14 +112,15 @@ class TestPublishedRuns:
         assert published.conclusion.startswith("metacontrol finds the pipeline soonest: 80.90 s sooner than none (95%")
 
 
+HEADINGS = {
+    "2023": "mission_name,datetime,initial pos (x;y),time budget (s),time search (s),distance inspected (m)",
+    "1.5": "mission name,datetime,initial pos (x;y),mission duration (s),pipeline found,"
+    "time searching pipeline (s),distance inspected (m),mean reaction time (s)",
+}
+
+
 class TestExemplarsColumns:
     """Result files as the exemplar writes them, a file for each manager."""
-
-    HEADINGS = {
-        "2023": "mission_name,datetime,initial pos (x;y),time budget (s),time search (s),distance inspected (m)",
-        "1.5": "mission name,datetime,initial pos (x;y),mission duration (s),pipeline found,"
-        "time searching pipeline (s),distance inspected (m),mean reaction time (s)",
-    }
 
     @staticmethod
     def line(release: str, manager: str, time_s: float, distance_m: float) -> str:
@@ -135,7 +136,7 @@ class TestExemplarsColumns:
             times_s = chance.normal(mean_s, 40.0, n).clip(20.0, 290.0).round(0)  # whole seconds: there are ties
             values[manager] = (times_s, chance.normal(mean_s / 4.0, 9.0, n).clip(0.0).round(2))
             lines = [self.line(release, manager, *row) for row in zip(*values[manager], strict=True)]
-            (tmp_path / f"{manager}.csv").write_text("\n".join([self.HEADINGS[release], *lines]) + "\n")
+            (tmp_path / f"{manager}.csv").write_text("\n".join([HEADINGS[release], *lines]) + "\n")
         comparison = compare_folders([tmp_path])
         for first, second in (("none", "random"), ("none", "metacontrol"), ("random", "metacontrol")):
             for metric, x, y in zip(
