@@ -22,12 +22,13 @@ from suave_des.errors import KnowledgeError
 from suave_des.knowledge.deliberation import Conclusion, Deliberation
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import Lit, Triple, facts_of
+from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.knowledge.rules.syntax import Atom, Named, Term, Variable
 from suave_des.knowledge.state import Fact, Inference, KnowledgeState
 from suave_des.knowledge.vocabulary import DECISION_PROPERTIES, HAS_VALUE, OWL, RDF_TYPE, RDFS, TOMASYS, XSD, local_name
 from suave_des.workbench.derivations import FACT_KINDS, Binding, matched
 from suave_des.workbench.knowledge_base import KnowledgeBase
-from suave_des.workbench.policy import kinds_of_states
+from suave_des.workbench.policy import PolicyCase, kinds_of_states
 from suave_des.workbench.policy_space import PolicySpace, numbers_in
 from suave_des.workbench.testing.mutants import Mutant
 from suave_des.workbench.testing.probes import Body, Probes
@@ -127,6 +128,22 @@ class _Original:
                 asserted = base.facts.union(facts_of(assertions, base.names))
                 self._found[situation] = frozenset(facts_of(found[0], base.names)) - asserted, found[1]
         return self._found[situation]
+
+    def touched(self, cases: Sequence[PolicyCase], numbers: Iterable[int]) -> frozenset[KnowledgeState]:
+        """States in which probes of some mutants may hold; all, where that cannot be told."""
+        probes = [self.touched_by[number] for number in numbers]
+        if not self.is_horn or None in probes:
+            return frozenset(case.state for case in cases)
+        wanted = frozenset[int]().union(*filter(None, probes))
+        return frozenset(case.state for case in self.probes.may_hold(cases, wanted))
+
+    def take_from_cache(self, state: KnowledgeState) -> None:
+        """Take what is inferred in a state, in which no probe of interest holds, from the reasoner's cache."""
+        self._found.setdefault(Situation(state), (self._reasoner.infer(state).facts, frozenset()))
+
+    @cached_property
+    def _reasoner(self) -> Reasoner:
+        return make_reasoner("remembered", self.bench.base, self.bench.limit)
 
     def outcome(self, base: Ontology, known: frozenset[Fact], situation: Situation) -> Outcome:
         """The outcome in a knowledge base with perhaps other data, from which the same is inferred.
@@ -293,14 +310,15 @@ def _compared(original: _Original, situations: Sequence[Situation], max_failed: 
     states = 0
     for kinds in kinds_of_states(bench.base, bench.settings, max_failed, space):
         states += len(kinds)
-        numbers = [original.touched_by[changed.number] for changed in open_ones]
-        is_rules_only = original.is_horn and all(changed.mutant.old is not None for changed in open_ones)
-        if is_rules_only and None not in numbers:
-            wanted = frozenset[int]().union(*filter(None, numbers))
-            cases = list(original.probes.may_hold(kinds, wanted)) if open_ones else []
-        else:
-            cases = list(kinds)
-        for case in cases:
+        if not open_ones:
+            continue
+        touched = original.touched(kinds, [changed.number for changed in open_ones])
+        of_data = any(changed.known != original.known for changed in open_ones)
+        for case in kinds:
+            if case.state not in touched:
+                if not of_data:
+                    continue
+                original.take_from_cache(case.state)
             look(Situation(case.state), "")
     reason = f"nothing differs in {states} kinds of states"
     for changed in open_ones:

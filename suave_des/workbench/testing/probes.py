@@ -81,21 +81,28 @@ class Probes:
         """Leave out cases in which none of the wanted conjunctions can hold.
 
         What several states assert is taken together: what does not follow from all of it follows from no part of it.
-        Where they contradict one another, they are divided.
+        Where they contradict one another, they are divided; states in which different functions are grounded would, as
+        the status of one without a grounding contradicts that of one with it.
 
         Raises:
             KnowledgeError: Pellet takes too long.
         """
+        groups: dict[tuple[str, ...], list[PolicyCase]] = {}
+        for case in cases if wanted else ():
+            ungrounded = tuple(function for function in case.asked if case.state.grounded(function) is None)
+            groups.setdefault(ungrounded, []).append(case)
+        for group in groups.values():
+            yield from self._may_hold(group, wanted)
+
+    def _may_hold(self, cases: Sequence[PolicyCase], wanted: frozenset[int]) -> Iterator[PolicyCase]:
         together = dict.fromkeys(triple for case in cases for triple in self.base.assertions(case.state))
-        found = self._conclude(tuple(together), cases[0].state) if wanted else (frozenset[Triple](), frozenset[int]())
-        holding = None if found is None else found[1]
-        if holding is not None and holding.isdisjoint(wanted):
-            return
-        if holding is not None or len(cases) == 1:
+        found = self._conclude(tuple(together), cases[0].state)
+        if found is None and len(cases) > 1:
+            middle = len(cases) // 2
+            yield from self._may_hold(cases[:middle], wanted)
+            yield from self._may_hold(cases[middle:], wanted)
+        elif found is None or not found[1].isdisjoint(wanted):
             yield from cases
-            return
-        for part in _divided(cases):
-            yield from self.may_hold(part, wanted)
 
     def _conclude(
         self, assertions: tuple[Triple, ...], state: KnowledgeState
@@ -108,18 +115,6 @@ class Probes:
             return None
         holding = frozenset(int(value.text) for _, name, value in entailed if name == _HOLDS and isinstance(value, Lit))
         return frozenset(triple for triple in entailed if not triple[0].startswith(_PROBE)), holding
-
-
-def _divided(cases: Sequence[PolicyCase]) -> list[list[PolicyCase]]:
-    """Cases by what is not grounded, whose status contradicts that of what is; else in halves."""
-    groups: dict[tuple[str, ...], list[PolicyCase]] = {}
-    for case in cases:
-        ungrounded = tuple(function for function in case.asked if case.state.grounded(function) is None)
-        groups.setdefault(ungrounded, []).append(case)
-    if len(groups) > 1:
-        return list(groups.values())
-    middle = len(cases) // 2
-    return [list(cases[:middle]), list(cases[middle:])]
 
 
 def _head(number: int) -> Atom:
