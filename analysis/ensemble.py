@@ -269,8 +269,8 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--out", type=Path, default=Path(__file__).parents[1] / "scenarios" / "ensembles")
     options.add_argument("--members", type=int, default=24)
-    options.add_argument("--generations", type=int, default=4)
-    options.add_argument("--runs", type=int, default=16, help="missions for each manager of 2023; of 2025, a tenth")
+    options.add_argument("--generations", type=int, default=8)
+    options.add_argument("--runs", type=int, default=40, help="missions for each manager of 2023; of 2025, a tenth")
     options.add_argument("--workers", type=int, default=2)
     chosen = options.parse_args()
 

@@ -115,3 +115,18 @@ def test_a_study_imports_public_names_only(script):
 def test_the_readme_has_the_plain_command_of_each_study(script):
     text = (FOLDER / "README.md").read_text(encoding="utf-8")
     assert script.stem == "studies" or f"`python analysis/{script.name}" in text
+
+
+def test_the_committed_table_of_mechanisms_is_of_the_committed_figures(study):
+    module, rows = study("mechanisms"), committed("mechanisms")
+    text = (FOLDER / "mechanisms" / "mechanisms.md").read_text(encoding="utf-8").strip()
+    assert text == module.table(rows)
+    assert list(rows["mechanism"]) == [each.mechanism for each in module.CHANGES]
+    fidelity = (ROOT / "docs" / "background" / "fidelity.md").read_text(encoding="utf-8")
+    assert text in fidelity
+
+
+def test_without_what_is_taken_out_missions_differ_more_from_the_real_ones(study):
+    module = study("mechanisms")
+    shipped, changed = (module.against_2025(3, each) for each in (module.CHANGES[0], module.CHANGES[1]))
+    assert 0.0 < shipped["distance_2025"] < 0.7 * changed["distance_2025"]

@@ -1,0 +1,237 @@
+"""What each mechanism of the vehicle and its software is worth: each taken out, or set to another value, one at a time.
+
+Simulated missions are held against the real ones of 2023 (`seams2023`, the same condition in each run) and of 2025
+(`planta_exp1_campaign`, six conditions). Writes a CSV file and the table that docs/background/fidelity.md shows.
+
+    python analysis/mechanisms.py [--out DIR] [--runs N] [--workers N]
+"""
+
+from __future__ import annotations
+
+import csv
+import multiprocessing
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pandas
+import studies
+from ensemble import SCALES, energy_distance
+from numpy.typing import NDArray
+from scipy import stats
+
+from suave_des import load_scenario, with_values
+from suave_des.calibration.loss import as_vectors, published_vectors, simulate
+from suave_des.report.runs import choose_managers, read_runs
+from suave_des.resources import find
+from suave_des.simulation.simulator import Simulator
+from suave_des.validation.real import read_conditions, read_real
+
+SIGNIFICANT = 0.05
+METRICS = list(SCALES)[:2]
+SHARE_2025 = 10
+"""Missions for each manager of 2023 to one for each manager and condition of 2025."""
+ADAPTED_ALIKE = ("none", "bt", "metacontrol")
+"""What random does differs from run to run by far more than with any mechanism."""
+
+FIRST_CONDITIONS = 4
+"""In these, each real run's reactions are alike."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """A mechanism, what is known of it, and the values that take it out or replace it."""
+
+    mechanism: str
+    evidence: str = ""
+    both: Mapping[str, Any] = field(default_factory=dict)
+    of_2023: Mapping[str, Any] = field(default_factory=dict)
+    of_2025: Mapping[str, Any] = field(default_factory=dict)
+
+
+FAILURES = "revision.thruster_failures"
+CHANGES = (
+    Change("all of them"),
+    Change(
+        "jerk of 0.5 m/s³ (1.0, ArduSub's default)",
+        "early and late turns of the spiral and the speed of following, in both years",
+        {"calibration.jerk_m_per_s3": 1.0},
+    ),
+    Change(
+        "integral of the velocity loop (none)",
+        "following with one dead thruster",
+        {"calibration.velocity_integral_gain_per_s2": 0.0},
+    ),
+    Change(
+        "heading control of 5 rad/s (3)",
+        "none with two dead thrusters, in five conditions of 2025",
+        {"calibration.heading_frequency_rad_per_s": 3.0},
+    ),
+    Change("the same (8)", "", {"calibration.heading_frequency_rad_per_s": 8.0}),
+    Change(
+        "failures without effect: before 30 s, and 15% (all have one)",
+        "none in 2025: five of five with a failure at 24.8 s, and six of 25 with later ones, go on as if whole",
+        {f"{FAILURES}.effective_from_s": 0.0, f"{FAILURES}.loss_probability": 0.0},
+    ),
+    Change(
+        "lost set-points: 2% in 2023, 1% in 2025 (none)",
+        "a new publisher for each call; stalls of 12 s",
+        {"revision.set_points.loss_probability": 0.0},
+    ),
+    Change(
+        "drift before guided mode (none)",
+        "recorded in both years",
+        {"calibration.drift_x_m": 0.0, "calibration.drift_y_m": 0.0},
+    ),
+    Change(
+        "spiral's centre 0.2 m south of where guided mode begins, 2023 (there)",
+        "the local frame's origin is set before the drift ends",
+        of_2023={"calibration.origin_y_m": 0.0},
+    ),
+    Change(
+        "altitude error, 2023: exponential, mean 0.5 m (none)",
+        "not explained",
+        of_2023={"calibration.altitude_error_m": 0.0},
+    ),
+    Change(
+        "detection 0.75 m above the pipeline's points, 2023 (at them)",
+        "read off the code",
+        of_2023={"revision.monitors.detected_point_height_m": 0.0},
+    ),
+    Change(
+        "simulator slower than the clock, 2023: mean 3% (not slower)",
+        "some runs follow more slowly",
+        of_2023={"calibration.real_time_factor_loss": 0.0},
+    ),
+    Change(
+        "timers in step, 2025 (phases of their own)",
+        "metacontrol's reaction times",
+        of_2025={"revision.timers_in_step": []},
+    ),
+)
+
+
+def against_2023(runs: int, change: Change) -> dict[str, float]:
+    """Count the means, standard deviations and distributions that agree with the 60 runs, and measure the distance."""
+    real = read_runs(find("seams2023_runs.csv", "scenarios/published"))
+    managers = choose_managers(real, None)
+    vectors = published_vectors(real.frame, managers)
+    simulator = Simulator(with_values(load_scenario("seams2023"), {**change.both, **change.of_2023}))
+    missions = {name: simulate(simulator, name, runs, studies.SEED) for name in managers}
+    distances = [
+        energy_distance(as_vectors(missions[name])[:, : vectors[name].shape[1]], vectors[name]) for name in managers
+    ]
+    agreeing = sum(
+        agree(real.frame.loc[real.frame["manager"] == name, metric].to_numpy(float), missions[name][metric].to_numpy())
+        for name in managers
+        for metric in METRICS
+    )
+    return {"agreeing_2023": agreeing, "distance_2023": float(np.mean(distances))}
+
+
+def agree(real: NDArray[np.float64], simulated: NDArray[np.float64]) -> int:
+    """Count what agrees: mean in the t interval, standard deviation in the chi-square one, Kolmogorov-Smirnov test."""
+    n = len(real)
+    half = stats.t.ppf(1.0 - SIGNIFICANT / 2.0, n - 1) * real.std(ddof=1) / np.sqrt(n)
+    ends = stats.chi2.ppf([1.0 - SIGNIFICANT / 2.0, SIGNIFICANT / 2.0], n - 1)
+    low, high = real.std(ddof=1) * np.sqrt((n - 1) / ends)
+    mean_agrees = abs(simulated.mean() - real.mean()) <= half
+    alike = stats.ks_2samp(real, simulated).pvalue > SIGNIFICANT
+    return int(mean_agrees) + int(low <= simulated.std(ddof=1) <= high) + int(alike)
+
+
+def against_2025(runs: int, change: Change) -> dict[str, float]:
+    """Compare none, bt and metacontrol with the real runs of the same condition.
+
+    Returns:
+        Energy distance, mean over managers and conditions; difference of the median search times, median over both;
+        standard deviation of none's distances, median over the conditions, beside the real one; and by how much
+        metacontrol's reaction time depends on the condition, among the first four.
+    """
+    conditions = read_conditions("planta_exp1_campaign")
+    real = read_real([find("planta_exp1_runs.csv", "scenarios/published")], conditions).frame
+    loaded = with_values(load_scenario("planta_exp1"), {**change.both, **change.of_2025})
+    scales = [SCALES[name] for name in METRICS]
+    distances, apart, spreads, slow = [], [], {"real": [], "simulated": []}, []
+    for number, values in enumerate(conditions.values, 1):
+        simulator = Simulator(with_values(loaded, dict(zip(conditions.names, values, strict=True))))
+        for name in ADAPTED_ALIKE:
+            theirs = real[(real["manager"] == name) & (real["condition"] == number)]
+            found = [simulator.run(name, run, studies.SEED).metrics for run in range(1, runs + 1)]
+            ours = np.array([[getattr(each, metric) for metric in METRICS] for each in found])
+            published = theirs[METRICS].to_numpy(float)
+            distances.append(energy_distance(ours / scales, published / scales))
+            apart.append(abs(float(np.median(ours[:, 0]) - np.median(published[:, 0]))))
+            if name == "none":
+                spreads["real"].append(float(published[:, 1].std(ddof=1)))
+                spreads["simulated"].append(float(ours[:, 1].std(ddof=1)))
+            if name == "metacontrol":
+                slow.append(float(np.median([each.mean_reaction_time_s for each in found])))
+    return {
+        "distance_2025": float(np.mean(distances)),
+        "median_apart_2025_s": float(np.median(apart)),
+        "spread_of_none_2025_m": float(np.median(spreads["simulated"])),
+        "real_spread_of_none_2025_m": float(np.median(spreads["real"])),
+        "reactions_2025_s": float(np.ptp(slow[:FIRST_CONDITIONS])),
+    }
+
+
+def measure(runs: int, change: Change) -> dict[str, Any]:
+    """Simulate with one change; a row of the table."""
+    row: dict[str, Any] = {"mechanism": change.mechanism, "evidence": change.evidence}
+    if change.both or change.of_2023 or not change.of_2025:
+        row |= against_2023(runs, change)
+    if change.both or change.of_2025 or not change.of_2023:
+        row |= against_2025(max(3, runs // SHARE_2025), change)
+    return row
+
+
+def study(runs: int, workers: int, chosen: list[str] | None = None) -> pandas.DataFrame:
+    """Take out each mechanism; a row for each."""
+    changes = [each for each in CHANGES if chosen is None or each.mechanism in chosen]
+    with multiprocessing.get_context("spawn").Pool(workers) as pool:
+        return pandas.DataFrame(pool.map(partial(measure, runs), changes, chunksize=1))
+
+
+def table(rows: pandas.DataFrame) -> str:
+    """Write the rows as a Markdown table."""
+    lines = [
+        "| mechanism (instead) | evidence | 2023: of 18 | 2023: distance | 2025: distance | 2025: medians apart |"
+        " 2025: spread of none | 2025: reactions |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for row in rows.to_dict("records"):
+        texts = [
+            shown(row["agreeing_2023"], "{:.0f}"),
+            shown(row["distance_2023"], "{:.3f}"),
+            shown(row["distance_2025"], "{:.3f}"),
+            shown(row["median_apart_2025_s"], "{:.1f} s"),
+            shown(row["spread_of_none_2025_m"], "{:.1f} m"),
+            shown(row["reactions_2025_s"], "{:.2f} s"),
+        ]
+        evidence = "" if pandas.isna(row["evidence"]) else row["evidence"]
+        lines.append("| " + " | ".join([row["mechanism"], evidence, *texts]) + " |")
+    return "\n".join(lines)
+
+
+def shown(value: float, form: str) -> str:
+    """Write a number, or a dash where the mechanism is not of that year."""
+    return "-" if pandas.isna(value) else form.format(value)
+
+
+def main() -> None:
+    """Take out each mechanism, write the table and print it."""
+    chosen = studies.options(__file__, __doc__ or "", runs=200)
+    rows = study(chosen.runs, chosen.workers)
+    chosen.out.mkdir(parents=True, exist_ok=True)
+    path = chosen.out / "mechanisms.csv"
+    rows.round(4).to_csv(path, index=False, lineterminator="\n", quoting=csv.QUOTE_MINIMAL)
+    text = table(pandas.read_csv(path))
+    (chosen.out / "mechanisms.md").write_text(text + "\n", encoding="utf-8")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()
