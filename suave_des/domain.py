@@ -1,4 +1,4 @@
-"""Facts of the exemplar that several rooms share: the depth of the water, and the mission's functions and tasks."""
+"""Facts of the exemplar that several packages share: the depth of the water, and the mission's functions and tasks."""
 
 from dataclasses import dataclass
 

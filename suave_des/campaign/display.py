@@ -20,7 +20,7 @@ from suave_des.campaign.progress import GroupProgress, OnProgress, Progress
 from suave_des.campaign.results import METRIC_TITLES
 
 _UPDATE_PERIOD_S = 0.25
-"""A campaign tells of each mission; it is looked at so often."""
+"""A campaign reports each mission; the display is drawn anew so often."""
 _FIRST_LINE_S, _LINE_PERIOD_S = 10.0, 30.0
 _RATE_PERIOD_S = 10.0
 """Missions a second are those of this time."""

@@ -136,7 +136,7 @@ def end_programs() -> None:
 
 
 class ExecManager(ManagingSubsystem):
-    """exec:COMMAND: a program that is told what happens, and answers with modes."""
+    """exec:COMMAND: a program that gets messages of what happens, and answers with modes."""
 
     command: ClassVar[str]
 
@@ -185,19 +185,19 @@ class ExecManager(ManagingSubsystem):
             self._thresholds = {name: tuple(sorted(map(float, each))) for name, each in edges.items()}
 
     def mission_started(self) -> None:
-        """Carry out what the program answered when it was told of the mission."""
+        """Carry out what the program answered to this message, which it got with the settings."""
         self._carry_out(self._begin)
 
     def mission_ended(self, metrics: MissionMetrics) -> None:
-        """Tell the program the metrics."""
+        """Send the program the metrics."""
         self._ask("mission_ended", metrics=asdict(metrics))
 
     def task_requested(self, task: Task) -> None:
-        """Tell the program of a task that begins."""
+        """Send the program a task that begins."""
         self._carry_out(self._ask("task_requested", task=task.name, functions=task.functions))
 
     def task_cancelled(self, task: Task) -> None:
-        """Tell the program of a task that is over; its functions are set to fd_unground first."""
+        """Send the program a task that is over; its functions are set to fd_unground first."""
         super().task_cancelled(task)
         self._carry_out(self._ask("task_cancelled", task=task.name, functions=task.functions))
 

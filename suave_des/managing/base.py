@@ -53,7 +53,7 @@ class ManagedSystem:
         knowledge: gives the knowledge base with its reasoner, opened on the first call.
         record_state: adds a state of knowledge that is reasoned about to the mission's record.
         state_changed: to be called when something that `adapt` depends on has changed of itself, not in a hook.
-        reasoned: to be called with the mission time, s, that reasoning took before an adaptation; a further metric.
+        record_reasoning_time: adds the mission time, s, that reasoning took before an adaptation; a further metric.
         measurements: what monitors have measured, by quality attribute; see `measured`.
         recorded: whether the mission is recorded.
         pose: gives the vehicle's pose now.
@@ -76,7 +76,7 @@ class ManagedSystem:
     knowledge: Callable[[], Deliberation]
     record_state: Callable[[KnowledgeState], None] = lambda state: None
     state_changed: Callable[[], None] = lambda: None
-    reasoned: Callable[[float], None] = lambda duration_s: None
+    record_reasoning_time: Callable[[float], None] = lambda duration_s: None
     measurements: Mapping[str, Measured] = field(default_factory=dict)
     recorded: bool = True
     pose: Callable[[], Pose] = _unknown
@@ -213,3 +213,24 @@ class ManagingSubsystem:
     def adapt(self) -> AdaptationProcess | None:
         """Adapt, once every `period_s`; a call that would come while an earlier one still runs is left out."""
         return None
+
+
+class FunctionsManager(ManagingSubsystem):
+    """Base of managers that adapt the functions which the mission needs at the time.
+
+    Attributes:
+        functions: those that are needed throughout the mission, and those of the task.
+    """
+
+    def __init__(self, system: ManagedSystem) -> None:
+        super().__init__(system)
+        self.functions = system.lasting_functions
+
+    def task_requested(self, task: Task) -> None:
+        """From now on adapt the task's functions, too."""
+        self.functions += task.functions
+
+    def task_cancelled(self, task: Task) -> None:
+        """Set the task's functions to fd_unground, and leave them alone."""
+        self.functions = tuple(name for name in self.functions if name not in task.functions)
+        super().task_cancelled(task)

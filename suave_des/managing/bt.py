@@ -11,16 +11,15 @@ from suave_des.domain import (
     MAINTAIN_MOTION,
     SURFACE,
     SURFACE_MODE,
-    Task,
 )
 from suave_des.managing import behaviours
-from suave_des.managing.base import ManagedSystem, ManagingSubsystem, Thresholds
+from suave_des.managing.base import FunctionsManager, ManagedSystem, Thresholds
 from suave_des.managing.behaviours import Behaviour, Condition, Fallback, Parallel, Sequence, SetMode
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
 from suave_des.scenario.modes import UNGROUND_MODE
 
 
-class BehaviourTree(ManagingSubsystem):
+class BehaviourTree(FunctionsManager):
     """bt: recover a failed thruster; search as high as the visibility allows; follow once the pipeline is detected.
 
     Attributes:
@@ -34,7 +33,6 @@ class BehaviourTree(ManagingSubsystem):
         self._settings = system.scenario.managers.bt
         self.period_s = self._settings.tick_period_s
         self.starts_s = system.stream("bt/phase").uniform(0.0, self.period_s)
-        self._functions = system.lasting_functions
         self._failed: set[str] = set()
         self._noted = ""
         self.root = self.make_tree()
@@ -42,15 +40,6 @@ class BehaviourTree(ManagingSubsystem):
     def make_tree(self) -> Behaviour:
         """Make the tree; called once, before the mission."""
         return Parallel("mission", self._branches())
-
-    def task_requested(self, task: Task) -> None:
-        """From now on the tree controls the task's functions, too."""
-        self._functions += task.functions
-
-    def task_cancelled(self, task: Task) -> None:
-        """Set the task's functions to fd_unground, and leave them alone."""
-        self._functions = tuple(name for name in self._functions if name not in task.functions)
-        super().task_cancelled(task)
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
         """Remember failed thrusters."""
@@ -110,7 +99,7 @@ class BehaviourTree(ManagingSubsystem):
         return Sequence(function, (Condition("is needed", holds=self._needs(function)), branch))
 
     def _needs(self, function: str) -> Callable[[], bool]:
-        return lambda: function in self._functions
+        return lambda: function in self.functions
 
     def _is_clear(self, least_m: float) -> Behaviour:
         def holds() -> bool:
@@ -149,6 +138,6 @@ class ExtendedBehaviourTree(BehaviourTree):
     def _is_low(self) -> Behaviour:
         def holds() -> bool:
             level = self.system.measured("battery_level")
-            return level is not None and level < self._settings.battery_limit and SURFACE not in self._functions
+            return level is not None and level < self._settings.battery_limit and SURFACE not in self.functions
 
         return Condition(f"battery is below {self._settings.battery_limit:g}", holds=holds)

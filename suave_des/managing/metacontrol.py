@@ -70,7 +70,7 @@ class Metacontrol(ManagingSubsystem):
     # The loop.
 
     def adapt(self) -> AdaptationProcess | None:
-        """Go through the loop once; what analyze and plan give for a state is remembered."""
+        """Go through the loop once; what analyze and plan give for a state is cached."""
         self.monitor()
         if not self.objectives or not self._awaited <= self.measurements.keys():
             return None
@@ -125,7 +125,7 @@ class Metacontrol(ManagingSubsystem):
         needed = self.objectives.keys() - self._cancelled
         grounded = self._adapter.carry_out(conclusion.plan, self.groundings, needed)
         if any(self.groundings.get(function) != design for function, design in grounded.items()):
-            self.system.reasoned(latency_s)
+            self.system.record_reasoning_time(latency_s)
         self.groundings |= grounded
         self.objectives |= dict.fromkeys(grounded)
         # From now on a recovered component is as if it had never failed. Kept, its status would make every objective

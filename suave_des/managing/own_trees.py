@@ -9,14 +9,13 @@ import py_trees
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from suave_des.domain import Task
-from suave_des.managing.base import ManagedSystem, ManagingSubsystem
+from suave_des.managing.base import FunctionsManager, ManagedSystem
 
 MOST_TICKED: Final = 100_000
 """So many behaviours a tick may go through; more, and it is taken not to end."""
 
 
-class PyTreesManager(ManagingSubsystem):
+class PyTreesManager(FunctionsManager):
     """Base of managers that tick a tree of py_trees; derive from it, and make the tree.
 
     The setting `tick_period_s` (0.1 s) under managers: is the period. Each tick that comes to something else than the
@@ -24,7 +23,6 @@ class PyTreesManager(ManagingSubsystem):
 
     Attributes:
         root: of the tree.
-        functions: what the mission needs now.
 
     Example:
         >>> class Mine(PyTreesManager):
@@ -41,7 +39,6 @@ class PyTreesManager(ManagingSubsystem):
         super().__init__(system)
         self.period_s = float(system.settings.get("tick_period_s", 0.1))
         self.starts_s = system.stream("py_trees/phase").uniform(0.0, self.period_s)
-        self.functions = system.lasting_functions
         self.root = self.make_tree()
         self._noted = ""
 
@@ -56,15 +53,6 @@ class PyTreesManager(ManagingSubsystem):
     def set_mode(self, function: str, mode: str) -> Behaviour:
         """A behaviour that requests a mode, and succeeds; it fails while nothing needs the function."""
         return _SetMode(self, function, mode)
-
-    def task_requested(self, task: Task) -> None:
-        """Remember what the task needs."""
-        self.functions += task.functions
-
-    def task_cancelled(self, task: Task) -> None:
-        """Set the task's functions to fd_unground, and forget them."""
-        self.functions = tuple(name for name in self.functions if name not in task.functions)
-        super().task_cancelled(task)
 
     def adapt(self) -> None:
         """Tick the tree.

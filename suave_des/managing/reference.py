@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOTION, Task
 from suave_des.errors import InputError, did_you_mean, shown
-from suave_des.managing.base import AdaptationProcess, ManagedSystem, ManagingSubsystem, Thresholds
+from suave_des.managing.base import AdaptationProcess, FunctionsManager, ManagedSystem, ManagingSubsystem, Thresholds
 from suave_des.managing.simple import NoManager
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
 from suave_des.scenario.modes import DEFAULT_MODE, UNGROUND_MODE
@@ -52,7 +52,7 @@ def fixed_mode(mode: str) -> type[ManagingSubsystem]:
     return type("FixedMode", (FixedMode,), {"mode": mode, "__doc__": FixedMode.__doc__})
 
 
-class Threshold(ManagingSubsystem):
+class Threshold(FunctionsManager):
     """threshold: metacontrol's decisions as plain if-then: what differs from metacontrol is the ontology's price.
 
     It adapts at metacontrol's times (`managers.metacontrol.reasoning_period_s`, with the same phase in each run), takes
@@ -67,22 +67,12 @@ class Threshold(ManagingSubsystem):
         self.starts_s = system.stream("metacontrol/phase").uniform(0.0, self.period_s or 0.0)
         self.thresholds_m = system.scenario.managers.bt.visibility_thresholds_m
         self.search_modes = system.scenario.managers.bt.search_modes
-        self.functions = system.lasting_functions
         self.failed: set[str] = set()
 
     @property
     def depends_on(self) -> Thresholds:
         """The thresholds between the search modes."""
         return {"water_visibility": tuple(sorted(self.thresholds_m))}
-
-    def task_requested(self, task: Task) -> None:
-        """From now on the task's functions are adapted, too."""
-        self.functions += task.functions
-
-    def task_cancelled(self, task: Task) -> None:
-        """Set the task's functions to fd_unground, and leave them alone."""
-        self.functions = tuple(name for name in self.functions if name not in task.functions)
-        super().task_cancelled(task)
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
         """Remember failed thrusters."""

@@ -60,7 +60,7 @@ class Observer:
             self._configurations.add(frozenset(self._in_force.items()))
         self._in_force_since_s = self.env.now
 
-    def reasoned(self, duration_s: float) -> None:
+    def reasoning_took(self, duration_s: float) -> None:
         """Take the time that the reasoner took in a cycle that changed something."""
         self.reasoning_time_s += duration_s
 

@@ -376,7 +376,9 @@ class MissionRun:
             record_state=self._recorder.record_state,
             state_changed=lambda: self._host.state_changed(),
             measurements=self._measured,
-            reasoned=(lambda duration_s: None) if self._observer is None else self._observer.reasoned,
+            record_reasoning_time=(lambda duration_s: None)
+            if self._observer is None
+            else self._observer.reasoning_took,
             recorded=self._recorder.enabled,
             pose=lambda: self._vehicle.pose(self.env.now),
             distance_inspected_m=lambda: self._follow.distance_m,

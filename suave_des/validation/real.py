@@ -63,12 +63,12 @@ def read_real(paths: Sequence[str | Path], conditions: Conditions | None = None)
 
     Args:
         paths: of files such as read_runs takes; the exemplar writes one for each manager.
-        conditions: of the campaign in which the missions were made. Which one a mission is of is told by columns that
+        conditions: of the campaign in which the missions were made. Which one a mission is of follows from columns that
             are named like the campaign's parameters, or `condition` or `block` with its number from 1, or else by
             order: equally many missions of each, one condition after the other, as the exemplar's runner makes them.
 
     Raises:
-        InputError: with file and line: a file cannot be read, two are the same, or a condition cannot be told.
+        InputError: with file and line: a file cannot be read, two are the same, or a condition cannot be determined.
     """
     names = () if conditions is None else (*conditions.names, *NUMBER_COLUMNS)
     files = [read_runs(path, where_present=names) for path in paths]

@@ -145,8 +145,8 @@ def found_shares(
         share = Share(manager=manager, name="pipeline found", where={"pipeline_found": ((1.0, 1.0),)})
         sides = []
         for runs in (published, simulated):
-            told = runs[runs["pipeline_found"].notna()] if "pipeline_found" in runs else runs[:0]
-            sides.append(count(share, told) if len(told) else Proportion(0, 0))
+            known = runs[runs["pipeline_found"].notna()] if "pipeline_found" in runs else runs[:0]
+            sides.append(count(share, known) if len(known) else Proportion(0, 0))
         if all(side.n for side in sides):
             found.append(ShareComparison(share, *sides))
     return tuple(found)

@@ -199,7 +199,7 @@ def remove_rule(path: Path, name: str) -> None:
     content = file.content
     for start, end in sorted((document.spans[part] for part in parts), reverse=True):
         content = _without(content, start, end)
-    _replace(file, content, lambda said: [each for each in said if each[0] != name])
+    _replace(file, content, lambda rules: [each for each in rules if each[0] != name])
 
 
 def set_enabled(path: Path, name: str, *, enabled: bool) -> bool:
@@ -225,7 +225,7 @@ def set_enabled(path: Path, name: str, *, enabled: bool) -> bool:
             mark = _mark_xml(document.prefixes, enabled=enabled).replace(b"\n", document.newline)
             changed = changed[:at] + mark + changed[at:]
         content = content[:start] + changed + content[end:]
-    _replace(file, content, lambda said: [(each[0], enabled, each[2]) if each[0] == name else each for each in said])
+    _replace(file, content, lambda rules: [(each[0], enabled, each[2]) if each[0] == name else each for each in rules])
     return True
 
 

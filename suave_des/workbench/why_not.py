@@ -154,8 +154,8 @@ class RuleQuestions:
         concluded = []
         stays = ""
         for atom in rule.head:
-            said = self._instance(atom, binding)
-            concluded.append(said)
+            instance = self._instance(atom, binding)
+            concluded.append(instance)
             others = self._other_values(atom, binding, facts)
             if others:
                 stays = f"; {others[0]} stays beside it, as rules only add"

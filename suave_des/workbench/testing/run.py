@@ -147,8 +147,8 @@ class Runner:
                 (outcome.choice(function), after, f"with {names}"),
             ):
                 if not _same(chosen, wanted, situation, function):
-                    said = f"{function}, {what}: {_words(chosen, situation, function)}, not {wanted}"
-                    yield Failure(said, situation, function=function)
+                    problem = f"{function}, {what}: {_words(chosen, situation, function)}, not {wanted}"
+                    yield Failure(problem, situation, function=function)
 
     def _prover_without(self, names: tuple[str, ...]) -> Prover:
         """The knowledge base without some rules."""
