@@ -8,7 +8,7 @@ import simpy
 from suave_des.clock import Process, tick_at_or_after, until
 from suave_des.domain import thruster_name
 from suave_des.monitor.diagnostics import FAILED, HULL, LEAK, RECOVERED, Diagnostic, DiagnosticsBus, Kind
-from suave_des.monitor.measurements import BatteryLevel, Measurements
+from suave_des.monitor.measurements import BatteryLevel, Measurements, Publishing
 from suave_des.vehicle.frames import Pose
 
 
@@ -70,9 +70,8 @@ def thruster_monitor(
     bus: Publisher,
     faults: Sequence[ThrusterFault],
     set_health: Callable[[float, int, float], None],
-    phase_s: float,
+    checking: Publishing,
     after_previous: bool,
-    period_s: float = 1.0,
 ) -> Process:
     """Inject the scheduled faults, and publish them.
 
@@ -83,19 +82,18 @@ def thruster_monitor(
         env, bus: the mission's clock, and where to publish.
         faults: the schedule.
         set_health: called with the time, a thruster's number and 0 (lost) or 1 (works).
-        phase_s: time of the first check.
+        checking: when the monitor checks.
         after_previous: whether each time counts from the fault before it (rev 2023) or from the start (rev 1.5).
-        period_s: time between checks.
     """
     counted_from, earliest = 0.0, 0.0
     for fault in faults:
         due = counted_from + fault.time_s
-        tick = tick_at_or_after(max(due, earliest), phase_s, period_s)
+        tick = tick_at_or_after(max(due, earliest), checking.phase_s, checking.period_s)
         yield until(env, tick)
         set_health(env.now, fault.thruster, 0.0 if fault.fails else 1.0)
         status = FAILED if fault.fails else RECOVERED
         bus.publish(Diagnostic(env.now, Kind.COMPONENT_STATUS, thruster_name(fault.thruster), status))
-        earliest = tick + period_s
+        earliest = tick + checking.period_s
         if after_previous:
             counted_from = tick
 

@@ -273,16 +273,19 @@ class MissionRun:
             self.env.process(distance_monitor(self.env, self._bus, lambda: self._follow.distance_m))
         if self._bus.has_subscribers(Kind.DETECTION):
             self._detector.detected.callbacks.append(self._publish_detection)
+        self._start_thruster_monitor()
+
+    def _start_thruster_monitor(self) -> None:
         faults = []
         for n, event in enumerate(self._scenario.thruster_events):
             time_s = self._chance.draw(f"thruster_events.{n}.time_s", event.time_s, least=0.0)
             faults.append(ThrusterFault(event.thruster, event.event == "failure", time_s))
         monitors = self._revision.monitors
         period_s, after_previous = monitors.thruster_check_period_s, monitors.thruster_event_times == "after_previous"
-        phase_s = self._monitor_phase_s("thruster_monitor", period_s)
+        checking = Publishing(period_s, self._monitor_phase_s("thruster_monitor", period_s))
         lost = self._chance.loss("thruster_monitor", self._scenario.thruster_monitor)
         bus = self._bus if lost is None else LossyPublisher(self._bus, lost)
-        self.env.process(thruster_monitor(self.env, bus, faults, self._make_fault, phase_s, after_previous, period_s))
+        self.env.process(thruster_monitor(self.env, bus, faults, self._make_fault, checking, after_previous))
 
     def _publish_detection(self, _: simpy.Event) -> None:
         point = float(self._detector.first_point or 0)

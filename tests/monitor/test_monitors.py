@@ -162,7 +162,7 @@ def publish_faults(subscriber: Subscriber, *faults: ThrusterFault, after_previou
             subscriber.bus,
             faults,
             lambda t_s, thruster, health: healths.append((t_s, thruster, health)),
-            phase_s=phase_s,
+            Publishing(1.0, phase_s),
             after_previous=after_previous,
         )
     )
