@@ -23,24 +23,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from suave_des import load_scenario, with_values
-from suave_des.calibration.loss import (
-    SCALES,
-    FreeParameter,
-    Problem,
-    energy_distance,
-    evaluate,
-    published_shares,
-    published_vectors,
-    resampling_spread,
-)
-from suave_des.calibration.parameters import read_parameters
-from suave_des.report.runs import choose_managers, read_runs
+from suave_des import load_scenario
+from suave_des.calibration.cases import read_cases
+from suave_des.calibration.fit import larger
+from suave_des.calibration.loss import FreeParameter, Problem, evaluate, resampling_spread
+from suave_des.calibration.parameters import read_problem
 from suave_des.resources import find
-from suave_des.simulation.simulator import Simulator
-from suave_des.validation.real import read_conditions, read_real
+from suave_des.validation.real import read_conditions
 
 Values = Mapping[str, float]
 Losses = tuple[float, ...]
@@ -54,104 +44,22 @@ LAST_GENERATIONS = 3
 """Generations whose states are checked."""
 CHECK_FACTOR = 2
 """How many times the missions the check has."""
-RESAMPLES = 200
 
 
-@dataclass(frozen=True)
-class Published:
-    """The runs of 2023, whose conditions do not differ: the calibration's own loss."""
-
-    problem: Problem
-
-    @property
-    def parameters(self) -> tuple[FreeParameter, ...]:
-        """What is free."""
-        return self.problem.parameters
-
-    def loss(self, values: Values) -> float:
-        """Simulate with some values, and measure the distance to the real runs."""
-        return evaluate(self.problem, [values[each.path] for each in self.parameters]).loss
-
-    def tolerance(self, values: Values) -> float:
-        """Return the standard error of the loss over resampled real runs."""
-        here = evaluate(self.problem, [values[each.path] for each in self.parameters])
-        return resampling_spread(self.problem, here, self.problem.seed)
-
-    def larger(self, factor: int) -> Published:
-        """Return the same with more missions and other random numbers."""
-        problem = self.problem
-        return Published(replace(problem, runs=problem.runs * factor, seed=problem.seed + 1))
+def problem_of(scenario: str, parameters: str, runs: int, managers: str | None = None) -> Problem:
+    """Return a scenario or campaign with its published runs, and with what the file of its calibration frees."""
+    return read_problem(find(parameters, "scenarios/calibration"), read_cases([scenario], (), managers), runs, 1)
 
 
-@dataclass(frozen=True)
-class UnderConditions:
-    """The runs of 2025: the mean over managers and conditions of the energy distance of search time and distance."""
-
-    loaded: Any
-    parameters: tuple[FreeParameter, ...]
-    conditions: tuple[Mapping[str, Any], ...]
-    real: Mapping[tuple[str, int], NDArray[np.float64]]
-    runs: int
-    seed: int
-
-    def loss(self, values: Values) -> float:
-        """Simulate with some values, and measure the distance to the real runs."""
-        simulated = self._simulate(values)
-        return float(np.mean([energy_distance(simulated[cell], real) for cell, real in self.real.items()]))
-
-    def tolerance(self, values: Values) -> float:
-        """Return the standard error of the loss over resampled real runs."""
-        simulated, rng = self._simulate(values), np.random.default_rng(self.seed)
-        losses = []
-        for _ in range(RESAMPLES):
-            drawn = {cell: real[rng.integers(len(real), size=len(real))] for cell, real in self.real.items()}
-            losses.append(np.mean([energy_distance(simulated[cell], real) for cell, real in drawn.items()]))
-        return float(np.std(losses, ddof=1))
-
-    def larger(self, factor: int) -> UnderConditions:
-        """Return the same with more missions and other random numbers."""
-        return replace(self, runs=self.runs * factor, seed=self.seed + 1)
-
-    def _simulate(self, values: Values) -> dict[tuple[str, int], NDArray[np.float64]]:
-        own = {each.path: values[each.path] for each in self.parameters}
-        names = list(SCALES)[:2]
-        found = {}
-        for number, condition in enumerate(self.conditions, 1):
-            simulator = Simulator(with_values(self.loaded, {**own, **condition}))
-            for manager in dict.fromkeys(manager for manager, _ in self.real):
-                metrics = [simulator.run(manager, run, self.seed).metrics for run in range(1, self.runs + 1)]
-                found[manager, number] = np.array(
-                    [[getattr(each, name) / SCALES[name] for name in names] for each in metrics]
-                )
-        return found
+def loss(problem: Problem, values: Values) -> float:
+    """Simulate with some values, and measure the distance to the real runs."""
+    return evaluate(problem, [values[each.path] for each in problem.parameters]).loss
 
 
-Data = Published | UnderConditions
-
-
-def published(runs: int) -> Published:
-    """Return the runs of 2023 with what `suave-des calibrate seams2023` frees."""
-    real = read_runs(find("seams2023_runs.csv", "scenarios/published"))
-    managers = choose_managers(real, None)
-    form, free = read_parameters(find("seams2023", "scenarios/calibration"), load_scenario("seams2023"))
-    shares = published_shares(real.frame, managers, real.path)
-    return Published(Problem(form, free, published_vectors(real.frame, managers), runs, 1, shares))
-
-
-def under_conditions(runs: int) -> UnderConditions:
-    """Return experiment 1 of 2025 with what the file of its calibration frees."""
-    loaded = load_scenario("planta_exp1")
-    conditions = read_conditions("planta_exp1_campaign")
-    real = read_real([find("planta_exp1_runs.csv", "scenarios/published")], conditions).frame
-    form, free = read_parameters(find("planta_exp1", "scenarios/calibration"), loaded)
-    scales = [SCALES[name] for name in list(SCALES)[:2]]
-    # What random does differs from run to run by far more than with any parameter.
-    cells = {
-        (manager, number): own[list(SCALES)[:2]].to_numpy(float) / scales
-        for (manager, number), own in real[real["manager"] != "random"].groupby(["manager", "condition"])
-    }
-    points = tuple(dict(zip(conditions.names, values, strict=True)) for values in conditions.values)
-    return UnderConditions(form, free, points, cells, runs, 1)
+def tolerance(problem: Problem, values: Values) -> float:
+    """Return the standard error of the loss over resampled real runs."""
+    here = evaluate(problem, [values[each.path] for each in problem.parameters])
+    return resampling_spread(problem, here, problem.seed)
 
 
 @dataclass(frozen=True)
@@ -165,13 +73,13 @@ class Region:
         shipped: values by that name.
     """
 
-    data: Mapping[str, Data]
+    data: Mapping[str, Problem]
     keys: Mapping[str, Mapping[str, str]]
     parameters: Mapping[str, FreeParameter]
     shipped: Values
 
     @classmethod
-    def of(cls, data: Mapping[str, Data]) -> Region:
+    def of(cls, data: Mapping[str, Problem]) -> Region:
         """Find out which parameters the scenarios share."""
         plain = {name: load_scenario(name).scenario.model_dump() for name in data}
         found = {
@@ -194,12 +102,12 @@ class Region:
 
     def larger(self, factor: int) -> Region:
         """Return the same with more missions and other random numbers."""
-        return replace(self, data={name: one.larger(factor) for name, one in self.data.items()})
+        return replace(self, data={name: larger(one, factor) for name, one in self.data.items()})
 
 
 def losses(region: Region, values: Values) -> Losses:
     """Return the loss of some values against each data set."""
-    return tuple(one.loss(region.own(name, values)) for name, one in region.data.items())
+    return tuple(loss(one, region.own(name, values)) for name, one in region.data.items())
 
 
 EvaluateAll = Callable[[Sequence[Values]], list[Losses]]
@@ -274,15 +182,19 @@ def main() -> None:
     options.add_argument("--workers", type=int, default=2)
     chosen = options.parse_args()
 
-    data: dict[str, Data] = {
-        "seams2023": published(chosen.runs),
-        "planta_exp1": under_conditions(max(2, chosen.runs // 10)),
+    conditions = len(read_conditions("planta_exp1_campaign") or ())
+    data = {
+        "seams2023": problem_of("seams2023", "seams2023", chosen.runs),
+        # What random does differs from run to run by far more than with any parameter.
+        "planta_exp1": problem_of(
+            "planta_exp1_campaign", "planta_exp1", conditions * max(2, chosen.runs // 10), "none,metacontrol,bt"
+        ),
     }
     region = Region.of(data)
     best = losses(region, region.shipped)
-    tolerances = tuple(one.tolerance(region.own(name, region.shipped)) for name, one in data.items())
-    for name, loss, tolerance in zip(data, best, tolerances, strict=True):
-        print(f"{name}: loss of the shipped values {loss:.4f}, tolerance {tolerance:.4f}", flush=True)
+    tolerances = tuple(tolerance(one, region.own(name, region.shipped)) for name, one in data.items())
+    for name, least, more in zip(data, best, tolerances, strict=True):
+        print(f"{name}: loss of the shipped values {least:.4f}, tolerance {more:.4f}", flush=True)
     with multiprocessing.get_context("spawn").Pool(chosen.workers) as pool:
         evaluate_all = partial(pool.map, partial(losses, region), chunksize=1)
         sampled = chains(region, _sums(best, tolerances), chosen.members, chosen.generations, evaluate_all)

@@ -78,7 +78,9 @@ def main() -> None:
     chosen = options.parse_args()
     chosen.out.mkdir(parents=True, exist_ok=True)
 
-    loaded, free = read_parameters(find("seams2023", "scenarios/calibration"), load_scenario("seams2023"))
+    scenarios = {"seams2023": load_scenario("seams2023")}
+    formed, free = read_parameters(find("seams2023", "scenarios/calibration"), scenarios)
+    loaded = formed["seams2023"]
     paths = tuple(each.path for each in free)
     names = [path.split(".", 1)[1].removesuffix("_m_per_s") for path in paths]
     problem = {"num_vars": len(free), "names": names, "bounds": [[each.lower, each.upper] for each in free]}

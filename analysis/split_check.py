@@ -14,10 +14,10 @@ from pathlib import Path
 
 import pandas
 
-from suave_des import load_scenario, run_campaign
+from suave_des import run_campaign
+from suave_des.calibration.cases import read_cases
 from suave_des.calibration.fit import fit
-from suave_des.calibration.loss import Problem, published_vectors
-from suave_des.calibration.parameters import read_parameters
+from suave_des.calibration.parameters import read_problem
 from suave_des.calibration.report import fitted_scenario, fitted_values
 from suave_des.estimates import estimate
 from suave_des.report.runs import METRICS, choose_managers, read_runs
@@ -83,18 +83,18 @@ def main() -> None:
 
     published = read_runs(find("seams2023_runs.csv", "scenarios/published"))
     managers = choose_managers(published, None)
-    form, free = read_parameters(find("seams2023", "scenarios/calibration"), load_scenario("seams2023"))
-    # The search starts in the middle of the bounds: the shipped values have seen all three managers.
-    free = tuple(replace(each, start=(each.lower + each.upper) / 2.0) for each in free)
     predicted = {}
     for left_out in managers:
-        others = tuple(name for name in managers if name != left_out)
-        problem = Problem(form, free, published_vectors(published.frame, others), chosen.runs, seed=1)
+        (case,) = read_cases(["seams2023"], (), ",".join(name for name in managers if name != left_out))
+        case = replace(case, shares=())  # they were chosen by what all three managers do
+        problem = read_problem(find("seams2023", "scenarios/calibration"), [case], chosen.runs, 1)
+        # The search starts in the middle of the bounds: the shipped values have seen all three managers.
+        free = tuple(replace(each, start=(each.lower + each.upper) / 2.0) for each in problem.parameters)
+        problem = replace(problem, parameters=free)
         tried = fit(problem, chosen.evaluations, workers=chosen.workers, seed=1)
         best = min(tried, key=lambda each: each.loss)
-        values = fitted_values(free, best)
         scenario = chosen.out / f"without_{left_out}.yaml"
-        scenario.write_text(fitted_scenario(problem, "seams2023", values))
+        scenario.write_text(fitted_scenario(problem, problem.cases[0], fitted_values(best), chosen.out))
         predicted[left_out] = run_campaign(scenario, [left_out], chosen.missions, 2, chosen.workers, progress=False)
         print(f"without {left_out}: distance of the two others {best.loss:.4f}")
     result = split_check(predicted, published.frame)

@@ -1,4 +1,4 @@
-"""Fit free parameters of a scenario to published missions, and determine how sharply each is known."""
+"""Fit free parameters of scenarios to real missions, and determine how sharply each is known."""
 
 from __future__ import annotations
 
@@ -79,9 +79,13 @@ def select(problem: Problem, tried: Sequence[Evaluation], workers: int) -> Evalu
     The least of many noisy losses is partly luck; the second evaluation is not chosen for it.
     """
     finalists = sorted(tried, key=lambda each: each.loss)[:FINALISTS]
-    larger = replace(problem, runs=problem.runs * FINAL_FACTOR, seed=problem.seed + 1)
-    with evaluator(larger, workers) as evaluate_all:
+    with evaluator(larger(problem), workers) as evaluate_all:
         return min(evaluate_all([each.values for each in finalists]), key=lambda each: each.loss)
+
+
+def larger(problem: Problem, factor: int = FINAL_FACTOR) -> Problem:
+    """Return the same with more missions and other streams."""
+    return replace(problem, runs=problem.runs * factor, seed=problem.seed + 1)
 
 
 @dataclass(frozen=True)

@@ -1,25 +1,29 @@
-"""Measure how far simulated missions are from published ones.
+"""Measure how far simulated missions are from real ones.
 
-The loss is the mean over the managers of the energy distance between missions as vectors, plus the mean absolute
-difference of the shares of missions in clusters. The energy distance of the distributions of X and Y is
+The loss of a scenario is the mean over the managers of the energy distance between missions as vectors, plus the mean
+absolute difference of the shares of missions in clusters. The energy distance of the distributions of X and Y is
 2 E|X - Y| - E|X - X'| - E|Y - Y'| (Székely and Rizzo, 2013); it is zero only if they are equal. scipy has it for
 single values only. A mission is the vector of its search time, its distance inspected and the x of the
-pipeline point seen first, each divided by a scale, so that which values come together counts, too.
+pipeline point seen first, each divided by a scale, so that which values come together counts, too. Where real missions
+were made under known conditions, a manager's distance is the mean over them of that within a condition. The loss of
+several scenarios is the mean of theirs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from statistics import median
 
 import numpy as np
 import pandas
 from numpy.typing import NDArray
 
-from suave_des.scenario.loader import LoadedScenario, with_values
+from suave_des.calibration.cases import Case
+from suave_des.scenario.loader import with_values
 from suave_des.simulation.simulator import Simulator
-from suave_des.validation.shares import Share, count, read_shares, shares_beside
+from suave_des.validation.conditions import CONDITION, balanced, compare_conditions
+from suave_des.validation.shares import count
 
 Vectors = NDArray[np.float64]
 """Missions as scaled vectors, shape (n, 2 or 3); unknown components are nan."""
@@ -31,12 +35,30 @@ RESAMPLES = 200
 
 @dataclass(frozen=True, slots=True)
 class FreeParameter:
-    """A parameter to fit: key path in the scenario, bounds, and the value that the search starts from."""
+    """A parameter to fit.
+
+    Attributes:
+        path: key path in the scenarios.
+        lower: least value.
+        upper: greatest value.
+        start: the value that the search starts from.
+        scenarios: names of the cases that have it; none: all.
+    """
 
     path: str
     lower: float
     upper: float
     start: float
+    scenarios: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Its key path, after the scenarios' names if not all have it."""
+        return f"{', '.join(self.scenarios)}: {self.path}" if self.scenarios else self.path
+
+    def is_of(self, case: Case) -> bool:
+        """Return whether a case has it."""
+        return not self.scenarios or case.name in self.scenarios
 
     def value(self, unit: float) -> float:
         """Value for a coordinate in [0, 1]; coordinates outside are reflected into it."""
@@ -49,25 +71,44 @@ class Problem:
     """What is fitted to what.
 
     Attributes:
-        loaded: the scenario.
+        cases: the scenarios, each with its real missions.
         parameters: what is free.
-        published: published missions, by manager.
-        runs: simulated missions for each manager and evaluation.
+        runs: simulated missions for each manager of a case and evaluation, in equal parts under its conditions.
         seed: seed of the simulated missions; all evaluations use the same streams, so that differences between them
             come from the parameters.
-        shares: shares of missions in clusters, each with the published one.
     """
 
-    loaded: LoadedScenario
+    cases: tuple[Case, ...]
     parameters: tuple[FreeParameter, ...]
-    published: Mapping[str, Vectors]
     runs: int
     seed: int
-    shares: tuple[tuple[Share, float], ...] = ()
 
     def values_at(self, units: Sequence[float]) -> list[float]:
         """Return the values of the parameters at coordinates, see FreeParameter.value."""
         return [parameter.value(float(unit)) for parameter, unit in zip(self.parameters, units, strict=True)]
+
+    def values_of(self, case: Case, values: Sequence[float]) -> dict[str, float]:
+        """Return those of the parameters' values that a case has, by key path."""
+        named = zip(self.parameters, values, strict=True)
+        return {parameter.path: float(value) for parameter, value in named if parameter.is_of(case)}
+
+
+@dataclass(frozen=True, slots=True)
+class CaseLoss:
+    """How far the missions of one case are from its real ones.
+
+    Attributes:
+        distances: energy distance of each manager's missions, by name; over conditions, their mean.
+        share_difference: mean absolute difference of the clusters' shares; zero if none are compared.
+    """
+
+    distances: Mapping[str, float]
+    share_difference: float
+
+    @property
+    def loss(self) -> float:
+        """Mean of the distances + the difference of the shares."""
+        return float(np.mean(list(self.distances.values()))) + self.share_difference
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,15 +117,16 @@ class Evaluation:
 
     Attributes:
         values: of the parameters.
-        distances: energy distance of each manager's missions, by name.
-        share_difference: mean absolute difference of the clusters' shares; zero if none are compared.
-        loss: mean of the distances + the difference of the shares.
+        cases: the loss of each case.
     """
 
     values: tuple[float, ...]
-    distances: tuple[float, ...]
-    share_difference: float
-    loss: float
+    cases: tuple[CaseLoss, ...]
+
+    @property
+    def loss(self) -> float:
+        """Mean of the cases' losses."""
+        return float(np.mean([each.loss for each in self.cases]))
 
 
 def energy_distance(x: Vectors, y: Vectors) -> float:
@@ -114,13 +156,6 @@ def published_vectors(frame: pandas.DataFrame, managers: Sequence[str]) -> dict[
     return {name: vectors[:, ~np.isnan(vectors).all(axis=0)] for name, vectors in by_manager.items()}
 
 
-def published_shares(frame: pandas.DataFrame, managers: Sequence[str], data: Path) -> tuple[tuple[Share, float], ...]:
-    """Count the managers' clusters that the file of shares beside the data names, in the published missions."""
-    beside = shares_beside(data)
-    counted = [(each, count(each, frame).share) for each in (read_shares(beside) if beside else ())]
-    return tuple((each, share) for each, share in counted if each.manager in managers and share is not None)
-
-
 def simulate(simulator: Simulator, manager: str, runs: int, seed: int) -> pandas.DataFrame:
     """Simulate missions of one manager; a frame with the columns that are compared."""
     metrics = [simulator.run(manager, run, seed).metrics for run in range(1, runs + 1)]
@@ -128,45 +163,106 @@ def simulate(simulator: Simulator, manager: str, runs: int, seed: int) -> pandas
     return pandas.DataFrame(rows).astype(dict.fromkeys(SCALES, float))
 
 
+def simulate_case(problem: Problem, case: Case, values: Sequence[float]) -> pandas.DataFrame:
+    """Simulate missions of all managers of a case, under all its conditions, with one set of parameter values.
+
+    Returns:
+        A row for each mission: manager, condition, and the columns that are compared.
+    """
+    own = problem.values_of(case, values)
+    runs = runs_for_each(problem, case)
+    frames = []
+    for number, condition in case.conditions.items():
+        simulator = Simulator(with_values(case.loaded, {**condition, **own}))
+        frames += [
+            simulate(simulator, manager, runs, problem.seed).assign(**{CONDITION: number}) for manager in case.managers
+        ]
+    return pandas.concat(frames, ignore_index=True)
+
+
+def runs_for_each(problem: Problem, case: Case) -> int:
+    """Return the number of missions of each manager under each condition: at least 2, for their spread."""
+    return max(2, -(-problem.runs // len(case.conditions))) if case.has_conditions else problem.runs
+
+
 def evaluate(problem: Problem, values: Sequence[float]) -> Evaluation:
-    """Simulate all managers with one set of parameter values, and compute the loss."""
-    missions = _simulate_all(problem, values)
-    distances = [
-        energy_distance(as_vectors(missions[manager])[:, : problem.published[manager].shape[1]], published)
-        for manager, published in sorted(problem.published.items())
-    ]
+    """Simulate all cases with one set of parameter values, and compute the loss."""
+    losses = tuple(compare(case, simulate_case(problem, case, values)) for case in problem.cases)
+    return Evaluation(tuple(map(float, values)), losses)
+
+
+def compare(case: Case, simulated: pandas.DataFrame) -> CaseLoss:
+    """Compare simulated missions, as of simulate, with a case's real ones."""
+    distances = {
+        manager: float(np.mean([energy_distance(*pair) for pair in _pairs(case, simulated, manager)]))
+        for manager in case.managers
+    }
     difference = 0.0
-    if problem.shares:
-        simulated = pandas.concat(missions.values(), ignore_index=True)
-        apart = [abs((count(share, simulated).share or 0.0) - published) for share, published in problem.shares]
+    if case.shares:
+        alike = balanced(case.real, simulated, case.managers) if case.has_conditions else simulated
+        apart = [abs((count(share, alike).share or 0.0) - real) for share, real in case.shares]
         difference = float(np.mean(apart))
-    return Evaluation(tuple(map(float, values)), tuple(distances), difference, float(np.mean(distances)) + difference)
+    return CaseLoss(distances, difference)
 
 
-def _simulate_all(problem: Problem, values: Sequence[float]) -> dict[str, pandas.DataFrame]:
-    named = {parameter.path: value for parameter, value in zip(problem.parameters, values, strict=True)}
-    simulator = Simulator(with_values(problem.loaded, named))
-    return {name: simulate(simulator, name, problem.runs, problem.seed) for name in sorted(problem.published)}
+def _pairs(case: Case, simulated: pandas.DataFrame, manager: str) -> Iterator[tuple[Vectors, Vectors]]:
+    """Yield simulated and real missions of a manager for each condition under which there are real ones.
+
+    A component that is never known in the real ones is left out.
+    """
+    ours, theirs = (side[side["manager"] == manager] for side in (simulated, case.real))
+    for number in sorted(set(theirs[CONDITION])):
+        real = published_vectors(theirs[theirs[CONDITION] == number], [manager])[manager]
+        yield as_vectors(ours[ours[CONDITION] == number])[:, : real.shape[1]], real
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """How well one case is met by one set of values.
+
+    Attributes:
+        conditions: of the case, by number.
+        loss: of the case.
+        median_difference_s: median over managers and conditions of |real - simulated median search time|.
+    """
+
+    conditions: tuple[int, ...]
+    loss: float
+    median_difference_s: float
+
+
+def judge(problem: Problem, case: Case, values: Sequence[float]) -> Judgement:
+    """Simulate a case with one set of values; return its loss and the difference of median search times."""
+    simulated = simulate_case(problem, case, values)
+    compared = compare_conditions(case.real, simulated, case.managers, ["search_time_s"])
+    difference_s = median(abs(each.difference) for each in compared)
+    return Judgement(tuple(case.conditions), compare(case, simulated).loss, difference_s)
 
 
 def resampling_spread(problem: Problem, best: Evaluation, seed: int) -> float:
-    """Bootstrap standard error of the best fit's mean energy distance over the published missions.
+    """Bootstrap standard error of the best fit's mean energy distance over the real missions.
 
-    A change of the loss smaller than this could as well come from which few missions were published.
+    A change of the loss smaller than this could as well come from which few missions were made.
     """
     from scipy.stats import bootstrap
 
-    missions = _simulate_all(problem, best.values)
-    published = [vectors for _, vectors in sorted(problem.published.items())]
-    simulated = [
-        as_vectors(own)[:, : theirs.shape[1]] for own, theirs in zip(missions.values(), published, strict=True)
-    ]
+    groups: list[list[list[tuple[Vectors, Vectors]]]] = []  # by case and manager, a pair for each condition
+    for case in problem.cases:
+        simulated = simulate_case(problem, case, best.values)
+        groups.append([list(_pairs(case, simulated, manager)) for manager in case.managers])
 
     def mean_distance(*drawn: NDArray[np.int64]) -> float:
-        chosen = (vectors[rows] for vectors, rows in zip(published, drawn, strict=True))
-        return float(np.mean([energy_distance(*pair) for pair in zip(simulated, chosen, strict=True)]))
+        rows = iter(drawn)
 
-    rows = [np.arange(len(vectors)) for vectors in published]
+        def of_manager(pairs: list[tuple[Vectors, Vectors]]) -> float:
+            chosen = (real[next(rows)] if len(real) > 1 else real for _, real in pairs)
+            return float(np.mean([energy_distance(ours, real) for (ours, _), real in zip(pairs, chosen, strict=True)]))
+
+        return float(np.mean([np.mean([of_manager(pairs) for pairs in managers]) for managers in groups]))
+
+    rows = [np.arange(len(real)) for managers in groups for pairs in managers for _, real in pairs if len(real) > 1]
+    if not rows:  # one real mission of each manager and condition says nothing of their spread
+        return 0.0
     rng = np.random.default_rng(seed)
     found = bootstrap(rows, mean_distance, n_resamples=RESAMPLES, vectorized=False, method="percentile", rng=rng)
     return float(found.standard_error)

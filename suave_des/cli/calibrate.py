@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,27 +11,64 @@ import typer
 from suave_des.cli.options import Files, Overwrite, Seed, Workers, command_line, grouped_options
 
 if TYPE_CHECKING:
-    from suave_des.calibration.loss import Evaluation
+    from collections.abc import Sequence
 
-_DATA = "seams2023_runs.csv"
+    from rich.console import Console
+
+    from suave_des.calibration.cases import Case
+    from suave_des.calibration.loss import Evaluation
+    from suave_des.calibration.report import Fit
 
 _Data = Annotated[
-    str, typer.Option("--data", metavar="FILE", help="Real missions; left out, the 60 published with the SUAVE paper.")
+    list[str] | None,
+    typer.Option(
+        "--data",
+        metavar="[NAME=]FILE",
+        help="Real missions; repeat it for several files. With several scenarios, NAME says of which. Left out, those"
+        " published for the scenario; of one scenario alone, or else the 60 of the SUAVE paper.",
+        show_default=False,
+    ),
+]
+_Parameters = Annotated[
+    str | None,
+    typer.Option(
+        "--parameters",
+        metavar="FILE",
+        help="What is free, and within which bounds.",
+        show_default="the shipped file of the scenario's name, or seams2023; of several scenarios: shared",
+    ),
 ]
 _Managers = Annotated[
     str | None, typer.Option("--managers", metavar="NAME,...", help="Of those in the data; left out: all.")
+]
+_FitConditions = Annotated[
+    str | None,
+    typer.Option(
+        "--fit-conditions",
+        metavar="NUMBER,...",
+        help="Fit these conditions of the campaign files alone, and judge the fit by the others, too.",
+    ),
 ]
 
 
 @grouped_options
 def calibrate(
-    scenario: Annotated[str, typer.Argument(help="A scenario file, or the name of a shipped one.")],
-    data: _Data = _DATA,
-    parameters: Annotated[
-        str, typer.Option("--parameters", metavar="FILE", help="What is free, and within which bounds.")
-    ] = "seams2023",
+    scenarios: Annotated[
+        list[str],
+        typer.Argument(metavar="SCENARIO...", help="Scenario or campaign files, or names of shipped scenarios."),
+    ],
+    data: _Data = None,
+    parameters: _Parameters = None,
     managers: _Managers = None,
-    runs: Annotated[int, typer.Option("--runs", min=2, help="Missions for each manager and set of values.")] = 150,
+    fit_conditions: _FitConditions = None,
+    runs: Annotated[
+        int,
+        typer.Option(
+            "--runs",
+            min=2,
+            help="Missions for each manager and set of values; of a campaign file, among all conditions.",
+        ),
+    ] = 150,
     evaluations: Annotated[int, typer.Option("--evaluations", min=1, help="Sets of values to try, about.")] = 500,
     profile: Annotated[bool, typer.Option(help="Determine how sharply each parameter is known, too.")] = True,
     workers: Workers = 2,
@@ -40,57 +78,125 @@ def calibrate(
     *,
     files: Files,
 ) -> None:
-    """Fit free parameters to real missions, and write the fitted scenario."""
+    """Fit free parameters to real missions, and write the fitted scenarios.
+
+    With a campaign file that sweeps the conditions of the real missions, each is compared with those of its own.
+    """
     from suave_des.calibration import report
-    from suave_des.calibration.fit import FINAL_FACTOR, fit, profiles, select
-    from suave_des.calibration.loss import Problem, evaluate, published_shares, published_vectors, resampling_spread
-    from suave_des.calibration.parameters import read_parameters
+    from suave_des.calibration.cases import read_cases
+    from suave_des.calibration.fit import FINAL_FACTOR, fit, larger, profiles, select
+    from suave_des.calibration.loss import evaluate, resampling_spread
+    from suave_des.calibration.parameters import read_problem
     from suave_des.campaign.output import check_output_folder, make_output_folder, write_files
     from suave_des.campaign.spec import RUNS_LIMIT, check_range, check_seed, check_workers
     from suave_des.cli.console import output
-    from suave_des.report.runs import choose_managers, read_runs
-    from suave_des.resources import find
-    from suave_des.scenario.loader import load_scenario
 
     check_workers(workers)
     check_seed(seed)
     check_range("runs", runs, 2, RUNS_LIMIT)
-    published = read_runs(find(data, "scenarios/published"))
-    chosen = choose_managers(published, managers)
-    loaded = load_scenario(scenario, **files.replacements)
-    form, free = read_parameters(find(parameters, "scenarios/calibration"), loaded)
-    shares = published_shares(published.frame, chosen, published.path)
-    problem = Problem(form, free, published_vectors(published.frame, chosen), runs, seed, shares)
+    cases = read_cases(scenarios, data or (), managers, **files.replacements)
+    problem = read_problem(_parameters_file(parameters, cases), cases, runs, seed)
+    halves = _halves(problem.cases, fit_conditions)
+    problem = replace(problem, cases=tuple(fitted for fitted, _ in halves))
     if out is not None:
         check_output_folder(out, "fit", overwrite=overwrite)
         make_output_folder(out)
     console = output()
+    for note in dict.fromkeys(note for case in cases for note in case.notes):
+        console.print(note, soft_wrap=True, markup=False)
 
     def print_generation(count: int, best: Evaluation) -> None:
         console.print(f"{count:5d} sets tried, least loss {best.loss:.4f}")
 
     tried = fit(problem, evaluations, workers=workers, seed=seed, on_generation=print_generation)
     best = select(problem, tried, workers)
-    values = report.fitted_values(problem.parameters, best)
-    contents: dict[str, str | bytes] = {report.SCENARIO: report.fitted_scenario(problem, scenario, values)}
+    values = report.fitted_values(best)
+    folder = out or Path()
+    contents: dict[str, str | bytes] = {
+        report.scenario_file(case, cases): report.fitted_scenario(problem, case, values, folder) for case in cases
+    }
+    stale = report.files_in(folder)
     if out is not None:  # at once: the profiles take as long again
-        write_files(out, contents, stale=report.FILES)
+        write_files(out, contents, stale=stale)
     spread = resampling_spread(problem, best, seed)
     here = evaluate(problem, best.values)  # the profiles are computed with the search's own streams
     threshold = here.loss + spread
     found = profiles(problem, here, threshold, workers) if profile else []
-    missions = problem.runs * FINAL_FACTOR
-    console.print(f"\nloss {best.loss:.4f} with {missions} missions for each manager and other streams")
-    for path, value in values.items():
-        admitted = next((f"   {one.low:8.3f} to {one.high:.3f}" for one in found if one.parameter.path == path), "")
-        console.print(f"{path:48s} {value:8.3f}{admitted}", soft_wrap=True)
+    judged = report.judge_halves(larger(problem), halves, best.values)
+    done = report.Fit(problem, tried, best, spread, found, judged)
+    console.print(
+        f"\nloss {best.loss:.4f} with {problem.runs * FINAL_FACTOR} missions for each manager and other streams"
+    )
+    _print_fit(console, done, values)
     if out is None:
         console.print("\nNo files were written; --out DIR keeps the fit.", soft_wrap=True)
         return
-    provenance = {"command": command_line(), "data": {"file": Path(data).name, "sha256": published.sha256}}
-    contents[report.RECORD] = report.record(problem, tried, best, spread, found, provenance)
+    contents[report.RECORD] = report.record(done, {"command": command_line(), "data": report.data_files(cases)})
     if found:
         contents[report.TABLE] = report.table(found)
         contents[report.FIGURE] = report.profiles_png(found, here, threshold)
-    write_files(out, contents, stale=report.FILES)
-    console.print(f"\nThe fitted scenario and the report are in {out}", soft_wrap=True)
+    write_files(out, contents, stale=stale)
+    what = "scenario" if len(cases) == 1 else "scenarios"
+    console.print(f"\nThe fitted {what} and the report are in {out}", soft_wrap=True)
+
+
+def _parameters_file(given: str | None, cases: Sequence[Case]) -> Path:
+    """Return the file of free parameters: the one given, or that of the scenario, or what several share."""
+    from suave_des.resources import find, shipped_folder
+
+    if given is None:
+        own = shipped_folder("scenarios/calibration") / f"{cases[0].name}.yaml"
+        given = ("seams2023" if not own.is_file() else cases[0].name) if len(cases) == 1 else "shared"
+    return find(given, "scenarios/calibration")
+
+
+def _halves(cases: Sequence[Case], given: str | None) -> list[tuple[Case, Case | None]]:
+    """Split each case into the conditions that are fitted and those that are not; none are where none are known.
+
+    Raises:
+        InputError: what is given is no list of numbers, there are no conditions, or none is left on one side.
+    """
+    from suave_des.errors import InputError
+
+    if given is None:
+        return [(case, None) for case in cases]
+    option = "--fit-conditions"
+    words = [word.strip() for word in given.split(",")]
+    if not all(word.isascii() and word.isdigit() for word in words) or len(set(words)) < len(words):
+        remedy = f"numbers from 1, each once, such as {option} 1,3,5"
+        raise InputError(f"{given!r} is no list of conditions", place=option, remedy=remedy)
+    numbers = list(map(int, words))
+    if not any(case.has_conditions for case in cases):
+        remedy = "give a campaign file that sweeps the conditions of the real missions"
+        raise InputError("no scenario has conditions that are known", place=option, remedy=remedy)
+    halves: list[tuple[Case, Case | None]] = []
+    for case in cases:
+        others = [number for number in case.conditions if number not in numbers]
+        if not case.has_conditions:
+            halves.append((case, None))
+        elif not others:
+            problem = f"{case.name} has no other condition, by which the fit could be judged"
+            raise InputError(problem, place=option, remedy=f"leave it out to fit all {len(case.conditions)}")
+        else:
+            halves.append((case.only(numbers), case.only(others)))
+    return halves
+
+
+def _print_fit(console: Console, fit: Fit, values: Sequence[float]) -> None:
+    """Print the loss of each scenario, the parameters, and how well conditions are met that were not fitted."""
+    parameters = fit.problem.parameters
+    admitted = {one.parameter.name: f"   {one.low:8.3f} to {one.high:.3f}" for one in fit.profiles}
+    if len(fit.problem.cases) > 1:
+        for case, loss in zip(fit.problem.cases, fit.best.cases, strict=True):
+            console.print(f"  of {case.name}: {loss.loss:.4f}", soft_wrap=True)
+    for scenarios in dict.fromkeys(each.scenarios for each in parameters):
+        if len(fit.problem.cases) > 1:
+            console.print(f"\n{'Of ' + ', '.join(scenarios) if scenarios else 'Of all scenarios'}", soft_wrap=True)
+        for each, value in zip(parameters, values, strict=True):
+            if each.scenarios == scenarios:
+                console.print(f"{each.path:48s} {value:8.3f}{admitted.get(each.name, '')}", soft_wrap=True)
+    for name, halves in fit.judgements.items():
+        console.print(f"\n{f'Conditions of {name}':40s}  loss   median difference, search time")
+        for half, one in halves.items():
+            listed = f"{half}: {', '.join(map(str, one.conditions))}"
+            console.print(f"{listed:38s} {one.loss:7.4f} {one.median_difference_s:7.2f} s", soft_wrap=True)

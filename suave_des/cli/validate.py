@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,13 +17,11 @@ if TYPE_CHECKING:
     from suave_des.campaign.campaign import CampaignResult
     from suave_des.report.runs import Runs
     from suave_des.validation.conditions import Conditions
-    from suave_des.validation.real import RealRuns
-    from suave_des.validation.shares import ConditionLimits, Share
     from suave_des.validation.validation import Validation
 
 TARGETS_NOT_MET = 1
 """Exit status with --strict."""
-_SCENARIO, _DATA = "seams2023", "seams2023_runs.csv"
+_SCENARIO = "seams2023"
 _RUNS = 2000
 
 _Data = Annotated[
@@ -92,7 +90,7 @@ def validate(
     from suave_des.cli.validation_tables import print_validation
     from suave_des.errors import InputError
     from suave_des.validation.conditions import CONDITION
-    from suave_des.validation.real import read_conditions, read_real
+    from suave_des.validation.real import read_conditions, read_real, targets_of
     from suave_des.validation.validation import validate as compare
 
     name = scenario or _SCENARIO
@@ -103,7 +101,7 @@ def validate(
     conditions = read_conditions(name, **files.replacements) if wants_conditions else None
     real = read_real(_data_files(name, data), conditions)
     chosen = real.choose(managers)
-    shares, limits, targets_paths = _targets(real, targets)
+    shares, limits, targets_paths = targets_of(real, targets)
     word = "published" if all(_is_shipped(file.path) for file in real.files) else "real"
 
     campaign: CampaignResult | None = None
@@ -119,7 +117,7 @@ def validate(
     else:
         from suave_des.campaign.campaign import run_campaign
 
-        _check_known(real, chosen)
+        real.check_can_be_run(chosen)
         runs = runs if runs is not None else -(-_RUNS // len(conditions or "1"))
         with progress(name, quiet=quiet) as show:
             campaign = run_campaign(
@@ -161,27 +159,12 @@ def validate(
 
 def _data_files(scenario: str, given: list[str] | None) -> list[Path]:
     """Return the files of real missions: those given, or those published for the scenario, or the paper's."""
-    from suave_des.resources import find, shipped_folder
+    from suave_des.resources import find
+    from suave_des.validation.real import PAPERS_RUNS, published_for
 
     if given:
         return [find(each, "scenarios/published") for each in given]
-    own = shipped_folder("scenarios/published") / f"{Path(scenario).stem.removesuffix('_campaign')}_runs.csv"
-    return [own if own.is_file() else find(_DATA, "scenarios/published")]
-
-
-def _targets(
-    real: RealRuns, given: Path | None
-) -> tuple[tuple[Share, ...], Mapping[str, ConditionLimits], tuple[Path, ...]]:
-    """Read the shares and limits of the file given, or of those beside the data."""
-    from suave_des.validation.shares import read_targets, shares_beside
-
-    paths = (given,) if given else tuple(path for file in real.files if (path := shares_beside(file.path)))
-    lists = [read_targets(path) for path in paths]
-    shares: list[Share] = []
-    for each in lists:
-        shares += [share for share in each.shares if share not in shares]
-    limits: dict[str, ConditionLimits] = {metric: limit for each in lists for metric, limit in each.conditions.items()}
-    return tuple(shares), limits, paths
+    return [published_for(scenario) or find(PAPERS_RUNS, "scenarios/published")]
 
 
 def _recorded(
@@ -210,24 +193,6 @@ def _recorded(
         check_output_folder(out, "campaign", overwrite=overwrite)
         make_output_folder(out)
     return recorded
-
-
-def _check_known(real: RealRuns, chosen: tuple[str, ...]) -> None:
-    """Check that every manager of the data can be run.
-
-    Raises:
-        InputError: one cannot, with the line that names it.
-    """
-    from suave_des.errors import InputError
-    from suave_des.registry import manager_class
-
-    for name in chosen:
-        try:
-            manager_class(name)
-        except InputError as error:
-            remedy = f"{error.remedy}; or choose others with --managers" if error.remedy else None
-            file = real.managers[name]
-            raise file.error(file.managers[name], error.problem, remedy) from None
 
 
 def _write(

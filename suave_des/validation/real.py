@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Unpack
@@ -12,12 +12,17 @@ import pandas
 from numpy.typing import NDArray
 
 from suave_des.campaign.spec import read_campaign_file
-from suave_des.campaign.variation import vary
+from suave_des.campaign.variation import Variation, vary
 from suave_des.errors import InputError
+from suave_des.registry import manager_class
 from suave_des.report.runs import Runs, choose_names, read_runs
-from suave_des.scenario.loader import Replacements, load_scenario
+from suave_des.resources import shipped_folder
+from suave_des.scenario.loader import LoadedScenario, Replacements, load_scenario
 from suave_des.validation.conditions import CONDITION, NUMBER_COLUMNS, Conditions
+from suave_des.validation.shares import ConditionLimits, Share, read_targets, shares_beside
 
+PAPERS_RUNS = "seams2023_runs.csv"
+"""The 60 missions published with the SUAVE paper, for scenarios that have none of their own."""
 _REMEDY = f"add a column {CONDITION} with the number of each mission's condition in the campaign, from 1"
 
 
@@ -52,6 +57,20 @@ class RealRuns:
             InputError: one is named twice, or has no mission.
         """
         return choose_names(wanted, self.managers, ", ".join(str(file.path) for file in self.files))
+
+    def check_can_be_run(self, managers: Iterable[str]) -> None:
+        """Check that missions of some of its managers can be simulated.
+
+        Raises:
+            InputError: there is no such manager, with the line that names it.
+        """
+        for name in managers:
+            try:
+                manager_class(name)
+            except InputError as error:
+                remedy = f"{error.remedy}; or choose others with --managers" if error.remedy else None
+                file = self.managers[name]
+                raise file.error(file.managers[name], error.problem, remedy) from None
 
 
 def read_real(paths: Sequence[str | Path], conditions: Conditions | None = None) -> RealRuns:
@@ -94,6 +113,30 @@ def read_real(paths: Sequence[str | Path], conditions: Conditions | None = None)
     return RealRuns(tuple(files), frame, tuple(notes))
 
 
+def read_varied(campaign: str | Path, **replacements: Unpack[Replacements]) -> tuple[LoadedScenario, Variation, str]:
+    """Read a campaign file's scenario, and what the file sweeps and perturbs; of a scenario, that nothing varies.
+
+    Args:
+        campaign: path of a campaign or scenario file, or name of a shipped one.
+        replacements: of the scenario's files, as of load_scenario.
+
+    Returns:
+        The scenario, what varies in it, and the scenario's own file as a further scenario can name it.
+
+    Raises:
+        InputError: a file cannot be used.
+    """
+    file = read_campaign_file(campaign)
+    if file is None:
+        return load_scenario(campaign, **replacements), Variation(), str(campaign)
+    settings, loaded = file.settings, load_scenario(file.scenario, **replacements)
+    try:
+        varied = vary(loaded, settings.sweep, settings.perturbations, settings.runs_per_draw, settings.seed)
+    except InputError as error:
+        raise file.located(error) from None
+    return *varied, str(file.scenario)
+
+
 def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) -> Conditions | None:
     """Read the conditions that a campaign file sweeps; none of another file, or if it sweeps none.
 
@@ -107,12 +150,34 @@ def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) 
     file = read_campaign_file(campaign)
     if file is None or not file.settings.sweep:
         return None
-    settings, loaded = file.settings, load_scenario(file.scenario, **replacements)
-    try:
-        _, variation = vary(loaded, settings.sweep, {}, 1, settings.seed)
-    except InputError as error:
-        raise file.located(error) from None
-    return Conditions.of(variation.sweep)
+    return Conditions.of(read_varied(campaign, **replacements)[1].sweep)
+
+
+def published_for(scenario: str | Path) -> Path | None:
+    """Return the file of the real missions that were published for a scenario or campaign file, if there are any.
+
+    Args:
+        scenario: path of the file, or its name.
+    """
+    own = shipped_folder("scenarios/published") / f"{Path(scenario).stem.removesuffix('_campaign')}_runs.csv"
+    return own if own.is_file() else None
+
+
+def targets_of(
+    real: RealRuns, given: Path | None = None
+) -> tuple[tuple[Share, ...], Mapping[str, ConditionLimits], tuple[Path, ...]]:
+    """Read the shares and limits of the file given, or of those beside the data, and name the files.
+
+    Raises:
+        InputError: with file and line: one cannot be read, or is not valid.
+    """
+    paths = (given,) if given else tuple(path for file in real.files if (path := shares_beside(file.path)))
+    lists = [read_targets(path) for path in paths]
+    shares: list[Share] = []
+    for each in lists:
+        shares += [share for share in each.shares if share not in shares]
+    limits: dict[str, ConditionLimits] = {metric: limit for each in lists for metric, limit in each.conditions.items()}
+    return tuple(shares), limits, paths
 
 
 def _numbered(file: Runs, conditions: Conditions) -> NDArray[np.int64] | None:

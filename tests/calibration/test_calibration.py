@@ -9,8 +9,10 @@ import pandas
 import pytest
 import yaml
 
+from suave_des.calibration.cases import Case
 from suave_des.calibration.fit import Profile, _crossing, fit
 from suave_des.calibration.loss import (
+    CaseLoss,
     Evaluation,
     FreeParameter,
     Problem,
@@ -31,6 +33,7 @@ from suave_des.simulation.simulator import Simulator
 
 GAIN = "calibration.position_gain_per_s"
 ORIGIN = "calibration.origin_y_m"
+SEAMS = {"seams2023": load_scenario("seams2023")}
 
 
 def test_energy_distance_of_two_pairs_of_points_by_hand() -> None:
@@ -68,13 +71,24 @@ def test_coordinates_outside_the_bounds_are_reflected(unit: float, value: float)
     assert FreeParameter(GAIN, 1.0, 3.0, 2.0).value(unit) == pytest.approx(value)
 
 
-def planted(origin_y_m: float, runs: int = 40) -> dict:
-    loaded = with_values(load_scenario("seams2023"), {ORIGIN: origin_y_m})
-    return {"none": as_vectors(simulate(Simulator(loaded), "none", runs, 99))}
+def planted(scenario: str, values: dict, runs: int = 40, conditions: dict | None = None) -> Case:
+    """A case whose real missions are simulated with other values."""
+    loaded = load_scenario(scenario)
+    conditions = conditions or {1: {}}
+    real = [
+        simulate(Simulator(with_values(loaded, {**values, **condition})), "none", runs, 99).assign(condition=number)
+        for number, condition in conditions.items()
+    ]
+    return Case(scenario, loaded, pandas.concat(real, ignore_index=True), conditions, base=scenario)
+
+
+def origin_problem(origin_y_m: float, start: float, real_runs: int, runs: int) -> Problem:
+    case = planted("seams2023", {ORIGIN: origin_y_m}, real_runs)
+    return Problem((case,), (FreeParameter(ORIGIN, -0.5, 0.3, start),), runs, 1)
 
 
 def test_the_fit_finds_what_was_planted() -> None:
-    problem = Problem(load_scenario("seams2023"), (FreeParameter(ORIGIN, -0.5, 0.3, 0.2),), planted(-0.2), 25, 1)
+    problem = origin_problem(-0.2, 0.2, 40, 25)
     tried = fit(problem, 30, workers=1, seed=1)
     best = min(tried, key=lambda each: each.loss)
     assert best.values[0] == pytest.approx(-0.2, abs=0.08)
@@ -82,19 +96,19 @@ def test_the_fit_finds_what_was_planted() -> None:
 
 
 def test_the_same_fit_twice_is_the_same() -> None:
-    problem = Problem(load_scenario("seams2023"), (FreeParameter(ORIGIN, -0.5, 0.3, 0.0),), planted(-0.2, 10), 5, 1)
+    problem = origin_problem(-0.2, 0.0, 10, 5)
     assert fit(problem, 8, workers=1, seed=3) == fit(problem, 8, workers=1, seed=3)
 
 
 def test_the_spread_of_the_loss_repeats_with_its_seed() -> None:
-    problem = Problem(load_scenario("seams2023"), (FreeParameter(ORIGIN, -0.5, 0.3, 0.0),), planted(-0.2, 10), 5, 1)
+    problem = origin_problem(-0.2, 0.0, 10, 5)
     best = evaluate(problem, [-0.2])
     assert 0.0 < resampling_spread(problem, best, 1) == resampling_spread(problem, best, 1) < 1.0
 
 
 def test_shipped_parameters_are_in_the_shipped_scenario() -> None:
-    form, free = read_parameters(shipped_folder("scenarios/calibration") / "seams2023.yaml", load_scenario("seams2023"))
-    assert all(value_at(form, each.path) is not None for each in free)
+    form, free = read_parameters(shipped_folder("scenarios/calibration") / "seams2023.yaml", SEAMS)
+    assert all(value_at(form["seams2023"], each.path) is not None for each in free)
     assert all(each.lower < each.start < each.upper for each in free)
 
 
@@ -114,17 +128,17 @@ def test_a_wrong_parameter_file_says_where_and_what(tmp_path: Path, text: str, w
     file = tmp_path / "free.yaml"
     file.write_text(text)
     with pytest.raises(InputError, match=words) as raised:
-        read_parameters(file, load_scenario("seams2023"))
+        read_parameters(file, SEAMS)
     assert "\n" not in str(raised.value)
 
 
 def test_a_fitted_scenario_loads_with_the_fitted_values(tmp_path: Path) -> None:
     paths = (GAIN, "calibration.altitude_error_m.mean", "revision.set_points.loss_probability")
     free = tuple(FreeParameter(path, 0.0, 1.0, 0.5) for path in paths)
-    problem = Problem(load_scenario("seams2023"), free, {}, 1, 1)
-    values = fitted_values(free, Evaluation((0.41234, 0.3, 0.05), (), 0.0, 0.0))
+    case = Case("seams2023", SEAMS["seams2023"], pandas.DataFrame(), base="seams2023")
+    values = fitted_values(Evaluation((0.41234, 0.3, 0.05), ()))
     file = tmp_path / "fitted.yaml"
-    file.write_text(fitted_scenario(problem, "seams2023", values))
+    file.write_text(fitted_scenario(Problem((case,), free, 1, 1), case, values, tmp_path))
     fitted = load_scenario(file)
     assert [value_at(fitted, path) for path in paths] == [0.412, 0.3, 0.05]
     assert fitted.scenario.revision.follow == load_scenario("seams2023").scenario.revision.follow
@@ -139,7 +153,7 @@ def test_the_admitted_interval_ends_where_the_loss_crosses_the_threshold() -> No
 def test_profiles_become_a_table_and_a_picture() -> None:
     one = Profile(FreeParameter(GAIN, 0.2, 1.2, 0.6), 0.5, (0.2, 0.5, 1.2), (0.9, 0.1, 0.8), 0.4, 0.7)
     assert table([one]).splitlines()[1] == f"{GAIN},0.2,1.2,0.6,0.5,0.4,0.7"
-    assert profiles_png([one], Evaluation((0.5,), (0.1,), 0.0, 0.1), 0.2).startswith(b"\x89PNG")
+    assert profiles_png([one], Evaluation((0.5,), (CaseLoss({"none": 0.1}, 0.0),)), 0.2).startswith(b"\x89PNG")
 
 
 def test_the_command_writes_a_scenario_a_report_and_the_profiles(
