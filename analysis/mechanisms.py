@@ -18,12 +18,11 @@ from typing import Any
 import numpy as np
 import pandas
 import studies
-from ensemble import SCALES, energy_distance
 from numpy.typing import NDArray
 from scipy import stats
 
 from suave_des import load_scenario, with_values
-from suave_des.calibration.loss import as_vectors, published_vectors, simulate
+from suave_des.calibration.loss import SCALES, as_vectors, energy_distance, published_vectors, simulate
 from suave_des.report.runs import choose_managers, read_runs
 from suave_des.resources import find
 from suave_des.simulation.simulator import Simulator
