@@ -141,7 +141,7 @@ def default_text(field: FieldInfo) -> str:
     """A key's default as it would be written in YAML."""
     if field.is_required():
         return "needed"
-    value = field.get_default(call_default_factory=True)
+    value = field.get_default(call_default_factory=True, validated_data={})
     if value is None:
         return "none"
     if isinstance(value, BaseModel):

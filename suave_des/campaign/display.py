@@ -26,7 +26,7 @@ _RATE_PERIOD_S = 10.0
 """Missions a second are those of this time."""
 _NOTEBOOK_WIDTH = 90
 _WAITS_S = 2.0
-_STARTING = "starting (the first time on this machine, missions are compiled)"
+_FIRST_TIME = "(the first time, missions are compiled: 20 to 60 s)"
 _WAITING = "Java starts, or missions are long"
 
 
@@ -107,7 +107,7 @@ class _Display(RichProgress):
     def get_renderables(self) -> Iterator[RenderableType]:
         """Yield what is drawn, from top to bottom."""
         if not self._groups:
-            yield Text(f"{self.label}: {_STARTING}, {duration(time.monotonic() - self._began_s)}")
+            yield Text(f"{self.label}: {self._starting()}", no_wrap=True, overflow="ellipsis")
             return
         waiting_s = time.monotonic() - self._done_s
         if waiting_s > _WAITS_S and self.progress is not None and self.progress.done < self.progress.total:
@@ -133,7 +133,7 @@ class _Display(RichProgress):
     def line(self) -> str:
         """Return the same in one line."""
         if (progress := self.progress) is None:
-            return f"suave-des: {self.label}: {_STARTING}"
+            return f"suave-des: {self.label}: {self._starting()}"
         last = self._groups[-1]
         means = [
             f"{self._name(group)} {estimated(group.mean, group.half_width)}"
@@ -144,6 +144,9 @@ class _Display(RichProgress):
         parts = (f"{progress.done} of {progress.total} missions", fields["failed"], fields["rate"], fields["left"])
         known = f"; {self._metric}: {', '.join(means)}" if means else ""
         return f"suave-des: {self.label}: {', '.join(filter(None, parts))}{known}"
+
+    def _starting(self) -> str:
+        return f"starting, {duration(time.monotonic() - self._began_s)} {_FIRST_TIME}"
 
     @property
     def _metric(self) -> str:
