@@ -72,6 +72,7 @@ def check(
             shapes=shapes or (),
             modes={name: loaded.modes.modes(name) for name in loaded.modes.functions},
             needed=MISSION_FUNCTIONS,
+            operators=loaded.scenario.revision.comparison_operators,
             time_limit_s=time_limit,
         )
     )

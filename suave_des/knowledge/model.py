@@ -227,6 +227,11 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
     return model, replace(content, triples=kept)
 
 
+def assumption(name: str, sign: str) -> str:
+    """Say which comparison operator is assumed of a quality attribute type."""
+    return f"{name} has no qa_comparison_operator in the ontologies: {sign} is assumed, as in the revision's code"
+
+
 def with_operators(content: Content, model: Model, operators: Mapping[str, str]) -> tuple[Content, dict[str, str]]:
     """Add the comparison operators of quality attribute types that have none; return those that were added, by name."""
     present = {subject for subject, predicate, _ in content.triples if predicate == _OPERATOR}

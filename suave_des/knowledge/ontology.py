@@ -10,7 +10,7 @@ from pathlib import Path
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.content import Content, merge, with_rules
-from suave_des.knowledge.model import Model, build_model, check_values, expectations, with_operators
+from suave_des.knowledge.model import Model, assumption, build_model, check_values, expectations, with_operators
 from suave_des.knowledge.ontology_file import OntologyFile, collect, enumerated_texts
 from suave_des.knowledge.rdf import Names, Triple, facts_of
 from suave_des.knowledge.rules.checks import check_property_use
@@ -106,10 +106,7 @@ class Ontology:
             model=model,
             vocabulary=vocabulary,
             sources=sources,
-            assumptions=tuple(
-                f"{name} has no qa_comparison_operator in the ontologies: {sign} is assumed, as in the revision's code"
-                for name, sign in added.items()
-            ),
+            assumptions=tuple(assumption(name, sign) for name, sign in added.items()),
             _designs={name: tuple(sorted(found)) for name, found in designs.items()},
             _expected=expectations(content, model),
         )

@@ -24,7 +24,7 @@ from xml.sax import SAXParseException
 
 import rdflib
 from lxml import etree
-from rdflib import Graph, URIRef
+from rdflib import Graph, Literal, URIRef
 from rdflib.collection import Collection
 from rdflib.namespace import OWL as OWL_TERMS
 from rdflib.namespace import RDF as RDF_TERMS
@@ -32,7 +32,7 @@ from rdflib.namespace import RDFS as RDFS_TERMS
 from rdflib.plugins.parsers.notation3 import BadSyntax
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.vocabulary import MROS, OWL, RDF, local_name
+from suave_des.knowledge.vocabulary import MROS, OWL, RDF, XSD, local_name
 from suave_des.resources import shipped_folder
 
 MAX_BYTES: Final = 64 * 2**20
@@ -243,11 +243,21 @@ def _parse_rdf(path: Path, content: bytes) -> Graph:
             place, text = f"line {error.lines + 1}", str(error._why)
         remedy = _SAVE_AS if form == "xml" else f"by its ending the file is {name}"
         raise KnowledgeError(f"not {name}: {' '.join(text.split())}", file=path, place=place, remedy=remedy) from error
+    _write_datatypes_out(graph)
     for triple in graph:
         for term in triple:
             if isinstance(term, URIRef) and not _NOT_IN_IRI.isdisjoint(term):
                 raise KnowledgeError(f"{str(term)!r} is not an IRI", file=path, remedy='no spaces or <>"{}|\\^`')
     return graph
+
+
+def _write_datatypes_out(graph: Graph) -> None:
+    """Correct rdf:datatype="xsd:string", as owlready2 saves it: RDF/XML has no prefixes in attributes."""
+    for subject, predicate, value in list(graph):
+        if isinstance(value, Literal) and value.datatype is not None and value.datatype.startswith("xsd:"):
+            datatype = URIRef(XSD + value.datatype.removeprefix("xsd:"))
+            graph.remove((subject, predicate, value))
+            graph.add((subject, predicate, Literal(str(value), datatype=datatype, normalize=False)))
 
 
 def enumerated_texts(files: Iterable[OntologyFile]) -> dict[str, frozenset[str]]:

@@ -47,9 +47,7 @@ def literal(term: Literal) -> Lit:
     """Convert a literal of rdflib; plain text is xsd:string (RDF 1.1)."""
     if term.language:
         return Lit(str(term), f"@{term.language}")
-    datatype = XSD + "string" if term.datatype is None else str(term.datatype)
-    # owlready2 saves rdf:datatype="xsd:string", with a prefix that RDF/XML does not know in attributes.
-    return Lit(str(term), XSD + datatype.removeprefix("xsd:") if datatype.startswith("xsd:") else datatype)
+    return Lit(str(term), XSD + "string" if term.datatype is None else str(term.datatype))
 
 
 def term_of(term: Node) -> str | Lit:

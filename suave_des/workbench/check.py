@@ -14,7 +14,7 @@ from typing import Final
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.content import Content, merge, with_rules
 from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit
-from suave_des.knowledge.model import Model, build_model, check_values
+from suave_des.knowledge.model import Model, assumption, build_model, check_values, with_operators
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, collect, enumerated_texts
 from suave_des.knowledge.reasoners import make_reasoner
@@ -27,7 +27,7 @@ from suave_des.knowledge.rules.writer import write_atom
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.resources import shipped_folder
 from suave_des.workbench.dead_rules import dead_rules, unmeasured_rules
-from suave_des.workbench.findings import Finding, Level, finding_from, has_level, ordered, relative_path
+from suave_des.workbench.findings import Finding, Level, finding_about, finding_from, has_level, ordered, relative_path
 from suave_des.workbench.model_checks import (
     check_designs,
     check_shapes,
@@ -53,6 +53,7 @@ class Subject:
         shapes: files of SHACL shapes, besides the shipped ones.
         modes: names of the modes by function; None leaves out what is checked against them.
         needed: functions that the mission cannot do without.
+        operators: qa_comparison_operator that the revision assumes of quality attribute types that have none, by name.
         time_limit_s: for Pellet.
     """
 
@@ -63,6 +64,7 @@ class Subject:
     shapes: Sequence[Path] = ()
     modes: Mapping[str, Collection[str]] | None = None
     needed: Collection[str] = ()
+    operators: Mapping[str, str] = field(default_factory=dict)
     time_limit_s: float = TIME_LIMIT_S
 
 
@@ -94,6 +96,7 @@ def check(subject: Subject) -> tuple[Finding, ...]:
     built: list[Model] = []
     attempt(lambda: built.append(build_model(content, sources)[0]))
     model = built[0] if built else None
+    assumed: Mapping[str, str] = {} if model is None else with_operators(content, model, subject.operators)[1]
     individuals = [] if model is None else [each.iri for each in model.individuals()]
     vocabulary = Vocabulary.of(content.triples, individuals, enumerated_texts(sources))
     findings += undefined_names(content, model, vocabulary, sources)
@@ -106,9 +109,12 @@ def check(subject: Subject) -> tuple[Finding, ...]:
         findings += _dead_rules(whole, model, {path.resolve() for path in (*given, *subject.rules)}, by_path)
         findings += check_designs(whole, model, sources, subject.modes, subject.needed)
         findings += unused_individuals(whole, model, sources)
+        for name, sign in assumed.items():
+            findings.append(finding_about(name, sources, Level.INFO, assumption(name, sign)))
         if values_are_right:
             findings += designs_without_performance(whole, model, sources)
-    findings += check_shapes(sources, subject.shapes)
+    known = {} if model is None else {model.attributes[name]: sign for name, sign in assumed.items()}
+    findings += check_shapes(sources, subject.shapes, known)
     findings += _ask_pellet(subject, findings)
     return ordered(replace(one, file=relative_path(one.file) if one.file else None) for one in findings)
 
@@ -197,7 +203,11 @@ def _ask_pellet(subject: Subject, before: Sequence[Finding]) -> Iterator[Finding
     is_wrong = has_level(before, Level.ERROR)
     try:
         base = Ontology.load(
-            subject.ontologies, values=subject.values, rules=subject.rules, disabled_rules=subject.disabled_rules
+            subject.ontologies,
+            values=subject.values,
+            rules=subject.rules,
+            disabled_rules=subject.disabled_rules,
+            operators=subject.operators,
         )
     except KnowledgeError as error:
         message = (

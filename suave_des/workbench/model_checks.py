@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from rdflib import Graph, Namespace, URIRef
+from rdflib import RDF, Graph, Literal, Namespace, URIRef
 from rdflib.plugins.parsers.notation3 import BadSyntax
 from rdflib.term import Node
 
@@ -149,8 +149,15 @@ def unused_individuals(content: Content, model: Model, sources: Sequence[Ontolog
         yield finding_about(name, sources, Level.INFO, f"nothing refers to {name}")
 
 
-def check_shapes(sources: Sequence[OntologyFile], more: Sequence[Path]) -> Iterator[Finding]:
+def check_shapes(
+    sources: Sequence[OntologyFile], more: Sequence[Path], assumed: Mapping[str, str]
+) -> Iterator[Finding]:
     """Check the model against SHACL shapes, the shipped ones and more.
+
+    Args:
+        sources: the ontologies.
+        more: files of shapes.
+        assumed: qa_comparison_operator by the IRI of a quality attribute type, besides what the ontologies say.
 
     Raises:
         InputError: a file of shapes cannot be read.
@@ -163,6 +170,8 @@ def check_shapes(sources: Sequence[OntologyFile], more: Sequence[Path]) -> Itera
     data = Graph()
     for source in sources:
         data += source.graph
+    for attribute, sign in assumed.items():
+        data.add((URIRef(attribute), URIRef(TOMASYS + "qa_comparison_operator"), Literal(sign)))
     try:
         _, report, _ = validate(data, shacl_graph=shapes, do_owl_imports=False, meta_shacl=False, inplace=False)
     except Exception as error:  # each kind of malformed shape raises another error
@@ -170,7 +179,14 @@ def check_shapes(sources: Sequence[OntologyFile], more: Sequence[Path]) -> Itera
         raise InputError(f"the shapes cannot be used: {reason}", file=", ".join(map(str, more)) or None) from error
     assert isinstance(report, Graph)
     for result in report.subjects(_SH.resultSeverity, None):
-        yield _shape_finding(report, result, sources)
+        if not _is_placeholder(report.value(result, _SH.focusNode), data):
+            yield _shape_finding(report, result, sources)
+
+
+def _is_placeholder(node: Node | None, data: Graph) -> bool:
+    """Whether of an individual nothing but its class is said, and nothing refers to it: it takes part in nothing."""
+    is_mentioned = any(predicate != RDF.type for predicate in data.predicates(node, None))
+    return isinstance(node, URIRef) and not is_mentioned and (None, None, node) not in data
 
 
 def _read_shapes(path: Path) -> Graph:

@@ -6,11 +6,14 @@ speak of INTERNAL_ERROR, and a recovered component gives its objectives the stat
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from rdflib import BNode, Graph, Literal, URIRef
 from rdflib.namespace import OWL, RDF, RDFS
 from rdflib.term import Node
+
+from suave_des.resources import shipped_folder
 
 MROS_IMPORT = "https://raw.githubusercontent.com/meta-control/mros_ontology/main/owl/mros.owl"
 TOMASYS_IMPORT = "http://raw.githubusercontent.com/meta-control/mc_mdl_tomasys/ros2/owl/tomasys.owl"
@@ -76,3 +79,23 @@ def write_exemplar_files(shipped: Path, folder: Path, *, oldest: bool = False) -
     for name, graph in files.items():
         graph.serialize(folder / f"{name}.owl", format="xml")
     return {name: folder / f"{name}.owl" for name in files}
+
+
+def write_as_owlready2_saves_it(path: Path, placeholder: str = "") -> Path:
+    """Write suave.owl as the files of 2023 are: no comparison operators, "xsd:string" for the datatype, a placeholder.
+
+    Args:
+        path: of the file.
+        placeholder: a class of TOMASys, of which there is an individual that says nothing.
+    """
+    text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
+    text = re.sub(r"<tomasys:qa_comparison_operator.*?</tomasys:qa_comparison_operator>", "", text)
+    text = text.replace("http://www.w3.org/2001/XMLSchema#", "xsd:")
+    text = text.replace('xmlns:xsd="xsd:"', 'xmlns:xsd="http://www.w3.org/2001/XMLSchema#"')
+    assert 'rdf:datatype="xsd:' in text
+    extra = (
+        '<owl:NamedIndividual rdf:about="http://www.metacontrol.org/suave#placeholder">'
+        f'<rdf:type rdf:resource="{TOMASYS}{placeholder}"/></owl:NamedIndividual>'
+    )
+    path.write_text(text.replace("</rdf:RDF>", f"{extra if placeholder else ''}</rdf:RDF>"), encoding="utf-8")
+    return path

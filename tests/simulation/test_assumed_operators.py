@@ -5,17 +5,14 @@ from pathlib import Path
 import pytest
 
 from suave_des.campaign.provenance import check_knowledge
-from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario
 from suave_des.simulation.simulator import Simulator
+from tests.helpers.exemplar_files import write_as_owlready2_saves_it
 
 
 def test_missions_are_those_with_the_operator_written_in(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
-    operator = "<tomasys:qa_comparison_operator>&lt;</tomasys:qa_comparison_operator>"
-    assert operator in text
-    owl = tmp_path / "suave.owl"
-    owl.write_text(text.replace(operator, ""), encoding="utf-8")
+    owl = write_as_owlready2_saves_it(tmp_path / "suave.owl", placeholder="FunctionDesign")
+    assert "<tomasys:qa_comparison_operator" not in owl.read_text(encoding="utf-8")
     loaded = load_scenario("seams2023", ontologies=[owl])
     check_knowledge(loaded, ["metacontrol"], given=True)
     assert caplog.text.count("water_visibility has no qa_comparison_operator in the ontologies: < is assumed") == 1

@@ -17,6 +17,7 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.resources import shipped_folder
 from suave_des.workbench.check import Subject, check
 from suave_des.workbench.findings import Finding, Level, folded, has_level
+from tests.helpers.exemplar_files import write_as_owlready2_saves_it
 
 SUAVE = "http://www.metacontrol.org/suave#"
 TOMASYS = "http://metacontrol.org/tomasys#"
@@ -360,6 +361,20 @@ def test_values_of_the_scenario_are_used(tmp_path: Path) -> None:
 def test_a_reasoner_that_takes_too_long_is_given_up_on(tmp_path: Path) -> None:
     findings = found(tmp_path, time_limit_s=1e-6)
     assert "not done after" in errors(findings)[0].message
+
+
+def test_a_comparison_operator_that_the_revision_assumes_is_told_in_one_note(tmp_path: Path) -> None:
+    files = [write_as_owlready2_saves_it(tmp_path / "suave.owl")]
+    note = only(check(Subject(files, operators={"water_visibility": "<"})), "comparison")
+    line = next(n for n, text in enumerate(files[0].read_text().splitlines(), 1) if '#water_visibility">' in text)
+    assert (note.level, note.line) == (Level.INFO, line)
+    assert "water_visibility has no qa_comparison_operator in the ontologies: < is assumed" in note.message
+    assert "never filters" in only(check(Subject(files)), "comparison").message
+
+
+@pytest.mark.parametrize("kind", ["FunctionDesign", "QAvalue"])
+def test_a_file_as_owlready2_saves_it_with_a_placeholder_has_no_error(kind: str, tmp_path: Path) -> None:
+    assert errors(check(Subject([write_as_owlready2_saves_it(tmp_path / "suave.owl", kind)]))) == []
 
 
 class TestBeforeItRuns:
