@@ -73,6 +73,17 @@ def test_the_committed_figure_and_conclusion_are_of_the_committed_table(study, n
     assert module.studies.figure_of(module.draw, rows, 3.0).axes
 
 
+def test_judging_the_shipped_values_again_gives_what_is_committed_of_one_half(study):
+    module = study("half_blocks")
+    (case,) = module.read_cases(["planta_exp1_campaign"], (), module.MANAGERS)
+    problem = module.read_problem(module.find("planta_exp1", "scenarios/calibration"), [case], 48, 2)
+    found = module.judge(problem, case.only(module.HALVES[0]), [each.start for each in problem.parameters])
+    before = pandas.read_csv(FOLDER / "split" / "half_blocks.csv").iloc[0]
+    assert (before["values"], before["judged_on"]) == ("shipped", "1 3 5")
+    assert found.loss == pytest.approx(before["loss"], rel=1e-3)
+    assert found.median_difference_s == pytest.approx(before["median_difference_s"], abs=1e-3)
+
+
 def test_an_ideal_vehicle_at_3_m_finds_the_pipeline_when_the_water_clears_and_an_adapting_one_a_turn_later(study):
     module = study("when_adapting_pays")
     case = module.PAPERS
