@@ -71,7 +71,7 @@ def conclude(rows: pandas.DataFrame) -> str:
 
 def main() -> None:
     """Run metacontrol with each margin, write the table and the figure."""
-    chosen = studies.options(__file__, __doc__ or "", runs=20)
+    chosen = studies.options(__file__, __doc__ or "", runs=60)
     rows = study(chosen.runs, chosen.workers)
     studies.write(chosen, "design_thresholds", rows, draw, conclude, height=2.6)
 

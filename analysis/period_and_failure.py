@@ -100,7 +100,7 @@ def _named(row: pandas.Series) -> str:
 
 def main() -> None:
     """Simulate every pair of values, write the table and the figure."""
-    chosen = studies.options(__file__, __doc__ or "", runs=8)
+    chosen = studies.options(__file__, __doc__ or "", runs=24)
     rows = study(chosen.runs, chosen.workers)
     studies.write(chosen, "period_and_failure", rows, draw, conclude, height=2.8)
 

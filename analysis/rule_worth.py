@@ -72,7 +72,7 @@ def conclude(rows: pandas.DataFrame) -> str:
 
 def main() -> None:
     """Run metacontrol with each rule switched off, write the table and the figure."""
-    chosen = studies.options(__file__, __doc__ or "", runs=20)
+    chosen = studies.options(__file__, __doc__ or "", runs=60)
     rows = study(chosen.runs, chosen.workers)
     studies.write(chosen, "rule_worth", rows, draw, conclude, height=3.4)
 

@@ -228,7 +228,7 @@ def _named(row: pandas.Series[Any]) -> str:
 
 def main() -> None:
     """Run every case, write the table and the figure."""
-    chosen = studies.options(__file__, __doc__ or "", runs=8)
+    chosen = studies.options(__file__, __doc__ or "", runs=20)
     rows = study(chosen.runs, chosen.workers)
     studies.write(chosen, "when_adapting_pays", rows, draw, conclude, height=3.2)
 
