@@ -95,7 +95,10 @@ def paired(ours: pandas.Series[float], theirs: pandas.Series[float]) -> dict[str
 
 def shown(row: Mapping[str, Any], unit: str = "s", digits: int = 0) -> str:
     """Write a difference with its interval, such as "-12 s (-20 to -4)"."""
-    number = f"{{:+.{digits}f}}".format
+
+    def number(value: float) -> str:
+        return f"{round(value, digits) + 0.0:+.{digits}f}"  # never "-0"
+
     ends = f"{number(row['low95'])} to {number(row['high95'])}"
     return f"{number(row['mean_difference'])} {unit} ({ends})"
 
