@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,9 +12,13 @@ import typer
 from suave_des.cli.options import (
     Files,
     ManagerOptions,
+    OptionGroup,
     Overwrite,
     Quiet,
+    SeedIfNew,
     TimeOut,
+    check_no_use,
+    comma_separated,
     command_line,
     grouped_options,
 )
@@ -24,7 +29,7 @@ if TYPE_CHECKING:
     from suave_des.campaign.missions import Failure
 
 _FAILURES_SHOWN = 20
-_MANAGERS, _RUNS, _SEED = "none,random,metacontrol", "20", "1"
+_MANAGERS, _RUNS = "none,random,metacontrol", "20"
 """As in campaign.spec, which is not imported for --help."""
 _WORKERS = 2
 
@@ -34,6 +39,36 @@ class Format(StrEnum):
 
     SUAVE = "suave"
     PARQUET = "parquet"
+
+
+@dataclass(frozen=True)
+class NewCampaign(OptionGroup):
+    """Options that hold for the whole of a campaign: one that goes on has them already."""
+
+    seed: SeedIfNew = None
+    ensemble: Annotated[
+        str | None,
+        typer.Option(
+            "--ensemble",
+            metavar="FILE",
+            help="Give each run one of this file's parameter sets, which fit the real runs equally well; for instance"
+            " seams2023, which is shipped.",
+        ),
+    ] = None
+    time_out: TimeOut = None
+    format: Annotated[
+        list[Format] | None,
+        typer.Option(
+            "--format",
+            help="Write the exemplar's own files into DIR/suave, or runs.parquet, besides; repeat it for both.",
+        ),
+    ] = None
+    record_knowledge: Annotated[
+        bool,
+        typer.Option("--record-knowledge", help="Keep what managers reasoned about, in knowledge_states.jsonl."),
+    ] = False
+    overwrite: Overwrite = False
+    manager_option: ManagerOptions = None
 
 
 @grouped_options
@@ -82,18 +117,6 @@ def campaign(
             help="Run missions on the workers of this Dask scheduler instead; the same bytes again.",
         ),
     ] = None,
-    seed: Annotated[
-        int | None, typer.Option("--seed", help="Seed of everything that is random.", show_default=_SEED)
-    ] = None,
-    ensemble: Annotated[
-        str | None,
-        typer.Option(
-            "--ensemble",
-            metavar="FILE",
-            help="Give each run one of this file's parameter sets, which fit the real runs equally well; for instance"
-            " seams2023, which is shipped.",
-        ),
-    ] = None,
     until_ci: Annotated[
         str | None,
         typer.Option(
@@ -104,19 +127,6 @@ def campaign(
             " of two is known, after 100 runs at least: 'metacontrol - bt: search_time_s: 2'.",
         ),
     ] = None,
-    time_out: TimeOut = None,
-    also: Annotated[
-        list[Format] | None,
-        typer.Option(
-            "--format",
-            help="Write the exemplar's own files into DIR/suave, or runs.parquet, besides; repeat it for both.",
-        ),
-    ] = None,
-    record_knowledge: Annotated[
-        bool,
-        typer.Option("--record-knowledge", help="Keep what managers reasoned about, in knowledge_states.jsonl."),
-    ] = False,
-    overwrite: Overwrite = False,
     quiet: Quiet = False,
     yes: Annotated[
         bool,
@@ -125,8 +135,8 @@ def campaign(
             help="More than a million missions are meant; with --resume: managers that DIR names may run.",
         ),
     ] = False,
-    manager_option: ManagerOptions = None,
     *,
+    new: NewCampaign,
     files: Files,
 ) -> None:
     """Run many missions and write their results.
@@ -136,26 +146,13 @@ def campaign(
     """
     if workers is None:
         workers = _WORKERS if scheduler is None else 1
-    names = None if managers is None else [name.strip() for name in managers.split(",") if name.strip()]
+    names = None if managers is None else comma_separated(managers)
     if resume is not None:
-        fixed = {
-            "SCENARIO": scenario,
-            "--out": out,
-            "--seed": seed,
-            "--ensemble": ensemble,
-            "--time-out": time_out,
-            "--format": also or None,
-            "--record-knowledge": record_knowledge,
-            "--overwrite": overwrite,
-            "--manager-option": manager_option,
-            **files.given,
-        }
-        for option, value in fixed.items():
-            if value is not None and value is not False:
-                raise InputError(
-                    f"{option} has no use with --resume: the campaign goes on as it began",
-                    remedy="leave it out, or start anew in another folder",
-                )
+        check_no_use(
+            {"SCENARIO": scenario, "--out": out, **new.given, **files.given},
+            "with --resume: the campaign goes on as it began",
+            "leave it out, or start anew in another folder",
+        )
     elif scenario is None or out is None:
         missing = "SCENARIO" if scenario is None else "--out DIR"
         raise InputError(f"{missing} is missing", remedy="see suave-des campaign --help")
@@ -179,26 +176,26 @@ def campaign(
         else:
             assert scenario is not None
             options = (
-                files.with_options(manager_option, names or managers_of(scenario))
-                if manager_option
+                files.with_options(new.manager_option, names or managers_of(scenario))
+                if new.manager_option
                 else files.replacements
             )
             spec = CampaignSpec.of(
                 scenario,
                 managers=names,
                 runs=runs,
-                seed=seed,
+                seed=new.seed,
                 workers=workers,
                 out=out,
                 **options,
-                suave_format=Format.SUAVE in (also or ()),
-                parquet=Format.PARQUET in (also or ()),
-                record_knowledge=record_knowledge,
-                time_out_s=time_out,
+                suave_format=Format.SUAVE in (new.format or ()),
+                parquet=Format.PARQUET in (new.format or ()),
+                record_knowledge=new.record_knowledge,
+                time_out_s=new.time_out,
                 until_ci=until_ci,
-                ensemble=ensemble,
+                ensemble=new.ensemble,
                 confirmed=yes,
-                overwrite=overwrite,
+                overwrite=new.overwrite,
                 command=command_line(),
                 scheduler=scheduler,
             )

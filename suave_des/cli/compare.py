@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from suave_des.cli.options import Results, comma_separated
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -25,12 +27,7 @@ class Format(StrEnum):
 
 
 def compare(
-    results: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="DIR...", help="Folders of campaign or reproduce, the exemplar's CSV files, or folders of these."
-        ),
-    ],
+    results: Results,
     managers: Annotated[
         str | None,
         typer.Option("--managers", metavar="NAME,...", help="Only these, in this order.", show_default="all"),
@@ -81,9 +78,9 @@ def compare(
     if out is not None:
         _check_out(out, ENDINGS)
     choices = Choices(
-        managers=_split(managers),
-        metrics=_split(metrics),
-        by=_split(by),
+        managers=comma_separated(managers),
+        metrics=comma_separated(metrics),
+        by=comma_separated(by),
         against=against,
         half_widths=tuple(half_width or ()),
         unpaired=unpaired,
@@ -98,10 +95,6 @@ def compare(
         print(plain_text(comparison, min(output().width, _TEXT_WIDTH)), end="")
     else:
         print(WRITERS[as_format.value](comparison), end="")
-
-
-def _split(names: str | None) -> tuple[str, ...]:
-    return tuple(name.strip() for name in (names or "").split(",") if name.strip())
 
 
 def _check_out(out: Path, endings: Iterable[str]) -> None:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from suave_des.cli.options import comma_separated
+
 if TYPE_CHECKING:
     from suave_des.report.mission_record import MissionRecord
 
@@ -52,8 +54,7 @@ def figure(
     """
     from suave_des.report.figures import draw_results
 
-    chosen = tuple(name.strip() for name in (parameters or "").split(",") if name.strip())
-    draw_results(folders, out, kind.value, chosen, _with_rules if kind is Kind.TIMELINE else None)
+    draw_results(folders, out, kind.value, comma_separated(parameters), _with_rules if kind is Kind.TIMELINE else None)
     print(f"drawn in {out}")
 
 

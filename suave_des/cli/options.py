@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
@@ -19,6 +19,12 @@ Ontologies = Annotated[
     list[Path] | None,
     typer.Option(
         "--ontology", metavar="FILE", help="Ontology in place of the scenario's; repeat it for several files."
+    ),
+]
+Results = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="DIR...", help="Folders of campaign or reproduce, the exemplar's CSV files, or folders of these."
     ),
 ]
 Modes = Annotated[
@@ -42,6 +48,8 @@ SetValues = Annotated[
     ),
 ]
 Seed = Annotated[int, typer.Option("--seed", help="Seed of everything that is random.")]
+SeedIfNew = Annotated[int | None, typer.Option("--seed", help="Seed of everything that is random.", show_default="1")]
+"""For commands that may go on from results, which have a seed already."""
 Workers = Annotated[
     int, typer.Option("--workers", help="Processes that run missions; any number gives the same bytes.")
 ]
@@ -61,7 +69,18 @@ Overwrite = Annotated[
 
 
 @dataclass(frozen=True)
-class KnowledgeFiles:
+class OptionGroup:
+    """Options that several commands share, or that go together; a field is named as its option."""
+
+    @property
+    def given(self) -> dict[str, object]:
+        """The options that are given, by name."""
+        values = {f"--{each.name.replace('_', '-')}": getattr(self, each.name) for each in fields(self)}
+        return {option: value for option, value in values.items() if _is_given(value)}
+
+
+@dataclass(frozen=True)
+class KnowledgeFiles(OptionGroup):
     """Options that replace or add to a scenario's ontologies, rules and values."""
 
     ontology: Ontologies = None
@@ -103,11 +122,32 @@ class Files(KnowledgeFiles):
         options: Replacements = {"manager_options": manager_options(words, managers)} if words else {}
         return self.replacements | options
 
-    @property
-    def given(self) -> dict[str, object]:
-        """The options that are given, by name."""
-        values = {f"--{each.name.replace('_', '-')}": getattr(self, each.name) for each in fields(self)}
-        return {option: value for option, value in values.items() if value}
+
+def _is_given(value: object) -> bool:
+    return value is not None and value is not False and value != []
+
+
+def check_no_use(options: Mapping[str, object], where: str, remedy: str = "leave it out") -> None:
+    """See that no option is given that a command cannot heed as it is called.
+
+    Args:
+        options: values by name, such as those of `Files.given`.
+        where: in which use of the command they cannot be heeded, such as "with --resume".
+        remedy: what to do instead.
+
+    Raises:
+        InputError: one is given.
+    """
+    from suave_des.errors import InputError
+
+    for option, value in options.items():
+        if _is_given(value):
+            raise InputError(f"{option} has no use {where}", remedy=remedy)
+
+
+def comma_separated(names: str | None) -> tuple[str, ...]:
+    """Split NAME,NAME,...; empty if nothing is given."""
+    return tuple(name.strip() for name in (names or "").split(",") if name.strip())
 
 
 def key_and_value(word: str, option: str) -> tuple[str, Any]:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from suave_des.cli.options import Files, grouped_options
+from suave_des.cli.options import Files, Results, SeedIfNew, check_no_use, comma_separated, grouped_options
 from suave_des.errors import InputError
 
 _SEED, _RUN, _POINT = 1, 1, 0
@@ -43,9 +43,7 @@ def replay(
         int | None,
         typer.Option("--run", metavar="K", help="Run of the campaign, or with this seed.", show_default=str(_RUN)),
     ] = None,
-    seed: Annotated[
-        int | None, typer.Option("--seed", help="Seed of everything that is random.", show_default=str(_SEED))
-    ] = None,
+    seed: SeedIfNew = None,
     point: Annotated[
         int | None,
         typer.Option("--point", metavar="N", help="Point of the campaign's sweep.", show_default=str(_POINT)),
@@ -73,15 +71,13 @@ def replay(
     if bool(folders) == (scenario is not None):
         problem = "both DIR and --scenario are given" if folders else "nothing to play is given"
         raise InputError(problem, remedy="give DIR, the --out folder of run or campaign, or --scenario NAME")
-    options = {"--seed": seed, **files.given} if folders else {"--point": point}
-    for option, value in options.items():
-        if value is not None:
-            where = "with DIR, whose missions have their own" if folders else "without a campaign's folder"
-            raise InputError(f"{option} has no use {where}", remedy="leave it out")
+    if folders:
+        check_no_use({"--seed": seed, **files.given}, "with DIR, whose missions have their own")
+    else:
+        check_no_use({"--point": point}, "without a campaign's folder")
     page_file = out or (folders[0] if folders else Path()) / "replay.html"
-    names = tuple(name.strip() for name in (managers or "").split(",") if name.strip())
     chosen = Chosen(
-        names,
+        comma_separated(managers),
         run=_RUN if run_number is None else run_number,
         seed=_SEED if seed is None else seed,
         point=point or _POINT,
@@ -97,12 +93,7 @@ def replay(
 
 
 def report(
-    results: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="DIR...", help="Folders of campaign or reproduce, the exemplar's CSV files, or folders of these."
-        ),
-    ],
+    results: Results,
     paths: Annotated[
         int | None,
         typer.Option(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from suave_des.cli.campaign import exit_telling_failures
-from suave_des.cli.options import Files, Overwrite, Quiet, Seed, Workers, command_line, grouped_options
+from suave_des.cli.options import Files, Overwrite, Quiet, Seed, Workers, check_no_use, command_line, grouped_options
 
 if TYPE_CHECKING:
     import pandas
@@ -88,15 +88,13 @@ def validate(
     """
     from suave_des.cli.console import output, progress
     from suave_des.cli.validation_tables import print_validation
-    from suave_des.errors import InputError
     from suave_des.validation.conditions import CONDITION
     from suave_des.validation.real import read_conditions, read_real, targets_of
     from suave_des.validation.validation import validate as compare
 
     name = scenario or _SCENARIO
     if runs_file is not None:
-        for option in files.given:
-            raise InputError(f"{option} has no use with --runs-file", remedy="leave one of them out")
+        check_no_use(files.given, "with --runs-file", "leave one of them out")
     wants_conditions = runs_file is None or scenario is not None
     conditions = read_conditions(name, **files.replacements) if wants_conditions else None
     real = read_real(_data_files(name, data), conditions)
