@@ -70,11 +70,12 @@ def paths_of(folder: Path, frame: pandas.DataFrame, groups: Sequence[str], runs:
         runs: how many runs of each manager; 0: none.
     """
     if runs == 0:
-        return Paths()
+        return Paths(note="Ways and timelines are left out; suave-des report --paths N has those of N runs")
     try:
         with opened_campaign(folder) as campaign:
             vertices = [(x, y) for x, y, *_ in campaign.loaded.scenario.pipeline.vertices_m]
-            return Paths(vertices, list(_paths(campaign, frame, groups, runs)))
+            paths = list(_paths(campaign, frame, groups, runs))
+            return Paths(vertices, paths, "" if paths else "No mission could be run again as it was")
     except SuaveDesError as error:
         return Paths(note=f"Paths and timelines are left out: {error}")
 

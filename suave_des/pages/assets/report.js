@@ -151,6 +151,17 @@ function pipelineTrace() {
   };
 }
 
+const runsWithWay = [...new Set(ways.paths.map((way) => way.run))];
+const otherWays = 'suave-des report --paths N has those of N runs';
+
+function sayWhichWays() {
+  const n = runsWithWay.length;
+  byId('runs-title').textContent = n
+    ? `Each mission; click one to look at it. Way and timeline are here for ${n} run${n > 1 ? 's' : ''} of each manager; ${otherWays}`
+    : `Each mission; click one to look at it. ${ways.note}`;
+  byId('where-title').textContent = `Ways of ${n} run${n > 1 ? 's' : ''} of each manager, from above; ${otherWays}`;
+}
+
 function drawWhere() {
   byId('where-box').hidden = !ways.paths.length;
   if (!ways.paths.length) return;
@@ -245,7 +256,7 @@ function drawTimeOf(way) {
     show('run-time', [], {});
     const empty = byId('run-time').querySelector('.empty');
     const with_ = [...new Set(ways.paths.filter((each) => each.group === state.group).map((each) => each.run))];
-    if (empty) empty.textContent = with_.length ? `this page has the way and timeline of runs ${with_.join(', ')}; the command above shows any other` : (ways.note || 'no way is recorded');
+    if (empty) empty.textContent = with_.length ? `this page has the way and timeline of runs ${with_.join(', ')}; ${otherWays}, and the command above shows any run` : ways.note;
     return;
   }
   const modeColour = themeMode();
@@ -377,6 +388,7 @@ function firstShown() {
 
 async function start() {
   writeText();
+  sayWhichWays();
   makeTools();
   startTheme(byId('theme'));
   [state.group, state.run] = firstShown();
