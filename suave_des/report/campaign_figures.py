@@ -24,6 +24,11 @@ _ROW_IN = 0.62
 _LEGEND_LINE_IN = 0.2
 _DOTS = 400
 """More missions are drawn as so many, evenly taken in the order of their values."""
+_MOST_KERNELS = 10_000
+_DENSITY_BINS = 3_000
+"""More missions than _MOST_KERNELS are counted in so many bins before their density is estimated."""
+_CURVE_POINTS = 2_000
+"""A curve over more runs is drawn through so many of them: it looks the same, and is written at once."""
 _FEWEST_FOR_CLOUD = 5
 _FEWEST_FOR_INTERVAL = 5
 _LARGEST_AREA = 900.0
@@ -116,12 +121,8 @@ def _raincloud(axes: Axes, row: int, group: Group, metric: str, published: Group
     values = np.sort(group.known_values(metric))
     colour = style.line(row)["color"]
     if len(values) >= _FEWEST_FOR_CLOUD and np.ptp(values) > 0.0:
-        from scipy.stats import gaussian_kde
-
-        # A narrow kernel, so that the clusters of search times, a turn of the spiral each, stay apart.
-        density = gaussian_kde(values, bw_method=0.6 * len(values) ** -0.2)
         grid = np.linspace(values[0], values[-1], 300)
-        heights = density(grid)
+        heights = _density(values, grid)
         heights *= 0.38 / heights.max()
         axes.fill_between(
             grid, row - 0.12 - heights, row - 0.12, color=colour, alpha=0.55, lw=0, hatch=style.hatch(row)
@@ -136,6 +137,21 @@ def _raincloud(axes: Axes, row: int, group: Group, metric: str, published: Group
     if published is not None:
         real = np.sort(published.known_values(metric))
         axes.plot(real, row + 0.3 + _jitter(len(real), 0.06), "x", color=style.BLACK, ms=2.8, mew=0.7)
+
+
+def _density(values: NDArray[np.float64], grid: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Estimate the density of values at the points of a grid.
+
+    The kernel is narrow, so that the clusters of search times, a turn of the spiral each, stay apart.
+    """
+    from scipy.stats import gaussian_kde
+
+    bandwidth = 0.6 * len(values) ** -0.2
+    if len(values) <= _MOST_KERNELS:
+        return np.asarray(gaussian_kde(values, bw_method=bandwidth)(grid))
+    counts, edges = np.histogram(values, bins=_DENSITY_BINS)
+    middles = (edges[:-1] + edges[1:]) / 2.0
+    return np.asarray(gaussian_kde(middles, bw_method=bandwidth, weights=counts)(grid))
 
 
 def _jitter(number: int, height: float) -> NDArray[np.floating]:
@@ -153,16 +169,11 @@ def draw_convergence(groups: Sequence[Group]) -> style.Picture:
             frame = group.frame.sort_values("run", kind="stable")
             values = frame[metric].to_numpy(float)
             values = values[~np.isnan(values)]
-            n = np.arange(1, len(values) + 1)
-            means = values.cumsum() / n
+            n, means, halves = running_means(values)
             look = style.line(number)
             axes.plot(n, means, label=_label(group), **look)
-            if len(values) > _FEWEST_FOR_INTERVAL:
-                late = n[_FEWEST_FOR_INTERVAL - 1 :]
-                variances = np.maximum((values**2).cumsum() / n - means**2, 0.0)[_FEWEST_FOR_INTERVAL - 1 :] * late
-                halves = _t_quantiles(late - 1) * np.sqrt(variances / (late - 1) / late)
-                middle = means[_FEWEST_FOR_INTERVAL - 1 :]
-                axes.fill_between(late, middle - halves, middle + halves, color=look["color"], alpha=0.18, lw=0)
+            low, high = means - halves, means + halves
+            axes.fill_between(n, low, high, where=n >= _FEWEST_FOR_INTERVAL, color=look["color"], alpha=0.18, lw=0)
         axes.set(xlabel="number of runs", ylabel=f"mean {title}")
         axes.set_xlim(left=1.0)
         axes.set_ylim(bottom=0.0)
@@ -173,8 +184,22 @@ def draw_convergence(groups: Sequence[Group]) -> style.Picture:
     return figure
 
 
-def _t_quantiles(freedoms: NDArray[np.int_]) -> NDArray[np.float64]:
-    return np.array([t_quantile(int(freedom)) for freedom in freedoms])
+def running_means(values: NDArray[np.float64]) -> tuple[NDArray[np.int_], NDArray[np.float64], NDArray[np.float64]]:
+    """Return numbers of values, the means of so many first values, and half the 95% intervals of these.
+
+    Of many values only some numbers are there, the first and the last among them, as dense at the beginning as a
+    figure over all shows them.
+    """
+    n = np.arange(1, len(values) + 1)
+    if len(values) > _CURVE_POINTS:
+        half = _CURVE_POINTS // 2
+        n = np.unique(np.r_[np.geomspace(1, len(values), half), np.linspace(1, len(values), half)].round().astype(int))
+    centred = values - values.mean() if len(values) else values  # else squares would lose the digits that count
+    sums, squares = centred.cumsum()[n - 1], (centred**2).cumsum()[n - 1]
+    with np.errstate(divide="ignore", invalid="ignore"):  # a single value has no interval
+        variances = np.maximum(squares - sums**2 / n, 0.0) / (n - 1)
+        halves = np.array([t_quantile(int(each) - 1) for each in n]) * np.sqrt(variances / n)
+    return n, values.cumsum()[n - 1] / n, halves
 
 
 def draw_detections(groups: Sequence[Group]) -> style.Picture:

@@ -24,7 +24,9 @@ _PUBLISHED_SCENARIO = "seams2023"
 
 
 def _rainclouds(groups: Sequence[Group]) -> Figure:
-    scenarios = {str(name) for group in groups for name in group.frame.get("scenario", [])}
+    scenarios = {
+        str(name) for group in groups if "scenario" in group.frame for name in group.frame["scenario"].unique()
+    }
     published = grouped(read_missions([published_runs()]), (), ())[0] if scenarios == {_PUBLISHED_SCENARIO} else []
     names = [group.name for group in groups]
     return campaign_figures.draw_rainclouds(groups, {group.name: group for group in published if group.name in names})

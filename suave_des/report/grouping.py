@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pandas
@@ -45,7 +46,11 @@ class Group:
         """Return the values by (seed, run); None for missions without these."""
         if self.frame["run"].isna().any() or (self.frame["seed"] == "").any():
             return None
-        return self.frame.set_index(["seed", "run"])[metric].astype(float)
+        return pandas.Series(self.values(metric), self._runs)
+
+    @cached_property
+    def _runs(self) -> pandas.MultiIndex:
+        return pandas.MultiIndex.from_frame(self.frame[["seed", "run"]])
 
 
 def time_limit_s(groups: Sequence[Group]) -> float:

@@ -7,7 +7,9 @@ import hashlib
 import io
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from contextlib import suppress
+from dataclasses import dataclass, field, fields
+from operator import itemgetter
 from pathlib import Path
 from typing import NamedTuple
 
@@ -157,13 +159,13 @@ def read_runs(
     try:
         header = [name.strip() for name in next(reader, [])]
         layout = _layout(path, header, further)
-        metrics = [field for field in fields(MissionMetrics) if are_simulated and field.name in header]
+        metrics = [each for each in fields(MissionMetrics) if are_simulated and each.name in header]
         optional = (layout.time_limit_s, layout.pipeline_found, layout.mean_reaction_time_s, layout.scenario)
         further = (*further, *(name for name in where_present if name in header))
         wanted = (*layout[:3], *layout.detection_x_m, *optional, layout.run, layout.seed, *further)
-        wanted += tuple(field.name for field in metrics)
+        wanted += tuple(each.name for each in metrics)
         names = [name for name in dict.fromkeys(wanted) if name in header]
-        places = [header.index(name) for name in names]
+        chosen = itemgetter(*(header.index(name) for name in names))
         for cells in reader:
             if any(map(str.strip, cells)):
                 if layout.is_exemplars and _first_word(cells) in _AVERAGES:
@@ -172,7 +174,7 @@ def read_runs(
                 if len(cells) != len(header):
                     problem = f"has {len(cells)} values, but the header has {len(header)}"
                     raise _error(path, reader.line_num, problem, "give each column a value, if only an empty one")
-                rows.append([cells[place].strip() for place in places])
+                rows.append(tuple(map(str.strip, chosen(cells))))
                 lines.append(reader.line_num)
     except csv.Error as error:
         remedy = "one line for each mission, cells separated by commas"
@@ -182,11 +184,11 @@ def read_runs(
     cells_by_name = pandas.DataFrame(rows, columns=names, index=lines, dtype=str)
     checked = _Cells(path, cells_by_name)
     frame = _missions(checked, layout)
-    for field in metrics:
-        checked.check_kind(field.name, str(field.type))
+    for each in metrics:
+        checked.check_kind(each.name, str(each.type))
     managers = _first_lines(frame["manager"])
     scenarios = _first_lines(cells_by_name[layout.scenario]) if layout.scenario in names else {}
-    frame = frame.assign(**{name: _numbers_or_words(cells_by_name[name]) for name in further})
+    frame = frame.assign(**{name: checked.numbers_or_words(name) for name in further})
     digest = hashlib.sha256(content).hexdigest()
     return Runs(path, frame.reset_index(drop=True), managers, scenarios, digest, tuple(averages), tuple(lines))
 
@@ -234,9 +236,9 @@ def _layout(path: Path, header: Sequence[str], further: Sequence[str]) -> _Layou
 
 def _missions(cells: _Cells, layout: _Layout) -> pandas.DataFrame:
     """Check and convert the cells; a frame with COLUMNS."""
-    words = [name.split() for name in cells.text[layout.manager]]
-    are_names = [len(each) == 1 or bool(each and layout.is_exemplars) for each in words]
-    cells.check(layout.manager, are_names, "a manager's name")
+    words = {name: str(name).split() for name in cells.text[layout.manager].unique()}
+    are_names = {name: len(each) == 1 or bool(each and layout.is_exemplars) for name, each in words.items()}
+    cells.check(layout.manager, cells.text[layout.manager].map(are_names), "a manager's name")
     search_time_s = cells.numbers(layout.search_time_s, least=-math.inf)
     limits = cells.numbers(layout.time_limit_s) if layout.time_limit_s in cells.text else None
     if limits is not None and layout.is_exemplars:
@@ -244,7 +246,7 @@ def _missions(cells: _Cells, layout: _Layout) -> pandas.DataFrame:
     cells.check(layout.search_time_s, search_time_s >= 0.0, "a finite number, at least 0")
     detection = next((name for name in layout.detection_x_m if name in cells.text), None)
     values = (
-        [each[-1] for each in words],
+        cells.text[layout.manager].map({name: each[-1] for name, each in words.items()}),
         search_time_s,
         cells.numbers(layout.distance_inspected_m),
         math.nan if detection is None else cells.numbers(detection, least=-math.inf, may_be_empty=True),
@@ -278,15 +280,17 @@ def _reactions(cells: _Cells, column: str) -> NDArray[np.float64] | float:
     return np.where(times_s > 0.0, times_s, math.nan)
 
 
-class _Cells(NamedTuple):
+@dataclass(frozen=True)
+class _Cells:
     """The cells of a file as text, indexed by line."""
 
     path: Path
     text: pandas.DataFrame
+    _converted: dict[str, NDArray[np.float64]] = field(default_factory=dict)
 
     def numbers(self, column: str, *, least: float = 0.0, may_be_empty: bool = False) -> NDArray[np.float64]:
         """Convert a column; empty cells are nan."""
-        numbers = pandas.to_numeric(self.text[column], errors="coerce").to_numpy(float)
+        numbers = self._as_numbers(column)
         is_right = np.isfinite(numbers) & (numbers >= least) & (np.abs(numbers) <= _GREATEST)
         if may_be_empty:
             is_right |= (self.text[column] == "").to_numpy()
@@ -304,16 +308,28 @@ class _Cells(NamedTuple):
         elif kind.startswith("float"):
             self.numbers(column, least=-math.inf, may_be_empty=True)
 
+    def numbers_or_words(self, column: str) -> pandas.Series[float] | pandas.Series[str]:
+        """Convert a column whose cells are all numbers, to integers if they are; any other stays as it is."""
+        text = self.text[column]
+        return text if np.isnan(self._as_numbers(column)).any() else pandas.to_numeric(text)
+
+    def _as_numbers(self, column: str) -> NDArray[np.float64]:
+        """Convert a column, once; what is no number is nan."""
+        if column not in self._converted:
+            self._converted[column] = _numbers(self.text[column])
+        return self._converted[column]
+
     def check(self, column: str, is_right: Iterable[bool], wanted: str) -> None:
         """Check a column.
 
         Raises:
             InputError: about the first line that is wrong.
         """
-        for line, text, right in zip(self.text.index, self.text[column], is_right, strict=True):
-            if not right:
-                problem = f"{column}: expected {wanted}, got {shown(text)}"
-                raise _error(self.path, line, problem, "correct it, or leave the mission out")
+        wrong = np.flatnonzero(~np.asarray(is_right, dtype=bool))
+        if len(wrong):
+            text = self.text[column].iloc[wrong[0]]
+            problem = f"{column}: expected {wanted}, got {shown(text)}"
+            raise _error(self.path, self.text.index[wrong[0]], problem, "correct it, or leave the mission out")
 
 
 def _first_word(cells: Sequence[str]) -> str:
@@ -324,9 +340,14 @@ def _first_lines(names: pandas.Series[str]) -> dict[str, int]:
     return {str(name): int(line) for line, name in names.drop_duplicates().items()}  # type: ignore[call-overload]
 
 
-def _numbers_or_words(text: pandas.Series[str]) -> pandas.Series[float] | pandas.Series[str]:
-    numbers = pandas.to_numeric(text, errors="coerce")
-    return text if numbers.isna().any() else numbers
+def _numbers(text: pandas.Series[str]) -> NDArray[np.float64]:
+    """Convert cells to numbers; what is none is nan."""
+    cells = text.to_list()
+    together = "".join(cells)
+    if together.isascii() and "_" not in together:  # else float() would take what is no number in a CSV file
+        with suppress(ValueError):
+            return np.array([float(cell) if cell else math.nan for cell in cells])
+    return pandas.to_numeric(text, errors="coerce").to_numpy(float)
 
 
 def _error(path: Path, line: int, problem: str, remedy: str | None) -> InputError:

@@ -63,6 +63,15 @@ def test_it_says_first_what_follows_and_last_how_it_was_made(report, browser):
         assert found.page.text_content("#count") == "16 missions"
 
 
+def test_it_says_for_which_runs_it_has_ways_and_how_to_have_others(report, browser):
+    with opened(browser, report) as found:
+        ready(found)
+        for caption in ("where-title", "runs-title"):
+            told = found.page.text_content(f"#{caption}")
+            assert "3 runs of each manager" in told
+            assert "--paths N" in told
+
+
 def test_managers_metrics_and_runs_can_be_chosen(report, browser):
     with opened(browser, report) as found:
         ready(found)

@@ -68,6 +68,8 @@ def test_blank_lines_and_a_byte_order_mark_do_no_harm(write):
         (f"{OWN}\n", 1, "has no mission"),
         (f"{OWN}\nnone,120,3\nnone,soon,3\n", 3, "search_time_s: expected a finite number, got 'soon'"),
         (f"{OWN}\nnone,120,\n", 2, "distance_inspected_m: expected a finite number, at least 0, got ''"),
+        (f"{OWN}\nnone,120,3\nnone,1_2,3\n", 3, "search_time_s: expected a finite number, got '1_2'"),
+        (f"{OWN}\nnone,١٢,3\n", 2, "search_time_s: expected a finite number, got '١٢'"),
         (f"{OWN}\nnone,nan,3\n", 2, "search_time_s: expected a finite number, got 'nan'"),
         (f"{OWN}\nnone,-1,3\n", 2, "search_time_s: expected a finite number, at least 0, got '-1'"),
         (f"{OWN}\nnone,120,-3\n", 2, "distance_inspected_m: expected a finite number, at least 0, got '-3'"),

@@ -1,0 +1,73 @@
+"""A million missions are drawn from fewer points and counts: what figures show stays the same."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas
+import pytest
+from scipy.stats import gaussian_kde
+
+from suave_des.estimates import estimate
+from suave_des.report import campaign_figures
+from suave_des.report.campaign_figures import draw_convergence, draw_rainclouds, running_means
+from suave_des.report.grouping import grouped
+from suave_des.report.result_files import missions_of
+from suave_des.report.statistics import student_interval
+
+
+def _times_s(n: int) -> np.ndarray:
+    """Make search times in clusters, as turns of the spiral make them."""
+    rng = np.random.default_rng(7)
+    return np.abs(rng.choice((60.0, 110.0, 190.0), n) + rng.normal(0.0, 8.0, n))
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 2_000, 30_000])
+def test_a_thinned_curve_has_the_ends_and_values_of_the_whole_one(n: int) -> None:
+    values = _times_s(n)
+    numbers, means, halves = running_means(values)
+    assert (numbers[0], numbers[-1]) == (1, n)
+    assert means[0] == values[0]
+    assert math.isnan(halves[0])
+    for place in {len(numbers) - 1, len(numbers) // 2} - {0}:
+        found = estimate(values[: numbers[place]].tolist())
+        assert found.mean_interval is not None
+        assert means[place] == pytest.approx(found.mean)
+        assert halves[place] == pytest.approx((found.mean_interval[1] - found.mean_interval[0]) / 2.0)
+
+
+def test_few_runs_are_drawn_one_by_one_and_many_are_not() -> None:
+    assert running_means(_times_s(2_000))[0].tolist() == list(range(1, 2_001))
+    assert len(running_means(_times_s(30_000))[0]) <= 2_000
+
+
+def test_thinning_leaves_no_gap_that_a_reader_sees() -> None:
+    numbers = running_means(_times_s(1_000_000))[0]
+    assert (np.diff(numbers) <= np.maximum(1, np.minimum(1_100, 0.02 * numbers[:-1] + 1))).all()
+
+
+def test_a_density_from_counts_is_that_from_values() -> None:
+    values = np.sort(_times_s(20_000))
+    grid = np.linspace(values[0], values[-1], 300)
+    counted = campaign_figures._density(values, grid)
+    exact = gaussian_kde(values, bw_method=0.6 * len(values) ** -0.2)(grid)
+    assert np.abs(counted - exact).max() < 0.005 * exact.max()
+
+
+def test_figures_of_many_missions_are_written_from_few_points() -> None:
+    n = 30_000
+    frame = pandas.DataFrame(
+        {"manager": "none", "run": np.arange(1, n + 1), "seed": 1, "search_time_s": _times_s(n)}
+    ).assign(distance_inspected_m=20.0, pipeline_found=True, scenario="seams2023")
+    groups, _ = grouped(missions_of(frame), (), ())
+    for figure in (draw_convergence(groups), draw_rainclouds(groups, {})):
+        for axes in figure.axes:
+            assert all(len(line.get_xdata()) <= 2_000 for line in axes.lines)
+            assert all(len(path.vertices) <= 5_000 for each in axes.collections for path in each.get_paths())
+
+
+def test_the_interval_of_many_values_is_that_of_the_estimates() -> None:
+    values = _times_s(6_000)
+    found, expected = student_interval(values), estimate(values.tolist())
+    assert (found.value, found.interval) == (expected.mean, expected.mean_interval)
