@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack, closing, suppress
 from dataclasses import replace
 from pathlib import Path
 
-from suave_des.campaign.ensemble import read_ensemble, with_ensemble
+from suave_des.campaign.early_checks import FirstFailures, check_size
 from suave_des.campaign.executors import InProcess, LocalWorkers
-from suave_des.campaign.manager_inputs import check_managers, check_trusted, scenarios_of, trained_on
-from suave_des.campaign.missions import Executor, Failure, Finished, JobSpec, MissionKey, Remark, WorkerError, plan
+from suave_des.campaign.inputs import default_time_out_s, read_inputs
+from suave_des.campaign.manager_inputs import check_trusted, trained_on
+from suave_des.campaign.missions import Executor, Finished, JobSpec, Remark, WorkerError, plan
 from suave_des.campaign.output import check_output_folder, make_output_folder, remove_parts, remove_results
 from suave_des.campaign.progress import OnProgress, ProgressTracker, parse_until_ci
-from suave_des.campaign.provenance import check_knowledge, check_same, deciding, identity
+from suave_des.campaign.provenance import check_same, deciding, identity
 from suave_des.campaign.results import FILES, CampaignResult, gather, write_results
 from suave_des.campaign.spec import CampaignFile, CampaignSpec, read_campaign_file
 from suave_des.campaign.store import (
@@ -29,20 +29,8 @@ from suave_des.campaign.store import (
     stored_outcomes,
 )
 from suave_des.campaign.suave_format import SUAVE_FOLDER
-from suave_des.campaign.variation import Variation, vary
 from suave_des.errors import InputError, SuaveDesError, did_you_mean
-from suave_des.scenario.layers import Files
-from suave_des.scenario.loader import LoadedScenario, Replacements, check_not_replaced, load_scenario
-
-LARGE = 1_000_000
-"""Missions from which a campaign needs to be confirmed."""
-TIME_OUT_S = 120.0
-TIME_OUTS_S = {"owlready2": 1800.0}
-"""Time that a mission may take with a reasoner, if not TIME_OUT_S: owlready2 takes some two minutes a mission."""
-_TIMED_RUNS = 3
-ALIKE = 20
-"""So many missions of a manager that all fail with the same error stop the campaign."""
-_REASONER = "knowledge.reasoner"
+from suave_des.scenario.loader import LoadedScenario
 
 
 class CampaignInterrupted(KeyboardInterrupt):
@@ -88,7 +76,7 @@ def run(
                 remedy="leave --format suave out, or run a campaign for each point",
             )
         if not spec.confirmed:
-            campaign.check_size()
+            check_size(campaign.job, campaign.tracker.total, spec.workers)
         return campaign.run(on_progress, resumed=False)
 
 
@@ -162,32 +150,6 @@ def _stored_spec(folder: Path, runs: int | None, until_ci: str | None) -> Campai
         return CampaignSpec.of_stored(store.about("request"), runs=runs, until_ci=until_ci)
 
 
-class _FirstFailures:
-    """Notices that a manager fails in the same way in all its first missions: it would in all others."""
-
-    def __init__(self, managers: Sequence[str]) -> None:
-        self._managers = managers
-        self._causes: dict[int, list[str]] = {}
-        self._works: set[int] = set()
-
-    def check(self, finished: Iterable[Finished]) -> None:
-        """Take outcomes.
-
-        Raises:
-            WorkerError: the first ALIKE missions of a manager have failed with the same error.
-        """
-        for key, outcome in finished:
-            if key.manager in self._works:
-                continue
-            causes = self._causes.setdefault(key.manager, [])
-            if not isinstance(outcome, Failure) or not outcome.lasting or (causes and outcome.cause != causes[0]):
-                self._works.add(key.manager)
-                continue
-            causes.append(outcome.cause)
-            if len(causes) == ALIKE:
-                raise WorkerError(f"manager {self._managers[key.manager]} fails in each mission: {outcome.cause}")
-
-
 class _Campaign:
     """A campaign whose input is read and checked.
 
@@ -237,28 +199,6 @@ class _Campaign:
         spec = self.spec
         until = None if spec.until_ci is None else parse_until_ci(spec.until_ci)
         return ProgressTracker(self.variation.sweep.points, spec.managers, spec.runs, until)
-
-    def check_size(self) -> None:
-        """See that a very large campaign is meant.
-
-        Raises:
-            InputError: it has more than LARGE missions; the time that they take is estimated from some of them.
-        """
-        total, workers = self.tracker.total, self.spec.workers
-        if total <= LARGE:
-            return
-        from suave_des.campaign.mission_runner import MissionRunner
-
-        managers = range(len(self.spec.managers))
-        few = tuple(MissionKey(0, manager, run) for manager in managers for run in range(1, _TIMED_RUNS + 1))
-        runner = MissionRunner(self.job)
-        list(runner.each(few[::_TIMED_RUNS]))  # compiles, and fills the reasoner's cache
-        began_s = time.perf_counter()
-        list(runner.each(few))
-        expected_s = (time.perf_counter() - began_s) / len(few) * total / workers
-        by = f"{workers} worker{'s' if workers > 1 else ''}"
-        problem = f"{total:,} missions take about {_duration_text(expected_s)} with {by} on this machine"
-        raise InputError(problem, remedy="give --yes if that is meant")
 
     def run(self, on_progress: OnProgress | None, *, resumed: bool) -> CampaignResult:
         """Run what is not done yet, and write the files."""
@@ -323,7 +263,7 @@ class _Campaign:
         self, store: Store, executor: Executor, on_progress: OnProgress | None
     ) -> KeyboardInterrupt | SuaveDesError | None:
         """Run missions until all are done; return what stopped the campaign before that."""
-        tracker, spec, alike = self.tracker, self.spec, _FirstFailures(self.spec.managers)
+        tracker, spec, alike = self.tracker, self.spec, FirstFailures(self.spec.managers)
         earlier = store.about("remarks") if store.has_note("remarks") else []
         remarks: dict[tuple[str, ...], int] = {(manager, text): count for manager, text, count in earlier}
         try:
@@ -397,59 +337,6 @@ class _Campaign:
         if self.spec.out is None or not (self.spec.out / STORE_FILE).exists():
             return ""
         return f"; what was kept before is safe: suave-des campaign --resume {self.spec.out} does the rest"
-
-
-def read_inputs(
-    spec: CampaignSpec, file: CampaignFile | None, loaded: LoadedScenario | None = None
-) -> tuple[LoadedScenario, Variation, dict[str, str]]:
-    """Read what a campaign is made of: the scenario, what varies, and the SHA-256 of each input file.
-
-    Raises:
-        InputError: something cannot be used.
-    """
-    replacements: Replacements = {
-        "ontologies": spec.ontologies,
-        "modes_file": spec.modes_file,
-        "reasoner": spec.reasoner,
-        "rules": spec.rules,
-        "disabled_rules": spec.disabled_rules,
-        "values": spec.values,
-        "manager_options": spec.manager_options,
-    }
-    if loaded is None:
-        loaded = load_scenario(spec.scenario if file is None else file.scenario, **replacements)
-    else:
-        check_not_replaced(loaded, replacements)
-    given = bool(spec.ontologies or spec.rules or spec.disabled_rules)
-    try:
-        loaded, variation = vary(loaded, spec.sweep, spec.perturbations, spec.runs_per_draw, spec.seed)
-    except InputError as error:
-        raise error if file is None else file.located(error) from None
-    files = Files()
-    if spec.ensemble is not None:
-        is_from_file = file is not None and "ensemble" in spec.from_file
-        beside = file.layer.place(("ensemble",)).file.parent if file is not None and is_from_file else None
-        ensemble, path, digest = read_ensemble(spec.ensemble, beside)
-        variation = with_ensemble(loaded, variation, ensemble, path)
-        files.note(path, digest)
-    inputs = {**check_knowledge(loaded, spec.managers, given=given), **files.inputs}
-    inputs |= check_managers(scenarios_of(loaded, variation), spec.managers)
-    return loaded, variation, inputs if file is None else {**inputs, **file.inputs}
-
-
-def default_time_out_s(loaded: LoadedScenario, variation: Variation) -> float:
-    """Return the time that a mission may take if none is given: it follows from the reasoners."""
-    sweep, name = variation.sweep, next((name for name, path in variation.paths.items() if path == _REASONER), None)
-    swept = [] if name is None else [sweep.values(point)[name] for point in sweep.each_value()]
-    return max(TIME_OUTS_S.get(str(each), TIME_OUT_S) for each in (loaded.scenario.knowledge.reasoner, *swept))
-
-
-def _duration_text(seconds: float) -> str:
-    units = (("year", 31_557_600.0), ("day", 86_400.0), ("hour", 3_600.0), ("minute", 60.0))
-    for unit, length_s in units:
-        if seconds >= 2 * length_s:
-            return f"{seconds / length_s:,.0f} {unit}s"
-    return f"{seconds:.0f} seconds"
 
 
 def _remove_empty(folder: Path) -> None:

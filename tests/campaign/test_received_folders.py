@@ -163,7 +163,7 @@ class TestOverwrite:
 
 
 def test_the_time_out_follows_the_reasoner() -> None:
-    from suave_des.campaign.runner import default_time_out_s, read_inputs
+    from suave_des.campaign.inputs import default_time_out_s, read_inputs
     from suave_des.campaign.spec import CampaignSpec
 
     def default(**options: object) -> float:
