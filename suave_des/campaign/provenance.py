@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from suave_des import __version__
-from suave_des.campaign.progress import parse_until_ci
 from suave_des.campaign.spec import CampaignSpec
+from suave_des.campaign.until_ci import parse_until_ci
 from suave_des.errors import InputError, shown
 from suave_des.registry import manager_class
 from suave_des.scenario.layers import Files

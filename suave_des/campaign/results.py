@@ -15,10 +15,11 @@ from suave_des.campaign.knowledge_records import CAMPAIGN_KNOWLEDGE_FILE, scenar
 from suave_des.campaign.missions import COLUMNS, Failure, Finished, Group, Row
 from suave_des.campaign.output import csv_pieces, csv_text, json_text, make_output_folder, rounded, write_files
 from suave_des.campaign.parquet_format import PARQUET_FILE, parquet_bytes
-from suave_des.campaign.progress import FEWEST_PAIRS, FEWEST_RUNS, GroupProgress, PairProgress, UntilCi, parse_until_ci
+from suave_des.campaign.progress import GroupProgress, PairProgress
 from suave_des.campaign.provenance import provenance
 from suave_des.campaign.spec import CampaignSpec
 from suave_des.campaign.suave_format import SUAVE_FOLDER, suave_file, suave_pieces
+from suave_des.campaign.until_ci import FEWEST_PAIRS, FEWEST_RUNS, UntilCi, parse_until_ci
 from suave_des.campaign.variation import Variation, cell_of
 from suave_des.estimates import estimate
 from suave_des.metrics.result import MissionMetrics

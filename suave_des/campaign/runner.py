@@ -13,7 +13,7 @@ from suave_des.campaign.inputs import default_time_out_s, read_inputs
 from suave_des.campaign.manager_inputs import check_trusted, trained_on
 from suave_des.campaign.missions import Executor, Finished, JobSpec, Remark, WorkerError, plan
 from suave_des.campaign.output import check_output_folder, make_output_folder, remove_parts, remove_results
-from suave_des.campaign.progress import OnProgress, ProgressTracker, parse_until_ci
+from suave_des.campaign.progress import OnProgress, ProgressTracker
 from suave_des.campaign.provenance import check_same, deciding, identity
 from suave_des.campaign.results import FILES, CampaignResult, gather, write_results
 from suave_des.campaign.spec import CampaignFile, CampaignSpec, read_campaign_file
@@ -29,6 +29,7 @@ from suave_des.campaign.store import (
     stored_outcomes,
 )
 from suave_des.campaign.suave_format import SUAVE_FOLDER
+from suave_des.campaign.until_ci import parse_until_ci
 from suave_des.errors import InputError, SuaveDesError, did_you_mean
 from suave_des.scenario.loader import LoadedScenario
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from suave_des.campaign.parquet_format import check_parquet
-from suave_des.campaign.progress import RUNS_LIMIT_DEFAULT, parse_until_ci
+from suave_des.campaign.until_ci import RUNS_LIMIT_DEFAULT, parse_until_ci
 from suave_des.errors import InputError, KeyPath, shown
 from suave_des.registry import manager_class
 from suave_des.resources import find

@@ -10,8 +10,9 @@ from rich.console import Console
 from rich.table import Table
 
 from suave_des.campaign.display import estimated
-from suave_des.campaign.progress import GroupProgress, UntilCi, parse_until_ci
+from suave_des.campaign.progress import GroupProgress
 from suave_des.campaign.results import METRIC_TITLES, METRICS, SUMMARY_COLUMNS
+from suave_des.campaign.until_ci import UntilCi, parse_until_ci
 from suave_des.campaign.variation import cell_of
 from suave_des.cli.console import number, plain_table, print_table
 

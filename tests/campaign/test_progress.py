@@ -15,7 +15,8 @@ from benchmarks import chaos
 from suave_des.campaign import display
 from suave_des.campaign.campaign import CampaignInterrupted, resume_campaign, run_campaign
 from suave_des.campaign.missions import COLUMNS, Failure, Finished, MissionKey
-from suave_des.campaign.progress import GROUPS_SHOWN, OnProgress, Progress, ProgressTracker, UntilCi
+from suave_des.campaign.progress import GROUPS_SHOWN, OnProgress, Progress, ProgressTracker
+from suave_des.campaign.until_ci import UntilCi
 from suave_des.estimates import estimate
 from tests.helpers import AWKWARD
 
