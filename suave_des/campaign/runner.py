@@ -15,7 +15,8 @@ from suave_des.campaign.missions import Executor, Finished, JobSpec, Remark, Wor
 from suave_des.campaign.output import check_output_folder, make_output_folder, remove_parts, remove_results
 from suave_des.campaign.progress import OnProgress, ProgressTracker
 from suave_des.campaign.provenance import check_same, deciding, identity
-from suave_des.campaign.results import FILES, CampaignResult, gather, write_results
+from suave_des.campaign.result_files import FILES, write_results
+from suave_des.campaign.results import CampaignResult, gather
 from suave_des.campaign.spec import CampaignFile, CampaignSpec, read_campaign_file
 from suave_des.campaign.store import (
     LOCK_FILE,
