@@ -20,7 +20,7 @@ from pydantic import ValidationError
 from suave_des.errors import InputError
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.metrics.result import KnowledgeRecord
-from suave_des.scenario.loader import set_value
+from suave_des.scenario.key_paths import set_value
 from suave_des.scenario.models import Scenario
 
 KNOWLEDGE_FILE: Final = "knowledge.jsonl"

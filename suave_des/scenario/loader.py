@@ -12,6 +12,7 @@ from typing import Any, Protocol, TypedDict, Unpack
 from suave_des.domain import GENERATE_SEARCH_PATH
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown
 from suave_des.resources import find
+from suave_des.scenario.key_paths import plain_value, set_value
 from suave_des.scenario.layers import Files, Layer, Location, find_named, scenario_layer
 from suave_des.scenario.models import REASONERS, ManagerSettings, Scenario
 from suave_des.scenario.modes import UNGROUND_MODE, ModeTable, modes_of
@@ -358,48 +359,4 @@ def value_at(loaded: LoadedScenario, path: str) -> Any:
     Raises:
         InputError: the path leads nowhere.
     """
-    holder, key = _holder(loaded.scenario.model_dump(mode="json"), path)
-    return holder[key]
-
-
-def set_value(data: dict[str, Any], path: str, value: Any) -> None:
-    """Replace the value at a key path of a scenario as plain data.
-
-    Raises:
-        InputError: the path leads nowhere.
-    """
-    holder, key = _holder(data, path)
-    holder[key] = value
-
-
-def _parts(data: dict[str, Any], path: str) -> list[str]:
-    """The keys of a key path; names of managers may have points in them, and their settings need not be there yet."""
-    first, _, rest = path.partition(".")
-    if first != "managers" or ":" not in rest:
-        return path.split(".")
-    managers = data["managers"]
-    named = max((name for name in managers if rest.startswith(f"{name}.")), key=len, default=None)
-    if named is None:
-        module, _, below = rest.partition(":")
-        named = f"{module}:{below.partition('.')[0]}"
-    keys = rest.removeprefix(named).removeprefix(".").split(".")
-    settings = managers.setdefault(named, {})
-    if isinstance(settings, dict) and keys != [""]:
-        settings.setdefault(keys[0], None)
-    return ["managers", named, *(keys if keys != [""] else [])]
-
-
-def _holder(data: dict[str, Any], path: str) -> tuple[Any, Any]:
-    """The mapping or list that holds the value at a key path, and its key there."""
-    here, parts = data, _parts(data, path)
-    for depth, part in enumerate(parts):
-        if isinstance(here, list):
-            if not (part.isascii() and part.isdigit() and len(part) < 10) or int(part) >= len(here):
-                raise InputError(f"{path}: there is no entry {part}", remedy=f"entries are 0 to {len(here) - 1}")
-        elif not isinstance(here, dict):
-            raise InputError(f"{path}: {'.'.join(parts[:depth])} is a plain value", remedy="leave out what follows it")
-        elif part not in here:
-            raise InputError(f"{path}: unknown key", remedy=did_you_mean(part, sorted(map(str, here))))
-        holder, key = here, int(part) if isinstance(here, list) else part
-        here = here[key]
-    return holder, key
+    return plain_value(loaded.scenario.model_dump(mode="json"), path)
