@@ -21,7 +21,8 @@ from suave_des.report.runs import METRICS
 
 _ROW_IN = 0.62
 """Height of a row of a figure that has one for each manager."""
-_LEGEND_LINE_IN = 0.2
+_LEGEND_LINE_IN, _HANDLE_IN, _LETTER_IN = 0.2, 0.58, 0.056
+"""Height of a line of a legend, and widths of an entry without its text and of a letter, on average."""
 _DOTS = 400
 """More missions are drawn as so many, evenly taken in the order of their values."""
 _MOST_KERNELS = 10_000
@@ -38,7 +39,8 @@ _TIME_BIN_S = 5.0
 
 def draw_distributions(groups: Sequence[Group]) -> style.Picture:
     """Draw the empirical distribution functions of search time and inspected distance, a curve for each group."""
-    figure = style.Picture(figsize=(style.WIDTH_IN, 2.5 + _legend_height(len(groups) + 1)), layout="constrained")
+    labels = [*map(_label, groups), "marks at 0%: means"]
+    figure = style.Picture(figsize=(style.WIDTH_IN, 2.5 + _legend_height(labels)), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
     limit_s = _limit_of_lost(groups)
     for axes, letter, (metric, title) in zip(panels, "ab", METRICS.items(), strict=True):
@@ -56,9 +58,8 @@ def draw_distributions(groups: Sequence[Group]) -> style.Picture:
             _mark_not_found(axes, limit_s)
     panels[0].set(ylabel="share of missions at or below", ylim=(0.0, 1.02))
     panels[0].yaxis.set_major_formatter(PercentFormatter(1.0))
-    labels = [_label(group) for group in groups]
     handles = [*_handles(groups), Line2D([], [], lw=0, marker="o", mfc="none", ms=4, color=style.GREY)]
-    _legend(figure, handles, [*labels, "marks at 0%: means"])
+    _legend(figure, handles, labels)
     return figure
 
 
@@ -79,7 +80,7 @@ def draw_rainclouds(groups: Sequence[Group], published: Mapping[str, Group]) -> 
         groups: to draw, a row for each.
         published: real missions to show beside a group, by its name.
     """
-    height = _ROW_IN * len(groups) + 0.55 + _legend_height(4)
+    height = _ROW_IN * len(groups) + 0.55 + _LEGEND_LINE_IN
     figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
     for axes, letter, (metric, title) in zip(panels, "ab", METRICS.items(), strict=True):
@@ -162,7 +163,8 @@ def _jitter(number: int, height: float) -> NDArray[np.floating]:
 
 def draw_convergence(groups: Sequence[Group]) -> style.Picture:
     """Draw the mean of the first n runs and its 95% interval over n, a curve for each group."""
-    figure = style.Picture(figsize=(style.WIDTH_IN, 2.5 + _legend_height(len(groups) + 1)), layout="constrained")
+    labels = [*map(_label, groups), "95% interval of the mean"]
+    figure = style.Picture(figsize=(style.WIDTH_IN, 2.5 + _legend_height(labels)), layout="constrained")
     panels = figure.subplots(1, 2)
     for axes, letter, (metric, title) in zip(panels, "ab", METRICS.items(), strict=True):
         for number, group in enumerate(groups):
@@ -178,9 +180,9 @@ def draw_convergence(groups: Sequence[Group]) -> style.Picture:
         axes.set_xlim(left=1.0)
         axes.set_ylim(bottom=0.0)
         axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
+        axes.xaxis.set_major_formatter("{x:,.0f}")
         axes.set_title(f"{letter}   {title.split(' (')[0].capitalize()}")
-    handles, labels = panels[0].get_legend_handles_labels()
-    _legend(figure, [*handles, Patch(color=style.GREY, alpha=0.3)], [*labels, "95% interval of the mean"])
+    _legend(figure, [*panels[0].lines, Patch(color=style.GREY, alpha=0.3)], labels)
     return figure
 
 
@@ -247,7 +249,9 @@ def _draw_detections(above: Axes, below: Axes, number: int, group: Group) -> Non
 
 def draw_reactions(groups: Sequence[Group]) -> style.Picture:
     """Draw how many adaptations missions have, and how long reactions take, a curve for each group."""
-    figure = style.Picture(figsize=(style.WIDTH_IN, 2.5 + _legend_height(len(groups))), layout="constrained")
+    figure = style.Picture(
+        figsize=(style.WIDTH_IN, 2.5 + _legend_height(list(map(_label, groups)))), layout="constrained"
+    )
     left, right = figure.subplots(1, 2)
     for number, group in enumerate(groups):
         look = style.line(number)
@@ -285,12 +289,19 @@ def _label(group: Group) -> str:
 
 
 def _legend(figure: style.Picture, handles: Sequence[Artist], labels: Sequence[str]) -> None:
-    figure.legend(handles, labels, loc="outside upper right", ncols=_columns(len(labels)), handlelength=2.8)
+    figure.legend(handles, labels, loc="outside upper right", ncols=_columns(labels), handlelength=2.8)
 
 
-def _columns(entries: int) -> int:
-    return entries if entries <= 4 else 3
+def _columns(labels: Sequence[str]) -> int:
+    """Return in how many columns a legend fits into the figure's width."""
+    most = len(labels) if len(labels) <= 4 else 3
+    for columns in range(most, 1, -1):
+        rows = math.ceil(len(labels) / columns)
+        longest = (max(map(len, labels[first : first + rows])) for first in range(0, len(labels), rows))
+        if sum(_HANDLE_IN + _LETTER_IN * letters for letters in longest) <= style.WIDTH_IN - 0.1:
+            return columns
+    return 1
 
 
-def _legend_height(entries: int) -> float:
-    return _LEGEND_LINE_IN * math.ceil(entries / _columns(entries))
+def _legend_height(labels: Sequence[str]) -> float:
+    return _LEGEND_LINE_IN * math.ceil(len(labels) / _columns(labels))

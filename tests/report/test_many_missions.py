@@ -11,7 +11,13 @@ from scipy.stats import gaussian_kde
 
 from suave_des.estimates import estimate
 from suave_des.report import campaign_figures
-from suave_des.report.campaign_figures import draw_convergence, draw_rainclouds, running_means
+from suave_des.report.campaign_figures import (
+    draw_convergence,
+    draw_distributions,
+    draw_rainclouds,
+    draw_reactions,
+    running_means,
+)
 from suave_des.report.grouping import grouped
 from suave_des.report.result_files import missions_of
 from suave_des.report.statistics import student_interval
@@ -65,6 +71,18 @@ def test_figures_of_many_missions_are_written_from_few_points() -> None:
         for axes in figure.axes:
             assert all(len(line.get_xdata()) <= 2_000 for line in axes.lines)
             assert all(len(path.vertices) <= 5_000 for each in axes.collections for path in each.get_paths())
+
+
+def test_a_legend_of_long_names_stays_within_the_figure() -> None:
+    names = [f"a manager with a long name {number}" for number in range(4)]
+    frame = pandas.DataFrame({"manager": names * 10, "run": np.repeat(np.arange(1, 11), 4), "seed": 1})
+    groups, _ = grouped(missions_of(frame.assign(search_time_s=_times_s(40), distance_inspected_m=20.0)), (), ())
+    for draw in (draw_convergence, draw_distributions, draw_reactions):
+        figure = draw(groups)
+        figure.draw_without_rendering()
+        box = figure.legends[0].get_window_extent()
+        assert box.x0 >= 0.0
+        assert box.x1 <= figure.bbox.x1
 
 
 def test_the_interval_of_many_values_is_that_of_the_estimates() -> None:
