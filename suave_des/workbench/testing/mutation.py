@@ -13,23 +13,21 @@ shortcut.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Final
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.deliberation import Conclusion, Deliberation
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import Lit, Triple, facts_of
+from suave_des.knowledge.rdf import facts_of
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
-from suave_des.knowledge.rules.syntax import Atom, Named, Term, Variable
 from suave_des.knowledge.state import Fact, Inference, KnowledgeState
-from suave_des.knowledge.vocabulary import DECISION_PROPERTIES, HAS_VALUE, OWL, RDF_TYPE, RDFS, TOMASYS, XSD, local_name
-from suave_des.workbench.derivations import FACT_KINDS, Binding, matched
+from suave_des.knowledge.vocabulary import DECISION_PROPERTIES, HAS_VALUE, TOMASYS, local_name
 from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.policy import PolicyCase, kinds_of_states
 from suave_des.workbench.policy_space import PolicySpace, numbers_in
+from suave_des.workbench.testing.effects import follows_anyway, is_horn, touching
 from suave_des.workbench.testing.mutants import Mutant
 from suave_des.workbench.testing.probes import Body, Probes
 from suave_des.workbench.testing.run import Runner
@@ -37,11 +35,6 @@ from suave_des.workbench.testing.situation import Outcome, Prover, Situation
 from suave_des.workbench.testing.suite import RuleTest
 
 KILLED, EQUIVALENT, SURVIVED = "killed", "equivalent", "survived"
-_NOT_HORN: Final = (
-    *("unionOf", "complementOf", "oneOf", "disjointUnionOf", "maxCardinality", "maxQualifiedCardinality"),
-    *("cardinality", "qualifiedCardinality", "minQualifiedCardinality", "minCardinality", "allValuesFrom"),
-)
-_FROZEN: Final = "urn:suave-des:any#"
 
 
 @dataclass(frozen=True)
@@ -107,13 +100,13 @@ class _Original:
         numbers: dict[Body, int] = {}
         self.touched_by: list[frozenset[int] | None] = []
         for mutant in self.mutants:
-            bodies = list(_touching(base, mutant))
+            bodies = list(touching(base, mutant))
             if any(not body for body in bodies):  # what is changed alone makes a rule fire
                 self.touched_by.append(None)
                 continue
             self.touched_by.append(frozenset(numbers.setdefault(body, len(numbers)) for body in bodies))
         self.probes = Probes.of(base, tuple(numbers), self.bench.limit)
-        self.is_horn = _is_horn(base)
+        self.is_horn = is_horn(base)
         self.known = _planning_facts(base)
         self._found: dict[Situation, tuple[frozenset[Fact], frozenset[int]] | None] = {}
 
@@ -288,7 +281,7 @@ def _compared(original: _Original, situations: Sequence[Situation], max_failed: 
     verdicts: dict[int, Verdict] = {}
     left = [_Changed(original, number) for number in range(len(original.mutants))]
     for changed in left:
-        if original.is_horn and _follows_anyway(bench, changed.mutant):
+        if original.is_horn and follows_anyway(bench, changed.mutant):
             reason = "what is left out follows from the other atoms by the schema"
             verdicts[changed.number] = Verdict(changed.mutant, EQUIVALENT, reason)
     open_ones = [changed for changed in left if changed.number not in verdicts]
@@ -360,74 +353,3 @@ def _space(bench: KnowledgeBase, mutants: Iterable[_Changed]) -> PolicySpace:
             space = space.common(PolicySpace.of(changed.base, bench.settings))
             numbers |= set(space.numbers)
     return replace(space, numbers=tuple(sorted(numbers)))
-
-
-def _touching(base: Ontology, mutant: Mutant) -> Iterator[Body]:
-    """Conjunctions of which one holds wherever a mutant can infer something else."""
-    if mutant.old is not None:
-        yield _plain(mutant.old.body)
-        if mutant.new is not None:
-            yield _plain(mutant.new.body)
-        return
-    for triple in (mutant.removed, mutant.added):
-        assert triple is not None
-        for rule in base.content.enabled_rules:
-            for number, atom in enumerate(rule.body):
-                binding = matched(atom, triple, {}) if atom.kind in FACT_KINDS else None
-                if binding is not None:
-                    rest = (*rule.body[:number], *rule.body[number + 1 :])
-                    yield _plain(tuple(_bound(each, binding) for each in rest))
-
-
-def _plain(body: Body) -> Body:
-    return tuple(replace(atom, places=()) for atom in body)
-
-
-def _bound(atom: Atom, binding: Binding) -> Atom:
-    def value(term: Term) -> Term:
-        if not isinstance(term, Variable) or term.name not in binding:
-            return term
-        found = binding[term.name]
-        return found if isinstance(found, Lit) else Named(found)
-
-    return replace(atom, arguments=tuple(map(value, atom.arguments)))
-
-
-def _follows_anyway(bench: KnowledgeBase, mutant: Mutant) -> bool:
-    """Whether an atom that a mutant leaves out follows from the others, whatever the state.
-
-    The other atoms are asserted of individuals of which nothing else is known; what follows then, follows of all.
-    """
-    if mutant.old is None or mutant.new is None or not mutant.generalises:
-        return False
-    dropped = next((atom for atom in mutant.old.body if atom not in mutant.new.body), None)
-    if dropped is None or dropped.kind not in FACT_KINDS:
-        return False
-    free = {name: f"{_FROZEN}{name}" for name in dropped.variables()}
-    facts: list[Triple] = []
-    for atom in mutant.new.body:
-        if atom.kind in ("class", "object"):
-            terms = [
-                term.iri if isinstance(term, Named) else f"{_FROZEN}{term.name}"
-                for term in atom.arguments
-                if isinstance(term, Named | Variable)
-            ]
-            is_class = atom.kind == "class"
-            facts.append((terms[0], RDF_TYPE if is_class else atom.predicate, atom.predicate if is_class else terms[1]))
-        elif atom.kind == "data" and isinstance(atom.arguments[0], Variable) and isinstance(atom.arguments[1], Lit):
-            facts.append((f"{_FROZEN}{atom.arguments[0].name}", atom.predicate, atom.arguments[1]))
-        elif atom.kind == "data" and isinstance(atom.arguments[0], Variable) and atom.predicate == HAS_VALUE:
-            facts.append((f"{_FROZEN}{atom.arguments[0].name}", atom.predicate, Lit("123.456", XSD + "decimal")))
-    asked = _bound(replace(dropped, places=()), free)
-    probes = Probes.of(bench.base, [(asked,)], bench.limit)
-    return probes.holding(Situation(KnowledgeState(), tuple(facts))) == {0}
-
-
-def _is_horn(base: Ontology) -> bool:
-    """Whether no axiom leaves a choice, so that what follows is what the rules and axioms build up step by step."""
-    datatypes = {line.split(" ", 1)[0] for line in base.content.structure if f"<{RDF_TYPE}> <{RDFS}Datatype>" in line}
-    return not any(
-        f"<{OWL}{name}>" in line and line.split(" ", 1)[0] not in datatypes
-        for line in base.content.structure
-        for name in _NOT_HORN
-    )
