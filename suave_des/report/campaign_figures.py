@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+import matplotlib
 import numpy as np
 import pandas
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.textpath import TextPath
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 from numpy.typing import NDArray
 
@@ -21,8 +24,8 @@ from suave_des.report.runs import METRICS
 
 _ROW_IN = 0.62
 """Height of a row of a figure that has one for each manager."""
-_LEGEND_LINE_IN, _HANDLE_IN, _LETTER_IN = 0.2, 0.58, 0.056
-"""Height of a line of a legend, and widths of an entry without its text and of a letter, on average."""
+_LEGEND_LINE_IN, _HANDLE_IN = 0.2, 0.6
+"""Height of a line of a legend, and width of an entry without its text."""
 _DOTS = 400
 """More missions are drawn as so many, evenly taken in the order of their values."""
 _MOST_KERNELS = 10_000
@@ -295,12 +298,16 @@ def _legend(figure: style.Picture, handles: Sequence[Artist], labels: Sequence[s
 def _columns(labels: Sequence[str]) -> int:
     """Return in how many columns a legend fits into the figure's width."""
     most = len(labels) if len(labels) <= 4 else 3
+    widths_in = [_HANDLE_IN + _text_width_in(label) for label in labels]
     for columns in range(most, 1, -1):
-        rows = math.ceil(len(labels) / columns)
-        longest = (max(map(len, labels[first : first + rows])) for first in range(0, len(labels), rows))
-        if sum(_HANDLE_IN + _LETTER_IN * letters for letters in longest) <= style.WIDTH_IN - 0.1:
+        if sum(max(column) for column in np.array_split(widths_in, columns)) <= style.WIDTH_IN:
             return columns
     return 1
+
+
+def _text_width_in(label: str) -> float:
+    font = FontProperties(size=matplotlib.rcParams["legend.fontsize"])
+    return float(TextPath((0.0, 0.0), label, prop=font).get_extents().x1) / 72.0
 
 
 def _legend_height(labels: Sequence[str]) -> float:

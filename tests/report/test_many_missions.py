@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import gaussian_kde
 
 from suave_des.estimates import estimate
-from suave_des.report import campaign_figures
+from suave_des.report import campaign_figures, style
 from suave_des.report.campaign_figures import (
     draw_convergence,
     draw_distributions,
@@ -78,8 +78,9 @@ def test_a_legend_of_long_names_stays_within_the_figure() -> None:
     frame = pandas.DataFrame({"manager": names * 10, "run": np.repeat(np.arange(1, 11), 4), "seed": 1})
     groups, _ = grouped(missions_of(frame.assign(search_time_s=_times_s(40), distance_inspected_m=20.0)), (), ())
     for draw in (draw_convergence, draw_distributions, draw_reactions):
-        figure = draw(groups)
-        figure.draw_without_rendering()
+        with style.publication():
+            figure = draw(groups)
+            figure.draw_without_rendering()
         box = figure.legends[0].get_window_extent()
         assert box.x0 >= 0.0
         assert box.x1 <= figure.bbox.x1
