@@ -52,6 +52,7 @@ class MissionRunner:
         self._first: dict[int, tuple[MissionKey, Outcome]] = {}
         self._number: dict[int, int] = {}
         self._refused: dict[tuple[str, str], int] = {}
+        self._remarks: tuple[str, ...] = ()
         self._go_to(0)
 
     def each(self, missions: Iterable[MissionKey]) -> Iterator[Finished]:
@@ -73,6 +74,9 @@ class MissionRunner:
                 for (function, mode), count in self._refused.items():
                     yield key, Remark(self._job.managers[key.manager], f"{function} has no mode {mode}", count)
                 self._refused = {}
+                for text in self._remarks:
+                    yield key, Remark(self._job.managers[key.manager], text, 0)
+                self._remarks = ()
 
     def _differs(self, key: MissionKey, outcome: Outcome, limit: _Limit) -> bool:
         """Whether a manager's first mission in this process gives another outcome when it is run again.
@@ -105,6 +109,7 @@ class MissionRunner:
         members = () if member is None else (member,)
         if result.refused:
             self._refused = result.refused
+        self._remarks = result.remarks
         row = (*row_of(result.metrics), *self._swept, *drawn, *members, *further_of(result))
         return (*row, self._knowledge(key, result)) if job.record_knowledge else row
 

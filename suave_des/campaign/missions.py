@@ -133,7 +133,7 @@ class Remark(NamedTuple):
     Attributes:
         manager: name of the managing subsystem.
         text: what.
-        times: how often.
+        times: how often; 0: that does not matter.
     """
 
     manager: str

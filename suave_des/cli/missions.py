@@ -57,6 +57,8 @@ def run(
             on_time=show,
             **files.with_options(manager_option, [manager]),
         )
+    for remark in result.remarks:
+        errors().print(f"suave-des: manager {manager}: {remark}", soft_wrap=True, markup=False)
     console = output()
     print_timeline(console, result)
     if out is not None:

@@ -101,6 +101,8 @@ class MissionResult:
     """How many requests of a mode were refused, by function and mode."""
     further: dict[str, float | int | None] = field(default_factory=dict)
     """Further metrics and the fulfilment of requirements, if the scenario asks for them, by column."""
+    remarks: tuple[str, ...] = ()
+    """What the manager's author should know, such as a name that it depends on and that nothing measures."""
 
     def __repr__(self) -> str:
         """Return the metrics as a table, and how much is recorded."""

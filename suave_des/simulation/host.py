@@ -1,6 +1,6 @@
 """Hosts a managing subsystem in a mission: calls its hooks; what it raises fails its mission, and nothing else."""
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass, field
 from math import inf
 from typing import Any, TypeVar
@@ -9,16 +9,18 @@ import simpy
 
 from suave_des.clock import Process, until
 from suave_des.domain import Task
-from suave_des.errors import InputError, MissionError, SuaveDesError
+from suave_des.errors import InputError, MissionError, SuaveDesError, did_you_mean, shown
 from suave_des.managing.base import AdaptationProcess, ManagedSystem, ManagingSubsystem
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus
-from suave_des.registry import manager_class
+from suave_des.registry import is_built_in, manager_class
 
 RAISED = (Exception, SystemExit)
 """What a manager may raise: one that calls sys.exit must end neither a campaign nor, without an error, its mission."""
 
 _T = TypeVar("_T")
+_MEASURED_SOMEWHERE = ("water_visibility", "battery_level")
+"""What shipped scenarios measure, though not each of them: a manager may serve all."""
 _STEPS_AT_ONE_TIME = 10_000
 """So often `adapt` may yield without mission time passing."""
 
@@ -50,6 +52,7 @@ class ManagerHost:
     skips_idle_calls: bool
     kind: type[ManagingSubsystem] | None = None
     manager: ManagingSubsystem = field(init=False)
+    remarks: tuple[str, ...] = ()  # what its author should know
     _is_waiting: bool = False  # for an event
     _idle_regions: set[tuple[int, ...]] = field(default_factory=set)  # of measured values: there, calls change nothing
 
@@ -60,13 +63,16 @@ class ManagerHost:
             if not hasattr(self.manager, "system"):
                 raise TypeError(f"{kind.__name__}.__init__ does not begin with super().__init__(system)")
             own = "depends_on" in vars(kind)  # a derived class may depend on more
-            thresholds = self.manager.depends_on if own and self.skips_idle_calls else None
+            is_users = not is_built_in(self.name)
+            declared = self.manager.depends_on if own and (self.skips_idle_calls or is_users) else None
         except InputError:
             raise  # such as an ontology that cannot be used: it concerns every mission
         except RAISED as error:
             raise self.mission_error(error) from error
-        self._is_event_triggered = thresholds is not None
-        edges = thresholds or {}
+        if is_users:
+            self.remarks = tuple(_unmeasured(declared or (), self.system.measurements))
+        self._is_event_triggered = declared is not None and self.skips_idle_calls
+        edges = (declared or {}) if self._is_event_triggered else {}
         self._depends_on = [(each, edges[name]) for name, each in self.system.measurements.items() if name in edges]
         self._is_tabulated = all(each.is_tabulated for each, _ in self._depends_on)
         if kind.diagnostic is not ManagingSubsystem.diagnostic:
@@ -197,3 +203,10 @@ def _tick_at_or_after(t_s: float, due_s: float, period_s: float) -> float:
     while due_s < t_s:
         due_s += period_s
     return due_s
+
+
+def _unmeasured(names: Iterable[str], measured: Iterable[str]) -> Iterator[str]:
+    """Yield a remark for each name that a manager waits for in vain, misspelt as it seems."""
+    known = sorted({*measured, *_MEASURED_SOMEWHERE})
+    for name in sorted(set(names).difference(known), key=str):
+        yield f"depends_on has {shown(name)}, which nothing measures ({did_you_mean(name, known)})"

@@ -178,7 +178,8 @@ class MissionRun:
         trajectory = recorder.trajectory(self._vehicle, self._visibility, measured)
         events, knowledge = tuple(recorder.events), tuple(recorder.knowledge)
         further = {} if self._evaluation is None else self._evaluation.further(metrics, float(self.env.now))
-        return MissionResult(metrics, events, trajectory, knowledge, drawn, self.modes.refused, further)
+        remarks = self._host.remarks
+        return MissionResult(metrics, events, trajectory, knowledge, drawn, self.modes.refused, further, remarks)
 
     def _guarded(self, run: Callable[..., object], *arguments: object) -> None:
         try:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from suave_des import InputError, run_campaign
+from suave_des import InputError, run_campaign, run_mission
 from suave_des.campaign.training import blocks, train
 from tests.helpers import AWKWARD
 from tests.helpers.command import suave_des_command
@@ -95,6 +95,24 @@ def test_modes_that_there_are_not_are_counted_and_reported(tmp_path: Path) -> No
         run_campaign("seams2023", [f"{AWKWARD}:Misspells"], 5, out=tmp_path / "out")
     (remark,) = json.loads((tmp_path / "out" / "manifest.json").read_text())["remarks"]
     assert remark.endswith("(5 times)")
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_name_that_nothing_measures_is_reported_once(workers: int, tmp_path: Path) -> None:
+    with pytest.warns(UserWarning, match="depends_on has 'water_visiblity', which nothing measures"):
+        run_campaign("seams2023", [f"{AWKWARD}:WaitsInVain"], 6, workers=workers, out=tmp_path / "out")
+    (remark,) = json.loads((tmp_path / "out" / "manifest.json").read_text())["remarks"]
+    assert remark.endswith("(did you mean 'water_visibility'? known: battery_level, water_visibility)")
+
+
+def test_a_name_that_nothing_measures_is_reported_of_one_mission_too() -> None:
+    (remark,) = run_mission("seams2023", f"{AWKWARD}:WaitsInVain").remarks
+    assert "did you mean 'water_visibility'?" in remark
+    assert run_mission("seams2023", f"{AWKWARD}:SavesCharge").remarks == ()
+
+
+def test_a_manager_that_serves_scenarios_without_a_battery_too_is_not_reported() -> None:
+    assert "remarks" not in run_campaign("seams2023", [f"{AWKWARD}:SavesCharge"], 2).attrs
 
 
 def test_the_same_error_in_the_first_missions_stops_the_campaign_with_one_message(tmp_path: Path) -> None:

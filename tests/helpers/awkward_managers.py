@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from suave_des.domain import Task
-from suave_des.managing.base import ManagedSystem, ManagingSubsystem
+from suave_des.managing.base import ManagedSystem, ManagingSubsystem, Thresholds
 from suave_des.managing.simple import NoManager
 
 
@@ -131,3 +131,19 @@ class Misspells(NoManager):
 
     def mission_started(self) -> None:
         self.system.change_mode("f_generate_search_path", "fd_spiral_hihg")
+
+
+class WaitsInVain(NoManager):
+    """Depends on a measured value whose name it misspells."""
+
+    @property
+    def depends_on(self) -> Thresholds:
+        return {"water_visiblity": (3.25,)}
+
+
+class SavesCharge(NoManager):
+    """Serves scenarios with a battery, and others."""
+
+    @property
+    def depends_on(self) -> Thresholds:
+        return {"water_visibility": (3.25,), "battery_level": (0.25,)}
