@@ -174,7 +174,7 @@ class TestCampaign:
         apart = (times["bt"] - times["metacontrol"]).std()
         for n, narrow in ((needed.paired, True), (needed.paired - 1, False)):
             assert (stats.t.ppf(0.975, n - 1) * apart / n**0.5 <= 2.0) == narrow
-        assert needed.unpaired > 2 * needed.paired
+        assert needed.unpaired > 1.5 * needed.paired
 
     def test_folders_side_by_side_are_told_apart_by_name(self, campaign: Path, tmp_path: Path) -> None:
         run_campaign("seams2023", ["bt"], 10, 1, out=tmp_path / "again")
