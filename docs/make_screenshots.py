@@ -39,8 +39,8 @@ def main() -> None:
         campaign = folder / "seams2023"
         run_campaign("seams2023", ["none", "random", "metacontrol"], runs=100, out=campaign)
         pages = {
-            "replay": replay_page(missions_run(loaded, Chosen(("metacontrol",), run=1, seed=1))),
-            "replay-two": replay_page(missions_run(loaded, Chosen(("metacontrol", "none"), run=1, seed=1))),
+            "replay": replay_page(missions_run(loaded, Chosen(("metacontrol",), run=2, seed=1))),
+            "replay-two": replay_page(missions_run(loaded, Chosen(("metacontrol", "none"), run=12, seed=1))),
             "report": report_page([campaign]),
         }
         for page, text in pages.items():

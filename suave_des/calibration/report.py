@@ -229,5 +229,7 @@ def profiles_png(found: Sequence[Profile], best: Evaluation, threshold: float) -
 
 
 def _title(parameter: FreeParameter) -> str:
-    path = parameter.path.replace("calibration.", "").replace("latencies.", "")
-    return f"{', '.join(parameter.scenarios)}:\n{path}" if parameter.scenarios else path
+    """Name a parameter in lines that fit above its panel: the scenario if it is of one alone, then the key path."""
+    keys = parameter.path.split(".")[1:] or [parameter.path]  # without the part of the scenario that it is in
+    lines = [f"{', '.join(parameter.scenarios)}:"] if parameter.scenarios else []
+    return "\n".join([*lines, *(f"{key}." for key in keys[:-1]), keys[-1]])

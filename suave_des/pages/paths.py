@@ -47,7 +47,7 @@ class Way:
 
 @dataclass(frozen=True)
 class Paths:
-    """Ways of some missions.
+    """Paths of some missions.
 
     Attributes:
         pipeline: vertices, x and y in m.
@@ -70,7 +70,7 @@ def paths_of(folder: Path, frame: pandas.DataFrame, groups: Sequence[str], runs:
         runs: how many runs of each manager; 0: none.
     """
     if runs == 0:
-        return Paths(note="Ways and timelines are left out; suave-des report --paths N has those of N runs")
+        return Paths(note="Paths and timelines are left out; suave-des report --paths N adds those of N runs")
     try:
         with opened_campaign(folder) as campaign:
             vertices = [(x, y) for x, y, *_ in campaign.loaded.scenario.pipeline.vertices_m]

@@ -37,7 +37,7 @@ def report_page(folders: Sequence[Path], runs: int = PATHS) -> str:
     library = plotly_script()
     missions = read_missions(folders)
     results = results_of(missions)
-    ways = Paths(note="Ways and timelines are in the report of one campaign's folder only")
+    ways = Paths(note="Paths and timelines are in the report of one campaign's folder only")
     if len(folders) == 1 and folders[0].is_dir() and missions.frame["run"].notna().all():
         managers = list(dict.fromkeys(missions.frame["manager"]))
         fitting = max(1, min(runs, _MOST_WAYS // len(managers))) if runs else 0

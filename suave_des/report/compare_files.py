@@ -259,6 +259,8 @@ def p_cell(p: float | None) -> str:
     """Write a p-value with two digits that say something."""
     if p is None:
         return ""
+    if p < 1e-300:  # next to the least that a float can hold
+        return "<1e-300"
     return f"{p:.3f}" if p >= 0.001 else f"{p:.0e}"
 
 

@@ -152,14 +152,14 @@ function pipelineTrace() {
 }
 
 const runsWithWay = [...new Set(ways.paths.map((way) => way.run))];
-const otherWays = 'suave-des report --paths N has those of N runs';
+const otherWays = 'more with suave-des report --paths N';
 
 function sayWhichWays() {
   const n = runsWithWay.length;
   byId('runs-title').textContent = n
-    ? `Each mission; click one to look at it. Way and timeline are here for ${n} run${n > 1 ? 's' : ''} of each manager; ${otherWays}`
+    ? `Each mission; click one to look at it. Paths and timelines are here for ${n} run${n > 1 ? 's' : ''} of each manager (${otherWays})`
     : `Each mission; click one to look at it. ${ways.note}`;
-  byId('where-title').textContent = `Ways of ${n} run${n > 1 ? 's' : ''} of each manager, from above; ${otherWays}`;
+  byId('where-title').textContent = `Paths of ${n} run${n > 1 ? 's' : ''} of each manager, from above (${otherWays})`;
 }
 
 function drawWhere() {
