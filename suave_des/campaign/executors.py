@@ -250,9 +250,10 @@ class _Worker:
 
     def stop(self, *, wait: bool) -> None:
         """Have the process end: at once, or when it has done what it was given."""
-        if not wait:
+        if wait:
+            self._pool.shutdown(wait=False, cancel_futures=True)
+        else:
             self.process.kill()
-        self._pool.shutdown(wait=False, cancel_futures=True)
 
     def join(self) -> int | None:
         """Wait for the process to end, and return its exit status; it is killed if that takes long."""
@@ -261,6 +262,8 @@ class _Worker:
             self.process.kill()
         while self.process.exitcode is None:  # the pool's own thread may just be reading it
             time.sleep(0.001)
+        # The thread of a killed pool ends here: while Python exits, it would print a traceback.
+        self._pool.shutdown(cancel_futures=True)
         return self.process.exitcode
 
 

@@ -83,10 +83,10 @@ def test_every_file_that_a_command_writes_is_known(command) -> None:
 
 def test_the_known_files_are_those_of_the_modules_that_write_them() -> None:
     from suave_des.calibration import report
-    from suave_des.campaign import knowledge_records, results, single, store
+    from suave_des.campaign import knowledge_records, result_files, single, store
     from suave_des.validation import files as validation
 
     assert set(FAMILIES["fit"]) == set(report.FILES)
-    assert {store.STORE_FILE, *results.FILES, *validation.FILES} <= set(FAMILIES["campaign"])
+    assert {store.STORE_FILE, *result_files.FILES, *validation.FILES} <= set(FAMILIES["campaign"])
     mission = {single.MISSION_FILE, single.EVENTS_FILE, single.TRAJECTORY_FILE, knowledge_records.KNOWLEDGE_FILE}
     assert set(FAMILIES["mission"]) == mission

@@ -228,7 +228,8 @@ def test_any_rule_that_is_written_reads_back_the_same(name, body, head, enabled)
     assert (rule.name, rule.body, rule.head, rule.enabled) == (name, tuple(body), tuple(head), enabled)
 
 
-def test_twenty_thousand_mutated_texts_give_rules_or_rule_errors(kb: Ontology) -> None:
+@pytest.mark.parametrize("count", [3_000, pytest.param(20_000, marks=pytest.mark.slow)])
+def test_mutated_texts_give_rules_or_rule_errors(kb: Ontology, count: int) -> None:
     draw = random.Random(3)
     alphabet = [
         *"()?,:^->\"\\#<>@{}[]' \n\t\r0129.eE+_x",
@@ -244,7 +245,7 @@ def test_twenty_thousand_mutated_texts_give_rules_or_rule_errors(kb: Ontology) -
     ]
     pieces = [*EVERYTHING.splitlines(), RULE, *(f"{rule.name}: {rule.text}" for rule in kb.rules)]
     outcomes = {"rule": 0, "syntax": 0, "meaning": 0}
-    for _ in range(20_000):
+    for _ in range(count):
         text = list("\n".join(draw.sample(pieces, 2)))
         for _ in range(draw.randint(1, 6)):
             at = draw.randrange(len(text) + 1)
@@ -264,7 +265,7 @@ def test_twenty_thousand_mutated_texts_give_rules_or_rule_errors(kb: Ontology) -
                 outcomes["rule"] += 1
             except RuleError:
                 outcomes["meaning"] += 1
-    assert min(outcomes.values()) > 1000
+    assert min(outcomes.values()) > count / 20
 
 
 def test_a_rule_of_five_thousand_atoms_is_read_at_once() -> None:
