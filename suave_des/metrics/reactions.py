@@ -23,7 +23,8 @@ class ReactionMeter:
 
     Three kinds of event: a thruster failure is reported, until maintain_motion is active; the measured visibility does
     not fit the search altitude, until the fitting altitude is set; the battery is low, until the recharge path is
-    active. An event that is never answered does not count.
+    active. An event that is never answered does not count, nor does a failure that is reported while maintain_motion
+    is active: it asks for nothing that has not been done (as in the real runs of 2025, docs/background/fidelity.md).
 
     During the mission reports and effects are only noted; what was measured is read from its tables at the end.
     """
@@ -42,8 +43,7 @@ class ReactionMeter:
 
     def mode_effect(self, function: str, mode: Mode) -> None:
         """Note that a mode has taken effect."""
-        if mode.active:
-            self._noted.append((self.env.now, _OpenEvents.mode_effect, (function, mode)))
+        self._noted.append((self.env.now, _OpenEvents.mode_effect, (function, mode)))
 
     def reactions_s(self) -> list[float]:
         """The reactions completed by now, in the order of their completion."""
@@ -94,12 +94,14 @@ class _OpenEvents:
         self._altitude_m = altitude_m
         self._expected_m: float | None = None
         self._battery_low = False
+        self._recovering = False  # whether maintain_motion is active
         self._since_s: dict[str, float] = {}  # when each kind of event began that is open
         self.completed_s: list[float] = []
 
     def failure(self, t_s: float, _: None) -> None:
         """A thruster failure is reported."""
-        self._since_s.setdefault("failure", t_s)
+        if not self._recovering:
+            self._since_s.setdefault("failure", t_s)
 
     def expect(self, t_s: float, altitude_m: float | None) -> None:
         """From this visibility message on another altitude fits; none: no altitude does."""
@@ -117,8 +119,12 @@ class _OpenEvents:
         self._battery_low = low
 
     def mode_effect(self, t_s: float, effect: tuple[str, Mode]) -> None:
-        """An active mode has taken effect."""
+        """A mode has taken effect."""
         function, mode = effect
+        if function == MAINTAIN_MOTION:
+            self._recovering = mode.active
+        if not mode.active:
+            return
         if function == MAINTAIN_MOTION:
             self._answer("failure", t_s)
         elif function == GENERATE_RECHARGE_PATH:

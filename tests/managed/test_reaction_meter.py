@@ -93,8 +93,19 @@ def test_a_second_failure_before_the_answer_counts_with_the_first() -> None:
 
 
 def test_a_second_failure_after_the_answer_is_another_reaction() -> None:
-    timeline = Timeline().thruster(35.0, "FALSE").mode(37.5, MOTION).thruster(60.0, "FALSE", 2).mode(61.0, MOTION)
-    assert timeline.reactions == [2.5, 1.0]
+    timeline = Timeline().thruster(35.0, "FALSE").mode(37.5, MOTION).mode(50.0, MOTION, active=False)
+    assert timeline.thruster(60.0, "FALSE", 2).mode(61.0, MOTION).reactions == [2.5, 1.0]
+
+
+def test_a_failure_while_maintain_motion_is_active_asks_for_nothing_more() -> None:
+    # As in the fifth condition of the runs of 2025: the task changes before the thrusters are recovered.
+    timeline = Timeline().thruster(112.0, "FALSE").mode(113.0, MOTION).thruster(113.01, "FALSE", 3)
+    assert timeline.mode(119.7, MOTION, active=False).mode(120.5, MOTION).reactions == [1.0]
+
+
+def test_once_maintain_motion_is_inactive_a_failure_is_an_event_again() -> None:
+    timeline = Timeline().mode(10.0, MOTION).mode(20.0, MOTION, active=False).thruster(30.0, "FALSE").mode(34.0, MOTION)
+    assert timeline.reactions == [4.0]
 
 
 def test_a_failure_never_answered_does_not_count() -> None:
