@@ -11,28 +11,23 @@ from __future__ import annotations
 import csv
 import multiprocessing
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 import pandas
 import studies
-from numpy.typing import NDArray
-from scipy import stats
 
-from suave_des import load_scenario, with_values
-from suave_des.calibration.loss import SCALES, as_vectors, energy_distance, published_vectors, simulate
-from suave_des.report.runs import choose_managers, read_runs
-from suave_des.resources import find
-from suave_des.simulation.simulator import Simulator
-from suave_des.validation.real import read_conditions, read_real
+from suave_des import with_values
+from suave_des.calibration.cases import Case, read_cases
+from suave_des.calibration.loss import Problem, compare, simulate_case
+from suave_des.validation.conditions import compare_conditions, summarise
+from suave_des.validation.validation import COMPARED, validate
 
-SIGNIFICANT = 0.05
-METRICS = list(SCALES)[:2]
 SHARE_2025 = 10
 """Missions for each manager of 2023 to one for each manager and condition of 2025."""
-ADAPTED_ALIKE = ("none", "bt", "metacontrol")
+ADAPTED_ALIKE = "none,bt,metacontrol"
 """What random does differs from run to run by far more than with any mechanism."""
 
 FIRST_CONDITIONS = 4
@@ -112,78 +107,61 @@ CHANGES = (
 )
 
 
-def against_2023(runs: int, change: Change) -> dict[str, float]:
+def agreement_2023(runs: int, change: Change) -> dict[str, float]:
     """Count the means, standard deviations and distributions that agree with the 60 runs, and measure the distance."""
-    real = read_runs(find("seams2023_runs.csv", "scenarios/published"))
-    managers = choose_managers(real, None)
-    vectors = published_vectors(real.frame, managers)
-    simulator = Simulator(with_values(load_scenario("seams2023"), {**change.both, **change.of_2023}))
-    missions = {name: simulate(simulator, name, runs, studies.SEED) for name in managers}
-    distances = [
-        energy_distance(as_vectors(missions[name])[:, : vectors[name].shape[1]], vectors[name]) for name in managers
-    ]
-    agreeing = sum(
-        agree(real.frame.loc[real.frame["manager"] == name, metric].to_numpy(float), missions[name][metric].to_numpy())
-        for name in managers
-        for metric in METRICS
-    )
-    return {"agreeing_2023": agreeing, "distance_2023": float(np.mean(distances))}
+    (case,) = read_cases(["seams2023"])
+    simulated, distance = simulated_and_distance(case, {**change.both, **change.of_2023}, runs)
+    found = validate(case.real, simulated, case.managers, seed=studies.SEED)
+    agreeing = sum(target.met is True for target in found.targets if target.kind in ("mean", "std", "ks"))
+    return {"agreeing_2023": agreeing, "distance_2023": distance}
 
 
-def agree(real: NDArray[np.float64], simulated: NDArray[np.float64]) -> int:
-    """Count what agrees: mean in the t interval, standard deviation in the chi-square one, Kolmogorov-Smirnov test."""
-    n = len(real)
-    half = stats.t.ppf(1.0 - SIGNIFICANT / 2.0, n - 1) * real.std(ddof=1) / np.sqrt(n)
-    ends = stats.chi2.ppf([1.0 - SIGNIFICANT / 2.0, SIGNIFICANT / 2.0], n - 1)
-    low, high = real.std(ddof=1) * np.sqrt((n - 1) / ends)
-    mean_agrees = abs(simulated.mean() - real.mean()) <= half
-    alike = stats.ks_2samp(real, simulated).pvalue > SIGNIFICANT
-    return int(mean_agrees) + int(low <= simulated.std(ddof=1) <= high) + int(alike)
-
-
-def against_2025(runs: int, change: Change) -> dict[str, float]:
+def agreement_2025(runs: int, change: Change) -> dict[str, float]:
     """Compare none, bt and metacontrol with the real runs of the same condition.
+
+    Args:
+        runs: missions of each manager under each condition.
+        change: what is taken out.
 
     Returns:
         Energy distance, mean over managers and conditions; difference of the median search times, median over both;
         standard deviation of none's distances, median over the conditions, beside the real one; and by how much
-        metacontrol's reaction time depends on the condition, among the first four.
+        metacontrol's median reaction time differs between the first four conditions.
     """
-    conditions = read_conditions("planta_exp1_campaign")
-    real = read_real([find("planta_exp1_runs.csv", "scenarios/published")], conditions).frame
-    loaded = with_values(load_scenario("planta_exp1"), {**change.both, **change.of_2025})
-    scales = [SCALES[name] for name in METRICS]
-    distances, apart, spreads, slow = [], [], {"real": [], "simulated": []}, []
-    for number, values in enumerate(conditions.values, 1):
-        simulator = Simulator(with_values(loaded, dict(zip(conditions.names, values, strict=True))))
-        for name in ADAPTED_ALIKE:
-            theirs = real[(real["manager"] == name) & (real["condition"] == number)]
-            found = [simulator.run(name, run, studies.SEED).metrics for run in range(1, runs + 1)]
-            ours = np.array([[getattr(each, metric) for metric in METRICS] for each in found])
-            published = theirs[METRICS].to_numpy(float)
-            distances.append(energy_distance(ours / scales, published / scales))
-            apart.append(abs(float(np.median(ours[:, 0]) - np.median(published[:, 0]))))
-            if name == "none":
-                spreads["real"].append(float(published[:, 1].std(ddof=1)))
-                spreads["simulated"].append(float(ours[:, 1].std(ddof=1)))
-            if name == "metacontrol":
-                slow.append(float(np.median([each.mean_reaction_time_s for each in found])))
+    (case,) = read_cases(["planta_exp1_campaign"], managers=ADAPTED_ALIKE)
+    simulated, distance = simulated_and_distance(case, {**change.both, **change.of_2025}, runs * len(case.conditions))
+    compared = compare_conditions(case.real, simulated, case.managers, tuple(COMPARED))
+    summaries = {(each.manager, each.metric): each for each in summarise(compared)}
+    spread = summaries["none", "distance_inspected_m"]
+    reactions = [
+        each.simulated.median
+        for each in compared
+        if (each.manager, each.metric) == ("metacontrol", "mean_reaction_time_s")
+    ]
     return {
-        "distance_2025": float(np.mean(distances)),
-        "median_apart_2025_s": float(np.median(apart)),
-        "spread_of_none_2025_m": float(np.median(spreads["simulated"])),
-        "real_spread_of_none_2025_m": float(np.median(spreads["real"])),
-        "reactions_2025_s": float(np.ptp(slow[:FIRST_CONDITIONS])),
+        "distance_2025": distance,
+        "median_apart_2025_s": summaries["all", "search_time_s"].difference,
+        "spread_of_none_2025_m": spread.simulated_std,
+        "real_spread_of_none_2025_m": spread.real_std,
+        "reactions_2025_s": float(np.ptp(reactions[:FIRST_CONDITIONS])),
     }
+
+
+def simulated_and_distance(case: Case, values: Mapping[str, Any], runs: int) -> tuple[pandas.DataFrame, float]:
+    """Simulate missions of a case with changed values; return them, and their mean energy distance to the real ones."""
+    simulated = simulate_case(
+        Problem((case,), (), runs, studies.SEED), replace(case, loaded=with_values(case.loaded, values)), ()
+    )
+    return simulated, float(np.mean(list(compare(case, simulated).distances.values())))
 
 
 def measure(runs: int, change: Change) -> dict[str, Any]:
     """Simulate with one change; a row of the table."""
     row: dict[str, Any] = {"mechanism": change.mechanism, "evidence": change.evidence}
     if change.both or change.of_2023 or not change.of_2025:
-        row |= against_2023(runs, change)
+        row |= agreement_2023(runs, change)
     if change.both or change.of_2025 or not change.of_2023:
-        row |= against_2025(max(3, runs // SHARE_2025), change)
+        row |= agreement_2025(max(3, runs // SHARE_2025), change)
     return row
 
 

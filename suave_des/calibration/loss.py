@@ -30,6 +30,8 @@ Vectors = NDArray[np.float64]
 
 SCALES = {"search_time_s": 40.0, "distance_inspected_m": 12.0, "detection_x_m": 1.5}
 """What components are divided by: about the published standard deviations within a manager."""
+_COLUMNS = (*SCALES, "pipeline_found", "mean_reaction_time_s")
+"""What is known of a simulated mission."""
 RESAMPLES = 200
 
 
@@ -159,8 +161,8 @@ def published_vectors(frame: pandas.DataFrame, managers: Sequence[str]) -> dict[
 def simulate(simulator: Simulator, manager: str, runs: int, seed: int) -> pandas.DataFrame:
     """Simulate missions of one manager; a frame with the columns that are compared."""
     metrics = [simulator.run(manager, run, seed).metrics for run in range(1, runs + 1)]
-    rows = [{"manager": manager, **{name: getattr(each, name) for name in SCALES}} for each in metrics]
-    return pandas.DataFrame(rows).astype(dict.fromkeys(SCALES, float))
+    rows = [{"manager": manager, **{name: getattr(each, name) for name in _COLUMNS}} for each in metrics]
+    return pandas.DataFrame(rows).astype({**dict.fromkeys(_COLUMNS, float), "pipeline_found": bool})
 
 
 def simulate_case(problem: Problem, case: Case, values: Sequence[float]) -> pandas.DataFrame:
