@@ -6,6 +6,7 @@ Cached inferences are kept in a folder of the test run, away from the user's, wh
 import os
 import shutil
 import signal
+import sys
 import tempfile
 
 import pytest
@@ -20,6 +21,9 @@ settings.load_profile("repeatable")
 os.environ.setdefault("NUMBA_CACHE_DIR", str(private_cache("numba")))
 if "PYTEST_XDIST_WORKER" not in os.environ:  # such a process has inherited the setting
     os.environ["SUAVE_DES_CACHE_DIR"] = tempfile.mkdtemp(prefix="suave-des-tests-")
+# So are compiled modules, whatever the environment says: a run starts hundreds of processes.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 os.environ["SUAVE_DES_JAVA_ARCHIVE"] = "off"  # or processes that outlive the tests would make one in that folder
 
 os.environ.pop("COLUMNS", None)  # which several test processes at once are given, as if there were a terminal

@@ -17,6 +17,8 @@ from suave_des.errors import InputError
 #: owlready2 0.50 and 0.51 ship a Jena class compiled for Java 25 (class-file version 69).
 NEEDED_VERSION: Final = 25
 _OPTION_VARIABLES: Final = ("JAVA_TOOL_OPTIONS", "JDK_JAVA_OPTIONS", "_JAVA_OPTIONS")
+#: Options of a Java process that makes one inference and ends: 2.0 s of CPU time in place of 3.5 s.
+SHORT_LIVED: Final = ("-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC", "-Xlog:disable")
 #: Options of the Java that runs inside this process.
 OPTIONS: Final = (
     "-Xrs",  # Ctrl-C is handled by Python: without this the process ends without running "finally"
@@ -37,6 +39,12 @@ def without_options_of_others() -> Iterator[None]:
         yield
     finally:
         os.environ.update(hidden)
+
+
+def launcher_environment(*options: str) -> dict[str, str]:
+    """The environment for a java command: with these options, and none that variables add to every Java."""
+    others = {name: value for name, value in os.environ.items() if name not in _OPTION_VARIABLES}
+    return {**others, "JDK_JAVA_OPTIONS": " ".join(options)}
 
 
 def java_home() -> Path:

@@ -17,6 +17,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import urldefrag, urljoin
@@ -223,7 +224,9 @@ def _literals_as_written() -> Iterator[None]:
         rdflib.NORMALIZE_LITERALS = before
 
 
+@lru_cache(maxsize=4)  # what is imported is read again with each ontology that imports it
 def _parse_rdf(path: Path, content: bytes) -> Graph:
+    """Parse a file; the graph is shared by all who read the same content, and is not to be changed."""
     graph = Graph()
     form, name = _FORMATS.get(path.suffix, ("xml", "RDF/XML"))
     if form == "json-ld" and re.search(rb'"@(context|import)"\s*:\s*(\[[^\]]*)?"', content):

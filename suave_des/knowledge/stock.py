@@ -21,7 +21,7 @@ from rdflib.term import Node
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.content import Terms
-from suave_des.knowledge.java import java_executable, without_options_of_others
+from suave_des.knowledge.java import SHORT_LIVED, java_executable, launcher_environment
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import unescape
 from suave_des.knowledge.rdf import Lit, Triple, n_triple, term_of
@@ -46,7 +46,7 @@ class StockPellet:
             TimeoutError: it took longer than the limit; its Java process is ended.
         """
         # owlready2 passes these on to subprocess.run, and has no other parameter for it.
-        owlready2.reasoning._subprocess_kargs["timeout"] = limit_s
+        owlready2.reasoning._subprocess_kargs.update(timeout=limit_s, env=launcher_environment(*SHORT_LIVED))
         owlready2.JAVA_EXE = str(java_executable())
         world = owlready2.World()
         try:
@@ -55,9 +55,7 @@ class StockPellet:
             ontology = world.get_ontology(_STATE_IRI).load(fileobj=io.BytesIO(text.encode()), only_local=True)
             for triple in lossy:
                 _add_exactly(world, ontology, triple)
-            with without_options_of_others():
-                is_consistent = _reason(world)
-            if not is_consistent:
+            if not _reason(world):
                 return None
             return frozenset(self._read(world)) - {_as_float(triple) for triple in lossy}
         finally:

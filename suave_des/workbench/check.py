@@ -13,7 +13,7 @@ from typing import Final
 
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.content import Content, merge, with_rules
-from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit
+from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit, times_abandoned
 from suave_des.knowledge.model import Model, assumption, build_model, check_values, with_operators
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, collect, enumerated_texts
@@ -219,8 +219,16 @@ def _ask_pellet(subject: Subject, before: Sequence[Finding]) -> Iterator[Finding
         yield Finding(Level.INFO, f"inferences are cached for equal measured values only, which is slower: {reason}")
     try:
         pellet = make_reasoner("pellet", base, TimeLimit(subject.time_limit_s, "--time-limit"))
-        for state in islice(_simple_states(base), MAX_STATES):
-            pellet.infer(state)
+        states = tuple(islice(simple_states(base), MAX_STATES))
+        abandoned = times_abandoned()
+        try:
+            for state in combined(states):
+                pellet.infer(state)
+        except KnowledgeError:
+            if times_abandoned() > abandoned:
+                raise
+            for state in states:  # the first that contradicts itself is the easiest to understand
+                pellet.infer(state)
     except InputError as error:
         found = finding_from(error)
         if found.rule not in {one.rule for one in before if one.rule and one.level is Level.ERROR}:
@@ -232,7 +240,32 @@ def _ask_pellet(subject: Subject, before: Sequence[Finding]) -> Iterator[Finding
             yield Finding(Level.INFO, message)
 
 
-def _simple_states(base: Ontology) -> Iterator[KnowledgeState]:
+def combined(states: Sequence[KnowledgeState]) -> tuple[KnowledgeState, ...]:
+    """Join states that do not exclude one another: 45 in place of 186 for the shipped ontologies.
+
+    What contradicts itself does so in every state that contains it: Pellet's reasoning is monotonic.
+    """
+    joined: list[tuple[dict[str, str], dict[str, Decimal]]] = []
+    for state in states:
+        groundings, measurements = dict(state.groundings), dict(state.measurements)
+        for designs, values in joined:
+            if _agree(designs, groundings) and _agree(values, measurements):
+                designs.update(groundings)
+                values.update(measurements)
+                break
+        else:
+            joined.append((groundings, measurements))
+    return tuple(
+        KnowledgeState.of(map(ObjectiveState, designs), groundings=designs, measurements=values)
+        for designs, values in joined
+    )
+
+
+def _agree(one: Mapping[str, object], other: Mapping[str, object]) -> bool:
+    return all(one.get(name, value) == value for name, value in other.items())
+
+
+def simple_states(base: Ontology) -> Iterator[KnowledgeState]:
     """Each design in use, without a measurement and with one in each range of each attribute that has an effect."""
     ranges = ranges_between(numbers_in(base))
     measurements: list[dict[str, Decimal]] = [{}]

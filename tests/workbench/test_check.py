@@ -15,7 +15,7 @@ from suave_des.cli.main import main
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.resources import shipped_folder
-from suave_des.workbench.check import Subject, check
+from suave_des.workbench.check import Subject, check, combined, simple_states
 from suave_des.workbench.findings import Finding, Level, folded, has_level
 from tests.helpers.exemplar_files import write_as_owlready2_saves_it
 
@@ -44,6 +44,14 @@ def test_the_shipped_ontology_passes(tmp_path: Path) -> None:
     findings = found(tmp_path)
     assert not has_level(findings, Level.WARN)
     assert only(findings, "battery_level").level is Level.INFO
+
+
+def test_pellet_is_asked_for_fewer_states_that_contain_all_simple_ones() -> None:
+    base = Ontology.load()
+    simple = tuple(simple_states(base))
+    asked = [set(base.assertions(state)) for state in combined(simple)]
+    assert len(asked) < len(simple) / 3
+    assert all(any(every >= set(base.assertions(state)) for every in asked) for state in simple)
 
 
 DECLARE = "declare it as {} property in the ontology"
