@@ -14,11 +14,11 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from suave_des.scenario.models import ManagerSettings, Scenario
+from suave_des.scenario.physical import VehicleDescription
 from suave_des.scenario.quantities import LONGEST_S, Choice, Exponential, Normal, Uniform
 from suave_des.scenario.revision import Revision
 from suave_des.scenario.schema import field_docs
 from suave_des.scenario.signal_kinds import ConstantSignal, SinusoidSignal, StepSignal, TableSignal
-from suave_des.scenario.vehicle import VehicleDescription
 
 PAGE = Path(__file__).parent / "reference" / "scenario.md"
 SIGNALS = (SinusoidSignal, ConstantSignal, StepSignal, TableSignal)

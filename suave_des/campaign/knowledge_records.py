@@ -20,7 +20,7 @@ from pydantic import ValidationError
 from suave_des.errors import InputError
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.metrics.result import KnowledgeRecord
-from suave_des.scenario.key_paths import set_value
+from suave_des.scenario.layers import holder_of
 from suave_des.scenario.models import Scenario
 
 KNOWLEDGE_FILE: Final = "knowledge.jsonl"
@@ -130,7 +130,8 @@ def read_missions(path: Path) -> Iterator[RecordedMission]:
         for content in lines:
             at_point = json.loads(json.dumps(scenario))
             for key_path, value in content["swept"].items():
-                set_value(at_point, key_path, value)
+                holder, key = holder_of(at_point, key_path)
+                holder[key] = value
             yield RecordedMission(
                 str(content["manager"]),
                 int(content["point"]),

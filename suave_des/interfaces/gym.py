@@ -20,8 +20,8 @@ from suave_des.interfaces.mission import CALLER, CallerManages
 from suave_des.managing.base import ManagedSystem
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
 from suave_des.scenario.loader import load_scenario
-from suave_des.scenario.models import THRUSTERS
 from suave_des.scenario.modes import DEFAULT_MODE, UNGROUND_MODE
+from suave_des.scenario.physical import THRUSTERS
 from suave_des.simulation.simulator import Simulator
 
 Observation = NDArray[np.float32]

@@ -98,7 +98,7 @@ class Session:
 
     def _components(self) -> list[str]:
         from suave_des.domain import thruster_name
-        from suave_des.scenario.models import THRUSTERS
+        from suave_des.scenario.physical import THRUSTERS
 
         return [thruster_name(number) for number in range(1, THRUSTERS + 1)]
 

@@ -13,7 +13,7 @@ from suave_des.managed.detection import PipelineDetector
 from suave_des.managed.follow import FollowPipeline
 from suave_des.managed.node import Log
 from suave_des.monitor.measurements import BatteryLevel
-from suave_des.scenario.additions import MissionFunctions
+from suave_des.scenario.models import MissionFunctions
 from suave_des.scenario.revision import CoordinatorRevision
 
 

@@ -10,7 +10,7 @@ import simpy
 
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.measurements import Measured
-from suave_des.scenario.evaluation import Requirement
+from suave_des.scenario.models import Requirement
 from suave_des.scenario.modes import Mode
 
 Value = float | int | None

@@ -14,8 +14,9 @@ from suave_des.managed.follow import InspectionPath
 from suave_des.pages.decisions import Cycles, explained
 from suave_des.pages.page import page
 from suave_des.pages.recorded import Recorded
-from suave_des.scenario.models import THRUSTERS, Scenario
+from suave_des.scenario.models import Scenario
 from suave_des.scenario.modes import UNGROUND_MODE
+from suave_des.scenario.physical import THRUSTERS
 from suave_des.world.pipeline import sample_points, there_and_back
 
 _DECIMALS: Final = 3

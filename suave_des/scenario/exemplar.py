@@ -10,18 +10,16 @@ from typing import Any
 
 from suave_des.errors import InputError, KeyPath
 from suave_des.resources import find, shipped_folder
-from suave_des.scenario.exemplar_campaign import RunnerImport, campaign_text
-from suave_des.scenario.exemplar_experiments import is_extended
-from suave_des.scenario.exemplar_nodes import (
+from suave_des.scenario.exemplar_campaign import RunnerImport, campaign_text, commented, flow, heading, one_line
+from suave_des.scenario.exemplar_files import (
     NODES,
     NOT_NEEDED,
     RUNNER,
     Configuration,
+    is_extended,
     read_configuration,
 )
-from suave_des.scenario.exemplar_releases import RELEASES, Release, release_of
-from suave_des.scenario.exemplar_settings import Setting, Settings, settings_of
-from suave_des.scenario.exemplar_text import commented, flow, heading, one_line
+from suave_des.scenario.exemplar_settings import RELEASES, Release, Setting, Settings, release_of, settings_of
 from suave_des.scenario.layers import Files, Layer, Location, merge, scenario_layer
 from suave_des.scenario.loader import LoadedScenario, load_layer
 from suave_des.scenario.models import Scenario

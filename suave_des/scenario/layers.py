@@ -1,4 +1,4 @@
-"""A scenario file merged over the files that it builds on, each value with its file and line."""
+"""A scenario file merged over the files that it builds on: plain data by key path, each with its file and line."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 from suave_des.errors import InputError, KeyPath, did_you_mean, place_text, shown
 from suave_des.resources import find, shipped_folder
+from suave_des.scenario.physical import VehicleDescription
 from suave_des.scenario.revision import Revision
-from suave_des.scenario.vehicle import VehicleDescription
 from suave_des.scenario.yamlfile import YamlDocument, read_bytes, read_yaml
 
 _KIND_KEYS = ("kind", "distribution")
@@ -255,3 +255,43 @@ def _part_layer(
         return layer
     below = _part_layer(files, layer, ("base",), layer.data["base"], part, depth + 1, (*above, path))
     return merge(below, layer.without("base"))
+
+
+# Values by their key paths, such as signals.water_visibility.period_s.
+
+
+def _parts(data: dict[str, Any], path: str) -> list[str]:
+    """The keys of a key path; names of managers may have points in them, and their settings need not be there yet."""
+    first, _, rest = path.partition(".")
+    if first != "managers" or ":" not in rest:
+        return path.split(".")
+    managers = data["managers"]
+    named = max((name for name in managers if rest.startswith(f"{name}.")), key=len, default=None)
+    if named is None:
+        module, _, below = rest.partition(":")
+        named = f"{module}:{below.partition('.')[0]}"
+    keys = rest.removeprefix(named).removeprefix(".").split(".")
+    settings = managers.setdefault(named, {})
+    if isinstance(settings, dict) and keys != [""]:
+        settings.setdefault(keys[0], None)
+    return ["managers", named, *(keys if keys != [""] else [])]
+
+
+def holder_of(data: dict[str, Any], path: str) -> tuple[Any, Any]:
+    """The mapping or list that holds the value at a key path of a scenario as plain data, and its key there.
+
+    Raises:
+        InputError: the path leads nowhere.
+    """
+    here, parts = data, _parts(data, path)
+    for depth, part in enumerate(parts):
+        if isinstance(here, list):
+            if not (part.isascii() and part.isdigit() and len(part) < 10) or int(part) >= len(here):
+                raise InputError(f"{path}: there is no entry {part}", remedy=f"entries are 0 to {len(here) - 1}")
+        elif not isinstance(here, dict):
+            raise InputError(f"{path}: {'.'.join(parts[:depth])} is a plain value", remedy="leave out what follows it")
+        elif part not in here:
+            raise InputError(f"{path}: unknown key", remedy=did_you_mean(part, sorted(map(str, here))))
+        holder, key = here, int(part) if isinstance(here, list) else part
+        here = here[key]
+    return holder, key

@@ -12,8 +12,7 @@ from typing import Any, Protocol, TypedDict, Unpack
 from suave_des.domain import GENERATE_SEARCH_PATH
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown
 from suave_des.resources import find
-from suave_des.scenario.key_paths import plain_value, set_value
-from suave_des.scenario.layers import Files, Layer, Location, find_named, scenario_layer
+from suave_des.scenario.layers import Files, Layer, Location, find_named, holder_of, scenario_layer
 from suave_des.scenario.models import REASONERS, ManagerSettings, Scenario
 from suave_des.scenario.modes import UNGROUND_MODE, ModeTable, modes_of
 from suave_des.scenario.problems import validated
@@ -338,7 +337,8 @@ def with_values(loaded: LoadedScenario, values: Mapping[str, Any]) -> LoadedScen
     """
     data = loaded.scenario.model_dump(mode="json")
     for path, value in values.items():
-        set_value(data, path, value)
+        holder, key = holder_of(data, path)
+        holder[key] = value
     layer = Layer(data, {(): Location(0, 1, loaded.path)})
     scenario = validated(layer, Scenario)
     if _named_files(scenario) != _named_files(loaded.scenario):
@@ -359,4 +359,5 @@ def value_at(loaded: LoadedScenario, path: str) -> Any:
     Raises:
         InputError: the path leads nowhere.
     """
-    return plain_value(loaded.scenario.model_dump(mode="json"), path)
+    holder, key = holder_of(loaded.scenario.model_dump(mode="json"), path)
+    return holder[key]

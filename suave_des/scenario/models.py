@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self, get_args
 
@@ -12,43 +11,53 @@ from suave_des.domain import (
     FOLLOW_PIPELINE,
     GENERATE_SEARCH_PATH,
     MISSION_FUNCTIONS,
-    SEA_BED_Z_M,
     SURFACE,
     SURFACE_MODE,
-    SURFACE_Z_M,
 )
-from suave_des.errors import shown
-from suave_des.scenario.additions import Current, FunctionSettings, Leak, MissionFunctions
-from suave_des.scenario.evaluation import Metrics, Requirement
+from suave_des.scenario.physical import Battery, Current, Leak, Pipeline, Start, ThrusterEvent, VehicleDescription
 from suave_des.scenario.quantities import (
-    Coordinate,
     CoordinateDistribution,
     DelayDistribution,
     Distribution,
     Duration,
-    HeadingDistribution,
-    Length,
     Name,
+    NotNegative,
     Number,
     OffsetDistribution,
     Period,
     Strict,
-    TimeDistribution,
-    ValueDistribution,
     Within,
     wrong,
 )
 from suave_des.scenario.revision import Revision
 from suave_des.scenario.signal_kinds import Monitor, Signal
-from suave_des.scenario.vehicle import VehicleDescription
 
 FileName = Annotated[str, Field(min_length=1)]
 
 Reasoner = Literal["remembered", "pellet", "owlready2"]
 REASONERS: tuple[str, ...] = get_args(Reasoner)
 
-THRUSTERS = 6
 _LONGEST_MISSION_S = 100_000.0
+
+
+class MissionFunctions(Strict):
+    """Functions that the mission needs besides the exemplar's."""
+
+    lasting: tuple[Name, ...] = ()
+    """Needed from launch to the end."""
+    search_pipeline: tuple[Name, ...] = ()
+    """Needed by the first task."""
+    inspect_pipeline: tuple[Name, ...] = ()
+    """Needed by the second task."""
+
+
+class FunctionSettings(Strict):
+    """A function of one's own: its class, and whatever settings that has."""
+
+    model_config = ConfigDict(extra="allow")
+
+    node: Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*(:[A-Za-z_]\w*)?$")]
+    """Class of the function's node, as module:Class, or the name under which a package registers it."""
 
 
 class Mission(Strict):
@@ -58,95 +67,6 @@ class Mission(Strict):
     """When the current task is cancelled and the metrics are taken."""
     functions: MissionFunctions = MissionFunctions()
     """Functions that are needed besides the exemplar's."""
-
-
-class Start(Strict):
-    """Where the vehicle is placed, in the world frame (x east, y north, z up; the sea bed is the plane z = -20)."""
-
-    x_m: CoordinateDistribution = -17.0
-    """East."""
-    y_m: CoordinateDistribution = 2.57
-    """North."""
-    z_m: Annotated[Distribution, Within(gt=SEA_BED_Z_M, le=SURFACE_Z_M, unit="m, between sea bed and surface")] = -18.5
-    """Up; the sea bed is at -20, the surface at 0."""
-    heading_rad: HeadingDistribution = 0.0
-    """Yaw, from east towards north."""
-
-
-class Pipeline(Strict):
-    """The pipeline on the sea bed."""
-
-    vertices_m: Annotated[
-        tuple[tuple[Coordinate, Coordinate, Coordinate], ...], Field(min_length=2, max_length=1000)
-    ] = (
-        (-15.0, 0.0, -20.0),
-        (-25.0, 0.0, -20.0),
-        (-35.0, 0.0, -20.0),
-        (-37.41, -1.0, -20.0),
-        (-44.49, -8.07, -20.0),
-        (-51.56, -15.14, -20.0),
-    )
-    """Vertices [x, y, z] in order. The default is the exemplar's pipeline (kas-lab/suave)."""
-    points_per_piece: Annotated[int, Field(strict=True), Within(1, 1000)] = 20
-    """Evenly spaced points on each straight piece, its first vertex excluded and its last included."""
-
-
-_EVENT_TEXT = re.compile(r"^\(\s*(?P<thruster>[^,]*?)\s*,\s*(?P<event>[^,]*?)\s*,\s*(?P<time_s>[^,]*?)\s*\)$")
-
-
-class ThrusterEvent(Strict):
-    """A failure or recovery of one thruster; also given as the exemplar writes it: "(1,failure,35)"."""
-
-    thruster: Annotated[int, Field(strict=True), Within(1, THRUSTERS)]
-    """1 to 4 horizontal (front right, front left, rear right, rear left), 5 and 6 vertical (right, left)."""
-    event: Literal["failure", "recovery"]
-    """What happens to it."""
-    recoverable: bool = True
-    """Whether f_maintain_motion can bring the thruster back after this failure."""
-    time_s: TimeDistribution
-    """When, drawn once a run; the revision decides whether after the start or after the event before. Below 0 is 0."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _from_text(cls, value: Any) -> Any:
-        if not isinstance(value, str):
-            return value
-        match = _EVENT_TEXT.match(value.strip())
-        if match is None:
-            remedy = "write (THRUSTER,failure or recovery,TIME), as in (1,failure,35)"
-            raise wrong(f"{shown(value)} is not a thruster event", remedy)
-        parts: dict[str, Any] = match.groupdict()
-        for key, convert, expected in (("thruster", int, "a whole number from 1 to 6"), ("time_s", float, "a number")):
-            try:
-                if not parts[key].isascii() or "_" in parts[key]:  # digits to Python, and to nobody else
-                    raise ValueError
-                parts[key] = convert(parts[key])
-            except ValueError:
-                raise wrong(f"expected {expected} as {key}, got {shown(parts[key])}", "as in (1,failure,35)") from None
-        return parts
-
-
-class Battery(Monitor):
-    """Battery of revision 1.5: falls linearly from 1.0, recharged at once near the station."""
-
-    discharge_time_s: Duration = 200.0
-    """Time from full (1.0) to empty (0.0)."""
-    publishing_period_s: Period = 1.0
-    """Period at which its level is published."""
-    station_x_m: Coordinate = -3.0
-    """Recharge station, east."""
-    station_y_m: Coordinate = -2.0
-    """Recharge station, north."""
-    station_radius_m: Length = 0.5
-    """Half-width of the box in x and y within which the vehicle counts as docked."""
-    noise: ValueDistribution = 0.0
-    """Added to each measurement of the level, drawn anew each time."""
-    approach_altitude_m: Length = 1.25
-    """Altitude above the sea bed at which the station is approached."""
-    mission_ends_at_level: Annotated[float, Field(strict=True), Within(0.0, lt=1.0)] | None = None
-    """Level at which, or below which, the mission ends; left out: it goes on with an empty battery."""
-    resend_period_s: Period = 10.0
-    """Period at which the station is sent to the autopilot again."""
 
 
 class Latencies(Strict):
@@ -281,6 +201,66 @@ class ManagerSettings(Strict):
     bt: BehaviourTreeSettings = BehaviourTreeSettings()
     """The behaviour tree manager."""
 
+
+FurtherMetric = Literal[
+    "adaptations_undone",
+    "configurations",
+    "reasoning_time_s",
+    "area_covered_m2",
+    "operational_thrusters",
+    "battery_level",
+    "recharges",
+    "surfacing_time_s",
+]
+FURTHER_METRICS: tuple[str, ...] = get_args(FurtherMetric)
+Metric = (
+    FurtherMetric
+    | Literal[
+        "mission_duration_s",
+        "search_time_s",
+        "distance_inspected_m",
+        "mean_reaction_time_s",
+        "adaptations",
+        "detection_time_s",
+    ]
+)
+
+
+class Requirement(Strict):
+    """A requirement that may be fulfilled in part, as in RELAX (Whittle et al., Requirements Engineering 15, 2010).
+
+    Exactly one of `metric` and `attribute` is given. Fulfilment is 1 where the value is as required, and falls to 0
+    in a straight line where it is off by the tolerance. Without tolerance it is RELAX's SHALL; with one, at_least is
+    AS MANY AS POSSIBLE, at_most AS FEW (or AS EARLY) AS POSSIBLE, close_to AS CLOSE AS POSSIBLE TO.
+    """
+
+    metric: Metric | None = None
+    """A metric of the mission."""
+    attribute: str | None = None
+    """A measured quality attribute; its fulfilment is the mean over mission time, from the first measurement on."""
+    relation: Literal["at_least", "at_most", "close_to"]
+    """How the value has to lie to the required one."""
+    value: Number
+    """The required value."""
+    tolerance: NotNegative = 0.0
+    """How far off the value may be; 0: not at all."""
+
+    @model_validator(mode="after")
+    def _is_about_one_thing(self) -> Self:
+        if (self.metric is None) == (self.attribute is None):
+            raise wrong("is about no value, or about two", "give either metric or attribute", "metric")
+        return self
+
+    def fulfilment(self, value: float) -> float:
+        """To which degree a value fulfils the requirement, from 0 to 1."""
+        off = value - self.value
+        gap = {"at_least": -off, "at_most": off, "close_to": abs(off)}[self.relation]
+        if gap <= 0.0:
+            return 1.0
+        return max(0.0, 1.0 - gap / self.tolerance) if self.tolerance > 0.0 else 0.0
+
+
+Metrics = Annotated[tuple[FurtherMetric, ...], Field(max_length=len(FURTHER_METRICS))]
 
 _DEFAULT_MODES = {GENERATE_SEARCH_PATH: "fd_spiral_low", FOLLOW_PIPELINE: "fd_follow_pipeline"}
 

@@ -7,8 +7,7 @@ from suave_des.domain import SEA_BED_Z_M
 from suave_des.metrics.further import Observer, Value, fulfilments
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.measurements import BatteryLevel, Measured
-from suave_des.scenario.evaluation import FURTHER_METRICS
-from suave_des.scenario.models import Scenario
+from suave_des.scenario.models import FURTHER_METRICS, Scenario
 from suave_des.vehicle.vehicle import Vehicle, row_at
 from suave_des.world.coverage import covered_area_m2
 

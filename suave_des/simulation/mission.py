@@ -37,7 +37,7 @@ from suave_des.monitor.monitors import (
     signal_monitor,
     thruster_monitor,
 )
-from suave_des.scenario.models import Battery
+from suave_des.scenario.physical import Battery
 from suave_des.simulation.evaluation import Evaluation
 from suave_des.simulation.host import RAISED, ManagerHost
 from suave_des.simulation.simulator import MissionMemory, Simulator

@@ -8,7 +8,7 @@ from suave_des import domain
 from suave_des.chance import Chance
 from suave_des.compiling import Array
 from suave_des.scenario.models import Scenario
-from suave_des.scenario.vehicle import VehicleDescription
+from suave_des.scenario.physical import VehicleDescription
 from suave_des.vehicle.autopilot import Autopilot
 from suave_des.vehicle.frames import Pose
 from suave_des.vehicle.model import Thruster, VehicleModel

@@ -8,7 +8,7 @@ import simpy
 
 from suave_des.domain import Task
 from suave_des.managed.coordinator import MissionCoordinator, MissionTiming
-from suave_des.scenario.additions import MissionFunctions
+from suave_des.scenario.models import MissionFunctions
 from tests.helpers.stand_ins import revision
 
 BOTH = pytest.mark.parametrize("name", ["2023", "1.5"])

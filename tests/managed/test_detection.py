@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from suave_des.managed.detection import PipelineDetector, measured_at_rows
-from suave_des.scenario.models import Pipeline
+from suave_des.scenario.physical import Pipeline
 from suave_des.vehicle.autopilot import Autopilot
 from suave_des.vehicle.frames import Pose
 from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at

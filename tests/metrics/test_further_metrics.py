@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from suave_des.errors import InputError
 from suave_des.metrics.further import Observer
-from suave_des.scenario.evaluation import FURTHER_METRICS, Requirement
 from suave_des.scenario.loader import load_scenario
+from suave_des.scenario.models import FURTHER_METRICS, Requirement
 from suave_des.scenario.modes import Mode
 from suave_des.simulation.simulator import Simulator
 from suave_des.world.coverage import covered_area_m2

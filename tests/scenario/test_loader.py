@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from suave_des.resources import find, shipped_folder
 from suave_des.scenario.loader import load_scenario
-from suave_des.scenario.models import ThrusterEvent
+from suave_des.scenario.physical import ThrusterEvent
 from suave_des.scenario.quantities import Normal, Uniform
 from suave_des.scenario.signal_kinds import ConstantSignal, SinusoidSignal, TableSignal
 

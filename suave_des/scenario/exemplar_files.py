@@ -1,18 +1,23 @@
-"""The exemplar's configuration files (ROS 2 parameters): which key of a scenario each of their parameters is.
+"""What is in the exemplar's configuration files (ROS 2 parameters), and which key of a scenario each parameter is.
 
 Source of the names: the exemplar's repository kas-lab/suave, revisions 2023 to 1.5.
 """
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, Field
 
 from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOTION
-from suave_des.errors import InputError, KeyPath, did_you_mean, place_text
+from suave_des.errors import InputError, KeyPath, did_you_mean, place_text, shown
 from suave_des.scenario.modes import modes_of
+from suave_des.scenario.quantities import Within, wrong
 from suave_des.scenario.yamlfile import YamlDocument, read_yaml
 
 _FUNCTION_MODES = {
@@ -230,3 +235,80 @@ def _parameters(document: YamlDocument, entry: str, content: Any, notes: list[st
 def unknown_key(parameter: Parameter, known: Iterable[str]) -> str:
     """The note about a parameter that a scenario or campaign has no use for; `known` are those that have one."""
     return f"{parameter.place}: not taken over: unknown key ({did_you_mean(parameter.key, known)})"
+
+
+# Experiments: which mission of the exemplar its runner launches, under which manager.
+
+Count = Annotated[int, Field(strict=True), Within(ge=1)]
+EXTENDED = "suave_extended"
+"""Name of the exemplar's mission with a battery and recharging."""
+_TREES = {"suave_bt": "bt", "suave_bt_extended": "bt_extended"}
+"""Manager by the name of the behaviour tree's executable."""
+_ARGUMENT = re.compile(r"(\w+):=(\S+)")
+_LIKE_THIS = 'as in {"adaptation_manager": "metacontrol", "num_runs": 20}'
+
+
+def json_object(value: Any) -> Any:
+    """Return the object that a text is in JSON; for a validator."""
+    content = value
+    if isinstance(value, str):
+        try:
+            content = json.loads(value)
+        except (ValueError, RecursionError):
+            content = None
+    if not isinstance(content, dict):
+        raise wrong(f"{shown(value)} is not a JSON object", _LIKE_THIS)
+    return content
+
+
+class Experiment(BaseModel):
+    """Missions of one manager."""
+
+    adaptation_manager: Annotated[str, Field(min_length=1)]
+    num_runs: Count
+    mission_name: str = ""
+    experiment_launch: str = ""
+
+    def manager(self, *, extended: bool) -> str:
+        """Return the manager's name here: that of the behaviour tree depends on its executable and on the mission.
+
+        Args:
+            extended: whether the configuration of the mission asks for the extended one.
+        """
+        if self.adaptation_manager != "bt":
+            return self.adaptation_manager
+        executable = self._arguments.get("bt_executable")
+        if executable is None:
+            return "bt_extended" if extended or self.is_extended else "bt"
+        return _TREES.get(executable, executable)
+
+    @property
+    def is_extended(self) -> bool:
+        """Whether its mission is the one with a battery."""
+        names = (
+            self.mission_name,
+            *(self._arguments.get(key, "") for key in ("mission_name", "mission", "mission_type")),
+        )
+        return EXTENDED in names or self._arguments.get("bt_executable") == "suave_bt_extended"
+
+    @property
+    def _arguments(self) -> Mapping[str, str]:
+        return dict(_ARGUMENT.findall(self.experiment_launch))
+
+
+Experiments = tuple[Annotated[Experiment, BeforeValidator(json_object)], ...]
+
+
+def is_extended(configuration: Configuration) -> bool:
+    """Return whether any mission of a configuration is the extended one."""
+    for parameter in configuration.parameters:
+        if parameter.key == "mission_name" and parameter.value == EXTENDED:
+            return True
+        if parameter.kind == RUNNER and parameter.key == "experiments" and isinstance(parameter.value, list):
+            for each in parameter.value:
+                try:
+                    if Experiment.model_validate(json_object(each)).is_extended:
+                        return True
+                except ValueError:  # reported where the campaign is imported
+                    continue
+    return False
