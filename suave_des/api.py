@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 from suave_des.campaign import campaign as campaigns
 from suave_des.campaign.campaign import CampaignOptions, CampaignResult
-from suave_des.campaign.given import ManagerLike
 from suave_des.campaign.progress import OnProgress
 from suave_des.errors import InputError
+from suave_des.registry import ManagerLike
 from suave_des.scenario.loader import LoadedScenario
 
 if TYPE_CHECKING:

@@ -13,13 +13,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 from weakref import WeakSet
 
-from suave_des.errors import InputError, did_you_mean
+from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.managing.base import ManagingSubsystem
 
 if TYPE_CHECKING:
     from suave_des.managed.own import OwnFunction
 
 _Base = TypeVar("_Base")
+ManagerLike = str | type[ManagingSubsystem]
+"""A manager's name, module:Class, or its class."""
 
 ENTRY_POINT_GROUP = "suave_des.managers"
 FUNCTION_GROUP = "suave_des.functions"
@@ -69,9 +71,25 @@ def manager_names() -> tuple[str, ...]:
     return (*_BUILT_IN, *(name for name in sorted(_registered()) if name not in _BUILT_IN))
 
 
-def registered_name(target: str) -> str | None:
-    """The name that stands for a class given as module:Class; None if there is none."""
-    return next((name for name, known in (_BUILT_IN | _registered()).items() if known == target), None)
+def name_of(manager: ManagerLike) -> str:
+    """The name of a manager: that which it is registered by, or module:Class.
+
+        name_of(Metacontrol)  # "metacontrol"
+
+    Raises:
+        InputError: it is no manager, or a class that cannot be found by its name.
+    """
+    if isinstance(manager, str):
+        return manager
+    if not (isinstance(manager, type) and issubclass(manager, ManagingSubsystem)):
+        problem = f"expected a manager, got {shown(manager)}"
+        raise InputError(problem, remedy="give a name, or a subclass of suave_des.managing.base.ManagingSubsystem")
+    target = f"{manager.__module__}:{manager.__qualname__}"
+    if getattr(sys.modules.get(manager.__module__), manager.__qualname__, None) is not manager:
+        problem = f"manager {target!r} cannot be found by its name"
+        raise InputError(problem, remedy="define the class at the top level of a module, script or notebook cell")
+    named = (name for name, known in (_BUILT_IN | _registered()).items() if known == target)
+    return next(named, target)
 
 
 def manager_class(name: str) -> type[ManagingSubsystem]:

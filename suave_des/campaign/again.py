@@ -8,8 +8,7 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from suave_des.campaign.inputs import read_inputs
-from suave_des.campaign.manager_inputs import check_trusted
+from suave_des.campaign.inputs import check_trusted, read_inputs
 from suave_des.campaign.spec import CampaignSpec, read_campaign_file
 from suave_des.campaign.store import STORE_FILE, Store
 from suave_des.campaign.variation import Variation

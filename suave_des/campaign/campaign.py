@@ -2,21 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing, suppress
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypedDict, Unpack
+from typing import Any, Unpack
 
-from suave_des.campaign.given import ManagerLike, manager_names, plain_sweep
-from suave_des.campaign.progress import OnProgress, Progress
-from suave_des.campaign.results import CampaignResult
-from suave_des.campaign.runner import CampaignInterrupted, resume_campaign, run
-from suave_des.campaign.spec import CampaignSpec
-from suave_des.scenario.loader import LoadedScenario
+from suave_des.campaign.early_checks import FirstFailures, check_size
+from suave_des.campaign.executors import InProcess, LocalWorkers
+from suave_des.campaign.inputs import check_trusted, default_time_out_s, read_inputs, trained_on
+from suave_des.campaign.missions import Executor, Finished, JobSpec, Remark, WorkerError, plan
+from suave_des.campaign.output import check_output_folder, make_output_folder, remove_parts, remove_results
+from suave_des.campaign.progress import OnProgress, Progress, ProgressTracker
+from suave_des.campaign.provenance import check_same, deciding, identity
+from suave_des.campaign.result_files import FILES, SUAVE_FOLDER, write_results
+from suave_des.campaign.results import CampaignResult, gather
+from suave_des.campaign.spec import CampaignFile, CampaignSpec, read_campaign_file
+from suave_des.campaign.store import (
+    LOCK_FILE,
+    NEW_STORE_FILE,
+    STORE_FILE,
+    Store,
+    StoreError,
+    locked,
+    make_store,
+    remove_store,
+    stored_outcomes,
+)
+from suave_des.campaign.variation import plain
+from suave_des.errors import InputError, SuaveDesError, did_you_mean
+from suave_des.registry import ManagerLike, name_of
+from suave_des.scenario.loader import LoadedScenario, Replacements
 
 __all__ = ["CampaignInterrupted", "CampaignOptions", "CampaignResult", "Progress", "resume_campaign", "run_campaign"]
 
 
-class CampaignOptions(TypedDict, total=False):
+class CampaignOptions(Replacements, total=False):
     """Options of a campaign by name, as described at CampaignSpec; None or left out: as in the campaign file."""
 
     sweep: Mapping[str, Any] | None
@@ -26,13 +47,6 @@ class CampaignOptions(TypedDict, total=False):
     until_ci: str | None
     time_out_s: float | None
     scheduler: str | None
-    ontologies: Sequence[str | Path]
-    modes_file: str | Path | None
-    reasoner: str | None
-    rules: Sequence[str | Path]
-    disabled_rules: Sequence[str]
-    values: Mapping[str, Any]
-    manager_options: Mapping[str, Mapping[str, Any]]
     suave_format: bool
     parquet: bool
     record_knowledge: bool
@@ -54,6 +68,10 @@ def run_campaign(
 ) -> CampaignResult:
     """Run `runs` missions of a scenario under each manager, at each point of the sweep if there is one.
 
+    The result is the same for any number of workers, and however often the campaign was interrupted and resumed. A
+    mission that fails (its manager raises, it takes too long, it ends its worker process again and again) has no row;
+    the others are kept.
+
     Example:
         result = run_campaign("seams2023", ["none", "metacontrol"], runs=100, workers=2)
         print(result.frame().groupby("manager")["search_time_s"].mean())
@@ -70,11 +88,304 @@ def run_campaign(
         options: see CampaignSpec.
 
     Raises:
-        InputError, WorkerError, StoreError, CampaignInterrupted: as runner.run.
+        InputError: something given cannot be used; nothing is written then.
+        WorkerError: worker processes end again and again; finished missions are kept.
+        StoreError: the disk is full, or the folder was removed.
+        CampaignInterrupted: Ctrl-C; finished missions are kept.
     """
-    given = {"managers": manager_names(managers), "runs": runs, "seed": seed, "workers": workers, "out": out}
-    if options.get("sweep") is not None:
-        options["sweep"] = plain_sweep(options["sweep"])
+    if managers is not None:
+        managers = [managers] if isinstance(managers, str | type) else list(managers)
+        managers = list(map(name_of, managers))
+    given = {"managers": managers, "runs": runs, "seed": seed, "workers": workers, "out": out}
+    options["sweep"] = plain(options.get("sweep"))
     loaded = scenario if isinstance(scenario, LoadedScenario) else None
     named = scenario.path if isinstance(scenario, LoadedScenario) else scenario
-    return run(CampaignSpec.of(named, **given, **options), on_progress, loaded)
+    spec = CampaignSpec.of(named, **given, **options)
+    if spec.out is not None:
+        _check_new(spec.out, overwrite=spec.overwrite)
+    file = read_campaign_file(spec.scenario) if loaded is None else None
+    with ExitStack() as stack:
+        campaign = _Campaign(spec, file, stack, loaded)
+        if spec.suave_format and campaign.variation.sweep.points > 1:
+            raise InputError(
+                "the exemplar's results file has no column for what a sweep varies",
+                remedy="leave --format suave out, or run a campaign for each point",
+            )
+        if not spec.confirmed:
+            check_size(campaign.job, campaign.tracker.total, spec.workers)
+        return campaign.run(on_progress, resumed=False)
+
+
+class CampaignInterrupted(KeyboardInterrupt):
+    """Ctrl-C during a campaign; finished missions are kept.
+
+    Attributes:
+        result: with the missions that were finished.
+    """
+
+    def __init__(self, result: CampaignResult) -> None:
+        self.result = result
+        super().__init__(f"interrupted; {result.kept()}")
+
+
+def resume_campaign(
+    folder: str | Path,
+    workers: int = 1,
+    *,
+    runs: int | None = None,
+    until_ci: str | None = None,
+    on_progress: OnProgress | None = None,
+    scheduler: str | None = None,
+    managers: Collection[str] = (),
+    confirmed: bool = False,
+) -> CampaignResult:
+    """Go on with a campaign where it stopped; its specification is in its folder.
+
+    Missions that failed for reasons that may not recur (time-out, a worker that was killed) are run again.
+
+    Args:
+        folder: the campaign's output folder.
+        workers: as of run_campaign; it may be another number.
+        runs: more runs than were asked for at first; left out: as many.
+        until_ci: the metric asked for at first with a smaller half-width; left out: as at first.
+        on_progress: called when missions are done.
+        scheduler: as of run_campaign; it may be another, or none.
+        managers: those of the campaign's that are not installed; their code is run only if they are named here.
+        confirmed: whether to run the code of all managers that the folder names.
+
+    Raises:
+        InputError: there is no campaign, it is damaged or in use, or something that decides results has changed; the
+            difference is named.
+        WorkerError, StoreError, CampaignInterrupted: as run_campaign.
+    """
+    folder = Path(folder)
+    spec = _stored_spec(folder, runs, until_ci)
+    spec = replace(spec, out=folder, workers=workers, scheduler=scheduler)
+    if unknown := [name for name in managers if name not in spec.managers]:
+        problem = f"the campaign has no manager {unknown[0]!r}, and goes on as it began"
+        raise InputError(problem, file=folder, remedy=did_you_mean(unknown[0], spec.managers, "its managers"))
+    check_trusted(spec.managers, managers, folder, confirmed=confirmed)
+    with ExitStack() as stack:
+        try:
+            campaign = _Campaign(spec, read_campaign_file(spec.scenario), stack)
+        except InputError as error:
+            if str(Path.cwd()) == spec.folder:
+                raise
+            remedy = f"the campaign was started in {spec.folder}: resume it there"
+            raise InputError(error.problem, file=error.file, place=error.place, remedy=remedy) from None
+        return campaign.run(on_progress, resumed=True)
+
+
+def _check_new(folder: Path, *, overwrite: bool) -> None:
+    check_output_folder(folder, "campaign", overwrite=overwrite, left_over=_is_of_campaign)
+    if not overwrite and (folder / STORE_FILE).exists():
+        raise InputError(
+            "the output folder is not empty: it has a campaign in it",
+            file=folder,
+            remedy=f"--resume {folder} goes on with it, --overwrite replaces it",
+        )
+
+
+def _is_of_campaign(name: str) -> bool:
+    """Whether a file is a campaign's own; without a store it is what is left of one that was killed as it began."""
+    return name in (LOCK_FILE, SUAVE_FOLDER, *FILES) or name.startswith((STORE_FILE, NEW_STORE_FILE))
+
+
+def _stored_spec(folder: Path, runs: int | None, until_ci: str | None) -> CampaignSpec:
+    if not (folder / STORE_FILE).is_file():
+        raise InputError("there is no campaign to resume", file=folder, remedy="start one with --out")
+    with locked(folder), closing(Store(folder / STORE_FILE)) as store:
+        return CampaignSpec.of_stored(store.about("request"), runs=runs, until_ci=until_ci)
+
+
+class _Campaign:
+    """A campaign whose input is read and checked.
+
+    Args:
+        spec: what to run.
+        file: the campaign file, if the specification names one.
+        stack: what is started is stopped at its end.
+        loaded: the scenario; None: it is read.
+    """
+
+    def __init__(
+        self, spec: CampaignSpec, file: CampaignFile | None, stack: ExitStack, loaded: LoadedScenario | None = None
+    ) -> None:
+        self.spec = spec = spec.with_file(file)
+        try:
+            spec.check()
+        except InputError as error:
+            raise error if file is None or "until_ci" not in spec.from_file else file.located(error) from None
+        self._stack = stack
+        self._local = self._start_workers()
+        self.loaded, self.variation, self.inputs = read_inputs(spec, file, loaded)
+        if "time_out_s" in spec.from_file and not (file is not None and file.sets("time_out_s")):
+            self.spec = spec = replace(spec, time_out_s=default_time_out_s(self.loaded, self.variation))
+        self.job = JobSpec(
+            self.loaded, self.variation, spec.managers, spec.seed, spec.time_out_s, spec.record_knowledge
+        )
+        self.tracker = self._new_tracker()
+        self.remarks: tuple[Remark, ...] = ()
+
+    def _start_workers(self) -> Executor:
+        """Start worker processes at once: they import what they need while this process reads and checks."""
+        spec = self.spec
+        workers = spec.workers if spec.sweep else min(spec.workers, len(spec.managers) * spec.runs)
+        if workers == 1:
+            return InProcess()
+        return self._stack.enter_context(LocalWorkers(spec.managers, workers))
+
+    def _executor(self) -> Executor:
+        """Return what runs the missions; a cluster is contacted only when all else is checked."""
+        if self.spec.scheduler is None:
+            return self._local
+        from suave_des.campaign.dask_cluster import connected
+
+        return self._stack.enter_context(connected(self.spec.scheduler))
+
+    def _new_tracker(self) -> ProgressTracker:
+        spec = self.spec
+        return ProgressTracker(self.variation.sweep.points, spec.managers, spec.runs, spec.until)
+
+    def run(self, on_progress: OnProgress | None, *, resumed: bool) -> CampaignResult:
+        """Run what is not done yet, and write the files."""
+        executor, folder = self._executor(), self.spec.out
+        with ExitStack() as stack:
+            if folder is not None:
+                if not folder.exists():
+                    stack.callback(_remove_empty, folder)  # unless something is in it then
+                make_output_folder(folder)
+                stack.enter_context(locked(folder))
+                remove_parts(folder, FILES)
+            if not resumed:
+                stack.callback(self._remove_store_if_empty)
+            store = self._store(resumed=resumed)
+            try:
+                stopped = self._work(store, executor, on_progress)
+                is_empty = store.count() == 0
+            finally:
+                if folder is not None:
+                    store.close()
+            if stopped is not None and is_empty and not resumed:
+                raise stopped
+            if isinstance(stopped, StoreError):
+                raise StoreError(f"{stopped}{self._how_to_go_on()}") from None
+            if isinstance(stopped, InputError):
+                raise stopped
+            try:
+                result = self._results(store, is_whole=stopped is None)
+            except KeyboardInterrupt:
+                if folder is None:
+                    raise
+                raise KeyboardInterrupt(f"interrupted; {self._how_to_have_files()}") from None
+        if isinstance(stopped, WorkerError):
+            raise WorkerError(f"{stopped}; {result.kept()}")
+        if stopped is not None:
+            raise CampaignInterrupted(result)
+        return result
+
+    def _store(self, *, resumed: bool) -> Store:
+        folder = self.spec.out
+        if folder is None:
+            return Store(None)
+        decides = deciding(self.spec, self.loaded, self.inputs)
+        about = {"request": self.spec.stored(), "deciding": decides, "identity": identity(decides)}
+        path = folder / STORE_FILE
+        if not resumed:
+            remove_results(folder, FILES)  # first, or a kill would leave them beside the new campaign
+            make_store(path, about)
+        store = Store(path)
+        try:
+            if resumed:
+                check_same(store.about("deciding"), decides, folder)
+                store.forget_passing_failures()
+                for name, value in about.items():
+                    store.note(name, value)
+        except BaseException:
+            store.close()
+            raise
+        return store
+
+    def _work(
+        self, store: Store, executor: Executor, on_progress: OnProgress | None
+    ) -> KeyboardInterrupt | SuaveDesError | None:
+        """Run missions until all are done; return what stopped the campaign before that."""
+        tracker, spec, alike = self.tracker, self.spec, FirstFailures(self.spec.managers)
+        earlier = store.about("remarks") if store.has_note("remarks") else []
+        remarks: dict[tuple[str, ...], int] = {(manager, text): count for manager, text, count in earlier}
+        try:
+            tracker.add_earlier(store.outcomes())
+            points = self.variation.sweep.points
+            missions = plan(
+                points, len(spec.managers), spec.runs, store.settled, tracker.is_over, run_by_run=tracker.needs_pairs
+            )
+            if left := tracker.total - tracker.done:
+                for among in executor.outcomes(self.job, missions, left):
+                    finished = [(key, each) for key, each in among if not isinstance(each, Remark)]
+                    for _, each in among:
+                        if isinstance(each, Remark):
+                            remarks[each[:2]] = remarks.get(each[:2], 0) + each.times
+                    store.append(finished)
+                    alike.check(finished)
+                    tracker.add(finished)
+                    if on_progress is not None:
+                        on_progress(tracker.progress())
+            store.commit()
+            self.remarks = tuple(Remark(manager, text, count) for (manager, text), count in sorted(remarks.items()))
+            if self.remarks:
+                store.note("remarks", self.remarks)
+        except (KeyboardInterrupt, SuaveDesError) as error:
+            if not isinstance(error, StoreError):
+                with suppress(StoreError):  # which is reported when the files cannot be written either
+                    store.commit()
+            return error
+        return None
+
+    def _results(self, store: Store, *, is_whole: bool) -> CampaignResult:
+        outcomes, tracker = self._outcomes(store), self.tracker
+        if not is_whole:  # it may have been interrupted while it counted
+            tracker = self._new_tracker()
+            tracker.add(outcomes())
+        result = gather(
+            self.spec,
+            self.loaded,
+            self.variation,
+            lambda: tracker.counted(outcomes()),
+            planned=tracker.total,
+            stops=tracker.stops(),
+            pairs=tracker.pairs(),
+        )
+        seen = trained_on(self.loaded, self.spec.managers, self.spec.seed, self.spec.runs)
+        result = replace(result, remarks=(*map(str, self.remarks), *seen))
+        if self.spec.out is not None:
+            try:
+                write_results(result, self.inputs, identity(deciding(self.spec, self.loaded, self.inputs)))
+            except InputError as error:
+                raise InputError(error.problem, file=error.file, remedy=self._how_to_have_files()) from None
+        return result
+
+    def _outcomes(self, store: Store) -> Callable[[], Iterator[Finished]]:
+        if self.spec.out is None:
+            return store.outcomes
+        path = self.spec.out / STORE_FILE
+        return lambda: stored_outcomes(path)
+
+    def _remove_store_if_empty(self) -> None:
+        """Remove a store without outcomes; one that cannot be read stays."""
+        if self.spec.out is not None:
+            with suppress(SuaveDesError):
+                if next(stored_outcomes(self.spec.out / STORE_FILE), None) is None:
+                    remove_store(self.spec.out)
+
+    def _how_to_have_files(self) -> str:
+        return f"nothing is lost: suave-des campaign --resume {self.spec.out} writes the files"
+
+    def _how_to_go_on(self) -> str:
+        if self.spec.out is None or not (self.spec.out / STORE_FILE).exists():
+            return ""
+        return f"; what was kept before is safe: suave-des campaign --resume {self.spec.out} does the rest"
+
+
+def _remove_empty(folder: Path) -> None:
+    with suppress(OSError):
+        folder.rmdir()

@@ -72,7 +72,7 @@ def pack(job: JobSpec) -> Parcel:
     Raises:
         InputError: a file cannot be read, or a manager is in a module that cannot be sent.
     """
-    from suave_des.campaign.manager_inputs import declared_files, scenarios_of
+    from suave_des.campaign.inputs import declared_files, scenarios_of
     from suave_des.campaign.own_modules import own_modules
     from suave_des.simulation.functions import own_functions
 

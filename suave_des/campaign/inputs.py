@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import hashlib
+import logging
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
 from suave_des.campaign.ensemble import read_ensemble, with_ensemble
-from suave_des.campaign.manager_inputs import check_managers, scenarios_of
-from suave_des.campaign.provenance import check_knowledge
+from suave_des.campaign.own_modules import own_modules
 from suave_des.campaign.spec import CampaignFile, CampaignSpec
 from suave_des.campaign.variation import Variation, vary
 from suave_des.errors import InputError
+from suave_des.managing.learned import read_file
+from suave_des.registry import is_built_in, is_installed, manager_class, takes_argument
 from suave_des.scenario.layers import Files
-from suave_des.scenario.loader import LoadedScenario, Replacements, check_not_replaced, load_scenario
+from suave_des.scenario.loader import LoadedScenario, load_scenario
+from suave_des.simulation.functions import own_functions
 
 TIME_OUT_S = 120.0
 TIME_OUTS_S = {"owlready2": 1800.0}
@@ -25,20 +33,7 @@ def read_inputs(
     Raises:
         InputError: something cannot be used.
     """
-    replacements: Replacements = {
-        "ontologies": spec.ontologies,
-        "modes_file": spec.modes_file,
-        "reasoner": spec.reasoner,
-        "rules": spec.rules,
-        "disabled_rules": spec.disabled_rules,
-        "values": spec.values,
-        "manager_options": spec.manager_options,
-    }
-    if loaded is None:
-        loaded = load_scenario(spec.scenario if file is None else file.scenario, **replacements)
-    else:
-        check_not_replaced(loaded, replacements)
-    given = bool(spec.ontologies or spec.rules or spec.disabled_rules)
+    loaded = load_scenario(loaded or (spec.scenario if file is None else file.scenario), **spec.replacements)
     try:
         loaded, variation = vary(loaded, spec.sweep, spec.perturbations, spec.runs_per_draw, spec.seed)
     except InputError as error:
@@ -50,9 +45,79 @@ def read_inputs(
         ensemble, path, digest = read_ensemble(spec.ensemble, beside)
         variation = with_ensemble(loaded, variation, ensemble, path)
         files.note(path, digest)
-    inputs = {**check_knowledge(loaded, spec.managers, given=given), **files.inputs}
-    inputs |= check_managers(scenarios_of(loaded, variation), spec.managers)
+    given = bool(spec.ontologies or spec.rules or spec.disabled_rules)
+    inputs = {**files.inputs, **check_inputs(loaded, spec.managers, given=given, variation=variation)}
     return loaded, variation, inputs if file is None else {**inputs, **file.inputs}
+
+
+def check_inputs(
+    loaded: LoadedScenario, managers: Sequence[str], *, given: bool, variation: Variation | None = None
+) -> dict[str, str]:
+    """See that missions will not fail for what they read: functions, knowledge base, managers and their files.
+
+    The knowledge base is opened if a manager uses it or the user gave ontologies.
+
+    Args:
+        loaded: the scenario with its files.
+        managers: names, or module:Class.
+        given: whether the user gave ontologies or rules.
+        variation: of the campaign; None: nothing varies.
+
+    Returns:
+        SHA-256 of each input file, by its name as shown to the user, or its place among modules: also of ontologies
+        that are imported, if the knowledge base was opened, of the code of functions and managers of one's own, and of
+        files that managers declare.
+
+    Raises:
+        InputError: a function has no node; the knowledge base cannot be read, does not fit the mission or the modes
+            file, or is inconsistent; a manager refuses the scenario, or a file of it cannot be read.
+    """
+    found = own_modules((), own_functions(loaded))
+    files = Files()
+    if given or any(manager_class(name).needs_knowledge for name in managers):
+        from suave_des.knowledge.state import KnowledgeState
+        from suave_des.scenario_knowledge import open_knowledge
+
+        knowledge = open_knowledge(loaded)
+        knowledge.analyze_and_plan(KnowledgeState())
+        for assumption in knowledge.base.assumptions:
+            logging.getLogger("suave_des").warning("note: %s", assumption)
+        for path in knowledge.base.files:
+            files.ontology(path)
+    found |= _modules(managers)
+    for each in [loaded] if variation is None else scenarios_of(loaded, variation):
+        for manager in managers:
+            manager_class(manager).check(each)
+        found |= declared_files([each], managers)
+    return {**loaded.inputs, **files.inputs, **{name: _sha256(path) for name, path in found.items()}}
+
+
+def _modules(managers: Iterable[str]) -> Iterator[tuple[str, Path]]:
+    """Yield the files that managers are in: their modules, and what these import of the user's own."""
+    for manager in managers:
+        if is_built_in(manager) or takes_argument(manager):
+            continue
+        module = manager_class(manager).__module__
+        if module == "__main__":
+            continue
+        path = Path(getattr(sys.modules[module], "__file__", None) or "")
+        if path.is_file():
+            is_package = path.stem == "__init__"
+            yield f"{module.replace('.', '/')}{'/__init__' if is_package else ''}{path.suffix}", path
+        if path.suffix == ".py":
+            yield from own_modules([manager]).items()
+
+
+def _sha256(path: Path) -> str:
+    try:
+        if path.stat().st_size > _LIMIT_BYTES:
+            raise InputError("is too large", file=path, remedy=f"at most {_LIMIT_BYTES:,} bytes")
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(
+            f"cannot be read: {error.strerror}", file=path, remedy="check the name and the rights"
+        ) from None
 
 
 def default_time_out_s(loaded: LoadedScenario, variation: Variation) -> float:
@@ -60,3 +125,66 @@ def default_time_out_s(loaded: LoadedScenario, variation: Variation) -> float:
     sweep, name = variation.sweep, next((name for name, path in variation.paths.items() if path == _REASONER), None)
     swept = [] if name is None else [sweep.values(point)[name] for point in sweep.each_value()]
     return max(TIME_OUTS_S.get(str(each), TIME_OUT_S) for each in (loaded.scenario.knowledge.reasoner, *swept))
+
+
+_LIMIT_BYTES = 1_000_000_000
+
+
+def declared_files(scenarios: Iterable[LoadedScenario], managers: Sequence[str]) -> dict[str, Path]:
+    """Return where the files are that managers declare, by their names as given.
+
+    Raises:
+        InputError: one is not there.
+    """
+    return {
+        name: path
+        for loaded in scenarios
+        for manager in managers
+        for name, path in loaded.declared_files(manager, manager_class(manager))
+    }
+
+
+def scenarios_of(loaded: LoadedScenario, variation: Variation) -> Iterator[LoadedScenario]:
+    """Yield scenarios that have, between them, each value of the managers' settings that a sweep varies."""
+    if any(path.startswith("managers.") for path in variation.paths.values()):
+        yield from (variation.scenario(loaded, point) for point in sorted(set(variation.sweep.each_value())))
+    else:
+        yield loaded
+
+
+def trained_on(loaded: LoadedScenario, managers: Sequence[str], seed: int, runs: int) -> Iterator[str]:
+    """Yield a remark for each manager whose training had missions of the campaign: its results say little."""
+    for manager in managers:
+        name = loaded.manager_settings(manager).get("learned")
+        if name is not None:
+            learned = read_file(loaded.manager_file(manager, str(name)))
+            if (learned.scenario, learned.seed) == (loaded.scenario.name, seed):
+                seen = min(runs, learned.missions)
+                yield f"{manager}: runs 1 to {seen} are missions that it was trained on; give another --seed"
+
+
+def check_trusted(managers: Iterable[str], named: Iterable[str], folder: Path, *, confirmed: bool) -> None:
+    """See that the code of a received campaign's managers is meant to run here; nothing is imported before that.
+
+    What is imported already, as by a script that resumes a campaign with a manager of its own, runs in any case.
+
+    Args:
+        managers: those that the folder names.
+        named: those that the user has named himself.
+        folder: the campaign's.
+        confirmed: whether the user has said that the folder's managers may run.
+
+    Raises:
+        InputError: a manager is neither installed nor named nor confirmed.
+    """
+    unknown = [name for name in managers if not (is_installed(name) or name in set(named) or _is_imported(name))]
+    if unknown and not confirmed:
+        raise InputError(
+            f"the campaign would run the code of {', '.join(unknown)}, which this folder names",
+            file=folder,
+            remedy=f"if you trust it, name it: --managers {','.join(unknown)}; or give --yes",
+        )
+
+
+def _is_imported(name: str) -> bool:
+    return ":" in name and not takes_argument(name) and name.partition(":")[0] in sys.modules

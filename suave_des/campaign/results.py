@@ -14,8 +14,7 @@ from suave_des.campaign.knowledge_records import scenario_line
 from suave_des.campaign.missions import COLUMNS, Failure, Finished, Group, Row
 from suave_des.campaign.output import rounded
 from suave_des.campaign.progress import GroupProgress, PairProgress
-from suave_des.campaign.spec import CampaignSpec
-from suave_des.campaign.until_ci import FEWEST_PAIRS, FEWEST_RUNS, UntilCi, parse_until_ci
+from suave_des.campaign.spec import FEWEST_PAIRS, FEWEST_RUNS, CampaignSpec, UntilCi
 from suave_des.campaign.variation import Variation, cell_of
 from suave_des.estimates import estimate
 from suave_des.metrics.result import MissionMetrics
@@ -291,9 +290,8 @@ def _figures(values: Sequence[float]) -> Row:
 
 
 def _until_ci(result: CampaignResult) -> dict[str, Any] | None:
-    if result.spec.until_ci is None:
+    if (until := result.spec.until) is None:
         return None
-    until = parse_until_ci(result.spec.until_ci)
     return {
         "metric": until.metric,
         "half_width": until.half_width,

@@ -6,18 +6,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, fields
 from operator import attrgetter
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any
+from typing import Unpack
 
-from suave_des.campaign.given import ManagerLike, manager_name
+from suave_des.campaign.inputs import check_inputs
 from suave_des.campaign.knowledge_records import KNOWLEDGE_FILE, knowledge_text
-from suave_des.campaign.manager_inputs import check_managers
 from suave_des.campaign.missions import COLUMNS, further_of, row_of
 from suave_des.campaign.output import check_output_folder, csv_text, json_text, make_output_folder, write_files
-from suave_des.campaign.provenance import check_knowledge, provenance
+from suave_des.campaign.provenance import provenance
 from suave_des.campaign.spec import RUNS_LIMIT, check_range, check_seed
 from suave_des.metrics.result import Event, MissionResult, TrajectoryPoint
-from suave_des.scenario.loader import LoadedScenario, Replacements, check_not_replaced, load_scenario
+from suave_des.registry import ManagerLike, name_of
+from suave_des.scenario.loader import LoadedScenario, Replacements, load_scenario
 from suave_des.simulation.simulator import Simulator
 
 MISSION_FILE, EVENTS_FILE, TRAJECTORY_FILE = "mission.json", "events.csv", "trajectory.csv"
@@ -34,16 +33,10 @@ def run_mission(
     seed: int = 1,
     out: str | Path | None = None,
     *,
-    ontologies: Sequence[str | Path] = (),
-    modes_file: str | Path | None = None,
-    reasoner: str | None = None,
-    rules: Sequence[str | Path] = (),
-    disabled_rules: Sequence[str] = (),
-    values: Mapping[str, Any] = MappingProxyType({}),
-    manager_options: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
     overwrite: bool = False,
     command: Sequence[str] = (),
     on_time: Callable[[float, float], None] | None = None,
+    **replacements: Unpack[Replacements],
 ) -> MissionResult:
     """Run one mission and keep its events and trajectory: the one that a campaign with this seed has as this run.
 
@@ -58,9 +51,10 @@ def run_mission(
         seed: of everything that is random.
         out: folder for mission.json, events.csv, trajectory.csv and, of a manager that reasons,
             knowledge.jsonl; it is made if its parent exists. None: no files.
-        ontologies, modes_file, reasoner, rules, disabled_rules, values, manager_options: see CampaignSpec.
         overwrite, command: see CampaignSpec.
         on_time: called each second of mission time with it and the time limit, in s.
+        replacements: ontologies, modes_file, reasoner, rules, disabled_rules, values, manager_options, as of
+            load_scenario.
 
     Raises:
         InputError: something given cannot be used; nothing is written then.
@@ -71,22 +65,10 @@ def run_mission(
         check_output_folder(folder, "mission", overwrite=overwrite)
     check_range("run", run, 1, RUNS_LIMIT)
     check_seed(seed)
-    name = manager_name(manager)
-    replacements: Replacements = {
-        "ontologies": ontologies,
-        "modes_file": modes_file,
-        "reasoner": reasoner,
-        "rules": rules,
-        "disabled_rules": disabled_rules,
-        "values": values,
-        "manager_options": manager_options,
-    }
-    if isinstance(scenario, LoadedScenario):
-        check_not_replaced(loaded := scenario, replacements)
-    else:
-        loaded = load_scenario(scenario, **replacements)
-    inputs = check_knowledge(loaded, [name], given=bool(ontologies or rules or disabled_rules))
-    inputs |= check_managers([loaded], [name])
+    name = name_of(manager)
+    loaded = load_scenario(scenario, **replacements)
+    given = any(replacements.get(each) for each in ("ontologies", "rules", "disabled_rules"))
+    inputs = check_inputs(loaded, [name], given=given)
     result = Simulator(loaded).run(name, run, seed, record=True, on_time=on_time)
     if folder is not None:
         make_output_folder(folder)

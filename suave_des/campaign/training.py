@@ -7,9 +7,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Unpack
 
-from suave_des.campaign.manager_inputs import check_managers
+from suave_des.campaign.inputs import check_inputs
 from suave_des.campaign.output import check_output_file, write_files
-from suave_des.campaign.provenance import check_knowledge
 from suave_des.campaign.spec import RUNS_LIMIT, check_range, check_seed
 from suave_des.errors import InputError
 from suave_des.managing.learned import Learned, read_file
@@ -57,7 +56,7 @@ def train(
     check_range("missions", missions, 1, RUNS_LIMIT)
     check_seed(seed)
     loaded = load_scenario(scenario, **replacements)
-    inputs = check_knowledge(loaded, [manager], given=False) | check_managers([loaded], [manager])
+    inputs = check_inputs(loaded, [manager], given=False)
     learned: dict[str, Any] = {} if start is None else json.loads(json.dumps(read_file(Path(start)).learned))
     simulator = Simulator(loaded, training={manager: learned})
     for run in range(1, missions + 1):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from itertools import islice
@@ -27,6 +27,7 @@ METHODS = ("latin_hypercube", "sobol")
 SOBOL_DIMENSIONS = 21_201
 """Dimensions for which scipy has direction numbers of Sobol's sequence."""
 _FORMS = ("grid", "zip", "sample")
+_MOST_VALUES = 1_000_000
 _CHECKED_POINTS = 300
 """Of sweeps with more points, so many are checked before anything runs."""
 _DISTRIBUTION: TypeAdapter[Any] = TypeAdapter(Distribution)
@@ -116,6 +117,28 @@ class Sweep:
         low, high = np.array(list(self.sample.ranges.values())).T
         rows: list[list[float]] = (low + engine.random(self.sample.points) * (high - low)).tolist()
         return rows
+
+
+def plain(given: Any, name: str = "sweep") -> Any:
+    """Return what a caller gave for a sweep as a file would have it: arrays, ranges, series and the like as lists.
+
+    Example:
+        >>> plain({"thruster_events.0.time_s": range(20, 50, 10)})
+        {'thruster_events.0.time_s': [20, 30, 40]}
+
+    Raises:
+        InputError: a range is without end, or very long.
+    """
+    if isinstance(given, Mapping):
+        return {key: plain(each, f"{name}.{key}") for key, each in given.items()}
+    if hasattr(given, "tolist"):  # of numpy or pandas
+        return given.tolist()
+    if isinstance(given, str | bytes) or not isinstance(given, Iterable):
+        return given
+    values = list(islice(given, _MOST_VALUES + 1))
+    if len(values) > _MOST_VALUES:
+        raise InputError(f"{name} has more than {_MOST_VALUES:,} values", remedy="give fewer")
+    return [plain(each, name) for each in values]
 
 
 def cell_of(value: Any) -> str | int | float | bool | None:

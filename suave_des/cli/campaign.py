@@ -156,8 +156,8 @@ def campaign(
     elif scenario is None or out is None:
         missing = "SCENARIO" if scenario is None else "--out DIR"
         raise InputError(f"{missing} is missing", remedy="see suave-des campaign --help")
-    from suave_des.campaign.runner import resume_campaign, run
-    from suave_des.campaign.spec import CampaignSpec, managers_of
+    from suave_des.campaign.campaign import resume_campaign, run_campaign
+    from suave_des.campaign.spec import managers_of
     from suave_des.cli.console import output, progress
     from suave_des.cli.summary import print_differences, print_stops, print_summary
 
@@ -180,13 +180,14 @@ def campaign(
                 if new.manager_option
                 else files.replacements
             )
-            spec = CampaignSpec.of(
+            result = run_campaign(
                 scenario,
-                managers=names,
-                runs=runs,
-                seed=new.seed,
-                workers=workers,
-                out=out,
+                names,
+                runs,
+                new.seed,
+                workers,
+                out,
+                on_progress=show,
                 **options,
                 suave_format=Format.SUAVE in (new.format or ()),
                 parquet=Format.PARQUET in (new.format or ()),
@@ -199,7 +200,6 @@ def campaign(
                 command=command_line(),
                 scheduler=scheduler,
             )
-            result = run(spec, show)
     console = output()
     print_summary(console, result)
     print_stops(console, result)

@@ -12,7 +12,7 @@ from rich.table import Table
 from suave_des.campaign.display import estimated
 from suave_des.campaign.progress import GroupProgress
 from suave_des.campaign.results import METRIC_TITLES, METRICS, SUMMARY_COLUMNS
-from suave_des.campaign.until_ci import UntilCi, parse_until_ci
+from suave_des.campaign.spec import UntilCi
 from suave_des.campaign.variation import cell_of
 from suave_des.cli.console import number, plain_table, print_table
 
@@ -98,9 +98,8 @@ def _figures(cells: Mapping[str, object], metric: str) -> tuple[str, str]:
 
 def print_stops(console: Console, result: CampaignResult) -> None:
     """Print which managers were stopped early, and whose interval is still too wide."""
-    if result.spec.until_ci is None:
+    if (until := result.spec.until) is None:
         return
-    until = parse_until_ci(result.spec.until_ci)
     if until.pair is not None:
         _print_pairs(console, result, until)
         return

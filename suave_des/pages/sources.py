@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from suave_des.campaign.again import OpenedCampaign, opened_campaign
-from suave_des.campaign.provenance import check_knowledge
+from suave_des.campaign.inputs import check_inputs
 from suave_des.campaign.spec import RUNS_LIMIT, check_range, check_seed
 from suave_des.campaign.store import STORE_FILE
 from suave_des.errors import InputError
@@ -87,7 +87,7 @@ def missions_run(loaded: LoadedScenario, chosen: Chosen) -> list[Recorded]:
     _check_number(len(managers))
     check_range("run", chosen.run, 1, RUNS_LIMIT)
     check_seed(chosen.seed)
-    check_knowledge(loaded, managers, given=False)
+    check_inputs(loaded, managers, given=False)
     simulator = Simulator(loaded)
     return [recorded_result(loaded, simulator.run(each, chosen.run, chosen.seed, record=True)) for each in managers]
 

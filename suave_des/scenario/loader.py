@@ -136,7 +136,7 @@ class Replacements(TypedDict, total=False):
     manager_options: Mapping[str, Mapping[str, Any]]
 
 
-def load_scenario(name: str | Path, **replacements: Unpack[Replacements]) -> LoadedScenario:
+def load_scenario(name: str | Path | LoadedScenario, **replacements: Unpack[Replacements]) -> LoadedScenario:
     """Read and check a scenario and the files that it names.
 
     Files named inside a file are looked for beside it, then among the shipped ones.
@@ -144,7 +144,8 @@ def load_scenario(name: str | Path, **replacements: Unpack[Replacements]) -> Loa
         loaded = load_scenario("seams2023", reasoner="pellet")
 
     Args:
-        name: path of a scenario file, or name of a shipped one with or without ".yaml".
+        name: path of a scenario file, or name of a shipped one with or without ".yaml"; a loaded scenario comes back
+            as it is, and nothing may replace its files any more.
         replacements: ontologies, modes_file and reasoner to use in place of the scenario's; rules (files of rules as
             text) and disabled_rules (names of rules to switch off) besides the scenario's; values by key path and
             settings of managers over all that.
@@ -152,6 +153,11 @@ def load_scenario(name: str | Path, **replacements: Unpack[Replacements]) -> Loa
     Raises:
         InputError: a file that cannot be read, or a value that cannot be right, with file and line.
     """
+    if isinstance(name, LoadedScenario):
+        if given := [each for each, value in replacements.items() if value]:
+            problem = f"{given[0]}: the scenario {name.scenario.name} is loaded already, with its files"
+            raise InputError(problem, remedy=f"give {given[0]} to load_scenario")
+        return name
     reasoner = replacements.get("reasoner")
     if reasoner is not None and reasoner not in REASONERS:
         remedy = did_you_mean(reasoner, REASONERS)
@@ -159,18 +165,6 @@ def load_scenario(name: str | Path, **replacements: Unpack[Replacements]) -> Loa
     files = Files()
     path = find(name, "scenarios")
     return load_layer(files, scenario_layer(files, path), path, **replacements)
-
-
-def check_not_replaced(loaded: LoadedScenario, replacements: Replacements) -> None:
-    """See that nothing is to replace files of a scenario that is loaded already.
-
-    Raises:
-        InputError: something is.
-    """
-    for name, value in replacements.items():
-        if value:
-            problem = f"{name}: the scenario {loaded.scenario.name} is loaded already, with its files"
-            raise InputError(problem, remedy=f"give {name} to load_scenario")
 
 
 def load_layer(files: Files, layer: Layer, path: Path, **replacements: Unpack[Replacements]) -> LoadedScenario:

@@ -9,10 +9,11 @@ import pytest
 
 from suave_des import load_scenario, run_campaign, run_mission, with_values
 from suave_des.campaign.campaign import run_campaign as campaign_result
-from suave_des.campaign.given import manager_name, manager_names, plain_sweep
+from suave_des.campaign.variation import plain
 from suave_des.errors import InputError
 from suave_des.managing.metacontrol import Metacontrol
 from suave_des.managing.simple import NoManager
+from suave_des.registry import name_of
 
 FAILURE_S = "thruster_events.0.time_s"
 
@@ -22,15 +23,13 @@ class Mine(NoManager):
 
 
 def test_a_class_is_known_by_its_registered_name_or_by_its_place():
-    assert manager_names(Metacontrol) == ("metacontrol",)
-    assert manager_names(["bt", Mine]) == ("bt", f"{__name__}:Mine")
-    assert manager_names(None) is None
+    assert [name_of(each) for each in (Metacontrol, "bt", Mine)] == ["metacontrol", "bt", f"{__name__}:Mine"]
 
 
 @pytest.mark.parametrize("wrong", [int, 3, None], ids=str)
 def test_what_is_no_manager_is_refused(wrong):
     with pytest.raises(InputError, match="expected a manager"):
-        manager_name(wrong)
+        name_of(wrong)
 
 
 def test_a_class_inside_a_function_cannot_be_found_by_workers():
@@ -38,7 +37,7 @@ def test_a_class_inside_a_function_cannot_be_found_by_workers():
         """Cannot be imported."""
 
     with pytest.raises(InputError, match="top level of a module, script or notebook cell"):
-        manager_name(Inner)
+        name_of(Inner)
 
 
 @pytest.mark.parametrize(
@@ -55,17 +54,17 @@ def test_a_class_inside_a_function_cannot_be_found_by_workers():
     ids=lambda values: type(values).__name__,
 )
 def test_a_sweep_takes_what_has_values(values):
-    (given,) = plain_sweep({FAILURE_S: values}).values()
+    (given,) = plain({FAILURE_S: values}).values()
     assert given == [20, 40]
     assert {type(value) for value in given} <= {int, float}
 
 
 def test_arrays_in_the_forms_of_a_sweep_become_lists():
     design = np.array([[1.0, 2.0], [3.0, 4.0]])
-    zipped = plain_sweep({"zip": {"start.x_m": design[:, 0], "start.y_m": design[:, 1]}})
+    zipped = plain({"zip": {"start.x_m": design[:, 0], "start.y_m": design[:, 1]}})
     assert zipped == {"zip": {"start.x_m": [1.0, 3.0], "start.y_m": [2.0, 4.0]}}
     sample = {"method": "sobol", "points": np.int64(4), "ranges": {"start.x_m": np.array([1.0, 2.0])}}
-    assert plain_sweep({"sample": sample})["sample"] == {**sample, "points": 4, "ranges": {"start.x_m": [1.0, 2.0]}}
+    assert plain({"sample": sample})["sample"] == {**sample, "points": 4, "ranges": {"start.x_m": [1.0, 2.0]}}
 
 
 def test_a_loaded_scenario_runs_as_its_file_does():

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from suave_des.campaign import runner
+from suave_des.campaign import campaign
 from suave_des.campaign.campaign import resume_campaign, run_campaign
 from suave_des.campaign.output import write_files
 from suave_des.cli.main import main
@@ -140,7 +140,7 @@ class TestOverwrite:
             found.extend(path.name for path in received.iterdir())
             raise InputError("killed here")
 
-        monkeypatch.setattr(runner, "plan", killed)
+        monkeypatch.setattr(campaign, "plan", killed)
         with pytest.raises(InputError, match="killed here"):
             run_campaign("release15", ["bt"], 2, 1, out=received, overwrite=True)
         assert not {"runs.csv", "summary.csv", "manifest.json"} & set(found)

@@ -115,9 +115,9 @@ class TestInterruptedAtAnAwkwardMoment:
         "moment",
         [
             "suave_des.campaign.store.FileLock.acquire",
-            "suave_des.campaign.runner.make_store",
+            "suave_des.campaign.campaign.make_store",
             "suave_des.campaign.store.remove_store",
-            "suave_des.campaign.runner.Store.__init__",
+            "suave_des.campaign.campaign.Store.__init__",
             "suave_des.campaign.executors.InProcess.outcomes",
         ],
     )
@@ -169,7 +169,7 @@ class TestInterruptedAtAnAwkwardMoment:
     ) -> None:
         out = tmp_path / "out"
         with monkeypatch.context() as patch:
-            patch.setattr("suave_des.campaign.runner.write_results", ctrl_c)
+            patch.setattr("suave_des.campaign.campaign.write_results", ctrl_c)
             with pytest.raises(KeyboardInterrupt, match=r"nothing is lost: suave-des campaign --resume .* writes"):
                 run_campaign(scenario, ["none"], 2, 1, out=out)
         assert resume_campaign(out).done == 2

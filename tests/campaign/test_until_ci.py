@@ -16,7 +16,7 @@ from benchmarks import chaos
 from suave_des.campaign.campaign import CampaignInterrupted, Progress, resume_campaign, run_campaign
 from suave_des.campaign.missions import COLUMNS, Failure, Outcome
 from suave_des.campaign.progress import GroupTracker, OnProgress
-from suave_des.campaign.until_ci import FEWEST_RUNS, METRICS
+from suave_des.campaign.spec import FEWEST_RUNS, METRICS
 from suave_des.errors import InputError
 from suave_des.estimates import RunningMean, estimate
 from tests.helpers import AWKWARD

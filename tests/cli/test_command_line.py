@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from suave_des.campaign.until_ci import RUNS_LIMIT_DEFAULT
+from suave_des.campaign.spec import RUNS_LIMIT_DEFAULT
 from suave_des.cli.main import main
 from tests.helpers.command import suave_des_command
 

@@ -11,9 +11,9 @@ from doc_blocks import ROOT
 
 from suave_des import __version__
 from suave_des.campaign.missions import COLUMNS
+from suave_des.campaign.result_files import suave_pieces
 from suave_des.campaign.results import SUMMARY_COLUMNS
 from suave_des.campaign.single import EVENT_COLUMNS, TRAJECTORY_COLUMNS, run_mission
-from suave_des.campaign.suave_format import suave_pieces
 
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 CSV_PAGE = ROOT / "docs" / "reference" / "csv.md"
