@@ -7,29 +7,16 @@ import gc
 import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from itertools import chain
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
 from suave_des import __version__
-from suave_des.cli import (
-    bench,
-    calibrate,
-    campaign,
-    compare,
-    figure,
-    kb,
-    missions,
-    pages,
-    reproduce,
-    serve,
-    train,
-    tree,
-    validate,
-)
+from suave_des.cli import bench, calibrate, campaign, files, kb, missions, results, validate
 from suave_des.cli.options import remember_command_line
 from suave_des.cli.terminal import plain, write_what_the_terminal_has
 from suave_des.errors import InputError, SuaveDesError
@@ -39,13 +26,19 @@ BAD_INPUT, MISSIONS_MISSING = 2, 3
 """Exit statuses besides 0 and those of signals; 3: done, but failed missions have no row."""
 
 
-_GROUPS = (
-    ("Run missions", ("reproduce", "run", "campaign", "train", "serve")),
-    ("Look at results", ("compare", "figure", "report", "replay", "validate")),
-    ("Knowledge, rules and trees", ("kb", "tree")),
-    ("Files", ("import-config", "scenarios", "schema")),
-)
-"""Headings of the help and their commands; those of packages besides, and what is seldom needed, come last."""
+_Command = Callable[..., None] | typer.Typer
+_GROUPS: Mapping[str, tuple[_Command, ...]] = {
+    "Run missions": (campaign.reproduce, missions.run, campaign.campaign, missions.train, missions.serve),
+    "Look at results": (results.compare, results.figure, results.report, results.replay, validate.validate),
+    "Knowledge, rules and trees": (kb.app, files.tree),
+    "Files": (files.import_config, files.scenarios, files.schema),
+    "Other": (calibrate.calibrate, bench.bench),
+}
+"""Headings of the help, and their commands, each named as its function."""
+
+
+def _name(command: _Command) -> str:
+    return str(command.info.name) if isinstance(command, typer.Typer) else command.__name__.replace("_", "-")
 
 
 class _Commands(TyperGroup):
@@ -53,14 +46,11 @@ class _Commands(TyperGroup):
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the commands under headings, each with the whole first line of its help."""
-        names = self.list_commands(ctx)
-        known = [name for _, group in _GROUPS for name in group]
-        for heading, group in (*_GROUPS, ("Other", [name for name in names if name not in known])):
-            commands = [(name, self.get_command(ctx, name)) for name in group if name in names]
-            rows = [(name, command.get_short_help_str(limit=200)) for name, command in commands if command is not None]
-            if rows:
-                with formatter.section(heading):
-                    formatter.write_dl(rows)
+        for heading, group in _GROUPS.items():
+            with formatter.section(heading):
+                formatter.write_dl(
+                    [(_name(each), self.commands[_name(each)].get_short_help_str(200)) for each in group]
+                )
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command."""
@@ -95,23 +85,11 @@ app = typer.Typer(
     help="SUAVE, the self-adaptive underwater vehicle exemplar, as a repeatable discrete-event simulation.",
     epilog="Exit status: 0 done; 2 bad input; 3 done, but missions failed; 130 interrupted, 143 by kill.",
 )
-app.command("reproduce")(reproduce.reproduce)
-app.command("run")(missions.run)
-app.command("campaign")(campaign.campaign)
-app.command("validate")(validate.validate)
-app.command("calibrate")(calibrate.calibrate)
-app.add_typer(kb.app, name="kb")
-app.command("compare")(compare.compare)
-app.command("train")(train.train)
-app.command("serve")(serve.serve)
-app.command("figure")(figure.figure)
-app.command("report")(pages.report)
-app.command("replay")(pages.replay)
-app.command("import-config")(missions.import_config)
-app.command("bench")(bench.bench)
-app.command("scenarios")(missions.scenarios)
-app.command("schema")(missions.schema)
-app.command("tree")(tree.tree)
+for _command in chain.from_iterable(_GROUPS.values()):
+    if isinstance(_command, typer.Typer):
+        app.add_typer(_command)
+    else:
+        app.command(_name(_command))(_command)
 
 
 def _print_version(wanted: bool) -> None:

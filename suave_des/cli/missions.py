@@ -1,11 +1,9 @@
-"""suave-des run, figure, scenarios, schema and import-config: single missions, and the files that describe them."""
+"""suave-des run, train and serve: missions one by one, for oneself, for managers that learn, and for other programs."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -18,6 +16,9 @@ from suave_des.cli.options import (
     command_line,
     grouped_options,
 )
+
+if TYPE_CHECKING:
+    from suave_des.metrics.result import MissionMetrics
 
 
 @grouped_options
@@ -65,124 +66,72 @@ def run(
         console.print(f"\nmission.json, events.csv and trajectory.csv are in {out}", soft_wrap=True)
 
 
-def scenarios() -> None:
-    """List the shipped scenarios and other inputs."""
-    from suave_des.cli.console import output, plain_table, print_table
-    from suave_des.resources import shipped_folder
-    from suave_des.scenario.loader import load_scenario
-
-    folder = shipped_folder("scenarios")
-    table = plain_table(("name", "revision", "what it is"))
-    files = sorted(folder.glob("*.yaml"))
-    modes = [path for path in files if path.stem.endswith("_modes")]
-    campaigns = [path for path in files if path.stem.endswith("_campaign")]
-    for path in files:
-        if path not in (*modes, *campaigns):
-            scenario = load_scenario(path).scenario
-            table.add_row(path.stem, scenario.revision.name, scenario.description)
-    console = output()
-    print_table(console, "Scenarios", table)
-    ontologies = sorted(shipped_folder("ontology").glob("*.owl"))
-    console.print(f"\nCampaign files: {', '.join(path.name for path in campaigns)}", soft_wrap=True)
-    console.print(f"Modes files: {', '.join(path.name for path in modes)}", soft_wrap=True)
-    console.print(f"Ontologies: {', '.join(path.name for path in ontologies)}", soft_wrap=True)
-    console.print(f"They are in {folder.parent}: copy what you want to change.", soft_wrap=True)
-
-
-class SchemaOf(StrEnum):
-    """What a JSON Schema is printed of."""
-
-    SCENARIO = "scenario"
-    EXEC = "exec"
-
-
-def schema(
-    what: Annotated[
-        SchemaOf,
-        typer.Argument(metavar="WHAT", help="scenario: scenario files; exec: messages of managers exec:COMMAND."),
-    ] = SchemaOf.SCENARIO,
-) -> None:
-    """Print the JSON Schema of scenario files, or of messages.
-
-    Editors and other tools use it to complete and check scenarios, and the messages that programs of one's own exchange
-    with missions.
-    """
-    import json
-
-    if what is SchemaOf.EXEC:
-        from suave_des.interfaces.exec import messages_schema
-
-        found = messages_schema()
-    else:
-        from suave_des.scenario.schema import scenario_schema
-
-        found = scenario_schema()
-    print(json.dumps(found, indent=2))
-
-
-def import_config(
-    files: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="FILE...", help="Mission, campaign and System Modes files of the exemplar, in any order."
-        ),
-    ],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Scenario file to write.")],
-    campaign: Annotated[
-        Path | None,
-        typer.Option("--campaign", metavar="FILE", help="Campaign file to write, from a campaign configuration."),
-    ] = None,
-    base: Annotated[
-        str | None,
-        typer.Option(
-            "--base",
-            metavar="SCENARIO",
-            help="Scenario to build on; left out, the shipped one of the files' revision.",
-        ),
-    ] = None,
-    revision: Annotated[
-        str | None,
-        typer.Option(
-            "--revision", metavar="NAME", help="Revision of the exemplar that the files are of, if they fit several."
-        ),
-    ] = None,
-    runner_seed: Annotated[
-        int | None,
-        typer.Option(
-            "--runner-seed",
-            metavar="SEED",
-            help="Write what the exemplar's runner draws from this seed (its random_seed), in place of draws anew.",
-        ),
+@grouped_options
+def train(
+    manager: Annotated[str, typer.Argument(metavar="MODULE:CLASS", help="The manager.")],
+    missions: Annotated[int, typer.Option("--missions", help="How many missions: runs 1 to that, in order.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="File for what is learned.")],
+    scenario: Annotated[str, typer.Option("--scenario", metavar="SCENARIO", help="To be trained on.")] = "seams2023",
+    seed: Annotated[int, typer.Option("--seed", help="Seed; not that of the campaign that judges it.")] = 0,
+    start: Annotated[
+        Path | None, typer.Option("--from", metavar="FILE", help="File of an earlier training, to go on from.")
     ] = None,
     overwrite: Overwrite = False,
+    manager_option: ManagerOptions = None,
+    *,
+    files: Files,
 ) -> None:
-    """Import the exemplar's configuration files.
+    """Train a manager: missions in one process, in order, and a file at the end.
 
-    What has no counterpart is reported, a line each. Files of any revision are read, with or without leading slashes.
+    A campaign takes it with --manager-option learned=FILE; there nothing is learned any more.
     """
-    from suave_des.campaign.output import check_output_file, write_files
-    from suave_des.cli.terminal import plain
-    from suave_des.errors import InputError
-    from suave_des.registry import manager_names
-    from suave_des.scenario.exemplar import ImportOptions
-    from suave_des.scenario.exemplar import import_config as imported_from
+    from suave_des.campaign.training import blocks
+    from suave_des.campaign.training import train as trained
+    from suave_des.cli.console import output, plain_table, print_table
 
-    targets = [out] if campaign is None else [out, campaign]
-    if campaign is not None and campaign.resolve() == out.resolve():
-        raise InputError("scenario and campaign cannot be one file", file=out, remedy="give --campaign another name")
-    for target in targets:
-        if target.resolve() in [file.resolve() for file in files]:
-            raise InputError("is one of the files to import", file=target, remedy="give the output another name")
-        check_output_file(target, overwrite=overwrite)
-    options = ImportOptions(base, revision, campaign, runner_seed, manager_names())
-    imported = imported_from(files, out, options)
-    written: dict[Path, dict[str, str | bytes | Iterable[str]]] = {}
-    for target, text in zip(targets, filter(None, (imported.scenario, imported.campaign)), strict=True):
-        written.setdefault(target.parent, {})[target.name] = text
-    for folder, contents in written.items():
-        write_files(folder, contents)
-    for note in imported.notes:
-        print(plain(note))
-    print(f"{out} is written, over the base {imported.base}: {imported.why}")
-    if campaign is not None:
-        print(f"{campaign} is written")
+    times_s: list[float] = []
+    distances_m: list[float] = []
+
+    def note(metrics: MissionMetrics) -> None:
+        times_s.append(metrics.search_time_s)
+        distances_m.append(metrics.distance_inspected_m)
+
+    options = files.with_options(manager_option, [manager])
+    trained(scenario, manager, missions, out, seed=seed, start=start, overwrite=overwrite, on_mission=note, **options)
+    table = plain_table(("missions", "search time, s", "distance, m"), right=("search time, s", "distance, m"))
+    for (first, last, time_s), (_, _, distance_m) in zip(blocks(times_s), blocks(distances_m), strict=True):
+        table.add_row(f"{first} to {last}", f"{time_s:.2f}", f"{distance_m:.2f}")
+    console = output()
+    print_table(console, f"{manager} on {scenario}, means", table)
+    console.print(f"what it has learned is in {out}", soft_wrap=True)
+
+
+@grouped_options
+def serve(
+    scenario: Scenario,
+    host: Annotated[str, typer.Option("--host", help="Address to listen at; the default is this machine alone.")] = (
+        "127.0.0.1"
+    ),
+    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port to listen at; 0 for any.")] = 3000,
+    run_number: Annotated[int, typer.Option("--run", metavar="K", help="Run of the first mission.")] = 1,
+    seed: Seed = 1,
+    real_time_factor: Annotated[
+        float,
+        typer.Option(
+            "--real-time-factor",
+            metavar="X",
+            help="Mission time per second; 0: it passes only when a client says so.",
+        ),
+    ] = 0.0,
+    *,
+    files: Files,
+) -> None:
+    """Serve a mission over HTTP, as UPISAS expects it of an exemplar."""
+    from suave_des.interfaces.serve import Server, Session
+    from suave_des.scenario.loader import load_scenario
+    from suave_des.simulation.simulator import Simulator
+
+    session = Session(Simulator(load_scenario(scenario, **files.replacements)), run_number, seed, real_time_factor)
+    with Server(session, host, port) as server:
+        print(f"http://{host}:{server.server_port}/monitor; Ctrl-C ends it", flush=True)
+        server.serve_forever(poll_interval=0.1)

@@ -1,0 +1,154 @@
+"""suave-des import-config, scenarios, schema and tree: files that describe missions, and what they lead to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from suave_des.cli.options import Overwrite
+from suave_des.errors import InputError
+
+
+def scenarios() -> None:
+    """List the shipped scenarios and other inputs."""
+    from suave_des.cli.console import output, plain_table, print_table
+    from suave_des.resources import shipped_folder
+    from suave_des.scenario.loader import load_scenario
+
+    folder = shipped_folder("scenarios")
+    table = plain_table(("name", "revision", "what it is"))
+    files = sorted(folder.glob("*.yaml"))
+    modes = [path for path in files if path.stem.endswith("_modes")]
+    campaigns = [path for path in files if path.stem.endswith("_campaign")]
+    for path in files:
+        if path not in (*modes, *campaigns):
+            scenario = load_scenario(path).scenario
+            table.add_row(path.stem, scenario.revision.name, scenario.description)
+    console = output()
+    print_table(console, "Scenarios", table)
+    ontologies = sorted(shipped_folder("ontology").glob("*.owl"))
+    console.print(f"\nCampaign files: {', '.join(path.name for path in campaigns)}", soft_wrap=True)
+    console.print(f"Modes files: {', '.join(path.name for path in modes)}", soft_wrap=True)
+    console.print(f"Ontologies: {', '.join(path.name for path in ontologies)}", soft_wrap=True)
+    console.print(f"They are in {folder.parent}: copy what you want to change.", soft_wrap=True)
+
+
+class SchemaOf(StrEnum):
+    """What a JSON Schema is printed of."""
+
+    SCENARIO = "scenario"
+    EXEC = "exec"
+
+
+def schema(
+    what: Annotated[
+        SchemaOf,
+        typer.Argument(metavar="WHAT", help="scenario: scenario files; exec: messages of managers exec:COMMAND."),
+    ] = SchemaOf.SCENARIO,
+) -> None:
+    """Print the JSON Schema of scenario files, or of messages.
+
+    Editors and other tools use it to complete and check scenarios, and the messages that programs of one's own exchange
+    with missions.
+    """
+    import json
+
+    if what is SchemaOf.EXEC:
+        from suave_des.interfaces.exec import messages_schema
+
+        found = messages_schema()
+    else:
+        from suave_des.scenario.schema import scenario_schema
+
+        found = scenario_schema()
+    print(json.dumps(found, indent=2))
+
+
+def import_config(
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE...", help="Mission, campaign and System Modes files of the exemplar, in any order."
+        ),
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Scenario file to write.")],
+    campaign: Annotated[
+        Path | None,
+        typer.Option("--campaign", metavar="FILE", help="Campaign file to write, from a campaign configuration."),
+    ] = None,
+    base: Annotated[
+        str | None,
+        typer.Option(
+            "--base",
+            metavar="SCENARIO",
+            help="Scenario to build on; left out, the shipped one of the files' revision.",
+        ),
+    ] = None,
+    revision: Annotated[
+        str | None,
+        typer.Option(
+            "--revision", metavar="NAME", help="Revision of the exemplar that the files are of, if they fit several."
+        ),
+    ] = None,
+    runner_seed: Annotated[
+        int | None,
+        typer.Option(
+            "--runner-seed",
+            metavar="SEED",
+            help="Write what the exemplar's runner draws from this seed (its random_seed), in place of draws anew.",
+        ),
+    ] = None,
+    overwrite: Overwrite = False,
+) -> None:
+    """Import the exemplar's configuration files.
+
+    What has no counterpart is reported, a line each. Files of any revision are read, with or without leading slashes.
+    """
+    from suave_des.campaign.output import check_output_file, write_files
+    from suave_des.cli.terminal import plain
+    from suave_des.errors import InputError
+    from suave_des.registry import manager_names
+    from suave_des.scenario.exemplar import ImportOptions
+    from suave_des.scenario.exemplar import import_config as imported_from
+
+    targets = [out] if campaign is None else [out, campaign]
+    if campaign is not None and campaign.resolve() == out.resolve():
+        raise InputError("scenario and campaign cannot be one file", file=out, remedy="give --campaign another name")
+    for target in targets:
+        if target.resolve() in [file.resolve() for file in files]:
+            raise InputError("is one of the files to import", file=target, remedy="give the output another name")
+        check_output_file(target, overwrite=overwrite)
+    options = ImportOptions(base, revision, campaign, runner_seed, manager_names())
+    imported = imported_from(files, out, options)
+    written: dict[Path, dict[str, str | bytes | Iterable[str]]] = {}
+    for target, text in zip(targets, filter(None, (imported.scenario, imported.campaign)), strict=True):
+        written.setdefault(target.parent, {})[target.name] = text
+    for folder, contents in written.items():
+        write_files(folder, contents)
+    for note in imported.notes:
+        print(plain(note))
+    print(f"{out} is written, over the base {imported.base}: {imported.why}")
+    if campaign is not None:
+        print(f"{campaign} is written")
+
+
+def tree(
+    manager: Annotated[str, typer.Argument(metavar="MANAGER", help="bt, bt_extended, or module:Class with a tree.")],
+    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="Scenario whose settings the tree has.")] = (
+        "release15"
+    ),
+) -> None:
+    """Draw the behaviour tree of a manager."""
+    from suave_des.scenario.loader import load_scenario
+    from suave_des.simulation.simulator import Simulator
+
+    drawn = getattr(Simulator(load_scenario(scenario)).start(manager, 1, 1).manager, "drawing", None)
+    if drawn is None:
+        raise InputError(
+            f"manager {manager!r} has no tree", remedy="bt and bt_extended have, and those that have drawing()"
+        )
+    print(drawn())

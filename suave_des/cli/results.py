@@ -1,0 +1,279 @@
+"""suave-des compare, figure, replay and report: results as tables, pictures, and pages for a browser."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from suave_des.cli.options import Files, Results, SeedIfNew, check_no_use, comma_separated, grouped_options
+from suave_des.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from suave_des.report.mission_record import MissionRecord
+
+_TEXT_WIDTH = 95
+
+
+class Format(StrEnum):
+    """How a comparison is printed."""
+
+    TABLE = "table"
+    CSV = "csv"
+    JSON = "json"
+    MARKDOWN = "markdown"
+    LATEX = "latex"
+
+
+def compare(
+    results: Results,
+    managers: Annotated[
+        str | None,
+        typer.Option("--managers", metavar="NAME,...", help="Only these, in this order.", show_default="all"),
+    ] = None,
+    against: Annotated[
+        str | None,
+        typer.Option(
+            "--against", metavar="NAME", help="Compare all others with this one only.", show_default="each with each"
+        ),
+    ] = None,
+    metrics: Annotated[
+        str | None,
+        typer.Option(
+            "--metrics",
+            metavar="COLUMN,...",
+            help="Columns of runs.csv.",
+            show_default="search time, distance, found, reaction time",
+        ),
+    ] = None,
+    by: Annotated[
+        str | None,
+        typer.Option("--by", metavar="KEY,...", help="Compare the values of these swept parameters, too."),
+    ] = None,
+    half_width: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--half-width",
+            metavar="METRIC:VALUE",
+            help="Give the runs needed for an interval this narrow; repeat it for several.",
+        ),
+    ] = None,
+    unpaired: Annotated[
+        bool, typer.Option("--unpaired", help="Take runs as independent though they share random numbers.")
+    ] = False,
+    as_format: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TABLE,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="Write .csv, .json, .md or .tex instead of printing.")
+    ] = None,
+) -> None:
+    """Compare managers by their results.
+
+    Runs that share their random numbers are compared in pairs, which takes fewer missions.
+    """
+    from suave_des.cli.console import output
+    from suave_des.report.compare import Choices, compare_folders
+    from suave_des.report.compare_files import ENDINGS, WRITERS, plain_text
+
+    if out is not None:
+        _check_out(out, ENDINGS)
+    choices = Choices(
+        managers=comma_separated(managers),
+        metrics=comma_separated(metrics),
+        by=comma_separated(by),
+        against=against,
+        half_widths=tuple(half_width or ()),
+        unpaired=unpaired,
+    )
+    comparison = compare_folders(results, choices)
+    if out is not None:
+        from suave_des.campaign.output import write_files
+
+        write_files(out.parent, {out.name: WRITERS[ENDINGS[out.suffix.lower()]](comparison)})
+        print(f"compared in {out}")
+    elif as_format is Format.TABLE:
+        print(plain_text(comparison, min(output().width, _TEXT_WIDTH)), end="")
+    else:
+        print(WRITERS[as_format.value](comparison), end="")
+
+
+def _check_out(out: Path, endings: Iterable[str]) -> None:
+    from suave_des.campaign.output import check_output_file
+    from suave_des.errors import InputError
+
+    if out.suffix.lower() not in endings:
+        problem = f"expected a table, got {out.suffix or 'a file without an ending'}"
+        raise InputError(problem, file=out, remedy=f"one of {', '.join(endings)}")
+    check_output_file(out, overwrite=True)
+
+
+class Kind(StrEnum):
+    """What is drawn; as in report.figures, which is not imported for --help."""
+
+    AUTO = "auto"
+    MAP = "map"
+    TIMELINE = "timeline"
+    DISTRIBUTIONS = "distributions"
+    RAINCLOUD = "raincloud"
+    DETECTIONS = "detections"
+    CONVERGENCE = "convergence"
+    REACTIONS = "reactions"
+    SWEEP = "sweep"
+    PATHS = "paths"
+
+
+def figure(
+    folders: Annotated[
+        list[Path], typer.Argument(metavar="DIR...", help="Output folders of run, campaign or reproduce, or CSV files.")
+    ],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Picture to write: .png, .pdf or .svg.")],
+    kind: Annotated[
+        Kind,
+        typer.Option(
+            "--kind",
+            help="Of a mission: map, timeline; of several: paths; of a campaign: distributions, raincloud, detections,"
+            " convergence, reactions; of a sweep: sweep.",
+        ),
+    ] = Kind.AUTO,
+    parameters: Annotated[
+        str | None,
+        typer.Option("--parameters", metavar="KEY,...", help="Of a sweep: draw these.", show_default="all"),
+    ] = None,
+) -> None:
+    """Draw a mission's map or a campaign's results.
+
+    Left to itself it draws what is in DIR: the map of a mission, the paths of several, a campaign's distributions, or
+    the means of a sweep.
+    """
+    from suave_des.report.figures import draw_results
+
+    draw_results(folders, out, kind.value, comma_separated(parameters), _with_rules if kind is Kind.TIMELINE else None)
+    print(f"drawn in {out}")
+
+
+def _with_rules(folder: Path, record: MissionRecord) -> MissionRecord:
+    from dataclasses import replace
+
+    from suave_des.pages.adaptation_rules import adaptation_rules
+
+    return replace(record, rules=adaptation_rules(folder, record))
+
+
+_SEED, _RUN, _POINT = 1, 1, 0
+_PATHS, _MOST_PATHS = 12, 100
+"""Defaults as in suave_des.pages, which is not imported for --help."""
+Open = Annotated[bool, typer.Option("--open", help="Show the page in the browser.")]
+
+
+@grouped_options
+def replay(
+    folders: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="[DIR]...",
+            help="Output folder of run or campaign; two of run are shown side by side.",
+            show_default=False,
+        ),
+    ] = None,
+    scenario: Annotated[
+        str | None,
+        typer.Option("--scenario", metavar="SCENARIO", help="In place of DIR: run missions of this scenario."),
+    ] = None,
+    managers: Annotated[
+        str | None,
+        typer.Option(
+            "--managers",
+            metavar="NAME,...",
+            help="One or two managing subsystems, on the same random numbers.",
+            show_default="metacontrol; of a campaign the last and the first",
+        ),
+    ] = None,
+    run_number: Annotated[
+        int | None,
+        typer.Option("--run", metavar="K", help="Run of the campaign, or with this seed.", show_default=str(_RUN)),
+    ] = None,
+    seed: SeedIfNew = None,
+    point: Annotated[
+        int | None,
+        typer.Option("--point", metavar="N", help="Point of the campaign's sweep.", show_default=str(_POINT)),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="FILE", help="Page to write.", show_default="replay.html, in DIR or the current folder"
+        ),
+    ] = None,
+    show: Open = False,
+    *,
+    files: Files,
+) -> None:
+    """Make a page that plays a mission, or two side by side.
+
+    It needs no network, and shows the vehicle, what its camera sees, and what its manager knew, inferred and decided.
+    """
+    from suave_des.pages.page import check_page_file, write_page
+    from suave_des.pages.replay import replay_page
+    from suave_des.pages.sources import Chosen, missions_in, missions_run
+    from suave_des.scenario.loader import load_scenario
+
+    folders = folders or []
+    if bool(folders) == (scenario is not None):
+        problem = "both DIR and --scenario are given" if folders else "nothing to play is given"
+        raise InputError(problem, remedy="give DIR, the --out folder of run or campaign, or --scenario NAME")
+    if folders:
+        check_no_use({"--seed": seed, **files.given}, "with DIR, whose missions have their own")
+    else:
+        check_no_use({"--point": point}, "without a campaign's folder")
+    page_file = out or (folders[0] if folders else Path()) / "replay.html"
+    chosen = Chosen(
+        comma_separated(managers),
+        run=_RUN if run_number is None else run_number,
+        seed=_SEED if seed is None else seed,
+        point=point or _POINT,
+    )
+    if out is not None or not folders:
+        check_page_file(page_file)
+    if scenario is not None:
+        missions = missions_run(load_scenario(scenario, **files.replacements), chosen)
+    else:
+        missions = missions_in(folders, chosen)
+    write_page(page_file, replay_page(missions), show=show)
+    print(f"{' and '.join(each.name for each in missions)}: {page_file}")
+
+
+def report(
+    results: Results,
+    paths: Annotated[
+        int | None,
+        typer.Option(
+            "--paths",
+            metavar="N",
+            help="Runs of each manager whose way and timeline are in the page; 0: none.",
+            show_default=str(_PATHS),
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="Page to write.", show_default="report.html, in the first DIR"),
+    ] = None,
+    show: Open = False,
+) -> None:
+    """Make a page about a campaign: what follows from it, its tables, charts to explore, and how it was made.
+
+    It is one file that needs no network.
+    """
+    from suave_des.pages.page import check_page_file, write_page
+    from suave_des.pages.report import report_page
+
+    runs = _PATHS if paths is None else paths
+    if not 0 <= runs <= _MOST_PATHS:
+        raise InputError(f"--paths: {runs} is out of range", remedy=f"give 0 to {_MOST_PATHS}")
+    first = results[0]
+    page_file = out or (first if first.is_dir() else first.parent) / "report.html"
+    if out is not None:
+        check_page_file(page_file)
+    write_page(page_file, report_page(results, runs), show=show)
+    print(f"the report is {page_file}")
