@@ -12,7 +12,8 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -25,7 +26,6 @@ from suave_des.errors import InputError, SuaveDesError
 
 if TYPE_CHECKING:
     from suave_des.campaign.mission_runner import MissionRunner
-    from suave_des.scenario.loader import LoadedScenario
 
 EXIT_AFTER_S = 30.0
 """A mission that is so much over its time, in code that cannot be interrupted, ends its worker."""
@@ -50,18 +50,14 @@ class Parcel:
     """A job and the content of every file that it needs.
 
     Attributes:
-        job: the job, with the paths that the user's files have there.
-        ontologies: names and contents of ontologies, imported ones included.
-        rules: names and contents of files of rules.
-        manager_files: names and contents of the files that managers declare.
+        job: the job, with the paths that the user's files have there; its ontologies are all, imported ones included.
+        files: contents of ontologies, files of rules, and files that managers declare, by these paths.
         modules: Python files of managers and functions, by their path below the folder of modules.
         manager_code: SHA-256 of each manager's module.
     """
 
     job: JobSpec
-    ontologies: tuple[tuple[str, bytes], ...]
-    rules: tuple[tuple[str, bytes], ...]
-    manager_files: tuple[tuple[str, bytes], ...]
+    files: Mapping[str, bytes]
     modules: Mapping[str, bytes]
     manager_code: Mapping[str, str]
 
@@ -74,27 +70,20 @@ def pack(job: JobSpec) -> Parcel:
     """
     from suave_des.campaign.inputs import declared_files, scenarios_of
     from suave_des.campaign.own_modules import own_modules
+    from suave_des.knowledge.ontology_file import collect
     from suave_des.simulation.functions import own_functions
 
+    ontologies, rules = job.loaded.ontologies, job.loaded.rules
+    with suppress(InputError):  # reported by the managers that reason with it, if there are any
+        ontologies = tuple(sorted(source.path for source in collect(ontologies)))
     declared = declared_files(scenarios_of(job.loaded, job.variation), job.managers)
     modules = own_modules(job.managers, own_functions(job.loaded))
     return Parcel(
-        job,
-        ontologies=tuple((str(path), path.read_bytes()) for path in _with_imports(job.loaded)),
-        rules=tuple((str(path), path.read_bytes()) for path in job.loaded.rules),
-        manager_files=tuple((name, path.read_bytes()) for name, path in declared.items()),
+        replace(job, loaded=replace(job.loaded, ontologies=ontologies, manager_files=declared)),
+        files={str(path): path.read_bytes() for path in (*ontologies, *rules, *declared.values())},
         modules={place: path.read_bytes() for place, path in modules.items()},
         manager_code={name: manager_code(name) for name in job.managers},
     )
-
-
-def _with_imports(loaded: LoadedScenario) -> list[Path]:
-    from suave_des.knowledge.ontology_file import collect
-
-    try:
-        return sorted(source.path for source in collect(loaded.ontologies))
-    except InputError:  # reported by the managers that reason with it, if there are any
-        return list(loaded.ontologies)
 
 
 class Unpacked:
@@ -114,27 +103,28 @@ class Unpacked:
     def __init__(self, parcel: Parcel, folder: Path) -> None:
         self.folder = Path(os.path.realpath(folder))
         self.modules, self.manager_code = frozenset(parcel.modules), parcel.manager_code
-        self._names: dict[str, str] = {}
         for place, content in parcel.modules.items():
-            path = self.folder / _MODULES / place
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content)
-        ontologies, rules = self._written(parcel.ontologies), self._written(parcel.rules)
-        names = [name for name, _ in parcel.manager_files]
-        files = dict(zip(names, self._written(parcel.manager_files), strict=True))
-        loaded = replace(parcel.job.loaded, ontologies=ontologies, rules=rules, manager_files=files)
+            self._write(self.folder / _MODULES / place, content)
+        # Each file is in a folder of its own: it keeps its name, which counts, and is beside no other.
+        here = {
+            known: self._write(self.folder / f"{number:06}" / Path(known).name, content)
+            for number, (known, content) in enumerate(parcel.files.items())
+        }
+        self._names = {str(path): known for known, path in here.items()}
+        loaded = parcel.job.loaded
+        loaded = replace(
+            loaded,
+            ontologies=tuple(here[str(path)] for path in loaded.ontologies),
+            rules=tuple(here[str(path)] for path in loaded.rules),
+            manager_files={name: here[str(path)] for name, path in loaded.manager_files.items()},
+        )
         self.job = replace(parcel.job, loaded=loaded)
 
-    def _written(self, files: Iterable[tuple[str, bytes]]) -> tuple[Path, ...]:
-        """Write each file into a folder of its own: it keeps its name, which counts, and is beside no other."""
-        paths = []
-        for known, content in files:
-            path = self.folder / f"{len(self._names):06}" / Path(known).name
-            path.parent.mkdir(parents=True)
-            path.write_bytes(content)
-            self._names[str(path)] = known
-            paths.append(path)
-        return tuple(paths)
+    @staticmethod
+    def _write(path: Path, content: bytes) -> Path:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+        return path
 
     def with_known_names(self, finished: Finished) -> Finished:
         """Return an outcome that names the user's own files."""

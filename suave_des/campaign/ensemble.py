@@ -139,10 +139,7 @@ def with_ensemble(loaded: LoadedScenario, variation: Variation, ensemble: Ensemb
     """
     varied = {*variation.drawn, *variation.paths.values()}
     for name in ensemble.paths:
-        both = next(
-            (other for other in varied if f"{other}.".startswith(f"{name}.") or name.startswith(f"{other}.")), None
-        )
-        if both is not None:
+        if any(_overlap(name, other) for other in varied):
             problem = f"varies {name}, as the campaign's sweep or perturbations do"
             raise InputError(problem, file=path, remedy="vary each key once")
         try:

@@ -153,17 +153,17 @@ class GroupTracker:
         runs: planned.
         metric: column whose mean is followed.
         half_width: the group is over as soon as the interval's half-width is below this; None: after all runs.
-        can_end_earlier: whether end_at may be called, for which all values are kept.
+        can_end_earlier: whether ended_at may be called, for which all values are kept.
     """
 
     __slots__ = (
-        *("_half_width", "_history", "_index", "_next", "_waiting"),
+        *("_half_width", "_index", "_metric", "_next", "_values", "_waiting"),
         *("done", "failed", "is_narrow", "runs", "values"),
     )
 
     def __init__(self, runs: int, metric: str, half_width: float | None, *, can_end_earlier: bool = False) -> None:
-        self._history: list[object] | None = [] if can_end_earlier else None
-        self._index = COLUMNS.index(metric)
+        self._values: dict[int, object] | None = {} if can_end_earlier else None
+        self._metric, self._index = metric, COLUMNS.index(metric)
         self._half_width = half_width
         self._next = 1
         self._waiting: dict[int, object] = {}
@@ -174,16 +174,20 @@ class GroupTracker:
 
     def add(self, run: int, outcome: Outcome) -> None:
         """Count an outcome, unless its run is counted already or lies beyond the last one."""
+        self._add(run, outcome if isinstance(outcome, Failure) else outcome[self._index])
+
+    def _add(self, run: int, found: object) -> None:
+        """Count a value of the metric, or a failure."""
         if run > self.runs or run < self._next or run in self._waiting:
             return
         self.done += 1
-        self.failed += isinstance(outcome, Failure)
-        self._waiting[run] = outcome if isinstance(outcome, Failure) else outcome[self._index]
+        self.failed += isinstance(found, Failure)
+        self._waiting[run] = found
+        if self._values is not None:
+            self._values[run] = found
         while self._next in self._waiting:
             value = self._waiting.pop(self._next)
             self._next += 1
-            if self._history is not None:
-                self._history.append(value)
             if isinstance(value, float | int) and self._is_narrow_with(value):
                 # The run before the next one is the last; what is known of later ones does not count.
                 self.is_narrow = True
@@ -191,20 +195,14 @@ class GroupTracker:
                 self.failed -= sum(isinstance(outcome, Failure) for outcome in self._waiting.values())
                 self._waiting.clear()
 
-    def end_at(self, run: int) -> None:
-        """Count the runs up to one that may be over already, and no others."""
-        assert self._history is not None
-        del self._history[run:]
-        self._waiting = {number: value for number, value in self._waiting.items() if number <= run}
-        self.runs, self.is_narrow = run, True
-        self._next = len(self._history) + 1
-        self.done = len(self._history) + len(self._waiting)
-        counted = (*self._history, *self._waiting.values())
-        self.failed = sum(isinstance(value, Failure) for value in counted)
-        self.values = RunningMean()
-        for value in self._history:
-            if isinstance(value, float | int):
-                self.values.add(value)
+    def ended_at(self, run: int) -> GroupTracker:
+        """Return a tracker that has the runs up to one that may be over already, and no others."""
+        assert self._values is not None
+        ended = GroupTracker(run, self._metric, None)
+        for number, found in self._values.items():
+            ended._add(number, found)
+        ended.is_narrow = True
+        return ended
 
     def _is_narrow_with(self, value: float) -> bool:
         self.values.add(value)
@@ -257,11 +255,9 @@ class ProgressTracker:
                 if group in self._complete:
                     continue
                 tracker = self._under_way[group] = self._new()
-            done, failed, runs = tracker.done, tracker.failed, tracker.runs
+            self._count(tracker, -1)
             tracker.add(key.run, outcome)
-            self.done += tracker.done - done
-            self.failed += tracker.failed - failed
-            self.total += tracker.runs - runs
+            self._count(tracker)
             if self._sides:
                 self._follow_pair(key.point, key.manager, key.run, outcome)
             elif tracker.done == tracker.runs:
@@ -283,14 +279,16 @@ class ProgressTracker:
             return
         self._last_runs[point] = last
         for group in ((point, number) for number in range(len(self._managers))):
-            tracker = self._under_way.setdefault(group, self._new())
-            self.done -= tracker.done
-            self.failed -= tracker.failed
-            self.total -= tracker.runs
-            tracker.end_at(last)
-            self.done += tracker.done
-            self.failed += tracker.failed
-            self.total += tracker.runs
+            tracker = self._under_way.get(group) or self._new()
+            self._count(tracker, -1)
+            self._under_way[group] = tracker.ended_at(last)
+            self._count(self._under_way[group])
+
+    def _count(self, tracker: GroupTracker, sign: int = 1) -> None:
+        """Add what a group has to the whole campaign's figures; with -1 take it from them."""
+        self.done += sign * tracker.done
+        self.failed += sign * tracker.failed
+        self.total += sign * tracker.runs
 
     @property
     def needs_pairs(self) -> bool:
@@ -307,11 +305,8 @@ class ProgressTracker:
         self._before = self.done
 
     def _new(self) -> GroupTracker:
-        if self._until is None:
-            return GroupTracker(self._runs, self._metric, None)
-        if self._sides:
-            return GroupTracker(self._runs, self._metric, None, can_end_earlier=True)
-        return GroupTracker(self._runs, self._metric, self._until.half_width)
+        half_width = None if self._until is None or self._sides else self._until.half_width
+        return GroupTracker(self._runs, self._metric, half_width, can_end_earlier=bool(self._sides))
 
     @property
     def _metric(self) -> str:

@@ -95,7 +95,10 @@ def test_files_that_managers_declare_travel_with_their_names(tmp_path: Path, mon
 
 
 def test_errors_name_the_user_s_files(tmp_path: Path) -> None:
-    parcel = Parcel(job("none"), (("own/suave.owl", b"<"), ("tomasys.owl", b"<")), (("r.swrl", b""),), (), {}, {})
+    files = [Path(name) for name in ("own/suave.owl", "tomasys.owl", "r.swrl")]
+    own = job("none")
+    own = replace(own, loaded=replace(own.loaded, ontologies=tuple(files[:2]), rules=tuple(files[2:])))
+    parcel = Parcel(own, {str(path): b"<" for path in files}, {}, {})
     unpacked = Unpacked(parcel, tmp_path)
     suave, tomasys = unpacked.job.loaded.ontologies
     assert [path.name for path in (suave, tomasys, *unpacked.job.loaded.rules)] == [
