@@ -346,17 +346,9 @@ class _Campaign:
         if not is_whole:  # it may have been interrupted while it counted
             tracker = self._new_tracker()
             tracker.add(outcomes())
-        result = gather(
-            self.spec,
-            self.loaded,
-            self.variation,
-            lambda: tracker.counted(outcomes()),
-            planned=tracker.total,
-            stops=tracker.stops(),
-            pairs=tracker.pairs(),
-        )
         seen = trained_on(self.loaded, self.spec.managers, self.spec.seed, self.spec.runs)
-        result = replace(result, remarks=(*map(str, self.remarks), *seen))
+        remarks = (*map(str, self.remarks), *seen)
+        result = gather(self.spec, self.loaded, self.variation, outcomes, tracker, remarks)
         if self.spec.out is not None:
             try:
                 write_results(result, self.inputs, identity(deciding(self.spec, self.loaded, self.inputs)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, fields
+from itertools import product
 from operator import attrgetter
 from typing import NamedTuple, Protocol
 
@@ -53,29 +54,11 @@ def plan(
         is_over: returns whether a group needs neither a run nor later ones; called before each.
         run_by_run: whether a run is planned under all managers before the next one, so that their difference is known.
     """
-    if run_by_run:
-        yield from _plan_run_by_run(points, managers, runs, settled, is_over)
-        return
-    for group in ((point, manager) for point in range(points) for manager in range(managers)):
-        known = settled(group)
+    together = [range(managers)] if run_by_run else [range(manager, manager + 1) for manager in range(managers)]
+    for point, group in product(range(points), together):
+        known = {manager: settled((point, manager)) for manager in group}
         for run in range(1, runs + 1):
-            if is_over(group, run):
-                break
-            if run not in known:
-                yield MissionKey(*group, run)
-
-
-def _plan_run_by_run(
-    points: int,
-    managers: int,
-    runs: int,
-    settled: Callable[[Group], Collection[int]],
-    is_over: Callable[[Group, int], bool],
-) -> Iterator[MissionKey]:
-    for point in range(points):
-        known = [settled((point, manager)) for manager in range(managers)]
-        for run in range(1, runs + 1):
-            left = [manager for manager in range(managers) if not is_over((point, manager), run)]
+            left = [manager for manager in group if not is_over((point, manager), run)]
             if not left:
                 break
             yield from (MissionKey(point, manager, run) for manager in left if run not in known[manager])

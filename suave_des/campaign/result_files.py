@@ -41,9 +41,9 @@ def write_results(result: CampaignResult, inputs: Mapping[str, str], identity: s
         MANIFEST_FILE: json_text(
             {
                 "scenario": scenario.name,
-                "managers": result.managers,
-                "runs": result.runs,
-                "seed": result.seed,
+                "managers": spec.managers,
+                "runs": spec.runs,
+                "seed": spec.seed,
                 **_varied(result),
                 **result.report(),
                 **provenance(result.loaded, inputs, spec.command),
@@ -76,7 +76,7 @@ def _write_suave_files(result: CampaignResult, folder: Path) -> None:
     files: dict[str, str | bytes | Iterable[str]] = {}
     if result.spec.suave_format:
         make_output_folder(folder)
-        for number, manager in enumerate(result.managers):
+        for number, manager in enumerate(result.spec.managers):
             name = f"{'time_constrained' if revision == '2023' else 'suave'}_{_OUTSIDE_NAME.sub('_', manager)}"
             if f"{name}.csv" in files:  # another manager's, which differs in signs that file names may not have
                 name += f"_{number + 1}"
@@ -110,7 +110,7 @@ def _numbered(result: CampaignResult, manager: int) -> Iterator[tuple[int, Row]]
     """Yield a manager's rows with the number of their mission in the campaign, from 1, whether or not all have one."""
     for key, outcome in result.outcomes():
         if key.manager == manager and not isinstance(outcome, Failure):
-            yield (key.point * len(result.managers) + key.manager) * result.runs + key.run, outcome
+            yield (key.point * len(result.spec.managers) + key.manager) * result.spec.runs + key.run, outcome
 
 
 _OUTSIDE_NAME = re.compile(r"[^A-Za-z0-9_.-]+")

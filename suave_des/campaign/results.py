@@ -13,7 +13,7 @@ from suave_des.campaign.ensemble import Difference, differences
 from suave_des.campaign.knowledge_records import scenario_line
 from suave_des.campaign.missions import COLUMNS, Failure, Finished, Group, Row
 from suave_des.campaign.output import rounded
-from suave_des.campaign.progress import GroupProgress, PairProgress
+from suave_des.campaign.progress import GroupProgress, PairProgress, ProgressTracker
 from suave_des.campaign.spec import FEWEST_PAIRS, FEWEST_RUNS, CampaignSpec, UntilCi
 from suave_des.campaign.variation import Variation, cell_of
 from suave_des.estimates import estimate
@@ -65,8 +65,8 @@ class CampaignResult:
     failures: tuple[Failure, ...]
     summary: tuple[Row, ...]
     outcomes: Callable[[], Iterator[Finished]]
-    remarks: tuple[str, ...] = ()
-    pairs: tuple[PairProgress, ...] = ()
+    remarks: tuple[str, ...]
+    pairs: tuple[PairProgress, ...]
 
     def __repr__(self) -> str:
         """Return the summary as a table, and where the files are."""
@@ -75,23 +75,8 @@ class CampaignResult:
         widths = [max(map(len, column)) for column in zip(headings, *rows, strict=True)]
         table = ["  ".join(map(str.ljust, cells, widths)).rstrip() for cells in (headings, *rows)]
         where = "" if self.folder is None else f", files in {self.folder}"
-        title = f"{self.loaded.scenario.name}, seed {self.seed}: {self.done} of {self.planned} missions{where}"
+        title = f"{self.loaded.scenario.name}, seed {self.spec.seed}: {self.done} of {self.planned} missions{where}"
         return "\n".join([title, *table])
-
-    @property
-    def managers(self) -> tuple[str, ...]:
-        """Names, in the order given."""
-        return self.spec.managers
-
-    @property
-    def runs(self) -> int:
-        """Number of runs planned for each manager."""
-        return self.spec.runs
-
-    @property
-    def seed(self) -> int:
-        """The campaign's seed."""
-        return self.spec.seed
 
     @property
     def folder(self) -> Path | None:
@@ -142,7 +127,7 @@ class CampaignResult:
             if (kind := str(field.type).removesuffix(" | None")) in _TYPES
         }
         types["scenario"] = pandas.CategoricalDtype([self.loaded.scenario.name])
-        types["manager"] = pandas.CategoricalDtype(list(self.managers))
+        types["manager"] = pandas.CategoricalDtype(list(self.spec.managers))
         return pandas.DataFrame.from_records(list(rows), columns=list(self.columns)).astype(types)
 
     def knowledge_lines(self) -> Iterator[str]:
@@ -158,7 +143,7 @@ class CampaignResult:
             return ()
         kept = ((key, outcome) for key, outcome in self.outcomes() if not isinstance(outcome, Failure))
         metrics = {metric: COLUMNS.index(metric) for metric in METRICS}
-        return tuple(differences(kept, self.managers, metrics, self.variation.ensemble))
+        return tuple(differences(kept, self.spec.managers, metrics, self.variation.ensemble))
 
     def report(self) -> dict[str, Any]:
         """Return how many missions were run, where managers were stopped, and what failed, as in manifest.json."""
@@ -227,12 +212,19 @@ def gather(
     loaded: LoadedScenario,
     variation: Variation,
     outcomes: Callable[[], Iterator[Finished]],
-    *,
-    planned: int,
-    stops: tuple[GroupProgress, ...],
-    pairs: tuple[PairProgress, ...] = (),
+    tracker: ProgressTracker,
+    remarks: Iterable[str],
 ) -> CampaignResult:
-    """Summarise the outcomes of a campaign's missions."""
+    """Summarise the outcomes of a campaign's missions.
+
+    Args:
+        spec: what was asked for.
+        loaded: the scenario.
+        variation: what differs between missions besides manager and run.
+        outcomes: reads the outcomes that were kept.
+        tracker: knows which of them count, as it was given all of them.
+        remarks: what users should know about managers.
+    """
     failures: list[Failure] = []
     summary: list[Row] = []
     done = reached = 0
@@ -247,7 +239,7 @@ def gather(
             summary.append((spec.managers[manager], *tally.figures(), *swept))
             tally = _Tally()
 
-    for key, outcome in outcomes():
+    for key, outcome in tracker.counted(outcomes()):
         summarise_before((key.point, key.manager))
         reached = key.point
         if isinstance(outcome, Failure):
@@ -257,7 +249,17 @@ def gather(
             tally.add(outcome)
     summarise_before((reached + 1, 0))
     return CampaignResult(
-        spec, loaded, variation, planned, done, stops, tuple(failures), tuple(summary), outcomes, pairs=pairs
+        spec,
+        loaded,
+        variation,
+        planned=tracker.total,
+        done=done,
+        stops=tracker.stops(),
+        failures=tuple(failures),
+        summary=tuple(summary),
+        outcomes=lambda: tracker.counted(outcomes()),
+        remarks=tuple(remarks),
+        pairs=tracker.pairs(),
     )
 
 

@@ -57,7 +57,7 @@ def print_summary(console: Console, result: CampaignResult) -> None:
         table = _summary(result, look)
         if console.measure(table, options=console.options.update(width=1000)).maximum <= console.width:
             break
-    title = f"{result.loaded.scenario.name}, seed {result.seed}: means ± half their 95% intervals"
+    title = f"{result.loaded.scenario.name}, seed {result.spec.seed}: means ± half their 95% intervals"
     print_table(console, f"{title}, standard deviations" if look.has_std else title, table)
     if len(result.summary) > _ROWS_SHOWN:
         more = len(result.summary) - _ROWS_SHOWN + 1

@@ -132,7 +132,7 @@ def validate(
             )
         simulated = campaign.frame()
         sources |= {"scenario": campaign.loaded.scenario.name, "runs": runs}
-        if not set(campaign.managers) <= set(simulated["manager"]):  # one has no mission to compare
+        if not set(campaign.spec.managers) <= set(simulated["manager"]):  # one has no mission to compare
             exit_telling_failures(campaign)
     if conditions is not None:
         simulated = simulated.assign(**{CONDITION: conditions.numbers(simulated)})

@@ -37,7 +37,7 @@ def rows_of(folder: Path) -> list[dict[str, str]]:
 def test_a_campaign_file_says_what_is_run_and_options_go_before_it(tmp_path: Path) -> None:
     path = write(tmp_path, HEAD)
     result = run_campaign(path)
-    assert (result.managers, result.runs, result.seed) == (("none", "random"), 4, 7)
+    assert (result.spec.managers, result.spec.runs, result.spec.seed) == (("none", "random"), 4, 7)
     assert result.rows == run_campaign("seams2023", ["none", "random"], 4, 7).rows
     other = run_campaign(path, ["none"], 2, 8)
     assert (other.managers, other.runs, other.seed) == (("none",), 2, 8)
