@@ -10,11 +10,18 @@ from typing import Any, Unpack
 
 from suave_des.campaign.early_checks import FirstFailures, check_size
 from suave_des.campaign.executors import InProcess, LocalWorkers
-from suave_des.campaign.inputs import check_trusted, default_time_out_s, read_inputs, trained_on
+from suave_des.campaign.inputs import (
+    check_same,
+    check_trusted,
+    deciding,
+    default_time_out_s,
+    identity,
+    read_inputs,
+    trained_on,
+)
 from suave_des.campaign.missions import Executor, Finished, JobSpec, Remark, WorkerError, plan
 from suave_des.campaign.output import check_output_folder, make_output_folder, remove_parts, remove_results
 from suave_des.campaign.progress import OnProgress, Progress, ProgressTracker
-from suave_des.campaign.provenance import check_same, deciding, identity
 from suave_des.campaign.result_files import FILES, SUAVE_FOLDER, write_results
 from suave_des.campaign.results import CampaignResult, gather
 from suave_des.campaign.spec import CampaignFile, CampaignSpec, read_campaign_file

@@ -50,12 +50,17 @@ _NOISY = ("distributed", "dask", "tornado", "asyncio", "bokeh")
 _logger = logging.getLogger("suave_des")
 
 
-def check_address(scheduler: str) -> None:
-    """See that a text can be a scheduler's address.
+def check_scheduler(scheduler: str, workers: int) -> None:
+    """See that a text can be a scheduler's address, and that no workers are wanted besides its own.
 
     Raises:
-        InputError: it cannot.
+        InputError: it cannot, or there are.
     """
+    if workers != 1:
+        raise InputError(
+            f"workers: {workers} has no use with a scheduler, whose own workers run the missions",
+            remedy="leave it out; `dask worker --nworkers N` says how many missions run there at a time",
+        )
     found = _ADDRESS.fullmatch(scheduler)
     if found is None or not 0 < int(found[1]) < 65536:
         raise InputError(

@@ -20,8 +20,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import suave_des
+from suave_des.campaign.inputs import declared_files, manager_code, scenarios_of, versions
 from suave_des.campaign.missions import Failure, Finished, JobSpec, MissionKey, WorkerError
-from suave_des.campaign.provenance import manager_code, versions
+from suave_des.campaign.own_modules import own_modules
 from suave_des.errors import InputError, SuaveDesError
 
 if TYPE_CHECKING:
@@ -68,8 +69,6 @@ def pack(job: JobSpec) -> Parcel:
     Raises:
         InputError: a file cannot be read, or a manager is in a module that cannot be sent.
     """
-    from suave_des.campaign.inputs import declared_files, scenarios_of
-    from suave_des.campaign.own_modules import own_modules
     from suave_des.knowledge.ontology_file import collect
     from suave_des.simulation.functions import own_functions
 

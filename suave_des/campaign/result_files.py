@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from suave_des.campaign.ensemble import ENSEMBLE_COLUMNS, ENSEMBLE_FILE
+from suave_des.campaign.inputs import provenance
 from suave_des.campaign.knowledge_records import CAMPAIGN_KNOWLEDGE_FILE
 from suave_des.campaign.missions import COLUMNS, Failure, Row
 from suave_des.campaign.output import csv_pieces, csv_text, json_text, make_output_folder, write_files
-from suave_des.campaign.provenance import provenance
 from suave_des.campaign.results import CampaignResult
 
 RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE, PARQUET_FILE = "runs.csv", "summary.csv", "manifest.json", "runs.parquet"

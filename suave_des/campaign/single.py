@@ -1,20 +1,29 @@
-"""One mission with its whole record, and its result files."""
+"""Missions outside campaigns: one with its whole record and result files, and those that managers learn from."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, fields
 from operator import attrgetter
 from pathlib import Path
-from typing import Unpack
+from typing import Any, Unpack
 
-from suave_des.campaign.inputs import check_inputs
+from suave_des.campaign.inputs import check_inputs, provenance
 from suave_des.campaign.knowledge_records import KNOWLEDGE_FILE, knowledge_text
 from suave_des.campaign.missions import COLUMNS, further_of, row_of
-from suave_des.campaign.output import check_output_folder, csv_text, json_text, make_output_folder, write_files
-from suave_des.campaign.provenance import provenance
+from suave_des.campaign.output import (
+    check_output_file,
+    check_output_folder,
+    csv_text,
+    json_text,
+    make_output_folder,
+    write_files,
+)
 from suave_des.campaign.spec import RUNS_LIMIT, check_range, check_seed
-from suave_des.metrics.result import Event, MissionResult, TrajectoryPoint
+from suave_des.errors import InputError
+from suave_des.managing.learned import Learned, read_file
+from suave_des.metrics.result import Event, MissionMetrics, MissionResult, TrajectoryPoint
 from suave_des.registry import ManagerLike, name_of
 from suave_des.scenario.loader import LoadedScenario, Replacements, load_scenario
 from suave_des.simulation.simulator import Simulator
@@ -99,3 +108,66 @@ def _trajectory_text(points: Sequence[TrajectoryPoint]) -> str:
     cells, further = attrgetter(*TRAJECTORY_COLUMNS), tuple(points[0].further)
     rows = ((*cells(point), *(point.further[name] for name in further)) for point in points)
     return csv_text((*TRAJECTORY_COLUMNS, *further), rows)
+
+
+# Training: missions in one process, in the order of their runs, and a file at the end.
+
+TRAINING_SEED = 0
+"""Not that of campaigns, so that a campaign has missions that training has not seen."""
+
+
+def train(
+    scenario: str | Path,
+    manager: str,
+    missions: int,
+    out: str | Path,
+    *,
+    seed: int = TRAINING_SEED,
+    start: str | Path | None = None,
+    overwrite: bool = False,
+    on_mission: Callable[[MissionMetrics], None] = lambda metrics: None,
+    **replacements: Unpack[Replacements],
+) -> Learned:
+    """Train a manager, and write what it has learned.
+
+    Example:
+        train("seams2023", "learner:Learner", 500, "policy.json")
+
+    Args:
+        scenario: path of a scenario file, or name of a shipped one.
+        manager: name, or module:Class; it keeps what it learns in `system.learned`.
+        missions: how many: runs 1 to that.
+        out: file to write.
+        seed: of everything that is random.
+        start: file of an earlier training, to go on from; None: with nothing.
+        overwrite: whether the file may exist.
+        on_mission: called with the metrics of each mission.
+        replacements: as of load_scenario.
+
+    Raises:
+        InputError: something given cannot be used, or nothing was learned; nothing is written then.
+        MissionError: the manager raised; nothing is written then.
+    """
+    check_output_file(Path(out), overwrite=overwrite)
+    check_range("missions", missions, 1, RUNS_LIMIT)
+    check_seed(seed)
+    loaded = load_scenario(scenario, **replacements)
+    inputs = check_inputs(loaded, [manager], given=False)
+    learned: dict[str, Any] = {} if start is None else json.loads(json.dumps(read_file(Path(start)).learned))
+    simulator = Simulator(loaded, training={manager: learned})
+    for run in range(1, missions + 1):
+        on_mission(simulator.run(manager, run, seed).metrics)
+    if not learned:
+        raise InputError(
+            f"manager {manager} has learned nothing", remedy="have it keep what it learns in system.learned"
+        )
+    result = Learned(manager, loaded.scenario.name, seed, missions, dict(sorted(inputs.items())), learned)
+    write_files(Path(out).parent, {Path(out).name: result.text()})
+    return result
+
+
+def blocks(values: Sequence[float], count: int = 10) -> list[tuple[int, int, float]]:
+    """Return the means of at most `count` blocks of missions: first and last mission, and mean."""
+    size = max(1, -(-len(values) // count))
+    parts = [values[first : first + size] for first in range(0, len(values), size)]
+    return [(n * size + 1, n * size + len(part), sum(part) / len(part)) for n, part in enumerate(parts)]

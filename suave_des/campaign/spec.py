@@ -13,7 +13,7 @@ from typing import Annotated, Any, cast
 
 from pydantic import Field
 
-from suave_des.errors import InputError, KeyPath, shown
+from suave_des.errors import InputError, shown
 from suave_des.metrics.result import MissionMetrics
 from suave_des.registry import manager_class
 from suave_des.resources import find
@@ -291,14 +291,9 @@ class CampaignSpec:
         check_range("runs", self.runs, 1, RUNS_LIMIT)
         check_workers(self.workers)
         if self.scheduler is not None:
-            from suave_des.campaign.dask_cluster import check_address
+            from suave_des.campaign.dask_cluster import check_scheduler
 
-            if self.workers != 1:
-                raise InputError(
-                    f"workers: {self.workers} has no use with a scheduler, whose own workers run the missions",
-                    remedy="leave it out; `dask worker --nworkers N` says how many missions run there at a time",
-                )
-            check_address(self.scheduler)
+            check_scheduler(self.scheduler, self.workers)
         check_seed(self.seed)
         if not 0.0 < self.time_out_s <= _LONGEST_TIME_OUT_S:
             remedy = f"give seconds above 0, at most {_LONGEST_TIME_OUT_S:g}"
@@ -366,20 +361,8 @@ class CampaignFile:
 
     def located(self, error: InputError) -> InputError:
         """Return an error about a key path of this file with its line."""
-        path = self._key_path(error.place or "")
+        path = self.layer.key_path(error.place or "")
         return self.layer.error(error.problem, path, error.remedy) if path else error
-
-    def _key_path(self, place: str) -> KeyPath:
-        """Split a place such as "sweep.grid.start.x_m" into keys of this file: those below may have points in them."""
-        path: list[str | int] = []
-        here: Any = self.layer.data
-        while place and isinstance(here, Mapping):
-            key = next((key for key in here if place == key or place.startswith(f"{key}.")), None)
-            if key is None:
-                break
-            path.append(key)
-            here, place = here[key], place[len(key) + 1 :]
-        return tuple(path)
 
 
 def read_campaign_file(name: str | Path) -> CampaignFile | None:

@@ -85,8 +85,8 @@ def train(
 
     A campaign takes it with --manager-option learned=FILE; there nothing is learned any more.
     """
-    from suave_des.campaign.training import blocks
-    from suave_des.campaign.training import train as trained
+    from suave_des.campaign.single import blocks
+    from suave_des.campaign.single import train as trained
     from suave_des.cli.console import output, plain_table, print_table
 
     times_s: list[float] = []

@@ -53,6 +53,18 @@ class Layer:
         """Whether a key path is in a file, and not a default."""
         return key_path in self.places
 
+    def key_path(self, place: str) -> KeyPath:
+        """Split a place such as "sweep.grid.start.x_m" into keys that are there; these may have points in them."""
+        path: list[str | int] = []
+        here: Any = self.data
+        while place and isinstance(here, Mapping):
+            key = next((key for key in here if place == key or place.startswith(f"{key}.")), None)
+            if key is None:
+                break
+            path.append(key)
+            here, place = here[key], place[len(key) + 1 :]
+        return tuple(path)
+
     def error(self, problem: str, key_path: KeyPath, remedy: str | None) -> InputError:
         """An error about the value at a key path."""
         place = self.place(key_path)

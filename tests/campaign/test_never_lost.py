@@ -167,7 +167,7 @@ class TestRefusals:
 
     def test_another_version(self, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         interrupted(scenario, tmp_path / "out")
-        monkeypatch.setattr("suave_des.campaign.provenance.__version__", "99.0")
+        monkeypatch.setattr("suave_des.campaign.inputs.__version__", "99.0")
         with pytest.raises(InputError, match=r"versions.suave-des was '[0-9.]+', and is '99.0' now"):
             resume_campaign(tmp_path / "out")
 
