@@ -13,7 +13,7 @@ import io
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, groupby, product
 from pathlib import Path
 from statistics import fmean, stdev
 from typing import TYPE_CHECKING
@@ -225,20 +225,15 @@ def differences(
         metrics: place in a row by name.
         ensemble: of the campaign.
     """
-    point, by_manager = 0, _tables(managers)
-    for key, row in rows:
-        if key.point != point:
-            yield from _of_point(point, by_manager, metrics, ensemble)
-            point, by_manager = key.point, _tables(managers)
-        by_manager[managers[key.manager]][key.run] = tuple(_float(row[place]) for place in metrics.values())
-    yield from _of_point(point, by_manager, metrics, ensemble)
-
-
-_Tables = dict[str, dict[int, tuple[float, ...]]]
-
-
-def _tables(managers: Sequence[str]) -> _Tables:
-    return {manager: {} for manager in managers}
+    for point, missions in groupby(rows, key=lambda found: found[0].point):
+        by_manager: dict[str, dict[int, list[float]]] = {manager: {} for manager in managers}
+        for key, row in missions:
+            by_manager[managers[key.manager]][key.run] = [_float(row[place]) for place in metrics.values()]
+        for (place, metric), (second, first) in product(enumerate(metrics), combinations(managers, 2)):
+            ours, theirs = by_manager[first], by_manager[second]
+            by_run = {run: ours[run][place] - theirs[run][place] for run in sorted(ours) if run in theirs}
+            if by_run:
+                yield _difference((first, second), metric, point, by_run, ensemble)
 
 
 def _float(cell: object) -> float:
@@ -246,17 +241,8 @@ def _float(cell: object) -> float:
     return float(cell)
 
 
-def _of_point(point: int, by_manager: _Tables, metrics: Mapping[str, int], ensemble: Ensemble) -> Iterator[Difference]:
-    for place, metric in enumerate(metrics):
-        for second, first in combinations(by_manager, 2):
-            ours, theirs = by_manager[first], by_manager[second]
-            found = {run: ours[run][place] - theirs[run][place] for run in sorted(ours) if run in theirs}
-            if found:
-                yield _difference(first, second, metric, point, found, ensemble)
-
-
 def _difference(
-    first: str, second: str, metric: str, point: int, by_run: Mapping[int, float], ensemble: Ensemble
+    pair: tuple[str, str], metric: str, point: int, by_run: Mapping[int, float], ensemble: Ensemble
 ) -> Difference:
     by_member: dict[int, list[float]] = {}
     for run, value in by_run.items():
@@ -264,5 +250,4 @@ def _difference(
     over_all = estimate(list(by_run.values()))
     assert over_all.mean is not None
     means = tuple(fmean(by_member[member]) for member in sorted(by_member))
-    interval = over_all.mean_interval
-    return Difference(first, second, metric, point, len(by_run), over_all.mean, interval, means)
+    return Difference(*pair, metric, point, len(by_run), over_all.mean, over_all.mean_interval, means)

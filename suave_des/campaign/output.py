@@ -99,24 +99,17 @@ def check_output_folder(
     for other, names in FAMILIES.items():
         known = min((name for name in names if name in entries), default=None)
         if other != family and known is not None:
-            raise InputError(
-                f"the output folder has a {other}'s results in it ({known}), which this command does not replace",
-                file=folder,
-                remedy="give another folder, or remove them first",
-            )
-    if found is not None and not overwrite:
-        raise InputError(
-            f"the output folder is not empty: it has {found}",
-            file=folder,
-            remedy="give another folder, or --overwrite to replace the results in it",
-        )
-    if is_there and not folder.is_dir():
-        raise InputError("the output folder is not a folder", file=folder, remedy="give another path")
-    if not is_there and not has_parent:
-        problem = f"there is no folder {folder.parent} to make it in"
-        raise InputError(problem, file=folder, remedy="make that folder first")
-    if not os.access(folder if is_there else folder.parent, os.W_OK | os.X_OK):
-        raise InputError("the output folder cannot be written", file=folder, remedy="give a folder that is yours")
+            problem = f"the output folder has a {other}'s results in it ({known}), which this command does not replace"
+            raise InputError(problem, file=folder, remedy="give another folder, or remove them first")
+    may_be_written = os.access(folder if is_there else folder.parent, os.W_OK | os.X_OK)
+    not_empty = f"the output folder is not empty: it has {found}"
+    _check(
+        folder,
+        (found and not overwrite, not_empty, "give another folder, or --overwrite to replace the results in it"),
+        (is_there and not folder.is_dir(), "the output folder is not a folder", "give another path"),
+        (not (is_there or has_parent), f"there is no folder {folder.parent} to make it in", "make that folder first"),
+        (not may_be_written, "the output folder cannot be written", "give a folder that is yours"),
+    )
 
 
 def check_output_file(file: Path, *, overwrite: bool) -> None:
@@ -126,14 +119,20 @@ def check_output_file(file: Path, *, overwrite: bool) -> None:
         InputError: it is a folder, its folder does not exist or cannot be written, or it exists and `overwrite` is
             false.
     """
-    for is_wrong, problem, remedy in (
+    _check(
+        file,
         (not file.name or file.is_dir(), "is a folder", "name a file in it"),
         (not file.parent.is_dir(), f"there is no folder {file.parent} to write it in", "make it first"),
         (not os.access(file.parent, os.W_OK | os.X_OK), "its folder cannot be written", "give one that is yours"),
         (file.exists() and not overwrite, "exists already", "give another name, or --overwrite to replace it"),
-    ):
+    )
+
+
+def _check(path: Path, *cases: tuple[object, str, str]) -> None:
+    """Raise an error for the first case, of condition, problem and remedy, whose condition holds."""
+    for is_wrong, problem, remedy in cases:
         if is_wrong:
-            raise InputError(problem, file=file, remedy=remedy)
+            raise InputError(problem, file=path, remedy=remedy)
 
 
 def make_output_folder(folder: Path) -> None:
