@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -69,10 +68,9 @@ def run_campaign(
         WorkerError: worker processes end again and again; finished missions are kept.
         StoreError: the disk is full, or the folder was removed.
     """
+    given = scenario, managers, runs, seed, workers, out
     result, attrs = _with_progress(
-        _label(scenario),
-        progress,
-        lambda show: campaigns.run_campaign(scenario, managers, runs, seed, workers, out, on_progress=show, **options),
+        scenario, progress, lambda show: campaigns.run_campaign(*given, on_progress=show, **options)
     )
     return _with_attrs(result.frame(), attrs)
 
@@ -100,10 +98,9 @@ def stream_campaign(
     """
     if chunk_rows < 1:
         raise InputError(f"chunk_rows: {chunk_rows} is out of range", remedy="give 1 or more")
+    given = scenario, managers, runs, seed, workers, out
     result, attrs = _with_progress(
-        _label(scenario),
-        progress,
-        lambda show: campaigns.run_campaign(scenario, managers, runs, seed, workers, out, on_progress=show, **options),
+        scenario, progress, lambda show: campaigns.run_campaign(*given, on_progress=show, **options)
     )
     return (_with_attrs(frame, attrs) for frame in result.frames(chunk_rows))
 
@@ -136,7 +133,7 @@ def resume_campaign(
         WorkerError, StoreError: as run_campaign.
     """
     result, attrs = _with_progress(
-        str(folder),
+        folder,
         progress,
         lambda show: campaigns.resume_campaign(
             folder,
@@ -152,17 +149,20 @@ def resume_campaign(
     return _with_attrs(result.frame(), attrs)
 
 
-def _label(scenario: str | Path | LoadedScenario) -> str:
-    return scenario.scenario.name if isinstance(scenario, LoadedScenario) else str(scenario)
-
-
 def _with_progress(
-    label: str, progress: bool | None, run: Callable[[OnProgress | None], CampaignResult]
+    named: str | Path | LoadedScenario, progress: bool | None, run: Callable[[OnProgress | None], CampaignResult]
 ) -> tuple[CampaignResult, dict[str, Any]]:
     """Run a campaign and show its progress; return its result, and the attrs of its frames."""
+    from rich.console import Console
+
+    from suave_des.campaign.display import shown
+
+    label = named.scenario.name if isinstance(named, LoadedScenario) else str(named)
+    console = Console(stderr=True, highlight=False)
+    is_wanted = console.is_jupyter or console.is_terminal if progress is None else progress
     interrupted = False
     try:
-        with _shown(label, progress) as show:
+        with shown(label, console, quiet=not is_wanted) as show:
             result = run(show)
     except campaigns.CampaignInterrupted as stopped:
         if not hasattr(sys, "ps1"):  # neither a prompt nor a notebook
@@ -177,16 +177,6 @@ def _with_progress(
     folder = None if result.folder is None else str(result.folder)
     attrs = {"summary": result.summary_records(), "interrupted": interrupted, "folder": folder}
     return result, {**result.report(), **attrs}
-
-
-def _shown(label: str, progress: bool | None) -> AbstractContextManager[OnProgress | None]:
-    from rich.console import Console
-
-    from suave_des.campaign.display import shown
-
-    console = Console(stderr=True, highlight=False)
-    is_wanted = console.is_jupyter or console.is_terminal if progress is None else progress
-    return shown(label, console, quiet=not is_wanted)
 
 
 def _with_attrs(frame: pandas.DataFrame, attrs: dict[str, Any]) -> CampaignFrame:
