@@ -181,8 +181,8 @@ def _registered(group: str = ENTRY_POINT_GROUP) -> dict[str, str]:
 def _load(what: str, target: str, base: type[_Base]) -> type[_Base]:
     module_name, _, attribute = target.partition(":")
     try:
-        if module_name not in sys.modules:
-            _look_here()
+        if module_name not in sys.modules and (here := str(Path.cwd())) not in sys.path:
+            sys.path.append(here)  # where `python` would find it, but an installed command would not
         module = importlib.import_module(module_name)
     except (Exception, SystemExit) as error:  # whatever the module's own code raises on import
         if isinstance(error.__cause__, KeyboardInterrupt):  # Python 3.11 wraps it while a class is made
@@ -198,9 +198,3 @@ def _load(what: str, target: str, base: type[_Base]) -> type[_Base]:
             remedy=f"derive your class from {base.__module__}.{base.__name__}",
         )
     return found
-
-
-def _look_here() -> None:
-    here = str(Path.cwd())
-    if here not in sys.path:  # where `python` would find a module of one's own, but an installed command would not
-        sys.path.append(here)

@@ -318,8 +318,9 @@ class _Campaign:
     ) -> KeyboardInterrupt | SuaveDesError | None:
         """Run missions until all are done; return what stopped the campaign before that."""
         tracker, spec, alike = self.tracker, self.spec, FirstFailures(self.spec.managers)
-        earlier = store.about("remarks") if store.has_note("remarks") else []
-        remarks: dict[tuple[str, ...], int] = {(manager, text): count for manager, text, count in earlier}
+        remarks: dict[tuple[str, ...], int] = {
+            (manager, text): count for manager, text, count in store.about("remarks", default=[])
+        }
         try:
             tracker.add_earlier(store.outcomes())
             points = self.variation.sweep.points

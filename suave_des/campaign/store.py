@@ -143,22 +143,19 @@ class Store:
 
     # What it is about.
 
-    def about(self, name: str) -> Any:
+    def about(self, name: str, default: Any = None) -> Any:
         """Return what was noted under a name.
 
         Raises:
-            InputError: nothing was, or it is damaged.
+            InputError: nothing was and there is no default, or it is damaged.
         """
         with _user_errors(self.path):
             found = self._db.execute("SELECT value, crc FROM about WHERE name = ?", (name,)).fetchone()
+        if found is None and default is not None:
+            return default
         if found is None or _note_crc(name, found[0]) != found[1]:
             raise _damaged(self.path, f"its {name} is {'missing' if found is None else 'not what was written'}")
         return json.loads(found[0])
-
-    def has_note(self, name: str) -> bool:
-        """Return whether anything was noted under a name."""
-        with _user_errors(self.path):
-            return self._db.execute("SELECT 1 FROM about WHERE name = ?", (name,)).fetchone() is not None
 
     def note(self, name: str, value: Any) -> None:
         """Note something about the campaign, at once and durably."""

@@ -130,13 +130,10 @@ Period = Annotated[_Float, Within(0.001, LONGEST_S, unit="s")]
 """Period of something that happens in mission time; the lower limit keeps a slip from stopping the clock."""
 
 
-_StreamName = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_.-]*$", max_length=100)]
-
-
 class Drawn(Strict):
     """Base of distributions."""
 
-    shared: _StreamName | None = None
+    shared: Name | None = None
     """Name of a draw that several keys share: distributions of the same kind and width are then shifted alike."""
 
 
@@ -260,13 +257,8 @@ def draw(distribution: AnyDistribution, stream: random.Random) -> float:
     return distribution if isinstance(distribution, float | int) else distribution.draw(stream)
 
 
-def stated(distribution: AnyDistribution) -> tuple[float, ...]:
-    """The values that a scenario states for a distribution: itself, its mean, its bounds, its choices."""
-    return tuple(value for _, value in _stated(distribution))
-
-
 def _stated(distribution: AnyDistribution) -> list[tuple[str, float]]:
-    """The stated values with their keys."""
+    """The values that a scenario states for a distribution, with their keys: itself, its mean, bounds, choices."""
     match distribution:
         case Normal():
             mean, low, high = distribution.mean, distribution.minimum, distribution.maximum
@@ -293,5 +285,5 @@ def support(distribution: AnyDistribution) -> tuple[float, float]:
         case Exponential():
             return distribution.minimum, distribution.minimum if distribution.mean == 0 else math.inf
         case _:
-            values = stated(distribution)
+            values = [value for _, value in _stated(distribution)]
             return min(values), max(values)
