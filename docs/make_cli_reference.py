@@ -71,7 +71,7 @@ class Parameter:
             names = map(
                 str, (declared.default, *(declared.param_decls or ()))
             )  # within Annotated the first one is there
-            option = next((each for each in names if each.startswith("--")), f"--{parameter.name}")
+            option = next((each for each in names if each.startswith("--")), f"--{parameter.name.replace('_', '-')}")
             self.written = option if kind is bool else f"{option} {value}"
         default = "needed" if self.needed else f"`{parameter.default}`" if parameter.default else ""
         if isinstance(declared.show_default, str):

@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 
 def bench(
     missions: Annotated[
-        int,
-        typer.Option("--missions", min=20, max=1_000_000, help="Missions of each campaign; the goals are for 10000."),
+        int, typer.Option(min=20, max=1_000_000, help="Missions of each campaign; the goals are for 10000.")
     ] = 10_000,
     large: Annotated[bool, typer.Option("--large", help="Measure memory with 100,000 missions, too.")] = False,
     json_file: Annotated[

@@ -64,16 +64,14 @@ def calibrate(
     runs: Annotated[
         int,
         typer.Option(
-            "--runs",
-            min=2,
-            help="Missions for each manager and set of values; of a campaign file, among all conditions.",
+            min=2, help="Missions for each manager and set of values; of a campaign file, among all conditions."
         ),
     ] = 150,
-    evaluations: Annotated[int, typer.Option("--evaluations", min=1, help="Sets of values to try, about.")] = 500,
+    evaluations: Annotated[int, typer.Option(min=1, help="Sets of values to try, about.")] = 500,
     profile: Annotated[bool, typer.Option(help="Determine how sharply each parameter is known, too.")] = True,
     workers: Workers = 2,
     seed: Seed = 1,
-    out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for the fit.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for the fit.")] = None,
     overwrite: Overwrite = False,
     *,
     files: Files,

@@ -58,7 +58,6 @@ class NewCampaign(OptionGroup):
     ensemble: Annotated[
         str | None,
         typer.Option(
-            "--ensemble",
             metavar="FILE",
             help="Give each run one of this file's parameter sets, which fit the real runs equally well; for instance"
             " seams2023, which is shipped.",
@@ -68,8 +67,7 @@ class NewCampaign(OptionGroup):
     format: Annotated[
         list[Format] | None,
         typer.Option(
-            "--format",
-            help="Write the exemplar's own files into DIR/suave, or runs.parquet, besides; repeat it for both.",
+            help="Write the exemplar's own files into DIR/suave, or runs.parquet, besides; repeat it for both."
         ),
     ] = None
     record_knowledge: Annotated[
@@ -91,37 +89,25 @@ def campaign(
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for runs.csv, summary.csv and manifest.json.")
+        Path | None, typer.Option(metavar="DIR", help="Folder for runs.csv, summary.csv and manifest.json.")
     ] = None,
     resume: Annotated[
-        Path | None,
-        typer.Option("--resume", metavar="DIR", help="Go on with the campaign in this folder; --runs may add runs."),
+        Path | None, typer.Option(metavar="DIR", help="Go on with the campaign in this folder; --runs may add runs.")
     ] = None,
     managers: Annotated[
         str | None,
-        typer.Option(
-            "--managers",
-            metavar="NAME,...",
-            help="Managing subsystems: names, or module:Class.",
-            show_default=_MANAGERS,
-        ),
+        typer.Option(metavar="NAME,...", help="Managing subsystems: names, or module:Class.", show_default=_MANAGERS),
     ] = None,
     runs: Annotated[
-        int | None,
-        typer.Option("--runs", help="Missions for each manager, at each point.", show_default=_RUNS),
+        int | None, typer.Option(help="Missions for each manager, at each point.", show_default=_RUNS)
     ] = None,
     workers: Annotated[
         int | None,
-        typer.Option(
-            "--workers",
-            help="Processes that run missions; any number gives the same bytes.",
-            show_default=str(_WORKERS),
-        ),
+        typer.Option(help="Processes that run missions; any number gives the same bytes.", show_default=str(_WORKERS)),
     ] = None,
     scheduler: Annotated[
         str | None,
         typer.Option(
-            "--scheduler",
             metavar="tcp://HOST:PORT",
             help="Run missions on the workers of this Dask scheduler instead; the same bytes again.",
         ),
@@ -129,7 +115,6 @@ def campaign(
     until_ci: Annotated[
         str | None,
         typer.Option(
-            "--until-ci",
             metavar="METRIC:HALF_WIDTH",
             help="Stop a manager when half the 95% interval of the metric's mean is less, after 20 runs at least, and"
             " after --runs (then 10000 if left out) at most; for instance search_time_s:5. Stop all when the difference"
@@ -248,11 +233,11 @@ _TEXT_WIDTH = 95
 
 @grouped_options
 def reproduce(
-    runs: Annotated[int, typer.Option("--runs", help="Missions for each manager; the paper has 20.")] = 200,
+    runs: Annotated[int, typer.Option(help="Missions for each manager; the paper has 20.")] = 200,
     workers: Workers = 2,
     seed: Seed = 1,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for result files; left out, none are written.")
+        Path | None, typer.Option(metavar="DIR", help="Folder for result files; left out, none are written.")
     ] = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,

@@ -75,29 +75,23 @@ def import_config(
             metavar="FILE...", help="Mission, campaign and System Modes files of the exemplar, in any order."
         ),
     ],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Scenario file to write.")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Scenario file to write.")],
     campaign: Annotated[
-        Path | None,
-        typer.Option("--campaign", metavar="FILE", help="Campaign file to write, from a campaign configuration."),
+        Path | None, typer.Option(metavar="FILE", help="Campaign file to write, from a campaign configuration.")
     ] = None,
     base: Annotated[
         str | None,
         typer.Option(
-            "--base",
-            metavar="SCENARIO",
-            help="Scenario to build on; left out, the shipped one of the files' revision.",
+            metavar="SCENARIO", help="Scenario to build on; left out, the shipped one of the files' revision."
         ),
     ] = None,
     revision: Annotated[
         str | None,
-        typer.Option(
-            "--revision", metavar="NAME", help="Revision of the exemplar that the files are of, if they fit several."
-        ),
+        typer.Option(metavar="NAME", help="Revision of the exemplar that the files are of, if they fit several."),
     ] = None,
     runner_seed: Annotated[
         int | None,
         typer.Option(
-            "--runner-seed",
             metavar="SEED",
             help="Write what the exemplar's runner draws from this seed (its random_seed), in place of draws anew.",
         ),

@@ -87,7 +87,7 @@ app = typer.Typer(
 )
 for _command in chain.from_iterable(_GROUPS.values()):
     if isinstance(_command, typer.Typer):
-        app.add_typer(_command)
+        app.add_typer(_command, name=_name(_command))
     else:
         app.command(_name(_command))(_command)
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 def run(
     scenario: Scenario,
     manager: Annotated[
-        str, typer.Option("--manager", metavar="NAME", help="Managing subsystem by name, or your own as module:Class.")
+        str, typer.Option(metavar="NAME", help="Managing subsystem by name, or your own as module:Class.")
     ] = "metacontrol",
     seed: Seed = 1,
     run_number: Annotated[
@@ -33,9 +33,7 @@ def run(
     ] = 1,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out", metavar="DIR", help="Folder for mission.json, events.csv, trajectory.csv, knowledge.jsonl."
-        ),
+        typer.Option(metavar="DIR", help="Folder for mission.json, events.csv, trajectory.csv, knowledge.jsonl."),
     ] = None,
     overwrite: Overwrite = False,
     manager_option: ManagerOptions = None,
@@ -69,10 +67,10 @@ def run(
 @grouped_options
 def train(
     manager: Annotated[str, typer.Argument(metavar="MODULE:CLASS", help="The manager.")],
-    missions: Annotated[int, typer.Option("--missions", help="How many missions: runs 1 to that, in order.")],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="File for what is learned.")],
-    scenario: Annotated[str, typer.Option("--scenario", metavar="SCENARIO", help="To be trained on.")] = "seams2023",
-    seed: Annotated[int, typer.Option("--seed", help="Seed; not that of the campaign that judges it.")] = 0,
+    missions: Annotated[int, typer.Option(help="How many missions: runs 1 to that, in order.")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="File for what is learned.")],
+    scenario: Annotated[str, typer.Option(metavar="SCENARIO", help="To be trained on.")] = "seams2023",
+    seed: Annotated[int, typer.Option(help="Seed; not that of the campaign that judges it.")] = 0,
     start: Annotated[
         Path | None, typer.Option("--from", metavar="FILE", help="File of an earlier training, to go on from.")
     ] = None,
@@ -109,19 +107,12 @@ def train(
 @grouped_options
 def serve(
     scenario: Scenario,
-    host: Annotated[str, typer.Option("--host", help="Address to listen at; the default is this machine alone.")] = (
-        "127.0.0.1"
-    ),
-    port: Annotated[int, typer.Option("--port", min=0, max=65535, help="Port to listen at; 0 for any.")] = 3000,
+    host: Annotated[str, typer.Option(help="Address to listen at; the default is this machine alone.")] = ("127.0.0.1"),
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0 for any.")] = 3000,
     run_number: Annotated[int, typer.Option("--run", metavar="K", help="Run of the first mission.")] = 1,
     seed: Seed = 1,
     real_time_factor: Annotated[
-        float,
-        typer.Option(
-            "--real-time-factor",
-            metavar="X",
-            help="Mission time per second; 0: it passes only when a client says so.",
-        ),
+        float, typer.Option(metavar="X", help="Mission time per second; 0: it passes only when a client says so.")
     ] = 0.0,
     *,
     files: Files,

@@ -32,34 +32,27 @@ class Format(StrEnum):
 def compare(
     results: Results,
     managers: Annotated[
-        str | None,
-        typer.Option("--managers", metavar="NAME,...", help="Only these, in this order.", show_default="all"),
+        str | None, typer.Option(metavar="NAME,...", help="Only these, in this order.", show_default="all")
     ] = None,
     against: Annotated[
         str | None,
-        typer.Option(
-            "--against", metavar="NAME", help="Compare all others with this one only.", show_default="each with each"
-        ),
+        typer.Option(metavar="NAME", help="Compare all others with this one only.", show_default="each with each"),
     ] = None,
     metrics: Annotated[
         str | None,
         typer.Option(
-            "--metrics",
             metavar="COLUMN,...",
             help="Columns of runs.csv.",
             show_default="search time, distance, found, reaction time",
         ),
     ] = None,
     by: Annotated[
-        str | None,
-        typer.Option("--by", metavar="KEY,...", help="Compare the values of these swept parameters, too."),
+        str | None, typer.Option(metavar="KEY,...", help="Compare the values of these swept parameters, too.")
     ] = None,
     half_width: Annotated[
         list[str] | None,
         typer.Option(
-            "--half-width",
-            metavar="METRIC:VALUE",
-            help="Give the runs needed for an interval this narrow; repeat it for several.",
+            metavar="METRIC:VALUE", help="Give the runs needed for an interval this narrow; repeat it for several."
         ),
     ] = None,
     unpaired: Annotated[
@@ -67,7 +60,7 @@ def compare(
     ] = False,
     as_format: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TABLE,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="Write .csv, .json, .md or .tex instead of printing.")
+        Path | None, typer.Option(metavar="FILE", help="Write .csv, .json, .md or .tex instead of printing.")
     ] = None,
 ) -> None:
     """Compare managers by their results.
@@ -129,18 +122,16 @@ def figure(
     folders: Annotated[
         list[Path], typer.Argument(metavar="DIR...", help="Output folders of run, campaign or reproduce, or CSV files.")
     ],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Picture to write: .png, .pdf or .svg.")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Picture to write: .png, .pdf or .svg.")],
     kind: Annotated[
         Kind,
         typer.Option(
-            "--kind",
             help="Of a mission: map, timeline; of several: paths; of a campaign: distributions, raincloud, detections,"
-            " convergence, reactions; of a sweep: sweep.",
+            " convergence, reactions; of a sweep: sweep."
         ),
     ] = Kind.AUTO,
     parameters: Annotated[
-        str | None,
-        typer.Option("--parameters", metavar="KEY,...", help="Of a sweep: draw these.", show_default="all"),
+        str | None, typer.Option(metavar="KEY,...", help="Of a sweep: draw these.", show_default="all")
     ] = None,
 ) -> None:
     """Draw a mission's map or a campaign's results.
@@ -179,13 +170,11 @@ def replay(
         ),
     ] = None,
     scenario: Annotated[
-        str | None,
-        typer.Option("--scenario", metavar="SCENARIO", help="In place of DIR: run missions of this scenario."),
+        str | None, typer.Option(metavar="SCENARIO", help="In place of DIR: run missions of this scenario.")
     ] = None,
     managers: Annotated[
         str | None,
         typer.Option(
-            "--managers",
             metavar="NAME,...",
             help="One or two managing subsystems, on the same random numbers.",
             show_default="metacontrol; of a campaign the last and the first",
@@ -197,14 +186,11 @@ def replay(
     ] = None,
     seed: SeedIfNew = None,
     point: Annotated[
-        int | None,
-        typer.Option("--point", metavar="N", help="Point of the campaign's sweep.", show_default=str(_POINT)),
+        int | None, typer.Option(metavar="N", help="Point of the campaign's sweep.", show_default=str(_POINT))
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out", metavar="FILE", help="Page to write.", show_default="replay.html, in DIR or the current folder"
-        ),
+        typer.Option(metavar="FILE", help="Page to write.", show_default="replay.html, in DIR or the current folder"),
     ] = None,
     show: Open = False,
     *,
@@ -249,15 +235,13 @@ def report(
     paths: Annotated[
         int | None,
         typer.Option(
-            "--paths",
             metavar="N",
             help="Runs of each manager whose way and timeline are in the page; 0: none.",
             show_default=str(_PATHS),
         ),
     ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="FILE", help="Page to write.", show_default="report.html, in the first DIR"),
+        Path | None, typer.Option(metavar="FILE", help="Page to write.", show_default="report.html, in the first DIR")
     ] = None,
     show: Open = False,
 ) -> None:

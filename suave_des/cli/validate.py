@@ -51,20 +51,16 @@ def validate(
     ] = None,
     data: _Data = None,
     runs_file: Annotated[
-        Path | None,
-        typer.Option("--runs-file", metavar="FILE", help="Compare this campaign's runs.csv; nothing is simulated."),
+        Path | None, typer.Option(metavar="FILE", help="Compare this campaign's runs.csv; nothing is simulated.")
     ] = None,
     managers: _Managers = None,
     targets: Annotated[
         Path | None,
-        typer.Option(
-            "--targets", metavar="FILE", help="Shares to compare; left out, NAME.targets.yaml beside NAME.csv."
-        ),
+        typer.Option(metavar="FILE", help="Shares to compare; left out, NAME.targets.yaml beside NAME.csv."),
     ] = None,
     runs: Annotated[
         int | None,
         typer.Option(
-            "--runs",
             help="Missions for each manager, and under each condition of a campaign file.",
             show_default=f"{_RUNS}, among all conditions",
         ),
@@ -72,7 +68,7 @@ def validate(
     workers: Workers = 2,
     seed: Seed = 1,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for tables, validation.json and figures.")
+        Path | None, typer.Option(metavar="DIR", help="Folder for tables, validation.json and figures.")
     ] = None,
     strict: Annotated[
         bool, typer.Option("--strict", help=f"Exit with status {TARGETS_NOT_MET} unless every target is met.")
