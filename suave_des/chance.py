@@ -9,7 +9,7 @@ from suave_des.scenario.quantities import Distribution, Drawn, draw
 from suave_des.scenario.signal_kinds import (
     ConstantSignal,
     Monitor,
-    Signal,
+    SignalDescription,
     SignalTable,
     SinusoidSignal,
     StepSignal,
@@ -74,7 +74,7 @@ class Chance(Streams):
         """Phase of a timer: arbitrary per node, another one in each run."""
         return self.stream(f"phase/{timer}").random() * period_s
 
-    def signal(self, name: str, description: Signal, tables: Mapping[str, SignalTable]) -> signals.Signal:
+    def signal(self, name: str, description: SignalDescription, tables: Mapping[str, SignalTable]) -> signals.Signal:
         """The run's signal from its entry in the scenario; `tables` has the contents of CSV files, by signal name."""
         match description:
             case SinusoidSignal():

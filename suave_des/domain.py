@@ -5,6 +5,8 @@ from dataclasses import dataclass
 SEA_BED_Z_M = -20.0
 """The sea bed is the plane of this height in the world frame (z up)."""
 SURFACE_Z_M = 0.0
+THRUSTERS = 6
+"""Number of the vehicle's thrusters; the first is thruster 1."""
 
 MAINTAIN_MOTION = "f_maintain_motion"
 GENERATE_SEARCH_PATH = "f_generate_search_path"

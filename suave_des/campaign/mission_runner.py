@@ -19,7 +19,7 @@ from suave_des.campaign.variation import cell_of
 from suave_des.errors import MissionError
 from suave_des.metrics.result import MissionResult
 from suave_des.registry import is_built_in
-from suave_des.scenario.models import Mission
+from suave_des.scenario.models import MissionSettings
 from suave_des.simulation.simulator import Simulator
 
 NOT_REPEATABLE = (
@@ -46,7 +46,7 @@ class MissionRunner:
         self._exit_after_s = exit_after_s
         self._drawn = tuple(job.variation.drawn)
         # Load or compile what missions run, before the first one's time counts: a mission of a second does.
-        short = job.loaded.scenario.model_copy(update={"mission": Mission(time_limit_s=1.0)})
+        short = job.loaded.scenario.model_copy(update={"mission": MissionSettings(time_limit_s=1.0)})
         Simulator(replace(job.loaded, scenario=short)).run("none", 1, 0)
         self._is_own = [not is_built_in(name) for name in job.managers]
         self._first: dict[int, tuple[MissionKey, Outcome]] = {}

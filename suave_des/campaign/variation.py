@@ -19,7 +19,7 @@ from suave_des.campaign.ensemble import COLUMN as ENSEMBLE_COLUMN
 from suave_des.campaign.ensemble import Ensemble
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.scenario.loader import LoadedScenario, value_at, with_values
-from suave_des.scenario.models import Mission
+from suave_des.scenario.models import MissionSettings
 from suave_des.scenario.quantities import Distribution
 from suave_des.streams import Streams
 
@@ -352,7 +352,7 @@ def _check_drawn(loaded: LoadedScenario, perturbed: Mapping[str, str]) -> None:
         return
     from suave_des.simulation.simulator import Simulator  # with it comes the compiler, which takes a while
 
-    short = loaded.scenario.model_copy(update={"mission": Mission(time_limit_s=1.0)})
+    short = loaded.scenario.model_copy(update={"mission": MissionSettings(time_limit_s=1.0)})
     drawn = Simulator(replace(loaded, scenario=short)).run("none", 1, 0).drawn
     for name, path in perturbed.items():
         if path not in drawn:

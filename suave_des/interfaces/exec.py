@@ -22,7 +22,7 @@ from typing import Any, ClassVar, Final
 
 from suave_des.domain import Task
 from suave_des.errors import InputError, did_you_mean, shown
-from suave_des.managing.base import ManagedSystem, ManagingSubsystem, Thresholds
+from suave_des.managing.base import Dependencies, ManagedSystem, ManagingSubsystem
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import MEASURED_AND_COMPONENTS, Diagnostic, Kind
 
@@ -152,7 +152,7 @@ class ExecManager(ManagingSubsystem):
         self._command = tuple(str(system.files[word].resolve()) if word in system.files else word for word in words)
         settings = dict(system.settings)
         self._time_out_s = float(settings.pop("time_out_s", TIME_OUT_S))
-        self._thresholds: Thresholds | None = None
+        self._thresholds: Dependencies | None = None
         answer = self._ask(
             "mission_started",
             protocol=PROTOCOL,
@@ -267,7 +267,7 @@ def exec_manager(command: str) -> type[ManagingSubsystem]:
     if not words:
         raise InputError("there is no manager 'exec'", remedy="write exec:COMMAND")
 
-    def thresholds(self: ExecManager) -> Thresholds | None:
+    def thresholds(self: ExecManager) -> Dependencies | None:
         return self._thresholds
 
     def kinds(self: ExecManager) -> Collection[Kind]:

@@ -14,14 +14,13 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
-from suave_des.domain import FOLLOW_PIPELINE, GENERATE_RECHARGE_PATH, MISSION_FUNCTIONS, thruster_name
+from suave_des.domain import FOLLOW_PIPELINE, GENERATE_RECHARGE_PATH, MISSION_FUNCTIONS, THRUSTERS, thruster_name
 from suave_des.errors import InputError
 from suave_des.interfaces.mission import CALLER, CallerManages
 from suave_des.managing.base import ManagedSystem
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.modes import DEFAULT_MODE, UNGROUND_MODE
-from suave_des.scenario.physical import THRUSTERS
 from suave_des.simulation.simulator import Simulator
 
 Observation = NDArray[np.float32]

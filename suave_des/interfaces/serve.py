@@ -97,8 +97,7 @@ class Session:
         return found | dict(zip(pose._fields, pose, strict=True))
 
     def _components(self) -> list[str]:
-        from suave_des.domain import thruster_name
-        from suave_des.scenario.physical import THRUSTERS
+        from suave_des.domain import THRUSTERS, thruster_name
 
         return [thruster_name(number) for number in range(1, THRUSTERS + 1)]
 

@@ -6,12 +6,10 @@ from dataclasses import dataclass, field
 import simpy
 
 from suave_des.clock import Process
-from suave_des.domain import thruster_name
+from suave_des.domain import THRUSTERS, thruster_name
 from suave_des.managed.node import FunctionNode
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, DiagnosticsBus, Kind
 from suave_des.scenario.revision import RecoveryRevision
-
-THRUSTERS = 6
 
 
 @dataclass(eq=False)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:  # or looking a manager up would load the vehicle, the compile
     from suave_des.vehicle.frames import Pose
 
 AdaptationProcess = Generator[simpy.Event, Any, None]
-Thresholds = Mapping[str, tuple[float, ...]]
+Dependencies = Mapping[str, tuple[float, ...]]
 """By quality attribute: the numbers, ascending, that its measured value is compared with."""
 
 
@@ -186,8 +186,8 @@ class ManagingSubsystem:
         self.starts_s = 0.0
 
     @property
-    def depends_on(self) -> Thresholds | None:
-        """Thresholds of the measured values that `adapt` depends on; None: it may depend on anything.
+    def depends_on(self) -> Dependencies | None:
+        """The measured values that `adapt` depends on, with their thresholds; None: it may depend on anything.
 
         Only the class that defines it is asked: one derived from it may depend on more.
         """

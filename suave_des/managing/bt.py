@@ -13,7 +13,7 @@ from suave_des.domain import (
     SURFACE_MODE,
 )
 from suave_des.managing import behaviours
-from suave_des.managing.base import FunctionsManager, ManagedSystem, Thresholds
+from suave_des.managing.base import Dependencies, FunctionsManager, ManagedSystem
 from suave_des.managing.behaviours import Behaviour, Condition, Fallback, Parallel, Sequence, SetMode
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
 from suave_des.scenario.modes import UNGROUND_MODE
@@ -63,7 +63,7 @@ class BehaviourTree(FunctionsManager):
         return behaviours.drawing(self.root)
 
     @property
-    def depends_on(self) -> Thresholds:
+    def depends_on(self) -> Dependencies:
         """The thresholds between the search modes."""
         return {"water_visibility": tuple(sorted(self._settings.visibility_thresholds_m))}
 
@@ -116,7 +116,7 @@ class ExtendedBehaviourTree(BehaviourTree):
     """bt_extended: the same, but with a low battery the vehicle goes to recharge first."""
 
     @property
-    def depends_on(self) -> Thresholds:
+    def depends_on(self) -> Dependencies:
         """The same, and whether the battery is low."""
         return {**super().depends_on, "battery_level": (self._settings.battery_limit,)}
 

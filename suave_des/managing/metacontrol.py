@@ -13,7 +13,7 @@ from suave_des.domain import GENERATE_SEARCH_PATH, Task
 from suave_des.knowledge.deliberation import Conclusion, Deliberation
 from suave_des.knowledge.state import UNGROUNDED, Inference, KnowledgeState, ObjectiveState, Plan
 from suave_des.managing.adapter import Adapter, TaskBridge
-from suave_des.managing.base import AdaptationProcess, ManagedSystem, ManagingSubsystem, Thresholds
+from suave_des.managing.base import AdaptationProcess, Dependencies, ManagedSystem, ManagingSubsystem
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, Kind
 from suave_des.scenario.modes import UNGROUND_MODE
 from suave_des.scenario.quantities import draw
@@ -168,7 +168,7 @@ class Metacontrol(ManagingSubsystem):
     # What the loop asks.
 
     @property
-    def depends_on(self) -> Thresholds | None:
+    def depends_on(self) -> Dependencies | None:
         """The numbers in the knowledge base, if the rules only compare measured values with them."""
         regions = self._knowledge.regions
         if regions is None or not regions.is_sound:

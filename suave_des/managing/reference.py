@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOTION, Task
 from suave_des.errors import InputError, did_you_mean, shown
-from suave_des.managing.base import AdaptationProcess, FunctionsManager, ManagedSystem, ManagingSubsystem, Thresholds
+from suave_des.managing.base import AdaptationProcess, Dependencies, FunctionsManager, ManagedSystem, ManagingSubsystem
 from suave_des.managing.simple import NoManager
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
 from suave_des.scenario.modes import DEFAULT_MODE, UNGROUND_MODE
@@ -70,7 +70,7 @@ class Threshold(FunctionsManager):
         self.failed: set[str] = set()
 
     @property
-    def depends_on(self) -> Thresholds:
+    def depends_on(self) -> Dependencies:
         """The thresholds between the search modes."""
         return {"water_visibility": tuple(sorted(self.thresholds_m))}
 

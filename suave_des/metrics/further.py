@@ -8,30 +8,40 @@ from itertools import pairwise
 
 import simpy
 
+from suave_des.compiling import Array
+from suave_des.domain import SEA_BED_Z_M
 from suave_des.metrics.result import MissionMetrics
-from suave_des.monitor.measurements import Measured
-from suave_des.scenario.models import Requirement
+from suave_des.monitor.measurements import BatteryLevel, Measured
+from suave_des.scenario.models import FURTHER_METRICS, Requirement, Scenario
 from suave_des.scenario.modes import Mode
+from suave_des.vehicle.vehicle import Vehicle, row_at
+from suave_des.world.coverage import covered_area_m2
 
-Value = float | int | None
+MetricValue = float | int | None
 
 
 @dataclass(eq=False)
-class Observer:
-    """Notes during the mission what further metrics are computed from.
+class FurtherMetrics:
+    """Notes during the mission what further metrics are computed from, and computes them.
 
     Attributes:
         env: the mission's clock.
-        undone_within_s: a change of mode that is taken back within this time counts as undone.
-        thrusters: how many there are.
-        adaptations_undone: changes of a function's mode that were taken back in time: indecision.
+        scenario: says which are asked for.
+        vehicle: has the track.
+        visibility_m: measured water visibility at each row of the track.
+        measured: what monitors have measured, by quality attribute.
+        battery: its level; none if there is no battery.
+        adaptations_undone: changes of a function's mode that were soon taken back: indecision.
         reasoning_time_s: mission time that the reasoner took in cycles that changed a function design.
         surfacing_time_s: from the leak to the surface; none while the vehicle has not surfaced.
     """
 
     env: simpy.Environment
-    undone_within_s: float
-    thrusters: int
+    scenario: Scenario
+    vehicle: Vehicle
+    visibility_m: Array
+    measured: Mapping[str, Measured]
+    battery: BatteryLevel | None
     adaptations_undone: int = 0
     reasoning_time_s: float = 0.0
     surfacing_time_s: float | None = None
@@ -43,8 +53,9 @@ class Observer:
 
     def adapted(self, function: str, before: str, after: str) -> None:
         """Take a change of mode of a function in use."""
-        changed_s, from_mode = self._changes.get(function, (-self.undone_within_s, ""))
-        is_undone = after == from_mode and self.env.now - changed_s <= self.undone_within_s
+        undone_within_s = self.scenario.reaction_metric.undone_within_s
+        changed_s, from_mode = self._changes.get(function, (-undone_within_s, ""))
+        is_undone = after == from_mode and self.env.now - changed_s <= undone_within_s
         self.adaptations_undone += is_undone
         # What is taken back is over: changing a third time does not undo the undoing.
         self._changes[function] = (self.env.now, "" if is_undone else before)
@@ -68,27 +79,55 @@ class Observer:
         """Take the moment at which the vehicle has surfaced after a leak."""
         self.surfacing_time_s = float(self.env.now) - leak_s
 
-    def thrusters_changed(self, working: int) -> None:
-        """Take a change of the number of thrusters that work."""
-        self._working.append((self.env.now, working))
+    def thrusters_changed(self) -> None:
+        """Take a change of the thrusters that work."""
+        self._working.append((self.env.now, self.vehicle.working_thrusters))
 
-    def configurations(self) -> int:
-        """How many configurations, one mode for each function, have been in force until now."""
-        self._count_configuration()
-        return len(self._configurations)
+    def columns(self, metrics: MissionMetrics) -> dict[str, MetricValue]:
+        """The further metrics and the fulfilment of requirements as of now, by column."""
+        scenario, now_s = self.scenario, float(self.env.now)
+        asked = (*scenario.metrics, *(str(each.metric) for each in scenario.requirements.values()))
+        found = {metric: self.value(metric) for metric in asked if metric in FURTHER_METRICS}
+        degrees = fulfilments(scenario.requirements, metrics, found, self.measured, now_s)
+        columns = {**found, **{f"requirement_{name}": degree for name, degree in degrees.items()}}
+        return {name: columns[name] for name in scenario.further_columns}
 
-    def operational_thrusters(self) -> float:
+    def value(self, metric: str) -> MetricValue:
+        """A further metric as of now."""
+        now_s = float(self.env.now)
+        match metric:
+            case "adaptations_undone":
+                return self.adaptations_undone
+            case "configurations":
+                self._count_configuration()
+                return len(self._configurations)
+            case "reasoning_time_s":
+                return self.reasoning_time_s
+            case "operational_thrusters":
+                return self._operational_thrusters()
+            case "area_covered_m2":
+                self.vehicle.position(now_s)  # fills the track until now
+                tangent = self.scenario.vehicle.camera.tangent
+                return covered_area_m2(self.vehicle.track, row_at(now_s), self.visibility_m, SEA_BED_Z_M, tangent)
+            case "surfacing_time_s":
+                return self.surfacing_time_s
+        assert self.battery is not None
+        level = self.battery.level(now_s)
+        return self.battery.recharges if metric == "recharges" else level
+
+    def _operational_thrusters(self) -> float:
         """Mean over mission time of the number of thrusters that work."""
+        all_thrusters = len(self.vehicle.model.thrusters)
         if self.env.now <= 0.0:
-            return float(self.thrusters)
-        steps = [(0.0, self.thrusters), *self._working, (self.env.now, 0)]
+            return float(all_thrusters)
+        steps = [(0.0, all_thrusters), *self._working, (self.env.now, 0)]
         return sum((later - since) * count for (since, count), (later, _) in pairwise(steps)) / self.env.now
 
 
 def fulfilments(
     requirements: Mapping[str, Requirement],
     metrics: MissionMetrics,
-    further: Mapping[str, Value],
+    further: Mapping[str, MetricValue],
     measured: Mapping[str, Measured],
     now_s: float,
 ) -> dict[str, float | None]:

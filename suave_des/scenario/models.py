@@ -30,7 +30,7 @@ from suave_des.scenario.quantities import (
     wrong,
 )
 from suave_des.scenario.revision import Revision
-from suave_des.scenario.signal_kinds import Monitor, Signal
+from suave_des.scenario.signal_kinds import Monitor, SignalDescription
 
 FileName = Annotated[str, Field(min_length=1)]
 
@@ -60,7 +60,7 @@ class FunctionSettings(Strict):
     """Class of the function's node, as module:Class, or the name under which a package registers it."""
 
 
-class Mission(Strict):
+class MissionSettings(Strict):
     """The coordinator's limit, and what its tasks need."""
 
     time_limit_s: Annotated[float, Field(strict=True), Within(gt=0, le=_LONGEST_MISSION_S, unit="s")] = 300.0
@@ -276,7 +276,7 @@ class Scenario(Strict):
     """How the exemplar's software of one revision behaves."""
     vehicle: VehicleDescription
     """Body, thrusters and camera; left out in a file: `bluerov2`."""
-    mission: Mission = Mission()
+    mission: MissionSettings = MissionSettings()
     """The coordinator's limit, and what its tasks need."""
     start: Start = Start()
     """Pose before the drift, each part drawn once a run."""
@@ -284,7 +284,7 @@ class Scenario(Strict):
     """The pipeline on the sea bed."""
     current: Current = Current()
     """Velocity of the water."""
-    signals: dict[Name, Signal]
+    signals: dict[Name, SignalDescription]
     """What is measured, by the name of its quality attribute; water_visibility (m) is needed."""
     thruster_events: tuple[ThrusterEvent, ...] = ()
     """Failures and recoveries, in order."""

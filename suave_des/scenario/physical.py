@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from suave_des.domain import SEA_BED_Z_M, SURFACE_Z_M
+from suave_des.domain import SEA_BED_Z_M, SURFACE_Z_M, THRUSTERS
 from suave_des.errors import shown
 from suave_des.scenario.quantities import (
     FARTHEST_M,
@@ -93,7 +93,7 @@ class VehicleDescription(Strict):
     """The camera."""
 
 
-class CurrentWave(Strict):
+class CurrentWaveDescription(Strict):
     """A current whose speed goes up and down: mean + amplitude sin(2 pi (t + shift) / period), in one direction."""
 
     mean_m_per_s: CurrentDistribution = 0.0
@@ -117,7 +117,7 @@ class Current(Strict):
     """Towards north."""
     z_m_per_s: CurrentDistribution = 0.0
     """Upwards."""
-    wave: CurrentWave | None = None
+    wave: CurrentWaveDescription | None = None
     """The part that varies over time; left out: none."""
 
 
@@ -159,7 +159,6 @@ class Pipeline(Strict):
     """Evenly spaced points on each straight piece, its first vertex excluded and its last included."""
 
 
-THRUSTERS = 6
 _EVENT_TEXT = re.compile(r"^\(\s*(?P<thruster>[^,]*?)\s*,\s*(?P<event>[^,]*?)\s*,\s*(?P<time_s>[^,]*?)\s*\)$")
 
 

@@ -113,7 +113,7 @@ class TableSignal(_Signal):
     """Between two rows: the earlier row's value, or a straight line."""
 
 
-Signal = Annotated[SinusoidSignal | ConstantSignal | StepSignal | TableSignal, Field(discriminator="kind")]
+SignalDescription = Annotated[SinusoidSignal | ConstantSignal | StepSignal | TableSignal, Field(discriminator="kind")]
 
 
 SignalTable = tuple[tuple[float, ...], tuple[float, ...]]

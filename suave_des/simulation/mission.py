@@ -21,7 +21,7 @@ from suave_des.managed.recharge import GenerateRechargePath
 from suave_des.managed.search import GenerateSearchPath
 from suave_des.managed.surface import Surface
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
-from suave_des.metrics.further import Observer
+from suave_des.metrics.further import FurtherMetrics
 from suave_des.metrics.reactions import ReactionMeter
 from suave_des.metrics.recording import Recorder
 from suave_des.metrics.result import MissionMetrics, MissionResult
@@ -38,7 +38,6 @@ from suave_des.monitor.monitors import (
     thruster_monitor,
 )
 from suave_des.scenario.physical import Battery
-from suave_des.simulation.evaluation import Evaluation
 from suave_des.simulation.host import RAISED, ManagerHost
 from suave_des.simulation.simulator import MissionMemory, Simulator
 from suave_des.simulation.vehicles import draw_start, make_vehicle
@@ -112,16 +111,13 @@ class MissionRun:
             self._bus.subscribe(self._recorder.diagnostic_of(thresholds_m, battery_limit))
             self.modes.listeners.append(self._recorder.mode_effect)
         self.modes.listeners.append(self._reactions.mode_effect)
-        self._observer: Observer | None = None
-        self._evaluation: Evaluation | None = None
+        self._further: FurtherMetrics | None = None
         if self._scenario.further_columns:
-            undone_within_s = self._scenario.reaction_metric.undone_within_s
-            self._observer = Observer(self.env, undone_within_s, len(simulator.vehicle_model.thrusters))
-            self.modes.listeners.append(self._observer.mode_effect)
-            self.modes.adaptation_listeners.append(self._observer.adapted)
-            self._evaluation = Evaluation(
-                self._scenario, self._observer, self._vehicle, memory.visibility_m, self._measured, self._battery
+            self._further = further = FurtherMetrics(
+                self.env, self._scenario, self._vehicle, memory.visibility_m, self._measured, self._battery
             )
+            self.modes.listeners.append(further.mode_effect)
+            self.modes.adaptation_listeners.append(further.adapted)
         self._coordinator = self._make_coordinator()
         self._host = self._make_host(kind)
         self._coordinator.start(self._host.request, self._host.cancel)
@@ -177,7 +173,7 @@ class MissionRun:
         measured = {} if self._battery is None else {self._battery.key: self._battery}
         trajectory = recorder.trajectory(self._vehicle, self._visibility, measured)
         events, knowledge = tuple(recorder.events), tuple(recorder.knowledge)
-        further = {} if self._evaluation is None else self._evaluation.further(metrics, float(self.env.now))
+        further = {} if self._further is None else self._further.columns(metrics)
         remarks = self._host.remarks
         return MissionResult(metrics, events, trajectory, knowledge, drawn, self.modes.refused, further, remarks)
 
@@ -233,8 +229,8 @@ class MissionRun:
 
     def _set_thruster_health(self, t_s: float, thruster: int, health: float) -> None:
         self._vehicle.set_thruster_health(t_s, thruster, health)
-        if self._observer is not None:
-            self._observer.thrusters_changed(self._vehicle.working_thrusters)
+        if self._further is not None:
+            self._further.thrusters_changed()
 
     def _measure(self, name: str) -> Measurements:
         signal, chance = self._scenario.signals[name], self._chance
@@ -362,8 +358,8 @@ class MissionRun:
             leak_s = self._chance.value("leak.time_s")
             leak = coordinator.surface_at(self._surface.surfaced)
             self.env.process(leak_monitor(self.env, self._bus, leak_s, leak))
-            if (observer := self._observer) is not None:
-                self._surface.surfaced.callbacks.append(lambda event: observer.surfaced(leak_s))
+            if (further := self._further) is not None:
+                self._surface.surfaced.callbacks.append(lambda event: further.surfaced(leak_s))
         return coordinator
 
     def _make_host(self, kind: type[ManagingSubsystem] | None) -> ManagerHost:
@@ -380,9 +376,7 @@ class MissionRun:
             record_state=self._recorder.record_state,
             state_changed=lambda: self._host.state_changed(),
             measurements=self._measured,
-            record_reasoning_time=(lambda duration_s: None)
-            if self._observer is None
-            else self._observer.reasoning_took,
+            record_reasoning_time=(lambda duration_s: None) if self._further is None else self._further.reasoning_took,
             recorded=self._recorder.enabled,
             pose=lambda: self._vehicle.pose(self.env.now),
             distance_inspected_m=lambda: self._follow.distance_m,

@@ -30,7 +30,7 @@ def vehicle_model(description: VehicleDescription) -> VehicleModel:
     )
 
 
-class Start(NamedTuple):
+class StartPlace(NamedTuple):
     """Where a mission begins.
 
     Attributes:
@@ -42,15 +42,15 @@ class Start(NamedTuple):
     origin_m: tuple[float, float]
 
 
-def draw_start(chance: Chance) -> Start:
+def draw_start(chance: Chance) -> StartPlace:
     """Draw where the vehicle is put, with what it has drifted before the mission."""
     value = chance.value
     x_m, y_m = (value(f"start.{axis}_m") + value(f"calibration.drift_{axis}_m") for axis in "xy")
-    return Start((x_m, y_m), (x_m + value("calibration.origin_x_m"), y_m + value("calibration.origin_y_m")))
+    return StartPlace((x_m, y_m), (x_m + value("calibration.origin_x_m"), y_m + value("calibration.origin_y_m")))
 
 
 def make_vehicle(
-    scenario: Scenario, model: VehicleModel, chance: Chance, start: Start, duration_s: float, track: Array
+    scenario: Scenario, model: VehicleModel, chance: Chance, start: StartPlace, duration_s: float, track: Array
 ) -> Vehicle:
     """Make the vehicle of one mission.
 

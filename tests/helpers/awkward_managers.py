@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from suave_des.domain import Task
-from suave_des.managing.base import ManagedSystem, ManagingSubsystem, Thresholds
+from suave_des.managing.base import Dependencies, ManagedSystem, ManagingSubsystem
 from suave_des.managing.simple import NoManager
 
 
@@ -137,7 +137,7 @@ class WaitsInVain(NoManager):
     """Depends on a measured value whose name it misspells."""
 
     @property
-    def depends_on(self) -> Thresholds:
+    def depends_on(self) -> Dependencies:
         return {"water_visiblity": (3.25,)}
 
 
@@ -145,5 +145,5 @@ class SavesCharge(NoManager):
     """Serves scenarios with a battery, and others."""
 
     @property
-    def depends_on(self) -> Thresholds:
+    def depends_on(self) -> Dependencies:
         return {"water_visibility": (3.25,), "battery_level": (0.25,)}

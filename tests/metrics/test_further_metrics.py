@@ -9,27 +9,39 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.errors import InputError
-from suave_des.metrics.further import Observer
+from suave_des.metrics.further import FurtherMetrics
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import FURTHER_METRICS, Requirement
 from suave_des.scenario.modes import Mode
 from suave_des.simulation.simulator import Simulator
+from suave_des.vehicle.autopilot import Autopilot
+from suave_des.vehicle.frames import Pose
+from suave_des.vehicle.vehicle import Vehicle
 from suave_des.world.coverage import covered_area_m2
+from tests.helpers.vehicles import BLUEROV2
 
 TANGENT = math.tan(math.radians(30.0))
 
 
 class Watched:
-    """An observer whose clock is set by the test."""
+    """A vehicle at rest and what is noted of its mission, at times that the test sets."""
 
     def __init__(self) -> None:
         self.env = simpy.Environment()
-        self.observer = Observer(self.env, undone_within_s=4.0, thrusters=6)
+        scenario = load_scenario("extended").scenario
+        scenario = scenario.model_copy(update={"metrics": FURTHER_METRICS, "requirements": {}, "battery": None})
+        self.vehicle = Vehicle(BLUEROV2, Autopilot(), Pose(0.0, 0.0, -18.0, 0.0, 0.0, 0.0), 60.0)
+        self.noted = FurtherMetrics(self.env, scenario, self.vehicle, np.full(2000, 3.0), {}, None)
 
-    def at(self, t_s: float) -> Observer:
+    def at(self, t_s: float) -> FurtherMetrics:
         if t_s > self.env.now:
             self.env.run(until=t_s)
-        return self.observer
+        return self.noted
+
+    def lose(self, t_s: float, thruster: int, health: float) -> None:
+        noted = self.at(t_s)
+        self.vehicle.set_thruster_health(t_s, thruster, health)
+        noted.thrusters_changed()
 
 
 @pytest.mark.parametrize(
@@ -46,14 +58,14 @@ def test_a_change_taken_back_in_time_is_undone(changes: list[tuple[float, str, s
     watched = Watched()
     for t_s, before, after in changes:
         watched.at(t_s + 1.0).adapted("f", before, after)
-    assert watched.observer.adaptations_undone == undone
+    assert watched.noted.value("adaptations_undone") == undone
 
 
 def test_changes_of_different_functions_do_not_undo_each_other() -> None:
     watched = Watched()
     watched.at(1.0).adapted("f", "a", "b")
     watched.at(2.0).adapted("g", "b", "a")
-    assert watched.observer.adaptations_undone == 0
+    assert watched.noted.value("adaptations_undone") == 0
 
 
 def test_configurations_are_counted_once_each_and_not_when_passed_through() -> None:
@@ -61,14 +73,14 @@ def test_configurations_are_counted_once_each_and_not_when_passed_through() -> N
     for t_s, function, mode in [(1.0, "f", "a"), (2.0, "g", "x"), (3.0, "f", "b"), (3.0, "g", "y"), (5.0, "f", "a")]:
         watched.at(t_s).mode_effect(function, Mode(mode, True, {}))
     watched.at(6.0).mode_effect("g", Mode("x", True, {}))  # f = a, g = x again
-    assert watched.at(7.0).configurations() == len([{"f": "a"}, {"a", "x"}, {"b", "y"}, {"a", "y"}])
+    assert watched.at(7.0).value("configurations") == len([{"f": "a"}, {"a", "x"}, {"b", "y"}, {"a", "y"}])
 
 
 def test_operational_thrusters_are_a_mean_over_time() -> None:
     watched = Watched()
-    watched.at(10.0).thrusters_changed(5)
-    watched.at(30.0).thrusters_changed(6)
-    assert watched.at(40.0).operational_thrusters() == pytest.approx((10 * 6 + 20 * 5 + 10 * 6) / 40)
+    watched.lose(10.0, 2, 0.0)
+    watched.lose(30.0, 2, 1.0)
+    assert watched.at(40.0).value("operational_thrusters") == pytest.approx((10 * 6 + 20 * 5 + 10 * 6) / 40)
 
 
 def track_of(*places: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
