@@ -17,14 +17,14 @@ from suave_des.caches import private_cache
 settings.register_profile("repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("repeatable")
 
-# Machine code is the same for all: it is kept where it always is, so that each run of the tests need not compile anew.
+# Machine code and Java's archive are the same for all: they are kept where they always are, so that each run of the
+# tests need not make them anew. So are compiled modules, whatever the environment says: hundreds of processes start.
 os.environ.setdefault("NUMBA_CACHE_DIR", str(private_cache("numba")))
-if "PYTEST_XDIST_WORKER" not in os.environ:  # such a process has inherited the setting
-    os.environ["SUAVE_DES_CACHE_DIR"] = tempfile.mkdtemp(prefix="suave-des-tests-")
-# So are compiled modules, whatever the environment says: a run starts hundreds of processes.
+os.environ.setdefault("SUAVE_DES_JAVA_ARCHIVE", str(private_cache("java")))
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-os.environ["SUAVE_DES_JAVA_ARCHIVE"] = "off"  # or processes that outlive the tests would make one in that folder
+if "PYTEST_XDIST_WORKER" not in os.environ:  # such a process has inherited the setting
+    os.environ["SUAVE_DES_CACHE_DIR"] = tempfile.mkdtemp(prefix="suave-des-tests-")
 
 os.environ.pop("COLUMNS", None)  # which several test processes at once are given, as if there were a terminal
 

@@ -27,7 +27,7 @@ print(total(numpy.ones(3)), "scipy.linalg" in sys.modules)
 
 @numba.njit
 def algebra(values):
-    return numpy.cov(values)[0, 1], numpy.dot(values, values)[0, 0], numpy.linalg.inv(values)[0, 0]
+    return numpy.dot(values, values)[0, 0], numpy.linalg.inv(values)[0, 0]
 
 print(*algebra(numpy.array([[1.0, 2.0], [3.0, 5.0]])), "scipy.linalg" in sys.modules)
 
@@ -58,7 +58,7 @@ def run(program: str, folder: Path) -> list[str]:
 def test_linear_algebra_is_loaded_by_what_uses_it_only(tmp_path: Path) -> None:
     first, second, third = run(COMPILING, tmp_path)
     assert first == "3.0 False"
-    assert [round(float(number), 9) for number in second.split()[:3]] == [1.0, 7.0, -5.0]
+    assert [round(float(number), 9) for number in second.split()[:2]] == [7.0, -5.0]
     assert second.endswith("True")
     assert third == "1.0"
 

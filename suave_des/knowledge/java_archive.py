@@ -6,7 +6,8 @@ after Java was first used. Without an archive, or with one that Java rejects, al
 
     python -m suave_des.knowledge.java_archive
 
-makes it at once, for a machine image for instance. SUAVE_DES_JAVA_ARCHIVE=off does without.
+makes it at once, for a machine image for instance. SUAVE_DES_JAVA_ARCHIVE=off does without; the absolute path of a
+folder keeps archives there, apart from the other caches.
 """
 
 from __future__ import annotations
@@ -56,7 +57,8 @@ def archive_path(class_path: Sequence[str] | None = None, options: Sequence[str]
     Java takes an archive only with the runtime, the jars (by path, size and time) and the options that it was made
     with: all that is in the name.
     """
-    if os.environ.get(_SWITCH) == "off":
+    chosen = os.environ.get(_SWITCH, "")
+    if chosen == "off":
         return None
     total = hashlib.sha256(repr(tuple(options)).encode())
     try:
@@ -65,7 +67,7 @@ def archive_path(class_path: Sequence[str] | None = None, options: Sequence[str]
             total.update(f"{path} {status.st_size} {status.st_mtime_ns}\n".encode())
     except (OSError, InputError):  # no Java: starting it gives the error
         return None
-    folder = private_cache("java")
+    folder = Path(chosen) if Path(chosen).is_absolute() else private_cache("java")
     return None if folder is None else folder / f"{total.hexdigest()[:32]}.aot"
 
 

@@ -81,7 +81,7 @@ def test_resuming_what_is_done_changes_nothing(scenario: Path, tmp_path: Path) -
 
 
 def test_killed_at_random_moments_the_bytes_are_the_same(scenario: Path, tmp_path: Path) -> None:
-    runs, out = 800, tmp_path / "out"
+    runs, out = 400, tmp_path / "out"
     whole = undisturbed(scenario, runs, tmp_path / "whole")
 
     def run(resumes: bool, told: Callable[[object], None]) -> None:
@@ -90,9 +90,9 @@ def test_killed_at_random_moments_the_bytes_are_the_same(scenario: Path, tmp_pat
         else:
             run_campaign(scenario, MANAGERS, runs, 1, out=out, on_progress=told)
 
-    done = chaos.survive_forked(15, random.Random(7), run, out)
+    done = chaos.survive_forked(8, random.Random(7), run, out)
     assert done == sorted(done)
-    assert len({count for count in done if 0 < count < 2 * runs}) >= 3  # or the moments showed nothing
+    assert len({count for count in done if 0 < count < 2 * runs}) >= 2  # or the moments showed nothing
     resume_campaign(out)
     assert (out / "runs.csv").read_bytes() == whole
     assert sorted(path.name for path in out.iterdir()) == [
@@ -100,11 +100,13 @@ def test_killed_at_random_moments_the_bytes_are_the_same(scenario: Path, tmp_pat
     ]
 
 
-def test_killed_with_its_workers_or_without_the_bytes_are_the_same(scenario: Path, tmp_path: Path) -> None:
-    runs = 1500
+@pytest.mark.parametrize(("kills", "runs"), [(1, 600), pytest.param(4, 3000, marks=pytest.mark.slow)])
+def test_killed_with_its_workers_or_without_the_bytes_are_the_same(
+    scenario: Path, tmp_path: Path, kills: int, runs: int
+) -> None:
     whole = undisturbed(scenario, runs, tmp_path / "whole")
     asked = [str(scenario), "--managers", ",".join(MANAGERS), "--runs", str(runs), "--workers", "2"]
-    done = chaos.survive(2, random.Random(7), tmp_path, asked, longest_s=0.3)
+    done = chaos.survive(kills, random.Random(7), tmp_path, asked, longest_s=0.3)
     assert done == sorted(done)
     assert (tmp_path / "out" / "runs.csv").read_bytes() == whole
 
@@ -115,7 +117,7 @@ def test_ctrl_c_on_the_command_line(scenario: Path, tmp_path: Path) -> None:
     while not (tmp_path / "out" / STORE_FILE).exists():
         assert time.monotonic() < started + 60
         time.sleep(0.05)
-    time.sleep(2.0)
+    time.sleep(0.5)
     process.send_signal(signal.SIGINT)
     status, err = chaos.ended(process)
     assert status == 130

@@ -56,31 +56,21 @@ def outcome(reasoner: Reasoner, state: KnowledgeState) -> Inference | str:
         return str(error)
 
 
-QUICK_JAVA = "-XX:+IgnoreUnrecognizedVMOptions -XX:TieredStopAtLevel=1 -XX:+UseSerialGC -Xlog:disable"
-"""For Java processes that live a second: less compiling, one thread less, no log. It changes nothing else."""
-
-
-@pytest.mark.parametrize("count", [24, pytest.param(120, marks=pytest.mark.slow)])
-def test_both_backends_infer_the_same_on_random_states(
-    kb: Ontology, pellet: Reasoner, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, count: int
-) -> None:
+@pytest.mark.parametrize("count", [6, pytest.param(120, marks=pytest.mark.slow)])
+def test_both_backends_infer_the_same_on_random_states(kb: Ontology, pellet: Reasoner, count: int) -> None:
     draw = random.Random(20230515)
     states = [random_state(draw) for _ in range(count)]
     # A grounding in error cannot belong to an objective that is said to be ungrounded.
     states += [searching("fd_spiral_high", 1.0, status="UNGROUNDED"), KnowledgeState()]
     assert len(set(states)) >= count
-    found = [outcome(pellet, state) for state in states]  # Java has started in this process, without what follows
-    # The first process leaves an archive of Pellet's classes, with which the others take half the time.
-    stock, archive = make_reasoner("owlready2", kb, TimeLimit(180.0)), tmp_path / "pellet.aot"
-    monkeypatch.setenv("JAVA_TOOL_OPTIONS", f"{QUICK_JAVA} -XX:AOTCacheOutput={archive}")
-    reference = [outcome(stock, states[0])]
-    monkeypatch.setenv("JAVA_TOOL_OPTIONS", f"{QUICK_JAVA} -XX:AOTCache={archive}")
+    found = [outcome(pellet, state) for state in states]
+    stock = make_reasoner("owlready2", kb, TimeLimit(180.0))
     with ThreadPoolExecutor(max_workers=2) as pool:  # each call waits for a Java process of its own
-        reference += pool.map(lambda state: outcome(stock, state), states[1:])
+        reference = list(pool.map(lambda state: outcome(stock, state), states))
     assert found == reference
     consistent = [one for one in found if isinstance(one, Inference)]
     assert any(isinstance(one, str) for one in found)
-    assert len({one.facts for one in consistent}) >= 10  # the states do differ in what follows from them
+    assert len({one.facts for one in consistent}) >= min(10, count // 2)  # what follows from the states does differ
     for ours, theirs in zip(found, reference, strict=True):
         if isinstance(ours, Inference) and isinstance(theirs, Inference):
             assert plan(kb, ours.state, ours) == plan(kb, theirs.state, theirs)
@@ -88,7 +78,7 @@ def test_both_backends_infer_the_same_on_random_states(
 
 def test_an_inference_does_not_depend_on_those_before_it(kb: Ontology) -> None:
     draw = random.Random(7)
-    states = [random_state(draw) for _ in range(150)]
+    states = [random_state(draw) for _ in range(40)]
     forth = make_reasoner("pellet", kb)
     back = make_reasoner("pellet", kb)
     one = [outcome(forth, state) for state in states]
@@ -118,14 +108,10 @@ class TestSchemas:
         assert found == [everything("owlready2", number, folder) for number in numbers]
         return found
 
-    def test_all_that_axioms_conclude_is_read(self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-        monkeypatch.setenv("JAVA_TOOL_OPTIONS", QUICK_JAVA)
-        assert sum(map(len, self.compare(range(200, 208), tmp_path))) >= 100
+    def test_all_that_axioms_conclude_is_read(self, tmp_path: Path) -> None:
+        assert sum(map(len, self.compare(range(200, 204), tmp_path))) >= 50
 
     @pytest.mark.slow
-    def test_all_that_axioms_conclude_is_read_in_200_ontologies(
-        self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-    ) -> None:
-        monkeypatch.setenv("JAVA_TOOL_OPTIONS", QUICK_JAVA)
+    def test_all_that_axioms_conclude_is_read_in_200_ontologies(self, tmp_path: Path) -> None:
         found = self.compare(range(200), tmp_path)
         assert sum(isinstance(one, str) for one in found) >= 5  # contradictions are among them

@@ -80,6 +80,12 @@ def test_it_can_be_switched_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert list(tmp_path.iterdir()) == []
 
 
+def test_it_is_kept_in_the_folder_that_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SUAVE_DES_JAVA_ARCHIVE", str(tmp_path))
+    archive = java_archive.archive_path([])
+    assert archive is not None and archive.parent == tmp_path
+
+
 def test_other_libraries_or_options_mean_another_archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("SUAVE_DES_JAVA_ARCHIVE")
     jar = tmp_path / "a.jar"

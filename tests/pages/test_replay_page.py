@@ -59,8 +59,7 @@ def colours(found, canvas):
     )
 
 
-@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
-@pytest.mark.parametrize("name", ["one", "both"])
+@pytest.mark.parametrize(("name", "size"), [("one", DESKTOP), ("both", PHONE), ("one", PHONE)])
 def test_it_opens_without_complaint_or_request_and_fits_the_window(name, size, browser, request):
     file = request.getfixturevalue(name)
     with opened(browser, file, size, f"#t={FAILURE_S}") as found:

@@ -40,8 +40,7 @@ def traces(found, chart):
     return found.value(f"document.getElementById('{chart}').data.map(each => each.name)")
 
 
-@pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
-@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize(("theme", "size"), [("light", DESKTOP), ("dark", PHONE)], ids=["desktop", "phone"])
 def test_it_opens_without_complaint_or_request_and_fits_the_window(theme, size, report, browser):
     with opened(browser, report, size, theme=theme) as found:
         ready(found)

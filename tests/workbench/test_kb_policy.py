@@ -219,7 +219,7 @@ class TestFiles:
         )
         two = KnowledgeBase.load(rules=[file])
         settings = ManagingSettings(measured=("battery_level", "water_visibility"))
-        space = PolicySpace(settings.measured, (Decimal(1), Decimal("2.25")), (), ())
+        space = PolicySpace(settings.measured, (Decimal(1),), (), ())
         found = make_policy(two.base, settings, two.infer, 0, space)
         draw_policy(found, tmp_path / "two.svg")
         assert "battery level" in (tmp_path / "two.svg").read_text()
@@ -253,16 +253,14 @@ class TestDiff:
         file = rules_file(
             tmp_path, f'QAWaterVisibility: {VISIBLE} ^ lessThan(?v, 3) -> fg_status(?fg, "IN_ERROR_NFR")\n'
         )
-        empty = rules_file(tmp_path, "# nothing\n", "empty.swrl")
-        _, text, _ = command("diff", empty, file, "--max-failed", "0")
+        _, text, _ = command("diff", same, file, "--max-failed", "0")
         assert f"{SEARCH}, now fd_spiral_high: A fd_spiral_medium, B stays\n  3 <= . < 3.25: 6 states\n" in text
-        _, printed, _ = command("diff", empty, file, "--max-failed", "0", "--format", "json")
+        _, printed, _ = command("diff", same, file, "--max-failed", "0", "--format", "json")
         assert json.loads(printed)["states"] == 6
 
-    def test_an_outcome_is_told_once(self, command, tmp_path):
-        empty = rules_file(tmp_path, "# nothing\n", "empty.swrl")
+    def test_an_outcome_is_told_once(self, command, edited, tmp_path):
         file = rules_file(tmp_path, "low: FunctionDesign(?d) -> fd_realisability(fd_spiral_low, false)\n")
-        _, text, _ = command("diff", empty, file, "--max-failed", "0")
+        _, text, _ = command("diff", edited(""), file, "--max-failed", "0")
         assert f"{SEARCH}, now ungrounded: A fd_spiral_low, B none left\n  1.25 <= . < 2.25: 6 states\n" in text
         assert "none left, none left" not in text
 
