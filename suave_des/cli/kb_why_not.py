@@ -60,13 +60,13 @@ def why_not(
     from suave_des.knowledge.limit import TimeLimit
     from suave_des.scenario.loader import load_scenario
     from suave_des.workbench.state_input import ManagingSettings, StateBuilder
-    from suave_des.workbench.testing.situation import FactReader, with_facts
+    from suave_des.workbench.testing.situation import FactReader
     from suave_des.workbench.why_not import RuleQuestions
 
     base, unusable = _open(sources)
     reader = FactReader(base)
     reader.declare(facts or ())
-    base = with_facts(base, [reader.triple(fact) for fact in facts or ()])
+    base = base.with_facts(reader.triple(fact) for fact in facts or ())
     builder = StateBuilder(base, ManagingSettings.of(load_scenario(sources.scenario, **sources.replacements).scenario))
     parts.add_to(builder, sources.measured)
     state = builder.state()

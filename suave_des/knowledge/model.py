@@ -84,6 +84,13 @@ class Model:
         for group in (self.objectives, self.groundings, self.measurements):
             yield from group.values()
 
+    def triples(self) -> Iterator[Triple]:
+        """What the ontologies assert that only states bring: of these individuals, and of components' status."""
+        for individual in self.individuals():
+            yield from individual.own
+        for initial in self.initial.values():
+            yield from initial
+
     def assertions(self, state: KnowledgeState) -> tuple[Triple, ...]:
         """Return the triples that assert a state, for every reasoner in the same order.
 

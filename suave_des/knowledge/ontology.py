@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
+from functools import cached_property
 from pathlib import Path
 
 from suave_des.errors import KnowledgeError
@@ -33,9 +34,7 @@ class Ontology:
         files: the ontology files in use, imports included, sorted by path, and the files of rules as text.
         content_hash: SHA-256 of all their content, of the overridden values and of the names of disabled rules,
             whatever the order of ontologies.
-        rules: the SWRL rules, disabled ones included.
-        facts: what the ontologies assert of individuals.
-        content: all triples for a reasoner.
+        content: all triples and rules for a reasoner.
         names: short names of IRIs, for facts.
         model: the functions, designs, components and quality attributes.
         vocabulary: the names that rules may use.
@@ -45,16 +44,12 @@ class Ontology:
 
     files: tuple[Path, ...]
     content_hash: str
-    rules: tuple[Rule, ...] = field(repr=False)
-    facts: frozenset[Fact] = field(repr=False)
     content: Content = field(repr=False)
     names: Names = field(repr=False)
     model: Model = field(repr=False)
     vocabulary: Vocabulary = field(repr=False)
     sources: tuple[OntologyFile, ...] = field(repr=False)
     assumptions: tuple[str, ...]
-    _designs: Mapping[str, tuple[str, ...]] = field(repr=False)
-    _expected: Mapping[str, Mapping[str, Decimal]] = field(repr=False)
 
     @classmethod
     def load(
@@ -91,25 +86,40 @@ class Ontology:
         files = [RulesFile.read(Path(path)) for path in rules]
         content = with_rules(content, [file.rules(vocabulary) for file in files], disabled_rules)
         check_property_use(merged.triples, content.enabled_rules)
-        facts = frozenset(facts_of(content.triples, names))
-        designs: dict[str, list[str]] = {name: [] for name in model.functions}
-        for fact in facts:
-            if fact.property == "solvesF" and fact.value in designs and fact.subject in model.designs:
-                designs[str(fact.value)].append(fact.subject)
         return cls(
             files=(*sorted(source.path for source in sources), *(file.path for file in files)),
             content_hash=hash_with_rules(_content_hash(sources, values or {}, added), files, disabled_rules),
-            rules=content.rules,
-            facts=facts,
             content=content,
             names=names,
             model=model,
             vocabulary=vocabulary,
             sources=sources,
             assumptions=tuple(assumption(name, sign) for name, sign in added.items()),
-            _designs={name: tuple(sorted(found)) for name, found in designs.items()},
-            _expected=expectations(content, model),
         )
+
+    def with_rules(self, rules: Iterable[Rule]) -> Ontology:
+        """The same ontology with other rules, in force or not."""
+        return replace(self, content=replace(self.content, rules=tuple(rules)))
+
+    def with_facts(self, facts: Iterable[Triple]) -> Ontology:
+        """The same ontology with further facts of individuals."""
+        return replace(self, content=replace(self.content, triples=(*self.content.triples, *facts)))
+
+    def with_triples(self, triples: Iterable[Triple]) -> Ontology:
+        """The ontology with other triples: functions, designs, components and attributes are found in them again."""
+        whole = replace(self.content, triples=(*triples, *self.model.triples()))
+        model, content = build_model(whole, self.sources)
+        return replace(self, content=content, model=model, names=Names(whole.triples))
+
+    @property
+    def rules(self) -> tuple[Rule, ...]:
+        """The SWRL rules, disabled ones included."""
+        return self.content.rules
+
+    @cached_property
+    def facts(self) -> frozenset[Fact]:
+        """What the ontologies assert of individuals."""
+        return frozenset(facts_of(self.content.triples, self.names))
 
     @property
     def functions(self) -> tuple[str, ...]:
@@ -130,9 +140,21 @@ class Ontology:
         """Function designs that solve a function, sorted by name; none for an unknown function."""
         return self._designs.get(function, ())
 
+    @cached_property
+    def _designs(self) -> Mapping[str, tuple[str, ...]]:
+        solving = sorted((fact.subject, fact.value) for fact in self.facts if fact.property == "solvesF")
+        return {
+            name: tuple(one for one, solved in solving if solved == name and one in self.model.designs)
+            for name in self.functions
+        }
+
     def expected(self, design: str) -> Mapping[str, Decimal]:
         """Expected value of each quality attribute of a function design (its performance among them)."""
         return self._expected.get(design, {})
+
+    @cached_property
+    def _expected(self) -> Mapping[str, Mapping[str, Decimal]]:
+        return expectations(self.content, self.model)
 
     def assertions(self, state: KnowledgeState) -> tuple[Triple, ...]:
         """Return the triples that assert a state.

@@ -160,10 +160,8 @@ def _of_ontologies(ontology: Ontology, carriers: frozenset[str]) -> Iterator[str
 
 def _numbers(ontology: Ontology) -> Iterator[Decimal]:
     """Every number in the knowledge base, whatever its datatype, and texts that look like one."""
-    model = ontology.model
-    own = (individual.own for individual in model.individuals())
-    for triples in (ontology.content.triples, *own, *model.initial.values()):
-        yield from _in_texts(value.text for _, _, value in triples if isinstance(value, Lit))
+    triples = (*ontology.content.triples, *ontology.model.triples())
+    yield from _in_texts(value.text for _, _, value in triples if isinstance(value, Lit))
     for line in ontology.content.structure:
         yield from _in_texts(text for text, _ in _LITERAL.findall(line))
     for rule in ontology.content.enabled_rules:

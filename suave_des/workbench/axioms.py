@@ -43,9 +43,7 @@ def compare_axioms(one: Ontology, other: Ontology) -> AxiomDifference:
 
 def axioms_of(base: Ontology) -> Iterator[str]:
     """Give every axiom, fact and rule as text."""
-    own = (triple for individual in base.model.individuals() for triple in individual.own)
-    initial = (triple for each in base.model.initial.values() for triple in each)
-    for triple in (*base.content.triples, *own, *initial):
+    for triple in (*base.content.triples, *base.model.triples()):
         yield _triple(base, triple)
     yield from _structure(base)
     for rule in base.rules:

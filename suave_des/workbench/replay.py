@@ -293,7 +293,7 @@ def _changed(base: Ontology, change: RuleChange) -> Ontology:
     except KnowledgeError as error:
         raise KnowledgeError(error.problem, place="--disable", remedy=error.remedy) from None
     digest = hash_with_rules(base.content_hash, files, disabled)
-    return replace(base, content=content, rules=content.rules, content_hash=digest)
+    return replace(base, content=content, content_hash=digest)
 
 
 def _decisions(bench: KnowledgeBase, state: KnowledgeState) -> tuple[dict[str, str | None], str | None]:

@@ -77,4 +77,4 @@ def open_without_unusable(loaded: LoadedScenario) -> tuple[Ontology, list[Unusab
     usable, unusable = sort_rules(base, rules)
     broken = {each.name for each in unusable}
     content = with_rules(base.content, [usable], [name for name in names if name not in broken])
-    return replace(base, content=content, rules=content.rules), unusable
+    return base.with_rules(content.rules), unusable

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
-from suave_des.knowledge.content import Content
 from suave_des.knowledge.limit import TimeLimit
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import Lit, Triple, facts_of, value_of
@@ -129,11 +128,7 @@ class RuleQuestions:
     @cached_property
     def _usable(self) -> Ontology:
         """The knowledge base without the rules that Pellet would drop."""
-        rules = tuple(rule for rule in self.base.rules if not rule.enabled or not self._problems(rule))
-        if len(rules) == len(self.base.rules):
-            return self.base
-        content: Content = replace(self.base.content, rules=rules)
-        return replace(self.base, content=content, rules=rules)
+        return self.base.with_rules(rule for rule in self.base.rules if not rule.enabled or not self._problems(rule))
 
     def _problems(self, rule: Rule) -> list[RuleProblem]:
         return [problem for problem in check_rule(rule, self.base.vocabulary) if problem.is_fatal]

@@ -13,7 +13,7 @@ from typing import Any
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.scenario.loader import load_scenario
 from suave_des.workbench.state_input import ManagingSettings, StateBuilder
-from suave_des.workbench.testing.situation import FactReader, with_facts
+from suave_des.workbench.testing.situation import FactReader
 from suave_des.workbench.unusable_rules import open_without_unusable
 from suave_des.workbench.why_not import RuleQuestions
 from tests.helpers.owl_text import SUAVE, TOMASYS, XSD
@@ -235,7 +235,7 @@ def prepared(name: str, ontology: Path, folder: Path) -> Asked:
     base, unusable = open_without_unusable(loaded)
     reader = FactReader(base)
     reader.declare(facts)
-    base = with_facts(base, map(reader.triple, facts))
+    base = base.with_facts(map(reader.triple, facts))
     builder = StateBuilder(base, ManagingSettings.of(loaded.scenario))
     for kind, content in parts.items():
         for thing, value in content.items():

@@ -11,10 +11,8 @@ from decimal import Decimal
 from types import MappingProxyType
 from typing import Final
 
-from suave_des.knowledge.content import Content
-from suave_des.knowledge.model import build_model, expectations
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import EXACT, Lit, Names, Triple, facts_of
+from suave_des.knowledge.rdf import EXACT, Lit, Triple
 from suave_des.knowledge.rules.checks import check_rule
 from suave_des.knowledge.rules.rdf import with_triples
 from suave_des.knowledge.rules.syntax import Atom, Named, Rule, Term, Variable
@@ -79,15 +77,10 @@ class Mutant:
     def applied(self, base: Ontology) -> Ontology:
         """The knowledge base with the change."""
         if self.old is not None:
-            rules = tuple(
-                self.new if rule is self.old else rule
-                for rule in base.rules
-                if rule is not self.old or self.new is not None
-            )
-            content: Content = replace(base.content, rules=rules)  # type: ignore[arg-type]
-            return replace(base, content=content, rules=content.rules)
-        triples = tuple(self.added if triple == self.removed else triple for triple in base.content.triples)
-        return _with_triples(base, triples)  # type: ignore[arg-type]
+            changed = (self.new if rule is self.old else rule for rule in base.rules)
+            return base.with_rules(rule for rule in changed if rule is not None)
+        changed_triples = (self.added if triple == self.removed else triple for triple in base.content.triples)
+        return base.with_triples(triple for triple in changed_triples if triple is not None)
 
     @property
     def generalises(self) -> bool:
@@ -98,29 +91,6 @@ class Mutant:
             and self.new.head == self.old.head
             and set(self.new.body) <= set(self.old.body)
         )
-
-
-def _with_triples(base: Ontology, triples: tuple[Triple, ...]) -> Ontology:
-    """The ontology with other facts: what was read from them is read again."""
-    own = [triple for individual in base.model.individuals() for triple in individual.own]
-    initial = [triple for each in base.model.initial.values() for triple in each]
-    whole = replace(base.content, triples=(*triples, *own, *initial))
-    model, content = build_model(whole, base.sources)
-    names = Names(whole.triples)
-    facts = frozenset(facts_of(content.triples, names))
-    designs: dict[str, list[str]] = {name: [] for name in model.functions}
-    for fact in sorted(facts, key=str):
-        if fact.property == "solvesF" and fact.value in designs and fact.subject in model.designs:
-            designs[str(fact.value)].append(fact.subject)
-    return replace(
-        base,
-        content=content,
-        facts=facts,
-        model=model,
-        names=names,
-        _designs={name: tuple(sorted(found)) for name, found in designs.items()},
-        _expected=expectations(content, model),
-    )
 
 
 def mutants_of(base: Ontology) -> tuple[Mutant, ...]:

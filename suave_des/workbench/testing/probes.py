@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -19,7 +19,7 @@ from suave_des.knowledge.rules.syntax import Atom, Named, Rule
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.knowledge.vocabulary import XSD
 from suave_des.workbench.policy import PolicyCase
-from suave_des.workbench.testing.situation import Situation, with_content
+from suave_des.workbench.testing.situation import Situation
 
 _PROBE: Final = "urn:suave-des:probe"
 _HOLDS: Final = f"{_PROBE}#holds"
@@ -57,7 +57,7 @@ class Probes:
             with_triples(Rule(f"probe {number}", "", Path(), True, BNode(), (), body, (_head(number),)))
             for number, body in enumerate(bodies)
         ]
-        probed = with_content(base, replace(base.content, rules=(*base.content.rules, *rules)))
+        probed = base.with_rules((*base.rules, *rules))
         return cls(tuple(bodies), base, limit, limit.run(lambda: InProcessPellet(probed), LOADING))
 
     def holding(self, situation: Situation) -> frozenset[int]:

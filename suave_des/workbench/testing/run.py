@@ -21,8 +21,6 @@ from suave_des.workbench.testing.situation import (
     Outcome,
     Prover,
     Situation,
-    with_content,
-    with_facts,
 )
 from suave_des.workbench.testing.suite import RuleTest
 from suave_des.workbench.why_not import RuleQuestions
@@ -154,15 +152,14 @@ class Runner:
         """The knowledge base without some rules."""
         if names not in self._without:
             base = self.prover.base
-            kept = tuple(rule for rule in base.rules if rule.name not in names)
-            changed = with_content(base, replace(base.content, rules=kept))
-            self._without[names] = Prover.of(self.bench, changed)
+            kept = (rule for rule in base.rules if rule.name not in names)
+            self._without[names] = Prover.of(self.bench, base.with_rules(kept))
         return self._without[names]
 
     def _because(self, failure: Failure) -> Iterator[str]:
         """Why something follows or does not, or is decided as it is."""
         fact, function = failure.fact, failure.function
-        base = with_facts(self.prover.base, failure.situation.facts)
+        base = self.prover.base.with_facts(failure.situation.facts)
         state, improves = failure.situation.state, self.prover.improves_exceeded
         try:
             if fact is not None and failure.what.endswith("does not follow"):

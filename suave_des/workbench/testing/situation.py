@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final, Protocol
 
 from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
-from suave_des.knowledge.content import Content
 from suave_des.knowledge.deliberation import Conclusion, Deliberation
 from suave_des.knowledge.limit import LOADING, TimeLimit, reasoning_on
 from suave_des.knowledge.ontology import Ontology
@@ -163,20 +162,6 @@ class _WithFacts:
         entailed = self.prover.limit.run(lambda: pellet.infer(assertions), reasoning_on(state))
         asserted = base.facts.union(facts_of(assertions, base.names))
         return Inference(state, asserted, frozenset(facts_of(entailed, base.names)) - asserted)
-
-
-def with_facts(base: Ontology, facts: Iterable[Triple]) -> Ontology:
-    """Assert facts in the ontology itself, so that everything that asks about states alone counts with them."""
-    more = tuple(facts)
-    if not more:
-        return base
-    content = replace(base.content, triples=(*base.content.triples, *more))
-    return replace(base, content=content, facts=base.facts.union(facts_of(more, base.names)))
-
-
-def with_content(base: Ontology, content: Content) -> Ontology:
-    """The same ontology with other rules or triples."""
-    return replace(base, content=content, rules=content.rules)
 
 
 @dataclass
