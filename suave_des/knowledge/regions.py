@@ -19,13 +19,11 @@ from typing import Final
 from suave_des.knowledge.inference_cache import Key
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import Lit
+from suave_des.knowledge.rules.builtins import COMPARISONS
 from suave_des.knowledge.rules.syntax import EXPRESSION, Rule, Variable
 from suave_des.knowledge.state import MAX_EXPONENT, KnowledgeState
-from suave_des.knowledge.vocabulary import HAS_VALUE, OWL, RDF_TYPE, RDFS, SWRLB, XSD, local_name
+from suave_des.knowledge.vocabulary import HAS_VALUE, OWL, RDF_TYPE, RDFS, XSD, local_name
 
-_COMPARING: Final = frozenset(
-    SWRLB + name for name in ("equal", "notEqual", "lessThan", "lessThanOrEqual", "greaterThan", "greaterThanOrEqual")
-)
 _SAME_VALUES: Final = (RDFS + "subPropertyOf", OWL + "equivalentProperty")
 _BINARY: Final = frozenset((XSD + "float", XSD + "double"))
 #: Datatypes of which a number is or is not by its size alone, or in which there is no number.
@@ -120,7 +118,7 @@ def _carriers(ontology: Ontology) -> frozenset[str]:
 def _of_rules(ontology: Ontology, carriers: frozenset[str]) -> Iterator[str]:
     for rule in ontology.content.enabled_rules:
         for atom in rule.atoms:
-            if atom.kind == "builtin" and atom.predicate not in _COMPARING:
+            if atom.kind == "builtin" and atom.predicate not in COMPARISONS:
                 yield f"rule {rule.name} computes with {local_name(atom.predicate)}"
             if atom.kind == "range" or atom.predicate == EXPRESSION:
                 yield f"rule {rule.name} asks for a datatype or a class expression"

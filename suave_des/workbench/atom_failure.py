@@ -7,24 +7,22 @@ from types import MappingProxyType
 from typing import Final
 
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import EXACT, Lit, value_of
+from suave_des.knowledge.rdf import NUMERIC, Lit, value_of
+from suave_des.knowledge.rules.builtins import COMPARISONS
 from suave_des.knowledge.rules.syntax import Atom, Named, Term, Variable
 from suave_des.knowledge.rules.writer import literal_text
-from suave_des.knowledge.vocabulary import OWL, SWRLB, TOMASYS, XSD, local_name, nearest
+from suave_des.knowledge.vocabulary import OWL, TOMASYS, local_name, nearest
 from suave_des.workbench.derivations import FACT_KINDS, Binding
 from suave_des.workbench.nearest_match import Facts
 
-_COMPARISONS: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        SWRLB + "lessThan": "less than",
-        SWRLB + "lessThanOrEqual": "at most",
-        SWRLB + "greaterThan": "greater than",
-        SWRLB + "greaterThanOrEqual": "at least",
-        SWRLB + "equal": "equal to",
-        SWRLB + "notEqual": "different from",
-    }
-)
-_NUMBERS: Final = EXACT | {XSD + "double", XSD + "float"}
+_WORDS: Final = {
+    "<": "less than",
+    "<=": "at most",
+    ">": "greater than",
+    ">=": "at least",
+    "=": "equal to",
+    "!=": "different from",
+}
 #: What a state asserts, and how to give it.
 _GIVEN_BY_STATES: Final[Mapping[str, str]] = MappingProxyType(
     {
@@ -53,7 +51,7 @@ def describe_failure(base: Ontology, atom: Atom, binding: Binding, facts: Facts)
         return _class(base, atom, binding, facts)
     if atom.kind in FACT_KINDS:
         return _property(base, atom, binding, facts)
-    if atom.predicate in _COMPARISONS and len(atom.arguments) == 2:
+    if atom.predicate in COMPARISONS and len(atom.arguments) == 2:
         return _comparison(base, atom, binding)
     if atom.kind == "different":
         return "that two names mean different things must be asserted: OWL does not assume it"
@@ -69,9 +67,9 @@ def _comparison(base: Ontology, atom: Atom, binding: Binding) -> str:
         _show(base, value) + (f" (?{term.name})" if isinstance(term, Variable) else "")
         for term, value in zip(atom.arguments, sides, strict=True)
     ]
-    words = _COMPARISONS[atom.predicate]
+    words = _WORDS[COMPARISONS[atom.predicate]]
     kinds = [value.datatype for value in sides if isinstance(value, Lit)]
-    numbers = [kind in _NUMBERS for kind in kinds]
+    numbers = [kind in NUMERIC for kind in kinds]
     if len(kinds) == 2 and numbers[0] != numbers[1]:
         text = texts[numbers.index(False)]
         return (
@@ -172,7 +170,7 @@ def _show(base: Ontology, value: str | Lit | None) -> str:
     if value is None:
         return "nothing"
     if isinstance(value, Lit):
-        is_plain_number = value.datatype in _NUMBERS and str(value_of(value, base.names)) == value.text
+        is_plain_number = value.datatype in NUMERIC and str(value_of(value, base.names)) == value.text
         return value.text if is_plain_number else literal_text(value)
     return base.names.short(value)
 

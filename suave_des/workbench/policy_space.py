@@ -17,14 +17,12 @@ from typing import Final
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import Lit, Triple
 from suave_des.knowledge.regions import regions_of
+from suave_des.knowledge.rules.builtins import COMPARISONS
 from suave_des.knowledge.rules.syntax import Atom, Named, Rule, Variable
 from suave_des.knowledge.state import exact
-from suave_des.knowledge.vocabulary import OWL, RDFS, SWRLB, TOMASYS, XSD
+from suave_des.knowledge.vocabulary import OWL, RDFS, TOMASYS, XSD
 from suave_des.workbench.state_input import ManagingSettings
 
-COMPARISONS: Final = frozenset(
-    SWRLB + name for name in ("equal", "notEqual", "lessThan", "lessThanOrEqual", "greaterThan", "greaterThanOrEqual")
-)
 _IS_QA_TYPE: Final = TOMASYS + "isQAtype"
 _HAS_VALUE: Final = TOMASYS + "hasValue"
 _OF_VALUES: Final = frozenset({_IS_QA_TYPE, _HAS_VALUE})

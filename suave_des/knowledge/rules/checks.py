@@ -14,23 +14,16 @@ from typing import Final
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.rdf import NUMERIC, Lit, Triple
-from suave_des.knowledge.rules.names import BUILTINS, TESTERS, Vocabulary
+from suave_des.knowledge.rules.builtins import BUILTINS, COMPARISON_OF, COMPARISONS, TESTERS, mirrored
+from suave_des.knowledge.rules.names import Vocabulary
 from suave_des.knowledge.rules.syntax import EXPRESSION, Atom, Named, Place, Rule, RuleError, Term, Variable
 from suave_des.knowledge.rules.writer import literal_text
 from suave_des.knowledge.vocabulary import OWL, RDF_TYPE, XSD, local_name, nearest
 
 _DECLARED_AS: Final = {"class": "class", "object": "object property", "data": "data property"}
 _ARGUMENTS: Final = {"class": 1, "range": 1, "object": 2, "data": 2, "same": 2, "different": 2}
-_BOUNDS: Final = {
-    "equal": (">=", "<="),
-    **{"lessThan": ("<",), "lessThanOrEqual": ("<=",), "greaterThan": (">",), "greaterThanOrEqual": (">=",)},
-}
-"""What a comparison with a number says of the value on its left."""
-_MIRRORED: Final = {
-    "equal": "equal",
-    **{"lessThan": "greaterThan", "greaterThan": "lessThan"},
-    **{"lessThanOrEqual": "greaterThanOrEqual", "greaterThanOrEqual": "lessThanOrEqual"},
-}
+#: What a comparison with a number says of the value on its left, by its sign.
+_BOUNDS: Final = {"=": (">=", "<="), "<": ("<",), "<=": ("<=",), ">": (">",), ">=": (">=",)}
 _DOUBLE: Final = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?INF|NaN")
 _LEXICAL: Final = {
     XSD + "boolean": re.compile(r"true|false|0|1"),
@@ -192,23 +185,24 @@ def _check_comparisons(rule: Rule, vocabulary: Vocabulary) -> Iterator[RuleProbl
     least: dict[str, tuple[Decimal, bool, str]] = {}  # number, whether it is excluded, how it is written
     most: dict[str, tuple[Decimal, bool, str]] = {}
     for atom in rule.body:
-        name = local_name(atom.predicate)
-        if atom.kind != "builtin" or name not in _BOUNDS or len(atom.arguments) != 2:
+        sign = COMPARISONS.get(atom.predicate, "")
+        if sign not in _BOUNDS or len(atom.arguments) != 2:
             continue
         one, other = atom.arguments
         if isinstance(one, Lit) and isinstance(other, Variable):
-            one, other, name = other, one, _MIRRORED[name]
+            one, other, sign = other, one, mirrored(sign)
         if not (isinstance(one, Variable) and isinstance(other, Lit)):
             continue
         ranges = vocabulary.ranges.get(holders.get(one.name, ""), frozenset())
         if ranges and ranges <= NUMERIC and other.datatype not in NUMERIC:
+            name = local_name(COMPARISON_OF[sign])
             problem = f"{name} compares ?{one.name}, a number, with the text {literal_text(other)}: it never holds"
             yield RuleProblem(problem, atom.place(), f"write {other.text} without quotes", is_fatal=False)
         elif other.datatype in NUMERIC and _LEXICAL[XSD + "decimal"].fullmatch(other.text.strip()):
             number = Decimal(other.text.strip())
-            for side in _BOUNDS[name]:
+            for side in _BOUNDS[sign]:
                 bounds, is_tighter = (least, gt) if side[0] == ">" else (most, lt)
-                bound = number, "=" not in side, f"{'=' if name == 'equal' else side} {other.text}"
+                bound = number, "=" not in side, f"{'=' if sign == '=' else side} {other.text}"
                 known = bounds.get(one.name)
                 if known is None or is_tighter(number, known[0]) or (number == known[0] and bound[1]):
                     bounds[one.name] = bound

@@ -6,12 +6,12 @@ from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import Final
 
 from rdflib import BNode
 
 from suave_des.knowledge.rdf import Lit, Triple
+from suave_des.knowledge.rules.builtins import BUILTINS
 from suave_des.knowledge.rules.rdf import with_triples
 from suave_des.knowledge.rules.syntax import (
     DIFFERENT,
@@ -39,36 +39,6 @@ from suave_des.knowledge.vocabulary import (
     nearest,
 )
 
-_COMPARING: Final = "equal notEqual lessThan lessThanOrEqual greaterThan greaterThanOrEqual"
-_TESTING_TEXT: Final = "contains containsIgnoreCase endsWith matches startsWith stringEqualIgnoreCase"
-#: Builtins that compare, so that every argument must be bound; the others compute their first one.
-TESTERS: Final = frozenset(SWRLB + name for name in f"{_COMPARING} {_TESTING_TEXT}".split())
-#: Pellet's builtins, as its registry has them, with the least and the largest number of arguments.
-BUILTINS: Final[Mapping[str, tuple[int, int]]] = MappingProxyType(
-    {
-        SWRLB + name: counts
-        for names, counts in (
-            (_COMPARING, (2, 2)),
-            (_TESTING_TEXT, (2, 2)),
-            ("abs ceiling cos floor round sin tan unaryMinus unaryPlus booleanNot", (2, 2)),
-            ("lowerCase normalizeSpace stringLength upperCase", (2, 2)),
-            ("divide integerDivide mod pow subtract", (3, 3)),
-            ("add multiply", (3, 99)),
-            ("roundHalfToEven", (2, 3)),
-            ("stringConcat", (2, 99)),
-            ("substring", (3, 4)),
-            ("substringAfter substringBefore tokenize", (3, 3)),
-            ("replace translate", (4, 4)),
-            ("anyURI resolveURI", (2, 99)),
-            ("date", (4, 5)),
-            ("dateTime", (7, 8)),
-            ("time", (4, 5)),
-            ("dayTimeDuration", (2, 5)),
-            ("yearMonthDuration", (2, 3)),
-        )
-        for name in names.split()
-    }
-)
 _DECLARED: Final = {
     OWL + "Class": "class",
     RDFS + "Class": "class",

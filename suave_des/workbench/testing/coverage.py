@@ -11,23 +11,23 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final
 
+from suave_des.knowledge.rules.builtins import COMPARISON_OF, COMPARISONS
 from suave_des.knowledge.rules.syntax import Atom, Rule
 from suave_des.knowledge.rules.writer import write_atom
 from suave_des.knowledge.state import KnowledgeState
-from suave_des.knowledge.vocabulary import SWRLB
 from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.nearest_match import testable_order
 from suave_des.workbench.policy import kinds_of_states
-from suave_des.workbench.policy_space import COMPARISONS, PolicySpace
+from suave_des.workbench.policy_space import PolicySpace
 from suave_des.workbench.testing.probes import Body, Probes
 from suave_des.workbench.testing.situation import Situation
 
 FIRES, FIRES_NOT, HOLDS, FAILS = "fires", "does not fire", "holds", "fails"
 #: How the values of a comparison can relate, with the built-in that says so.
 ORDERS: Final[Mapping[str, str]] = {
-    "less": SWRLB + "lessThan",
-    "equal": SWRLB + "equal",
-    "greater": SWRLB + "greaterThan",
+    "less": COMPARISON_OF["<"],
+    "equal": COMPARISON_OF["="],
+    "greater": COMPARISON_OF[">"],
 }
 _WORDS: Final[Mapping[str, str]] = {
     "less": "with the first value less than the second",

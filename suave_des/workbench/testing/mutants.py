@@ -8,36 +8,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
+from functools import partial
 from types import MappingProxyType
 from typing import Final
 
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import EXACT, Lit, Triple
+from suave_des.knowledge.rules.builtins import COMPARISON_OF, COMPARISONS, mirrored
 from suave_des.knowledge.rules.checks import check_rule
 from suave_des.knowledge.rules.rdf import with_triples
 from suave_des.knowledge.rules.syntax import Atom, Named, Rule, Term, Variable
 from suave_des.knowledge.rules.writer import literal_text, write_atom
-from suave_des.knowledge.vocabulary import HAS_VALUE, LANGUAGE_NAMESPACES, RDF_TYPE, SWRLB, TOMASYS, XSD, local_name
+from suave_des.knowledge.vocabulary import HAS_VALUE, LANGUAGE_NAMESPACES, RDF_TYPE, TOMASYS, XSD, local_name
 
-_TURNED: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        SWRLB + one: SWRLB + other
-        for one, other in (
-            *(("lessThan", "greaterThan"), ("greaterThan", "lessThan")),
-            *(("lessThanOrEqual", "greaterThanOrEqual"), ("greaterThanOrEqual", "lessThanOrEqual")),
-            *(("equal", "notEqual"), ("notEqual", "equal")),
-        )
-    }
-)
-_SHIFTED: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        SWRLB + one: SWRLB + other
-        for one, other in (
-            *(("lessThan", "lessThanOrEqual"), ("lessThanOrEqual", "lessThan")),
-            *(("greaterThan", "greaterThanOrEqual"), ("greaterThanOrEqual", "greaterThan")),
-        )
-    }
-)
 #: By how much thresholds are moved, up and down.
 _MOVED: Final = (Decimal("1.1"), Decimal("0.9"))
 #: Properties whose values are thresholds, and those that connect individuals of the model.
@@ -127,19 +110,21 @@ def _with_atom(rule: Rule, number: int, atom: Atom) -> Mutant:
     return _changed(rule, atoms[: len(rule.body)], atoms[len(rule.body) :], text)
 
 
-def _exchanged_comparisons(base: Ontology, table: Mapping[str, str]) -> Iterator[Mutant]:
+def _comparisons(base: Ontology, change: Callable[[str], str]) -> Iterator[Mutant]:
+    """Each comparison with another sign."""
     for rule in _rules(base):
         for number, atom in enumerate(rule.body):
-            if atom.predicate in table:
-                yield _with_atom(rule, number, replace(atom, predicate=table[atom.predicate]))
+            if atom.predicate in COMPARISONS:
+                sign = change(COMPARISONS[atom.predicate])
+                yield _with_atom(rule, number, replace(atom, predicate=COMPARISON_OF[sign]))
 
 
-def _turned(base: Ontology) -> Iterator[Mutant]:
-    yield from _exchanged_comparisons(base, _TURNED)
+def _turned(sign: str) -> str:
+    return {"=": "!=", "!=": "="}.get(sign) or mirrored(sign)
 
 
-def _shifted(base: Ontology) -> Iterator[Mutant]:
-    yield from _exchanged_comparisons(base, _SHIFTED)
+def _shifted(sign: str) -> str:
+    return sign if sign in ("=", "!=") else sign.removesuffix("=") if sign.endswith("=") else f"{sign}="
 
 
 def _dropped(base: Ontology) -> Iterator[Mutant]:
@@ -214,11 +199,14 @@ def _statuses(base: Ontology) -> Iterator[Mutant]:
 
 def _operators_of_attributes(base: Ontology) -> Iterator[Mutant]:
     """The comparison operator of each quality attribute, turned."""
-    turned = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
     for triple in base.content.triples:
         subject, predicate, value = triple
-        if predicate == TOMASYS + "qa_comparison_operator" and isinstance(value, Lit) and value.text in turned:
-            yield _data(triple, (subject, predicate, Lit(turned[value.text], value.datatype)))
+        if (
+            predicate == TOMASYS + "qa_comparison_operator"
+            and isinstance(value, Lit)
+            and value.text in OPERATORS_OF_ATTRIBUTES
+        ):
+            yield _data(triple, (subject, predicate, Lit(mirrored(value.text), value.datatype)))
 
 
 def _removed(base: Ontology) -> Iterator[Mutant]:
@@ -288,8 +276,8 @@ def _individuals(base: Ontology) -> Iterator[Mutant]:
 #: Kinds of changes, by name.
 OPERATORS: Final[Mapping[str, Callable[[Ontology], Iterator[Mutant]]]] = MappingProxyType(
     {
-        "comparison turned": _turned,
-        "comparison shifted": _shifted,
+        "comparison turned": partial(_comparisons, change=_turned),
+        "comparison shifted": partial(_comparisons, change=_shifted),
         "atom dropped": _dropped,
         "variable exchanged": _variables_exchanged,
         "conclusion changed": _conclusions,
