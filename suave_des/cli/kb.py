@@ -197,7 +197,8 @@ def _function_table(table: FunctionTable, *, breaks_names: bool) -> Table:
 
 
 def _policy_summary(found: Policy) -> Iterator[str]:
-    from suave_des.workbench.policy import NONE_LEFT, no_proof
+    from suave_des.knowledge.deliberation import NONE_LEFT
+    from suave_des.workbench.policy import no_proof
 
     kinds, most = len(found.cases), found.max_failed
     yield f"{found.states} states of {kinds} kinds, with at most {most} components reporting"

@@ -118,7 +118,7 @@ def test(
 def _write_mission(folder: Path, file: Path | None, knowledge: Tested, time_limit_s: float) -> None:
     """Write a recorded mission's decisions as tests, or print them."""
     from suave_des.campaign.output import write_files
-    from suave_des.workbench.testing.situation import Prover
+    from suave_des.workbench.prover import Prover
     from suave_des.workbench.testing.writing import mission_knowledge, mission_states, tests_text
 
     about = mission_knowledge(folder).with_replacements(knowledge.scenario, knowledge.replacements)
@@ -137,8 +137,8 @@ def _cover(console: Console, suites: Sequence[Suite], max_failed: int, file: Pat
     """Show what the tests of each knowledge base cover, and write tests of what they do not."""
     from suave_des.campaign.output import write_files
     from suave_des.cli.kb_test_reports import print_coverage
+    from suave_des.workbench.prover import Prover
     from suave_des.workbench.testing.coverage import measure_coverage
-    from suave_des.workbench.testing.situation import Prover
     from suave_des.workbench.testing.writing import NamedState, tests_text
 
     benches = {id(suite.bench): suite for suite in suites}

@@ -59,8 +59,8 @@ def why_not(
     """
     from suave_des.knowledge.limit import TimeLimit
     from suave_des.scenario.loader import load_scenario
+    from suave_des.workbench.fact_reader import FactReader
     from suave_des.workbench.state_input import ManagingSettings, StateBuilder
-    from suave_des.workbench.testing.situation import FactReader
     from suave_des.workbench.why_not import RuleQuestions
 
     base, unusable = _open(sources)

@@ -13,6 +13,9 @@ from suave_des.knowledge.reasoners import Reasoner
 from suave_des.knowledge.regions import Regions
 from suave_des.knowledge.state import Inference, KnowledgeState, Plan
 
+#: What happens to a function's grounding that gets no other design.
+STAYS: Final = "stays"
+NONE_LEFT: Final = "none left"
 #: Conclusions kept by a Deliberation; the least recently used are dropped.
 CACHED_CONCLUSIONS: Final = 16384
 
@@ -29,6 +32,13 @@ class Conclusion:
 
     inference: Inference
     plan: Plan
+
+    @cached_property
+    def changes(self) -> dict[str, str]:
+        """What happens to each function's grounding that changes or has no design left: a design, or NONE_LEFT."""
+        state = self.inference.state
+        outcomes = {each.function: each.design or NONE_LEFT for each in self.plan.decisions}
+        return {function: outcome for function, outcome in outcomes.items() if outcome != state.grounded(function)}
 
     @cached_property
     def statuses(self) -> frozenset[str]:
@@ -79,19 +89,11 @@ class Deliberation:
 
     def plan(self, inference: Inference, *, improve_exceeded: bool = False) -> Plan:
         """Choose function designs for the objectives to adapt; see `analyze_and_plan`."""
-        to_adapt = dict(self._exceeded(inference.state)) if improve_exceeded else {}
-        return plan(self.base, inference.state, inference, to_adapt=to_adapt)
+        return plan(self.base, inference, improve_exceeded=improve_exceeded)
 
     def _analyze_and_plan(self, state: KnowledgeState, improve_exceeded: bool) -> Conclusion:
         inference = self.analyze(state)
         return Conclusion(inference, self.plan(inference, improve_exceeded=improve_exceeded))
-
-    def _exceeded(self, state: KnowledgeState) -> Iterator[tuple[str, str]]:
-        measured = dict(state.measurements)
-        for function, design in state.groundings:
-            for name, value in sorted(self.base.expected(design).items()):
-                if name in measured and measured[name] > value:
-                    yield function, f"{name} {measured[name]:.2f} exceeds what {design} expects"
 
 
 def _statuses(inference: Inference) -> Iterator[str]:

@@ -11,7 +11,7 @@ import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge import jvm
@@ -19,6 +19,7 @@ from suave_des.knowledge.content import RULE_IRI, Terms
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import Lit, Triple, canonical, facts_of, for_pellet, n_triple
 from suave_des.knowledge.rules.syntax import Rule
+from suave_des.knowledge.state import ContradictionError
 from suave_des.knowledge.vocabulary import RDF_TYPE, XSD
 
 _LITERAL: Final = re.compile(r"literal\((.*),([^,]*),([^,]*)\)", re.DOTALL)
@@ -157,24 +158,40 @@ class InProcessPellet:
                 raise KnowledgeError(f"Pellet does not use part of a rule: {warning}", file=_files(self._ontology))
 
 
-def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> KnowledgeError:
-    """Explain a contradiction: on what, by which rules, and from which assertions of the state.
+class Trace(NamedTuple):
+    """What Pellet says a contradiction follows from.
 
-    Loads everything again with Pellet's tracing, which is off otherwise, because it takes time.
+    Attributes:
+        message: the individual and the property that it names.
+        axioms: all that it used, sorted, as it writes them: rule(...), prop(...), type(...), and those of the schema.
+        rules: numbers of the rules among them.
     """
+
+    message: str
+    axioms: tuple[str, ...]
+    rules: tuple[int, ...]
+
+
+def trace_contradiction(text: str) -> Trace:
+    """Load contradictory N-Triples with Pellet's tracing, which is off otherwise, because it takes time."""
     options = jvm.java_class(_PELLET + "PelletOptions")
     options.USE_TRACING = True
     try:
-        text = ontology.content.n_triples() + "".join(map(n_triple, assertions))
         knowledge_base = load_n_triples(text, explain=True)
         knowledge_base.isConsistent()
-        reason = str(knowledge_base.getExplanation())
+        message = str(knowledge_base.getExplanation())
         axioms = sorted(str(axiom.toString()) for axiom in knowledge_base.getExplanationSet())
+        numbers = {int(number) for axiom in axioms for number in _RULE.findall(axiom)[:1]}
+        return Trace(message, tuple(axioms), tuple(sorted(numbers)))
     finally:
         options.USE_TRACING = False
         jvm.take_warnings()
-    numbers = {int(number) for axiom in axioms for number in _RULE.findall(axiom)[:1]}
-    rules = sorted(_rule_with_place(ontology, ontology.content.rules[number]) for number in numbers)
+
+
+def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> ContradictionError:
+    """Explain a contradiction: on what, by which rules, and from which assertions of the state."""
+    reason, axioms, numbers = trace_contradiction(ontology.content.n_triples() + "".join(map(n_triple, assertions)))
+    rules = sorted(_rule_with_place(ontology, ontology.rules[number]) for number in numbers)
     facts = [
         str(fact)
         for triple in assertions
@@ -186,7 +203,7 @@ def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> Knowledge
         problem += f", by the rule{'s' if len(rules) > 1 else ''} {', '.join(rules)}"
     if facts:
         problem += f", in the state {', '.join(facts)}"
-    return KnowledgeError(
+    return ContradictionError(
         f"contradiction: {problem[0].lower()}{problem[1:]}",
         file=_files(ontology),
         remedy="change a rule, so that no two of these hold at once" if rules else "correct the ontology",

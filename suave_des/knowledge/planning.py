@@ -26,26 +26,34 @@ _COMPARE: Final[Mapping[str, Callable[[Decimal, Decimal], bool]]] = MappingProxy
 )
 
 
-def plan(
-    ontology: Ontology, state: KnowledgeState, inference: Inference, *, to_adapt: Mapping[str, str] | None = None
-) -> Plan:
+def plan(ontology: Ontology, inference: Inference, *, improve_exceeded: bool = False) -> Plan:
     """Decide on every objective that is ungrounded, in error, updatable or always to be improved.
 
     Args:
         ontology: the ontology.
-        state: the state that was analyzed.
-        inference: what the reasoner added to it.
-        to_adapt: functions whose objectives are adapted whatever their status, each with the reason.
+        inference: what the reasoner added to the state that was analyzed.
+        improve_exceeded: whether an objective is also adapted when a measured value exceeds what its present function
+            design expects (the exemplar's revision 2023 does so in code).
 
     Raises:
         KnowledgeError: an objective requires a value of a quality attribute type without comparison operator.
     """
     decisions = []
-    for objective in state.objectives:
-        call = _call(objective, inference) or (to_adapt or {}).get(objective.function)
+    exceeded = dict(_exceeded(ontology, inference.state)) if improve_exceeded else {}
+    for objective in inference.state.objectives:
+        call = _call(objective, inference) or exceeded.get(objective.function)
         if call is not None:
             decisions.append(_decide(ontology, inference, objective.function, call))
     return Plan(tuple(decisions))
+
+
+def _exceeded(ontology: Ontology, state: KnowledgeState) -> Iterator[tuple[str, str]]:
+    """Functions whose present design expects less than is measured, each with the reason to adapt it."""
+    measured = dict(state.measurements)
+    for function, design in state.groundings:
+        for name, value in sorted(ontology.expected(design).items()):
+            if name in measured and measured[name] > value:
+                yield function, f"{name} {measured[name]:.2f} exceeds what {design} expects"
 
 
 def calls(status: str) -> bool:

@@ -23,6 +23,10 @@ UNGROUNDED: Final = "UNGROUNDED"
 MAX_EXPONENT: Final = 400
 
 
+class ContradictionError(KnowledgeError):
+    """A state that contradicts the ontologies, or ontologies that contradict themselves."""
+
+
 def exact(number: Number) -> Decimal:
     """Convert a number to the decimal that the shortest text of a float denotes: 0.1, not 0.1000000000000000055.
 
@@ -125,8 +129,12 @@ class Fact:
         """As a rule atom: fg_status(fg_spiral_high, IN_ERROR_NFR), Component(c_thruster_1)."""
         if self.property == "type":
             return f"{self.value}({self.subject})"
-        value = str(self.value).lower() if isinstance(self.value, bool) else self.value
-        return f"{self.property}({self.subject}, {value})"
+        return f"{self.property}({self.subject}, {value_text(self.value)})"
+
+
+def value_text(value: Value) -> str:
+    """Write a value as rules and facts do: true, 2.25, IN_ERROR_NFR."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 class Inference:

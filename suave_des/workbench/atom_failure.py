@@ -9,11 +9,10 @@ from typing import Final
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import NUMERIC, Lit, value_of
 from suave_des.knowledge.rules.builtins import COMPARISONS
-from suave_des.knowledge.rules.syntax import Atom, Named, Term, Variable
+from suave_des.knowledge.rules.syntax import Atom, Variable
 from suave_des.knowledge.rules.writer import literal_text
 from suave_des.knowledge.vocabulary import OWL, TOMASYS, local_name, nearest
-from suave_des.workbench.derivations import FACT_KINDS, Binding
-from suave_des.workbench.nearest_match import Facts
+from suave_des.workbench.matching import FACT_KINDS, Binding, Facts, bound
 
 _WORDS: Final = {
     "<": "less than",
@@ -62,7 +61,7 @@ def describe_failure(base: Ontology, atom: Atom, binding: Binding, facts: Facts)
 
 
 def _comparison(base: Ontology, atom: Atom, binding: Binding) -> str:
-    sides = [_bound(term, binding) for term in atom.arguments]
+    sides = [bound(term, binding) for term in atom.arguments]
     texts = [
         _show(base, value) + (f" (?{term.name})" if isinstance(term, Variable) else "")
         for term, value in zip(atom.arguments, sides, strict=True)
@@ -80,7 +79,7 @@ def _comparison(base: Ontology, atom: Atom, binding: Binding) -> str:
 
 def _property(base: Ontology, atom: Atom, binding: Binding, facts: Facts) -> str:
     name = local_name(atom.predicate)
-    subject, wanted = (_bound(term, binding) for term in (atom.arguments[0], atom.arguments[-1]))
+    subject, wanted = (bound(term, binding) for term in (atom.arguments[0], atom.arguments[-1]))
     if isinstance(subject, str):
         values = facts.values(subject, atom.predicate)
         who = base.names.short(subject)
@@ -89,10 +88,9 @@ def _property(base: Ontology, atom: Atom, binding: Binding, facts: Facts) -> str
         if wanted is None:
             return f"{who} has {name} {_list(base, values)}, but not as the other atoms need it"
         return f"found {name} {_list(base, values)} of {who}, needed {_show(base, wanted)}{_unequal(values, wanted)}"
-    pairs = facts.candidates(atom, {})
-    if not pairs:
+    values = facts.values(None, atom.predicate)
+    if not values:
         return f"nothing has a {name}{_help(base, atom)}"
-    values = list(dict.fromkeys(triple[2] for triple in pairs))
     if wanted is None:
         return f"no {name} connects what the other atoms need"
     return f"found {name} {_list(base, values)}, needed {_show(base, wanted)}{_unequal(values, wanted)}"
@@ -105,7 +103,7 @@ def _class(base: Ontology, atom: Atom, binding: Binding, facts: Facts) -> str:
         why = f"; {name} is defined by {closed}, which never follows from facts that are missing (open world)"
     else:
         why = _help(base, atom)
-    subject = _bound(atom.arguments[0], binding)
+    subject = bound(atom.arguments[0], binding)
     if isinstance(subject, str):
         return f"{base.names.short(subject)} is not known to be a {name}{why}"
     return f"there is no {name}{why}"
@@ -158,12 +156,6 @@ def _closed_world(base: Ontology, iri: str) -> Iterator[str]:
             if value.startswith("_:") and value not in seen:
                 seen.add(value)
                 waiting.append(value)
-
-
-def _bound(term: Term, binding: Binding) -> str | Lit | None:
-    if isinstance(term, Variable):
-        return binding.get(term.name)
-    return term.iri if isinstance(term, Named) else term
 
 
 def _show(base: Ontology, value: str | Lit | None) -> str:

@@ -3,37 +3,23 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from decimal import Decimal
-from itertools import islice
-from operator import eq, ge, gt, le, lt, ne
 from typing import Final
 
-from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
+from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.knowledge.deliberation import Conclusion, Deliberation
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.planning import performance
-from suave_des.knowledge.rdf import Lit, Triple, facts_of, value_of
+from suave_des.knowledge.rdf import Triple, facts_of
 from suave_des.knowledge.reasoners import make_reasoner
-from suave_des.knowledge.rules.syntax import Atom, Named, Rule, Variable
-from suave_des.knowledge.rules.writer import write_atom
-from suave_des.knowledge.state import Decision, Fact, KnowledgeState, Value
-from suave_des.knowledge.vocabulary import SWRLB, objective_name
-from suave_des.workbench.derivations import FACT_KINDS, Binding, Clash, Derivation, partial_matches
-from suave_des.workbench.tracing import Tracer
+from suave_des.knowledge.state import ContradictionError, Decision, Fact, KnowledgeState, value_text
+from suave_des.knowledge.vocabulary import objective_name
+from suave_des.workbench.tracing import Clash, Derivation, Tracer
+from suave_des.workbench.why_not import RuleQuestions, WhyNot
 
 #: Rules that are named for a fact that does not follow.
 NEAREST: Final = 3
-#: Ways to match a rule's body that are looked at.
-MOST_WAYS: Final = 20_000
-_COMPARE: Final[Mapping[str, Callable[[Decimal, Decimal], bool]]] = {
-    SWRLB + name: compare
-    for name, compare in (
-        *(("equal", eq), ("notEqual", ne), ("lessThan", lt)),
-        *(("lessThanOrEqual", le), ("greaterThan", gt), ("greaterThanOrEqual", ge)),
-    )
-}
 _WHY: Final = re.compile(r"why\s+(not\s+)?([\w.-]+)\s*\??", re.IGNORECASE)
 _ATOM: Final = re.compile(r"([^\s(]+)\s*\(\s*([^,()]+?)\s*(?:,\s*(.+?)\s*)?\)")
 _FORMS: Final = (
@@ -137,10 +123,10 @@ def explain(base: Ontology, state: KnowledgeState, question: str, improves_excee
     reasoner = make_reasoner("pellet", base, terms=base.content.all_terms())
     try:
         conclusion = Deliberation(base, reasoner).analyze_and_plan(state, improve_exceeded=improves_exceeded)
-    except KnowledgeError:
+    except ContradictionError:
         problem, clashes, rules = tracer.clashes()
         if not rules and not clashes:
-            raise  # not a contradiction: the message has all there is to say
+            raise  # the message has all there is to say
         return Explanation(state, contradiction=problem, clashes=clashes, rules=rules)
     explainer = _Explainer(base, conclusion, tracer)
     if atom:
@@ -171,24 +157,24 @@ class _Explainer:
         """How a fact follows that is written as an atom; an atom of a class has no value."""
         name, wanted = ("type", property_name) if value is None else (property_name, value.strip("\"'"))
         for fact, triple in self.triples.items():
-            if fact.property == name and fact.subject == subject and _value_text(fact.value) == wanted:
+            if fact.property == name and fact.subject == subject and value_text(fact.value) == wanted:
                 return self.tracer.derive(triple)
         known = sorted({fact.subject for fact in self.triples})
         if subject not in known:
             raise InputError(f"there is nothing named {shown(subject)} in this state", remedy=_near(subject, known))
         there = sorted(
-            _value_text(fact.value) for fact in self.triples if (fact.property, fact.subject) == (name, subject)
+            value_text(fact.value) for fact in self.triples if (fact.property, fact.subject) == (name, subject)
         )
         kinds = self.base.vocabulary.kinds.items()
         declared = {self.base.names.short(iri) for iri, kind in kinds if kind & {"object property", "data property"}}
         properties = sorted(declared | {fact.property for fact in self.triples})
         iri = next(triple[0] for fact, triple in self.triples.items() if fact.subject == subject)
-        near = near_rules(self.base, name, iri, wanted, self.tracer.known)
+        near = RuleQuestions(self.base).missing(Fact(subject, name, wanted), iri, self.tracer.state)
         if not near and not there and value is not None and name not in properties:
             raise InputError(f"there is no property {shown(name)}", remedy=_near(name, properties))
         raise InputError(
             f"{property_name}({subject}{', ' + wanted if value is not None else ''}) does not follow in this state",
-            remedy="; ".join([f"{name} of {subject}: {', '.join(there) or 'none'}", *map(str, near[:NEAREST])]),
+            remedy="; ".join([f"{name} of {subject}: {', '.join(there) or 'none'}", *map(_near_rule, near[:NEAREST])]),
         )
 
     def design(self, design: str, *, wanted: bool) -> DecisionExplanation:
@@ -252,96 +238,13 @@ class _Explainer:
                 yield self.tracer.derive(self.triples[fact])
 
 
+def _near_rule(answer: WhyNot) -> str:
+    """The first atom that fails of a rule that could conclude what is missing, in the nearest match."""
+    if not answer.atom:
+        return f"rule {answer.rule}: {answer.answer}"
+    bound = ", ".join(f"?{name} = {value}" for name, value in answer.bindings)
+    return f"rule {answer.rule}: {answer.atom} does not hold{f' with {bound}' if bound else ''}"
+
+
 def _near(word: str, known: list[str]) -> str:
     return did_you_mean(word, known).partition("? ")[0] + "?" if len(known) > 40 else did_you_mean(word, known)
-
-
-@dataclass(frozen=True)
-class NearRule:
-    """A rule that could conclude a fact, and does not.
-
-    Attributes:
-        rule: its name.
-        fails: the first atom of its body that does not hold, as the rule writes it; of all ways to match those before
-            it, with the one that comes furthest.
-        bindings: what the variables stand for then.
-        missing: number of atoms of the body from there on.
-    """
-
-    rule: str
-    fails: str
-    bindings: tuple[tuple[str, Value], ...]
-    missing: int
-
-    def __str__(self) -> str:
-        """In one line."""
-        bound = ", ".join(f"?{name} = {value}" for name, value in self.bindings)
-        return f"rule {self.rule}: {self.fails} does not hold{f' with {bound}' if bound else ''}"
-
-
-def near_rules(base: Ontology, name: str, subject: str, wanted: str, known: Sequence[Triple]) -> tuple[NearRule, ...]:
-    """Find the rules whose head could assert a fact that does not follow, those that lack least first.
-
-    Args:
-        base: the ontologies.
-        name: of the property, or "type".
-        subject: IRI of the individual.
-        wanted: the value, as text.
-        known: all that follows.
-    """
-    found: list[NearRule] = []
-    for rule in base.content.enabled_rules:
-        for atom in rule.head:
-            start = _binding_for(base, atom, name, subject, wanted)
-            near = None if start is None else _furthest_match(base, rule, start, known)
-            if near is not None:
-                found.append(near)
-    return tuple(sorted(found, key=lambda each: (each.missing, each.rule)))
-
-
-def _binding_for(base: Ontology, atom: Atom, name: str, subject: str, wanted: str) -> Binding | None:
-    """The binding with which an atom of a head asserts the fact, its value left free; None if it cannot."""
-    if atom.kind not in FACT_KINDS or name != ("type" if atom.kind == "class" else base.names.short(atom.predicate)):
-        return None
-    first, last = atom.arguments[0], atom.arguments[-1]
-    value = atom.predicate if atom.kind == "class" else None if isinstance(last, Variable) else last
-    if value is not None:
-        plain = value_of(value.iri if isinstance(value, Named) else value, base.names)
-        if _value_text(plain) != wanted:
-            return None
-    if isinstance(first, Variable):
-        return {first.name: subject}
-    return {} if first == Named(subject) else None
-
-
-def _furthest_match(base: Ontology, rule: Rule, start: Binding, known: Sequence[Triple]) -> NearRule | None:
-    """The way to match a rule's body that comes furthest; None if all of it holds, and it concludes something else."""
-    best, furthest = start, -1
-    for depth, binding, _ in islice(partial_matches(rule.body, start, known, _holds), MOST_WAYS):
-        if depth == len(rule.body):
-            return None
-        if depth > furthest:
-            best, furthest = binding, depth
-    bound = tuple((name, value_of(best[name], base.names)) for name in sorted(best))
-    return NearRule(rule.name, write_atom(rule.body[furthest]), bound, len(rule.body) - furthest)
-
-
-def _holds(atom: Atom, binding: Binding) -> bool:
-    """Whether a comparison of numbers holds; any other atom counts as if it did."""
-    compare = _COMPARE.get(atom.predicate) if atom.kind == "builtin" else None
-    values = [binding.get(term.name) if isinstance(term, Variable) else term for term in atom.arguments]
-    if compare is None or len(values) != 2:
-        return True
-    one, other = map(_number, values)
-    return True if one is None or other is None else compare(one, other)
-
-
-def _number(term: object) -> Decimal | None:
-    try:
-        return Decimal(term.text) if isinstance(term, Lit) else None
-    except ArithmeticError:
-        return None
-
-
-def _value_text(value: Value) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -9,9 +9,9 @@ from functools import cached_property
 from typing import Final
 
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.knowledge.deliberation import Conclusion
+from suave_des.knowledge.deliberation import NONE_LEFT, STAYS, Conclusion
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.state import KnowledgeState
+from suave_des.knowledge.state import ContradictionError, KnowledgeState
 from suave_des.workbench.policy_space import (
     ComponentReports,
     PolicySpace,
@@ -26,7 +26,7 @@ from suave_des.workbench.state_input import LASTING, ManagingSettings
 
 #: Beyond this many inferences a policy is refused: at a millisecond and a half each it would take ten minutes.
 LARGEST: Final = 400_000
-INCONSISTENT, NONE_LEFT, FLIP_FLOP = "inconsistent", "none left", "flip-flop"
+INCONSISTENT, FLIP_FLOP = "inconsistent", "flip-flop"
 NO_GROUNDING: Final = "ungrounded"
 
 
@@ -40,7 +40,7 @@ class PolicyCase:
         reports: what the components report.
         asked: functions that have an objective.
         statuses: what is inferred of objectives and groundings, as text, sorted.
-        choices: (function, design) decided; None for the design when none is left.
+        choices: (function, what happens to its grounding), where that changes or no design is left.
         marks: any of "inconsistent", "none left", "flip-flop".
         flipping: functions whose grounding flips back and forth.
         problem: what contradicts what, in an inconsistent state.
@@ -51,22 +51,14 @@ class PolicyCase:
     reports: ComponentReports
     asked: tuple[str, ...]
     statuses: tuple[str, ...] = ()
-    choices: tuple[tuple[str, str | None], ...] = ()
+    choices: tuple[tuple[str, str], ...] = ()
     marks: tuple[str, ...] = ()
     flipping: tuple[str, ...] = ()
     problem: str | None = None
 
     def outcome(self, function: str) -> str:
         """What happens to a function's grounding: a design, "stays", "none left" or "inconsistent"."""
-        if INCONSISTENT in self.marks:
-            return INCONSISTENT
-        choice = dict(self.choices)
-        if function not in choice:
-            return "stays"
-        design = choice[function]
-        if design is None:
-            return NONE_LEFT
-        return "stays" if design == self.state.grounded(function) else design
+        return INCONSISTENT if INCONSISTENT in self.marks else dict(self.choices).get(function, STAYS)
 
     def outcome_text(self, function: str) -> str:
         """The outcome, and whether the choice flips back and forth."""
@@ -81,7 +73,7 @@ class PolicyCase:
     @property
     def after(self) -> tuple[tuple[str, str], ...]:
         """Groundings after the decisions."""
-        chosen = {function: design for function, design in self.choices if design is not None}
+        chosen = {function: design for function, design in self.choices if design != NONE_LEFT}
         return tuple(sorted({**dict(self.state.groundings), **chosen}.items()))
 
 
@@ -219,12 +211,10 @@ def _tasks(base: Ontology) -> Iterator[tuple[tuple[str, ...], dict[str, str]]]:
 def _decide(case: PolicyCase, infer: Callable[[KnowledgeState], Conclusion]) -> PolicyCase:
     try:
         conclusion = infer(case.state)
-    except KnowledgeError as error:
-        if not error.problem.startswith("contradiction"):
-            raise
+    except ContradictionError as error:
         return replace(case, marks=(INCONSISTENT,), problem=error.problem)
-    choices = tuple((each.function, each.design) for each in conclusion.plan.decisions)
-    marks = (NONE_LEFT,) if any(design is None for _, design in choices) else ()
+    marks = (NONE_LEFT,) if NONE_LEFT in conclusion.changes.values() else ()
+    choices = tuple(conclusion.changes.items())
     return replace(case, statuses=tuple(sorted(conclusion.statuses)), choices=choices, marks=marks)
 
 

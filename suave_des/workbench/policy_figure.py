@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from suave_des.errors import InputError
+from suave_des.knowledge.deliberation import NONE_LEFT, STAYS
 from suave_des.report.style import MODE_COLOURS, OTHER_MODES, VERMILION, WIDTH_IN, publication
-from suave_des.workbench.policy import FLIP_FLOP, INCONSISTENT, NO_GROUNDING, NONE_LEFT, Policy
+from suave_des.workbench.policy import FLIP_FLOP, INCONSISTENT, NO_GROUNDING, Policy
 from suave_des.workbench.policy_space import ValueRange
 from suave_des.workbench.policy_table import FunctionTable, TableRow, function_table
 
@@ -68,7 +69,7 @@ def draw_policy(policy: Policy, path: Path) -> None:
 
 
 def _has_choice(table: FunctionTable) -> bool:
-    return len({outcome for row in table.rows for outcome in row.outcomes} - {"stays"}) > 1
+    return len({outcome for row in table.rows for outcome in row.outcomes} - {STAYS}) > 1
 
 
 @dataclass(frozen=True)
@@ -196,7 +197,7 @@ def _tile(
 def _design_after(outcome: str, row: TableRow, table: FunctionTable) -> str:
     """The design in use afterwards, or why there is none."""
     now = row.groundings.get(table.function, NO_GROUNDING)
-    return outcome.replace("stays", now, 1) if outcome.startswith("stays") else outcome
+    return outcome.replace(STAYS, now, 1) if outcome.startswith(STAYS) else outcome
 
 
 def _colours(tables: Sequence[FunctionTable]) -> dict[str, str]:

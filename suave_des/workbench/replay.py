@@ -14,11 +14,12 @@ from pydantic import ValidationError
 from suave_des.campaign.knowledge_records import CAMPAIGN_KNOWLEDGE_FILE, KNOWLEDGE_FILE, read_knowledge, read_missions
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.content import with_rules
+from suave_des.knowledge.deliberation import NONE_LEFT
 from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rules.files import RulesFile, hash_with_rules
 from suave_des.knowledge.rules.parser import parse_rule, parse_rules
-from suave_des.knowledge.state import Fact, KnowledgeState, Value
+from suave_des.knowledge.state import ContradictionError, Fact, KnowledgeState, Value
 from suave_des.metrics.result import KnowledgeRecord
 from suave_des.resources import find
 from suave_des.scenario.loader import load_scenario
@@ -296,12 +297,10 @@ def _changed(base: Ontology, change: RuleChange) -> Ontology:
     return replace(base, content=content, content_hash=digest)
 
 
-def _decisions(bench: KnowledgeBase, state: KnowledgeState) -> tuple[dict[str, str | None], str | None]:
+def _decisions(bench: KnowledgeBase, state: KnowledgeState) -> tuple[dict[str, str], str | None]:
     """Groundings that would be changed, by function; and the contradiction in a state that has one."""
     try:
-        decisions = bench.decide(state).plan.decisions
-    except KnowledgeError as error:
-        if not error.problem.startswith("contradiction"):
-            raise
+        changes = bench.decide(state).changes
+    except ContradictionError as error:
         return {}, error.problem
-    return {each.function: each.design for each in decisions if each.design != state.grounded(each.function)}, None
+    return {function: design for function, design in changes.items() if design != NONE_LEFT}, None

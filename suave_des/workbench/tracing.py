@@ -1,4 +1,4 @@
-"""Trace facts: find the rules and facts that they follow from.
+"""Derive facts: find the rules and facts that they follow from, as a tree.
 
 Every step of a derivation is made by Pellet: it is given the facts of one instantiated rule body, that rule and the
 schema, and nothing else, and what it adds is what the step concludes. Where a fact follows in several ways, the first
@@ -15,29 +15,94 @@ from functools import cached_property
 from typing import Any, Final
 
 from suave_des.knowledge import jvm
-from suave_des.knowledge.content import RULE_IRI, Content
+from suave_des.knowledge.content import Content
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet import InProcessPellet, load_n_triples, one_at_a_time, read_term
+from suave_des.knowledge.pellet import (
+    InProcessPellet,
+    Trace,
+    load_n_triples,
+    one_at_a_time,
+    read_term,
+    trace_contradiction,
+)
 from suave_des.knowledge.rdf import Lit, Triple, canonical, facts_of, is_fact, n_triple, value_of
 from suave_des.knowledge.rules.syntax import Atom, Kind, Rule
 from suave_des.knowledge.state import Fact, KnowledgeState, Value
 from suave_des.knowledge.vocabulary import OWL, RDF_TYPE
-from suave_des.workbench.derivations import Binding, Clash, Derivation, matched, partial_matches
+from suave_des.workbench.matching import Binding, Facts, matched
 
-_RULE: Final = re.compile(r"^rule\(" + re.escape(RULE_IRI) + r"(\d+)")
 _FACT: Final = re.compile(r"^(prop|type)\(([^,()]+),([^,()]+)")
 _IRI: Final = re.compile(r"[a-z]+:[^\s,()]+")
 _Bindings = tuple[tuple[str, Value], ...]
 
 
 @dataclass(frozen=True)
-class _Trace:
-    """What Pellet says a contradiction follows from."""
+class Derivation:
+    """How a fact follows.
 
-    message: str
-    rules: tuple[Rule, ...]
-    triples: tuple[Triple, ...]
-    axioms: tuple[str, ...]
+    Attributes:
+        fact: what follows.
+        source: "state" or "ontology" where it is asserted, "rule", or "axioms" where it follows from the schema.
+        rule: the rule's name.
+        bindings: value of each of the rule's variables, by variable.
+        axioms: the axioms of the schema that were used.
+        premises: the facts of the rule's body, instantiated.
+    """
+
+    fact: Fact
+    source: str
+    rule: str | None = None
+    bindings: tuple[tuple[str, Value], ...] = ()
+    axioms: tuple[str, ...] = ()
+    premises: tuple[Derivation, ...] = ()
+
+    def __str__(self) -> str:
+        """As a tree of lines."""
+        return "\n".join(self.lines())
+
+    def lines(self, indent: str = "") -> Iterator[str]:
+        """The fact and how it follows, and below it, indented, the facts that it follows from."""
+        bindings = ", ".join(f"?{name} = {value}" for name, value in self.bindings)
+        how = {
+            "rule": f"by rule {self.rule}" + (f" with {bindings}" if bindings else ""),
+            "axioms": f"by the schema: {'; '.join(self.axioms)}" if self.axioms else "by the schema",
+            "state": "given in the state",
+            "ontology": "asserted in the ontology",
+        }[self.source]
+        yield f"{indent}{self.fact}  [{how}]"
+        for premise in self.premises:
+            yield from premise.lines(indent + "  ")
+
+    def leaves(self) -> Iterator[Derivation]:
+        """The asserted facts that it follows from."""
+        if not self.premises:
+            yield self
+        for premise in self.premises:
+            yield from premise.leaves()
+
+    def grounds(self) -> frozenset[tuple[str, str]]:
+        """(subject, property) of all facts that it follows from, without itself."""
+        direct = frozenset((premise.fact.subject, premise.fact.property) for premise in self.premises)
+        return direct.union(*(premise.grounds() for premise in self.premises))
+
+    def rules(self) -> frozenset[str]:
+        """Names of all rules in it."""
+        own = frozenset({self.rule} if self.rule is not None else ())
+        return own.union(*(premise.rules() for premise in self.premises))
+
+
+@dataclass(frozen=True)
+class Clash:
+    """A contradiction: an individual would have two values of a functional property.
+
+    Attributes:
+        subject, property: the individual and the property.
+        sides: how each of the values follows.
+    """
+
+    subject: str
+    property: str
+    sides: tuple[Derivation, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +142,11 @@ class Tracer:
         return tuple(sorted({_canonical(triple) for triple in entailed if is_fact(triple)}, key=str))
 
     @cached_property
+    def facts(self) -> Facts:
+        """The same, to be looked up."""
+        return Facts(self.known)
+
+    @cached_property
     def _leaves(self) -> dict[Triple, Triple]:
         """What is asserted, by its canonical form."""
         return {_canonical(triple): triple for triple in sorted(filter(is_fact, self.asserted), key=str)}
@@ -93,14 +163,16 @@ class Tracer:
             found = self._derive(_canonical(triple), frozenset())
             if found is None:  # what Pellet says that it follows from, without the steps between
                 trace = self._trace(self.asserted, self.base.content.enabled_rules, _denial(triple))
-                premises = tuple(map(self._leaf, trace.triples))
-                found = Derivation(self._fact(triple), "axioms", premises=premises, axioms=trace.axioms)
+                named = {fact.groups() for axiom in trace.axioms if (fact := _FACT.match(axiom))}
+                leaves = [each for each in sorted(self.asserted, key=str) if _as_axiom(each) in named]
+                premises = tuple(map(self._leaf, leaves))
+                found = Derivation(self._fact(triple), "axioms", premises=premises, axioms=self._axioms(trace))
             return found
 
     def firings(self, rule: Rule) -> Iterator[tuple[_Bindings, tuple[Fact, ...]]]:
         """Find every way in which a rule fires: the bindings, and the facts that it concludes."""
         with one_at_a_time:
-            for binding, body in _matches(rule, {}, self.known):
+            for binding, body in _matches(rule, {}, self.facts):
                 concluded = self._step(rule, frozenset(body))
                 if concluded:
                     yield self._bindings(binding), tuple(self._fact(each) for each in sorted(concluded, key=str))
@@ -121,7 +193,7 @@ class Tracer:
         for rule in self.base.content.enabled_rules:
             starts = (matched(atom, triple, {}) for atom in rule.head)
             for start in (each for each in starts if each is not None):
-                for binding, body in _matches(rule, start, self.known):
+                for binding, body in _matches(rule, start, self.facts):
                     if above.isdisjoint(body) and triple in self._step(rule, frozenset(body)):
                         premises = [found for each in body if (found := self._derive(each, above)) is not None]
                         if len(premises) == len(body):
@@ -139,7 +211,7 @@ class Tracer:
             if about_same and other not in above and triple in self._concluded(frozenset({other}), [asked]):
                 premise = self._derive(other, above)
                 if premise is not None:
-                    axioms = self._trace((other,), (), _denial(triple)).axioms
+                    axioms = self._axioms(self._trace((other,), (), _denial(triple)))
                     yield Derivation(self._fact(triple), "axioms", premises=(premise,), axioms=axioms)
 
     def clashes(self) -> tuple[str, tuple[Clash, ...], tuple[str, ...]]:
@@ -170,15 +242,16 @@ class Tracer:
             return message, clashes, tuple(sorted(rules))
         with one_at_a_time:
             trace = self._trace(self.asserted, self.base.content.enabled_rules)
-        return self._shorten(trace.message).strip(), (), tuple(sorted(rule.name for rule in trace.rules))
+        names = sorted(self.base.rules[number].name for number in trace.rules)
+        return self._shorten(trace.message).strip(), (), tuple(names)
 
     def _forward_chain(self) -> dict[Triple, Derivation]:
         """What all rules conclude from what is asserted, round by round, in a state in which Pellet infers nothing."""
         known = {triple: self._leaf(asserted) for triple, asserted in self._leaves.items()}
         while True:
-            more: dict[Triple, Derivation] = {}
+            facts, more = Facts(known), dict[Triple, Derivation]()
             for rule in self.base.content.enabled_rules:
-                for binding, body in _matches(rule, {}, known):
+                for binding, body in _matches(rule, {}, facts):
                     for triple in sorted(self._step(rule, frozenset(body)) - known.keys(), key=str):
                         premises = [known[each] for each in body]
                         more.setdefault(triple, self._by_rule(triple, rule, binding, premises))
@@ -218,28 +291,13 @@ class Tracer:
         content = replace(self._schema, triples=(*self._schema.triples, *sorted(facts, key=str)))
         return content.n_triples(rules)
 
-    def _trace(self, facts: Iterable[Triple], rules: Sequence[Rule], denial: str = "") -> _Trace:
+    def _trace(self, facts: Iterable[Triple], rules: Sequence[Rule], denial: str = "") -> Trace:
         """What Pellet says a contradiction follows from: the state's own, or that of a fact with its denial."""
-        options = jvm.java_class("org.mindswap.pellet.PelletOptions")
-        options.USE_TRACING = True
-        try:
-            knowledge_base = load_n_triples(self._text(facts, rules) + denial, explain=True)
-            knowledge_base.isConsistent()
-            message = str(knowledge_base.getExplanation())
-            axioms = sorted(str(axiom.toString()) for axiom in knowledge_base.getExplanationSet())
-        finally:
-            options.USE_TRACING = False
-            jvm.take_warnings()
-        numbers = sorted(int(found.group(1)) for axiom in axioms if (found := _RULE.match(axiom)))
-        named = {found.groups() for axiom in axioms if (found := _FACT.match(axiom))}
-        # Facts and the denial are not of the schema; the others are domains, subclasses and the like.
-        schema = [axiom for axiom in axioms if not axiom.startswith(("rule(", "prop(", "type("))]
-        return _Trace(
-            message,
-            tuple(self.base.content.rules[number] for number in numbers),
-            tuple(triple for triple in sorted(self.asserted, key=str) if _as_axiom(triple) in named),
-            tuple(map(self._shorten, schema)),
-        )
+        return trace_contradiction(self._text(facts, rules) + denial)
+
+    def _axioms(self, trace: Trace) -> tuple[str, ...]:
+        """The axioms of the schema in a trace: domains, subclasses and the like."""
+        return tuple(self._shorten(each) for each in trace.axioms if not each.startswith(("rule(", "prop(", "type(")))
 
     def _shorten(self, text: str) -> str:
         """A text of Pellet's with names in place of IRIs."""
@@ -255,10 +313,9 @@ class Tracer:
         return next(facts_of([triple], self.base.names))
 
 
-def _matches(rule: Rule, binding: Binding, known: Iterable[Triple]) -> list[tuple[Binding, tuple[Triple, ...]]]:
+def _matches(rule: Rule, binding: Binding, facts: Facts) -> list[tuple[Binding, tuple[Triple, ...]]]:
     """Ways to match a rule's body with facts, in a fixed order; comparisons are left to Pellet."""
-    ways = partial_matches(rule.body, binding, known)
-    return sorted(((bound, body) for depth, bound, body in ways if depth == len(rule.body)), key=str)
+    return sorted(facts.all_matches(rule.body, binding), key=str)
 
 
 def _canonical(triple: Triple) -> Triple:

@@ -6,24 +6,22 @@ the answer is the first atom that fails, for the binding that comes nearest, wit
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
+from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.knowledge.limit import TimeLimit
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import Lit, Triple, facts_of, value_of
 from suave_des.knowledge.rules.checks import RuleProblem, check_rule
-from suave_des.knowledge.rules.syntax import Atom, Named, Rule, Variable
+from suave_des.knowledge.rules.syntax import Atom, Rule
 from suave_des.knowledge.rules.writer import write_atom
-from suave_des.knowledge.state import KnowledgeState, Value
+from suave_des.knowledge.state import ContradictionError, Fact, KnowledgeState, Value, value_text
 from suave_des.knowledge.vocabulary import RDF_TYPE
 from suave_des.workbench.atom_failure import describe_failure
-from suave_des.workbench.derivations import FACT_KINDS, Binding
-from suave_des.workbench.nearest_match import Facts, NearestFinder
-from suave_des.workbench.testing.probes import Probes
-from suave_des.workbench.testing.situation import Situation
+from suave_des.workbench.matching import FACT_KINDS, Binding, Facts, NearestFinder, bound, unified
+from suave_des.workbench.prover import Prover, Situation
 from suave_des.workbench.tracing import Tracer
 from suave_des.workbench.unusable_rules import UnusableRule
 
@@ -123,7 +121,7 @@ class RuleQuestions:
 
     def _fires_in_pellet(self, rule: Rule, state: KnowledgeState) -> bool:
         """Whether a rule fires: what is the same and what is different, Pellet alone knows."""
-        return bool(Probes.of(self._usable, [rule.body], TimeLimit()).holding(Situation(state)))
+        return bool(Prover.load(self._usable, TimeLimit(), [rule.body]).holding(Situation(state)))
 
     @cached_property
     def _usable(self) -> Ontology:
@@ -139,11 +137,35 @@ class RuleQuestions:
             try:
                 tracer = Tracer(self._usable, state)
                 self._facts[state] = Facts(_with_languages(tracer.known, tracer.asserted))
-            except KnowledgeError as error:
-                if not error.problem.startswith("contradiction"):
-                    raise
+            except ContradictionError as error:
                 self._facts[state] = error.problem.removeprefix("contradiction: ")
         return self._facts[state]
+
+    def missing(self, fact: Fact, subject: str, state: KnowledgeState) -> list[WhyNot]:
+        """Say of each rule that could conclude a fact why it does not, those that lack least first.
+
+        Args:
+            fact: which does not follow.
+            subject: IRI of its subject.
+            state: the state.
+        """
+        found = []
+        for rule in self.base.content.enabled_rules:
+            starts = (self._says(head, fact, subject) for head in rule.head)
+            start = next((each for each in starts if each is not None), None)
+            if start is not None:
+                found.append(self.of(rule, state, start))
+        return sorted((each for each in found if not each.fires), key=lambda each: (each.failing, each.rule))
+
+    def _says(self, head: Atom, fact: Fact, subject: str) -> Binding | None:
+        """The binding with which an atom of a head says a fact, its value left free; None if it cannot."""
+        names, last = self.base.names, head.arguments[-1]
+        if fact.property != ("type" if head.kind == "class" else names.short(head.predicate)):
+            return None
+        value = head.predicate if head.kind == "class" else bound(last, {})
+        if value is not None and value_text(value_of(value, names)) != value_text(fact.value):
+            return None
+        return unified(head.arguments[:1], (subject,), {})
 
     def _fires(self, rule: Rule, binding: Binding, facts: Facts) -> str:
         concluded = []
@@ -159,22 +181,17 @@ class RuleQuestions:
 
     def _instance(self, atom: Atom, binding: Binding) -> str:
         """An atom of a head with the values of its variables, as a fact."""
-        terms = [binding.get(term.name) if isinstance(term, Variable) else term for term in atom.arguments]
-        if atom.kind not in FACT_KINDS or any(term is None for term in terms):
+        terms = [bound(term, binding) for term in atom.arguments]
+        if atom.kind not in FACT_KINDS or None in terms:
             return write_atom(atom)
-        plain = [term.iri if isinstance(term, Named) else term for term in terms]
-        subject, value = str(plain[0]), plain[-1]
-        if atom.kind == "class":
-            return str(next(facts_of([(subject, RDF_TYPE, atom.predicate)], self.base.names)))
-        return str(next(facts_of([(subject, atom.predicate, value)], self.base.names)))  # type: ignore[list-item]
+        subject, value = str(terms[0]), terms[-1] or ""
+        triple = (subject, RDF_TYPE, atom.predicate) if atom.kind == "class" else (subject, atom.predicate, value)
+        return str(next(facts_of([triple], self.base.names)))
 
     def _other_values(self, atom: Atom, binding: Binding, facts: Facts) -> list[str]:
         """Facts that give the subject of a head's atom another value of the same data property."""
-        first, last = atom.arguments[0], atom.arguments[-1]
-        if atom.kind != "data" or not isinstance(last, Lit):
-            return []
-        subject = first.iri if isinstance(first, Named) else binding.get(getattr(first, "name", ""))
-        if not isinstance(subject, str):
+        subject, last = bound(atom.arguments[0], binding), atom.arguments[-1]
+        if atom.kind != "data" or not isinstance(last, Lit) or not isinstance(subject, str):
             return []
         values = [value for value in facts.values(subject, atom.predicate) if value != last]
         triples = [(subject, atom.predicate, value) for value in values]
@@ -196,12 +213,12 @@ class RuleQuestions:
         """Other rules with a head that says what an atom asks for, with the binding with which it does."""
         if atom.kind not in FACT_KINDS:
             return
-        wanted = [binding.get(term.name) if isinstance(term, Variable) else term for term in atom.arguments]
+        wanted = [bound(term, binding) for term in atom.arguments]
         for other in self._usable.content.enabled_rules:
             for head in other.head:
                 if other is rule or (head.kind, head.predicate) != (atom.kind, atom.predicate):
                     continue
-                start = _unified(head, wanted)
+                start = unified(head.arguments, wanted, {})
                 if start is not None:
                     yield other, start
 
@@ -220,18 +237,3 @@ def _with_languages(known: Iterable[Triple], asserted: Iterable[Triple]) -> list
         subject, predicate, value = triple
         found += languages.get((subject, predicate, value.text), [triple]) if isinstance(value, Lit) else [triple]
     return found
-
-
-def _unified(head: Atom, wanted: Sequence[object]) -> Binding | None:
-    """The binding with which a head says what is wanted; None for a term stands for anything."""
-    binding: dict[str, str | Lit] = {}
-    for term, value in zip(head.arguments, wanted, strict=False):
-        plain = value.iri if isinstance(value, Named) else value
-        if plain is None:
-            continue
-        if isinstance(term, Variable):
-            if binding.setdefault(term.name, plain) != plain:  # type: ignore[arg-type]
-                return None
-        elif (term.iri if isinstance(term, Named) else term) != plain:
-            return None
-    return binding

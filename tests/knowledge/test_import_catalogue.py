@@ -28,7 +28,7 @@ STORY = [
 
 
 def decisions(base: Ontology, reasoner: Reasoner) -> list[dict[str, str | None]]:
-    plans = [plan(base, state, reasoner.infer(state)) for state in STORY]
+    plans = [plan(base, reasoner.infer(state)) for state in STORY]
     return [{d.function: d.design for d in one.decisions} for one in plans]
 
 

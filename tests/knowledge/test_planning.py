@@ -12,12 +12,12 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.planning import calls, plan
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.knowledge.state import Decision, KnowledgeState, ObjectiveState
-from tests.helpers.knowledge_states import FOLLOW, MOTION, SEARCH, searching
+from tests.helpers.knowledge_states import MOTION, SEARCH, searching
 from tests.helpers.owl_text import MakeOntology, individual
 
 
-def decide(kb: Ontology, reasoner: Reasoner, state: KnowledgeState, **options: list[str]) -> dict[str, Decision]:
-    decisions = plan(kb, state, reasoner.infer(state), **options).decisions
+def decide(kb: Ontology, reasoner: Reasoner, state: KnowledgeState, **options: bool) -> dict[str, Decision]:
+    decisions = plan(kb, reasoner.infer(state), **options).decisions
     assert [d.function for d in decisions] == sorted(d.function for d in decisions)
     return {decision.function: decision for decision in decisions}
 
@@ -72,12 +72,13 @@ def test_an_objective_that_is_well_is_left_alone(kb: Ontology, pellet: Reasoner)
     assert decide(kb, pellet, searching("fd_spiral_low", 3.5)) == {}
 
 
-def test_an_objective_is_adapted_on_request_or_when_always_to_be_improved(kb: Ontology, pellet: Reasoner) -> None:
-    asked = decide(kb, pellet, searching("fd_spiral_low", 3.5), to_adapt={SEARCH: "the water is clearer"})
-    assert asked[SEARCH].design == "fd_spiral_high"
+def test_an_objective_is_adapted_when_exceeded_or_always_to_be_improved(kb: Ontology, pellet: Reasoner) -> None:
+    exceeded = decide(kb, pellet, searching("fd_spiral_low", 3.5), improve_exceeded=True)
+    assert exceeded[SEARCH].design == "fd_spiral_high"
+    assert exceeded[SEARCH].reason.startswith("water_visibility 3.50 exceeds what fd_spiral_low expects")
     always = decide(kb, pellet, searching("fd_spiral_low", 3.5, always_improve=True))
     assert always[SEARCH].design == "fd_spiral_high"
-    assert decide(kb, pellet, searching("fd_spiral_low", 3.5), to_adapt={FOLLOW: "the water is clearer"}) == {}
+    assert decide(kb, pellet, searching("fd_spiral_low", 1.25), improve_exceeded=True) == {}
 
 
 @pytest.mark.parametrize(

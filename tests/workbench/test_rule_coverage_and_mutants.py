@@ -6,11 +6,11 @@ import pytest
 
 from suave_des.knowledge.ontology import Ontology
 from suave_des.workbench import KnowledgeBase
+from suave_des.workbench.prover import Prover, Situation
 from suave_des.workbench.testing.coverage import FIRES, Goal, least_cover, measure_coverage
 from suave_des.workbench.testing.mutants import OPERATORS, mutants_of, sample
 from suave_des.workbench.testing.mutation import EQUIVALENT, KILLED, SURVIVED, mutate
 from suave_des.workbench.testing.run import Runner
-from suave_des.workbench.testing.situation import Prover, Situation
 from suave_des.workbench.testing.suite import TestFile
 
 TESTS = """\
@@ -61,7 +61,7 @@ def test_mutants_are_killed_proved_equivalent_or_survive_with_a_state_that_tells
     for verdict in report.of(SURVIVED):
         changed = Prover.of(bench, verdict.mutant.applied(bench.base)).outcome(Situation(verdict.state))
         original = Prover.of(bench).outcome(Situation(verdict.state))
-        assert (changed.inferred, changed.choices) != (original.inferred, original.choices)
+        assert (changed.inferred, changed.changes) != (original.inferred, original.changes)
 
 
 @pytest.mark.parametrize("all_rules", [False, pytest.param(True, marks=pytest.mark.slow)])

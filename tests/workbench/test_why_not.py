@@ -10,8 +10,7 @@ from suave_des.errors import InputError
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.scenario.loader import load_scenario
-from suave_des.workbench.testing.probes import Probes
-from suave_des.workbench.testing.situation import Situation
+from suave_des.workbench.prover import Prover, Situation
 from suave_des.workbench.unusable_rules import open_without_unusable
 from suave_des.workbench.why_not import RuleQuestions
 from tests.helpers.number_ontology import NS, NUMBERS, numbers_ontology
@@ -21,8 +20,8 @@ SEARCH = "f_generate_search_path"
 
 
 @pytest.fixture(scope="module")
-def probes(bench):
-    return Probes.of(bench.base, [rule.body for rule in bench.base.rules], bench.limit)
+def prover(bench):
+    return Prover.of(bench, bodies=[rule.body for rule in bench.base.rules])
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -79,13 +78,13 @@ def test_the_command_takes_states_by_name_by_file_and_from_a_mission(command, tm
     statuses=st.lists(st.sampled_from(["FALSE", "RECOVERED"]), max_size=2),
     visibility=st.sampled_from(["1", "1.25", "2.25", "3.2", "4"]),
 )
-def test_a_rule_fires_where_pellet_says_so(bench, probes, design, statuses, visibility):
+def test_a_rule_fires_where_pellet_says_so(bench, prover, design, statuses, visibility):
     state = bench.state(
         groundings={SEARCH: design},
         components={f"c_thruster_{n}": status for n, status in enumerate(statuses, start=1)},
         measurements={"water_visibility": visibility},
     )
-    holding = probes.holding(Situation(state))
+    holding = prover.holding(Situation(state))
     questions = RuleQuestions(bench.base)
     answers = {rule.name: questions.of(rule, state).fires for rule in bench.base.rules}
     assert answers == {rule.name: number in holding for number, rule in enumerate(bench.base.rules)}

@@ -16,11 +16,10 @@ from suave_des.knowledge.rules.syntax import Atom, Rule
 from suave_des.knowledge.rules.writer import write_atom
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.workbench.knowledge_base import KnowledgeBase
-from suave_des.workbench.nearest_match import testable_order
+from suave_des.workbench.matching import testable_order
 from suave_des.workbench.policy import kinds_of_states
 from suave_des.workbench.policy_space import PolicySpace
-from suave_des.workbench.testing.probes import Body, Probes
-from suave_des.workbench.testing.situation import Situation
+from suave_des.workbench.prover import Body, Prover, Situation
 
 FIRES, FIRES_NOT, HOLDS, FAILS = "fires", "does not fire", "holds", "fails"
 #: How the values of a comparison can relate, with the built-in that says so.
@@ -193,8 +192,8 @@ def measure_coverage(bench: KnowledgeBase, situations: Iterable[Situation], max_
         KnowledgeError: the reasoner takes too long.
     """
     questions = _Questions(tuple(rule for rule in bench.base.content.enabled_rules if rule.body))
-    probes = Probes.of(bench.base, tuple(questions.bodies), bench.limit)
-    by_situation = [set(questions.covered(probes.holding(each))) for each in dict.fromkeys(situations)]
+    prover = Prover.of(bench, bodies=tuple(questions.bodies))
+    by_situation = [set(questions.covered(prover.holding(each))) for each in dict.fromkeys(situations)]
     covered = set[Goal]().union(*by_situation)
     missing = questions.goals() - covered
     candidates, states = _reached(bench, missing, max_failed) if missing else ({}, 0)
@@ -220,15 +219,15 @@ def _reached(
     names = {goal.rule for goal in missing}
     rules = (rule for rule in bench.base.content.enabled_rules if rule.name in names and rule.body)
     questions = _Questions(tuple(rules))
-    probes = Probes.of(bench.base, tuple(questions.bodies), bench.limit)
+    prover = Prover.of(bench, bodies=tuple(questions.bodies))
     wanted, everywhere = frozenset(questions.needed(missing)), questions.always(missing)
     space = PolicySpace.of(bench.base, bench.settings)
     found: dict[frozenset[Goal], KnowledgeState] = {}
     states = 0
     for kinds in kinds_of_states(bench.base, bench.settings, max_failed, space):
         states += len(kinds)
-        for case in kinds if everywhere else probes.may_hold(kinds, wanted):
-            goals = frozenset(questions.covered(probes.holding(Situation(case.state)))) & missing
+        for case in kinds if everywhere else prover.may_hold(kinds, wanted):
+            goals = frozenset(questions.covered(prover.holding(Situation(case.state)))) & missing
             if goals:
                 found.setdefault(goals, case.state)
     return {state: goals for goals, state in found.items()}, states

@@ -8,14 +8,13 @@ from typing import Final
 
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import Lit, Triple
-from suave_des.knowledge.rules.syntax import Atom, Named, Term, Variable
+from suave_des.knowledge.rules.syntax import Named, Variable
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.knowledge.vocabulary import HAS_VALUE, OWL, RDF_TYPE, RDFS, XSD
-from suave_des.workbench.derivations import FACT_KINDS, Binding, matched
 from suave_des.workbench.knowledge_base import KnowledgeBase
+from suave_des.workbench.matching import FACT_KINDS, instance, matched
+from suave_des.workbench.prover import Body, Prover, Situation
 from suave_des.workbench.testing.mutants import Mutant
-from suave_des.workbench.testing.probes import Body, Probes
-from suave_des.workbench.testing.situation import Situation
 
 _NOT_HORN: Final = (
     *("unionOf", "complementOf", "oneOf", "disjointUnionOf", "maxCardinality", "maxQualifiedCardinality"),
@@ -38,21 +37,11 @@ def touching(base: Ontology, mutant: Mutant) -> Iterator[Body]:
                 binding = matched(atom, triple, {}) if atom.kind in FACT_KINDS else None
                 if binding is not None:
                     rest = (*rule.body[:number], *rule.body[number + 1 :])
-                    yield _plain(tuple(_bound(each, binding) for each in rest))
+                    yield tuple(instance(each, binding) for each in rest)
 
 
 def _plain(body: Body) -> Body:
     return tuple(replace(atom, places=()) for atom in body)
-
-
-def _bound(atom: Atom, binding: Binding) -> Atom:
-    def value(term: Term) -> Term:
-        if not isinstance(term, Variable) or term.name not in binding:
-            return term
-        found = binding[term.name]
-        return found if isinstance(found, Lit) else Named(found)
-
-    return replace(atom, arguments=tuple(map(value, atom.arguments)))
 
 
 def follows_anyway(bench: KnowledgeBase, mutant: Mutant) -> bool:
@@ -80,9 +69,9 @@ def follows_anyway(bench: KnowledgeBase, mutant: Mutant) -> bool:
             facts.append((f"{_FROZEN}{atom.arguments[0].name}", atom.predicate, atom.arguments[1]))
         elif atom.kind == "data" and isinstance(atom.arguments[0], Variable) and atom.predicate == HAS_VALUE:
             facts.append((f"{_FROZEN}{atom.arguments[0].name}", atom.predicate, Lit("123.456", XSD + "decimal")))
-    asked = _bound(replace(dropped, places=()), free)
-    probes = Probes.of(bench.base, [(asked,)], bench.limit)
-    return probes.holding(Situation(KnowledgeState(), tuple(facts))) == {0}
+    asked = instance(dropped, free)
+    prover = Prover.of(bench, bodies=[(asked,)])
+    return prover.holding(Situation(KnowledgeState(), tuple(facts))) == {0}
 
 
 def is_horn(base: Ontology) -> bool:

@@ -201,11 +201,7 @@ def _operators_of_attributes(base: Ontology) -> Iterator[Mutant]:
     """The comparison operator of each quality attribute, turned."""
     for triple in base.content.triples:
         subject, predicate, value = triple
-        if (
-            predicate == TOMASYS + "qa_comparison_operator"
-            and isinstance(value, Lit)
-            and value.text in OPERATORS_OF_ATTRIBUTES
-        ):
+        if predicate == TOMASYS + "qa_comparison_operator" and isinstance(value, Lit):
             yield _data(triple, (subject, predicate, Lit(mirrored(value.text), value.datatype)))
 
 

@@ -14,24 +14,25 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.deliberation import Conclusion, Deliberation
+from suave_des.knowledge.deliberation import Conclusion
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.planning import plan
 from suave_des.knowledge.rdf import facts_of
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
-from suave_des.knowledge.state import Fact, Inference, KnowledgeState
+from suave_des.knowledge.state import ContradictionError, Fact, Inference, KnowledgeState
 from suave_des.knowledge.vocabulary import DECISION_PROPERTIES, HAS_VALUE, TOMASYS, local_name
 from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.policy import PolicyCase, kinds_of_states
 from suave_des.workbench.policy_space import PolicySpace, numbers_in
+from suave_des.workbench.prover import Body, Entailed, Outcome, Prover, Situation
 from suave_des.workbench.testing.effects import follows_anyway, is_horn, touching
 from suave_des.workbench.testing.mutants import Mutant
-from suave_des.workbench.testing.probes import Body, Probes
 from suave_des.workbench.testing.run import Runner
-from suave_des.workbench.testing.situation import Outcome, Prover, Situation
 from suave_des.workbench.testing.suite import RuleTest
 
 KILLED, EQUIVALENT, SURVIVED = "killed", "equivalent", "survived"
@@ -105,22 +106,15 @@ class _Original:
                 self.touched_by.append(None)
                 continue
             self.touched_by.append(frozenset(numbers.setdefault(body, len(numbers)) for body in bodies))
-        self.probes = Probes.of(base, tuple(numbers), self.bench.limit)
+        self.prover = Prover.of(self.bench, bodies=tuple(numbers))
         self.is_horn = is_horn(base)
         self.known = _planning_facts(base)
-        self._found: dict[Situation, tuple[frozenset[Fact], frozenset[int]] | None] = {}
 
-    def conclude(self, situation: Situation) -> tuple[frozenset[Fact], frozenset[int]] | None:
+    def entailed(self, situation: Situation) -> Entailed | None:
         """What is inferred, and which probes hold; None for a contradiction."""
-        if situation not in self._found:
-            base, found = self.bench.base, self.probes.conclude(situation)
-            if found is None:
-                self._found[situation] = None
-            else:
-                assertions = (*base.assertions(situation.state), *situation.facts)
-                asserted = base.facts.union(facts_of(assertions, base.names))
-                self._found[situation] = frozenset(facts_of(found[0], base.names)) - asserted, found[1]
-        return self._found[situation]
+        with suppress(ContradictionError):
+            return self.prover.entailed(situation)
+        return None
 
     def touched(self, cases: Sequence[PolicyCase], numbers: Iterable[int]) -> frozenset[KnowledgeState]:
         """States in which probes of some mutants may hold; all, where that cannot be told."""
@@ -128,11 +122,11 @@ class _Original:
         if not self.is_horn or None in probes:
             return frozenset(case.state for case in cases)
         wanted = frozenset[int]().union(*filter(None, probes))
-        return frozenset(case.state for case in self.probes.may_hold(cases, wanted))
+        return frozenset(case.state for case in self.prover.may_hold(cases, wanted))
 
     def take_from_cache(self, state: KnowledgeState) -> None:
         """Take what is inferred in a state, in which no probe of interest holds, from the reasoner's cache."""
-        self._found.setdefault(Situation(state), (self._reasoner.infer(state).facts, frozenset()))
+        self.prover.known.setdefault(Situation(state), Entailed(self._reasoner.infer(state).facts, frozenset()))
 
     @cached_property
     def _reasoner(self) -> Reasoner:
@@ -146,29 +140,18 @@ class _Original:
             known: of its facts those that planning reads.
             situation: the situation.
         """
-        found = self.conclude(situation)
+        found = self.entailed(situation)
         if found is None:
             return Outcome(None)
         assertions = (*base.assertions(situation.state), *situation.facts)
-        inference = Inference(situation.state, known.union(facts_of(assertions, base.names)), found[0])
+        inference = Inference(situation.state, known.union(facts_of(assertions, base.names)), found.facts)
         improves = self.bench.settings.improves_exceeded
-        plan = Deliberation(base, _NoReasoner()).plan(inference, improve_exceeded=improves)
-        return Outcome(Conclusion(inference, plan))
+        return Outcome(Conclusion(inference, plan(base, inference, improve_exceeded=improves)))
 
 
 def _planning_facts(base: Ontology) -> frozenset[Fact]:
     names = {local_name(name) for name in DECISION_PROPERTIES}
     return frozenset(fact for fact in base.facts if fact.property in names)
-
-
-class _NoReasoner:
-    """Stands where a reasoner would, for planning on what is inferred already."""
-
-    name = "none"
-
-    def infer(self, state: KnowledgeState) -> Inference:
-        """Refuse."""
-        raise AssertionError(f"nothing is inferred here: {state}")
 
 
 @dataclass
@@ -204,12 +187,12 @@ class _Changed:
 
     def touches(self, situation: Situation) -> bool:
         """Whether the change can make a difference to what is inferred in a situation."""
-        found, probes = self.original.conclude(situation), self.original.touched_by[self.number]
-        return found is None or probes is None or not self.original.is_horn or not probes.isdisjoint(found[1])
+        found, probes = self.original.entailed(situation), self.original.touched_by[self.number]
+        return found is None or probes is None or not self.original.is_horn or not probes.isdisjoint(found.holding)
 
     def outcome(self, situation: Situation) -> Outcome:
         """Conclude what follows in a situation."""
-        found = self.original.conclude(situation)
+        found = self.original.entailed(situation)
         if found is None or self.touches(situation):
             return self.prover.outcome(situation)
         if self.known == self.original.known:
@@ -323,7 +306,7 @@ def _difference(before: Outcome, after: Outcome) -> str | None:
     """What a mutant makes different, in words; None: nothing."""
     if (before.conclusion is None) != (after.conclusion is None):
         return "it contradicts itself" if after.conclusion is None else "it contradicts itself no more"
-    for function in sorted({name for name, _ in (*before.choices, *after.choices)}):
+    for function in sorted({*before.changes, *after.changes}):
         one, other = before.choice(function), after.choice(function)
         if one != other:
             return f"{function}: {other}, not {one}"

@@ -8,15 +8,16 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown
+from suave_des.knowledge.deliberation import NONE_LEFT, STAYS
 from suave_des.knowledge.state import Fact, KnowledgeState
 from suave_des.scenario.yamlfile import YamlDocument
+from suave_des.workbench.fact_reader import FactReader
 from suave_des.workbench.knowledge_base import KnowledgeBase
-from suave_des.workbench.policy import NONE_LEFT
 from suave_des.workbench.policy_space import ValueRange
+from suave_des.workbench.prover import Situation
 from suave_des.workbench.state_input import StateBuilder
 from suave_des.workbench.state_words import add_state, recorded_state, recorded_states
 from suave_des.workbench.testing.regions import measurements_in, parse_region
-from suave_des.workbench.testing.situation import STAYS, FactReader, Situation, check_function
 from suave_des.workbench.testing.suite import RuleTest, check_keys, texts
 
 _TEST_KEYS: Final = ("name", "given", "follows", "follows_not", "decides", "contradiction", "without", "changes")
@@ -107,7 +108,8 @@ class TestReader:
             raise self.error(f"{shown(content)} is not a mapping", (key,), example)
         for name, value in content.items():
             with self._at(key, name):
-                check_function(self.bench.base, name)
+                if name not in (known := self.bench.base.functions):
+                    raise InputError(f"there is no function {shown(name)}", remedy=did_you_mean(name, known))
             yield name, value
 
     def _facts(self, key: str) -> tuple[Fact, ...]:

@@ -5,23 +5,16 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 from suave_des.errors import InputError, KnowledgeError
+from suave_des.knowledge.deliberation import STAYS
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import value_of
-from suave_des.knowledge.rules.syntax import Named, Rule, Variable
 from suave_des.knowledge.state import Fact
-from suave_des.workbench.derivations import Binding
 from suave_des.workbench.explain import explain
+from suave_des.workbench.fact_reader import NEW_INDIVIDUAL
 from suave_des.workbench.knowledge_base import KnowledgeBase
-from suave_des.workbench.testing.situation import (
-    NEW_INDIVIDUAL,
-    STAYS,
-    Concluder,
-    Outcome,
-    Prover,
-    Situation,
-)
+from suave_des.workbench.prover import Outcome, Prover, Situation
 from suave_des.workbench.testing.suite import RuleTest
 from suave_des.workbench.why_not import RuleQuestions
 
@@ -64,6 +57,25 @@ class TestResult:
     def passed(self) -> bool:
         """Whether all that was expected is so."""
         return not self.failures
+
+
+class Concluder(Protocol):
+    """Concludes what follows in situations, as a Prover does.
+
+    Attributes:
+        base: ontologies and rules.
+        improves_exceeded: as ManagingSettings has it.
+    """
+
+    @property
+    def base(self) -> Ontology: ...  # noqa: D102
+
+    @property
+    def improves_exceeded(self) -> bool: ...  # noqa: D102
+
+    def outcome(self, situation: Situation) -> Outcome:
+        """Conclude what follows."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -178,37 +190,15 @@ class Runner:
 
 
 def _missing(base: Ontology, situation: Situation, fact: Fact) -> Iterator[str]:
-    """Why each rule that could conclude a fact does not."""
-    questions = RuleQuestions(base)
-    able = [(rule, start) for rule in base.content.enabled_rules if (start := _start(base, rule, fact)) is not None]
-    found = (questions.of(rule, situation.state, start) for rule, start in able)
-    answers = [answer for answer in found if not answer.fires]
-    near = min((answer.failing for answer in answers if answer.failing), default=0)
-    for answer in answers:
-        if answer.failing in (0, near):
-            yield str(answer)
-    if not able:
-        what = f"membership in {fact.value}" if fact.property == "type" else fact.property
-        yield f"no rule concludes {what}"
-
-
-def _start(base: Ontology, rule: Rule, fact: Fact) -> Binding | None:
-    """What variables of a rule must stand for, if it is to conclude a fact; None if it cannot."""
+    """Why each rule that could conclude a fact does not: of those whose atoms fail, the ones that lack least."""
     named = {base.names.short(iri): iri for iri in base.vocabulary.kinds}
     subject = named.get(fact.subject, NEW_INDIVIDUAL + fact.subject)
-    for atom in rule.head:
-        first, last = atom.arguments[0], atom.arguments[-1]
-        if atom.kind == "class":
-            says_it = fact.property == "type" and base.names.short(atom.predicate) == fact.value
-        else:
-            term = last.iri if isinstance(last, Named) else last
-            value = None if isinstance(term, Variable) else value_of(term, base.names)
-            says_it = base.names.short(atom.predicate) == fact.property and value in (None, fact.value)
-        if says_it and isinstance(first, Variable):
-            return {first.name: subject}
-        if says_it and first == Named(subject):
-            return {}
-    return None
+    answers = RuleQuestions(base).missing(fact, subject, situation.state)
+    near = min((answer.failing for answer in answers if answer.failing), default=0)
+    yield from (str(answer) for answer in answers if answer.failing in (0, near))
+    if not answers:
+        what = f"membership in {fact.value}" if fact.property == "type" else fact.property
+        yield f"no rule concludes {what}"
 
 
 def _same(chosen: str, wanted: str, situation: Situation, function: str) -> bool:

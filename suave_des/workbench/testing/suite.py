@@ -25,7 +25,7 @@ from suave_des.resources import find, shipped_folder
 from suave_des.scenario.loader import Replacements
 from suave_des.scenario.yamlfile import YamlDocument, read_yaml
 from suave_des.workbench.knowledge_base import KnowledgeBase
-from suave_des.workbench.testing.situation import Situation
+from suave_des.workbench.prover import Situation
 
 _FILE_KEYS: Final = ("scenario", "ontologies", "rules", "disabled_rules", "tests")
 

@@ -1,12 +1,12 @@
-"""Find the binding of a rule's variables that comes nearest to making the whole body hold.
+"""Match the atoms of a rule's body with facts.
 
 Atoms about facts are matched with what follows in a state. What a built-in says of given values, or computes from
-them, is asked of Pellet, with a rule that has this one atom.
+them, is left to Pellet; the nearest match asks for it with a rule that has this one atom.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
@@ -19,13 +19,109 @@ from suave_des.knowledge.pellet import load_n_triples, one_at_a_time, read_term
 from suave_des.knowledge.rdf import Lit, Triple, canonical
 from suave_des.knowledge.rules.builtins import TESTERS
 from suave_des.knowledge.rules.rdf import with_triples
-from suave_des.knowledge.rules.syntax import Atom, Named, Rule, Variable
+from suave_des.knowledge.rules.syntax import Atom, Named, Rule, Term, Variable
 from suave_des.knowledge.vocabulary import RDF_TYPE, XSD
-from suave_des.workbench.derivations import FACT_KINDS, Binding, matched
 
+#: What the variables of a rule stand for: IRIs and literals by name.
+Binding = Mapping[str, str | Lit]
+#: Kinds of atoms that are about facts; the others compare or compute.
+FACT_KINDS: Final = ("class", "object", "data")
 #: Ways to bind variables that are looked at for each number of atoms that fail.
 MOST_WAYS: Final = 20_000
 _PROBE: Final = "urn:suave-des:probe"
+
+
+def bound(term: Term, binding: Binding) -> str | Lit | None:
+    """What a term stands for; None for a variable without a value."""
+    if isinstance(term, Variable):
+        return binding.get(term.name)
+    return term.iri if isinstance(term, Named) else term
+
+
+def instance(atom: Atom, binding: Binding) -> Atom:
+    """An atom with the values of those variables that have one."""
+
+    def value(term: Term) -> Term:
+        found = bound(term, binding)
+        return term if found is None else found if isinstance(found, Lit) else Named(found)
+
+    return replace(atom, arguments=tuple(map(value, atom.arguments)), places=())
+
+
+def unified(terms: Sequence[Term], values: Iterable[str | Lit | None], binding: Binding) -> Binding | None:
+    """Extend a binding so that terms have given values, None for any; None if they cannot."""
+    found = dict(binding)
+    for term, value in zip(terms, values, strict=False):
+        if value is None:
+            continue
+        wanted = _canonical(value)
+        if isinstance(term, Variable):
+            if found.setdefault(term.name, wanted) != wanted:
+                return None
+        elif _canonical(term.iri if isinstance(term, Named) else term) != wanted:
+            return None
+    return found
+
+
+def matched(atom: Atom, triple: Triple, binding: Binding) -> Binding | None:
+    """Extend a binding so that an atom says a triple; None if it cannot."""
+    subject, predicate, value = triple
+    if atom.kind == "class":
+        fits = predicate == RDF_TYPE and value == atom.predicate
+        return unified(atom.arguments[:1], (subject,), binding) if fits else None
+    fits = atom.kind in FACT_KINDS and predicate == atom.predicate
+    return unified(atom.arguments, (subject, value), binding) if fits else None
+
+
+def _canonical(value: str | Lit) -> str | Lit:
+    """A number in its one shortest form; anything else as it is."""
+    return canonical(value) if isinstance(value, Lit) else value
+
+
+class Facts:
+    """What follows in a state, to be looked up by property and subject."""
+
+    def __init__(self, known: Iterable[Triple]) -> None:
+        self.all = tuple((subject, predicate, _canonical(value)) for subject, predicate, value in known)
+        self._by_predicate: dict[str, list[Triple]] = {}
+        self._by_subject: dict[tuple[str, str], list[Triple]] = {}
+        for triple in self.all:
+            self._by_predicate.setdefault(_key(triple), []).append(triple)
+            self._by_subject.setdefault((_key(triple), triple[0]), []).append(triple)
+
+    def matches(self, atom: Atom, binding: Binding) -> Iterator[tuple[Binding, Triple]]:
+        """Extend a binding in each way in which an atom says a fact, with that fact."""
+        subject = bound(atom.arguments[0], binding)
+        if isinstance(subject, str):
+            candidates = self._by_subject.get((atom.predicate, subject), ())
+        else:
+            candidates = self._by_predicate.get(atom.predicate, ())
+        for triple in candidates:
+            found = matched(atom, triple, binding)
+            if found is not None:
+                yield found, triple
+
+    def all_matches(
+        self, atoms: Sequence[Atom], binding: Binding, body: tuple[Triple, ...] = ()
+    ) -> Iterator[tuple[Binding, tuple[Triple, ...]]]:
+        """Extend a binding in each way in which atoms say facts, with these facts; those that compare count as true."""
+        about_facts = [atom for atom in atoms if atom.kind in FACT_KINDS]
+        if not about_facts:
+            yield binding, body
+            return
+        for found, triple in self.matches(about_facts[0], binding):
+            yield from self.all_matches(about_facts[1:], found, body if triple in body else (*body, triple))
+
+    def values(self, subject: str | None, predicate: str) -> list[str | Lit]:
+        """Values of a property of an individual; None: of all of them."""
+        every = self._by_predicate.get(predicate, ())
+        found = every if subject is None else self._by_subject.get((predicate, subject), ())
+        return list(dict.fromkeys(triple[2] for triple in found))
+
+
+def _key(triple: Triple) -> str:
+    """The property of a triple, or the class of which it says membership."""
+    return str(triple[2]) if triple[1] == RDF_TYPE else triple[1]
 
 
 @dataclass(frozen=True)
@@ -41,50 +137,6 @@ class NearestMatch:
     binding: Binding
     failing: tuple[int, ...]
     is_complete: bool = True
-
-
-class Facts:
-    """What follows in a state, to be looked up by property and subject."""
-
-    def __init__(self, known: Iterable[Triple]) -> None:
-        self.all = tuple((subject, predicate, _canonical(value)) for subject, predicate, value in known)
-        self._by_predicate: dict[str, list[Triple]] = {}
-        self._by_subject: dict[tuple[str, str], list[Triple]] = {}
-        for triple in self.all:
-            self._by_predicate.setdefault(_key(triple), []).append(triple)
-            self._by_subject.setdefault((_key(triple), triple[0]), []).append(triple)
-
-    def candidates(self, atom: Atom, binding: Binding) -> Sequence[Triple]:
-        """Facts that an atom may say, given what its subject stands for."""
-        first = atom.arguments[0]
-        subject = first.iri if isinstance(first, Named) else binding.get(getattr(first, "name", ""))
-        if isinstance(subject, str):
-            return self._by_subject.get((atom.predicate, subject), ())
-        return self._by_predicate.get(atom.predicate, ())
-
-    def matches(self, atom: Atom, binding: Binding) -> Iterator[Binding]:
-        """Extend a binding in each way in which an atom says a fact."""
-        for triple in self.candidates(atom, binding):
-            bound = matched(atom, triple, binding)
-            if bound is not None:
-                yield bound
-
-    def values(self, subject: str, predicate: str) -> list[str | Lit]:
-        """Values of a property of an individual."""
-        return [triple[2] for triple in self._by_subject.get((predicate, subject), ())]
-
-    def members(self, name: str) -> list[str]:
-        """Members of a class."""
-        return [triple[0] for triple in self._by_predicate.get(name, ())]
-
-
-def _canonical(value: str | Lit) -> str | Lit:
-    return canonical(value) if isinstance(value, Lit) else value
-
-
-def _key(triple: Triple) -> str:
-    """The property of a triple, or the class of which it says membership."""
-    return str(triple[2]) if triple[1] == RDF_TYPE else triple[1]
 
 
 @dataclass
@@ -113,7 +165,7 @@ class NearestFinder:
         hopeless = frozenset(
             number
             for number, atom in enumerate(body)
-            if atom.kind in FACT_KINDS and next(self.facts.matches(atom, self.start), None) is None
+            if atom.kind in FACT_KINDS and not any(True for _ in self.facts.matches(atom, self.start))
         )
         order = [number for number in testable_order(body) if number not in hopeless]
         complete = True
@@ -142,13 +194,13 @@ class NearestFinder:
         number, rest = order[0], order[1:]
         atom = _canonical_atom(self.rule.body[number])
         if atom.kind in FACT_KINDS:
-            for bound in self.facts.matches(atom, binding):
-                yield from self._ways_to_match(rest, bound, failing, allowed)
+            for found, _ in self.facts.matches(atom, binding):
+                yield from self._ways_to_match(rest, found, failing, allowed)
             is_failing = True  # the fact that is missing may be the only thing wrong, with another binding
         else:
             results = self.tested(atom, binding)
-            for bound in results or ():
-                yield from self._ways_to_match(rest, bound, failing, allowed)
+            for found in results or ():
+                yield from self._ways_to_match(rest, found, failing, allowed)
             is_failing = results == []
             if results is None:  # a variable has no value, as the atom that gives it one fails
                 yield from self._ways_to_match(rest, binding, failing, allowed)
@@ -161,16 +213,14 @@ class NearestFinder:
         Returns:
             the bindings with which it holds, with what it computes; None if an argument has no value.
         """
-        given = [binding.get(term.name, term) if isinstance(term, Variable) else term for term in atom.arguments]
-        unbound = [number for number, term in enumerate(given) if isinstance(term, Variable)]
+        asked = instance(atom, binding)
+        unbound = [number for number, term in enumerate(asked.arguments) if isinstance(term, Variable)]
         computes = atom.kind == "builtin" and atom.predicate not in TESTERS and unbound == [0]
         if unbound and not computes:
             return None
         if atom.kind in ("same", "different"):
-            is_same = str(given[0]) == str(given[1])
+            is_same = asked.arguments[0] == asked.arguments[1]
             return [binding] if is_same == (atom.kind == "same") else []
-        arguments = tuple(Named(term) if type(term) is str else term for term in given)
-        asked = Atom(atom.kind, atom.predicate, arguments)  # type: ignore[arg-type]
         if asked not in self._answers:
             self._answers[asked] = _ask_pellet(asked, computes=computes)
         values = self._answers[asked]
@@ -186,33 +236,31 @@ class NearestFinder:
             return 0, -number
         if atom.kind == "class":
             return 3, -number
-        first = atom.arguments[0]
-        subject = first.iri if isinstance(first, Named) else binding.get(getattr(first, "name", ""))
+        subject = bound(atom.arguments[0], binding)
         if isinstance(subject, str) and self.facts.values(subject, atom.predicate):
             return 1, -number
         return 2, -number
 
 
 def _canonical_atom(atom: Atom) -> Atom:
-    arguments = tuple(canonical(term) if isinstance(term, Lit) else term for term in atom.arguments)
-    return replace(atom, arguments=arguments)
+    return replace(atom, arguments=tuple(canonical(each) if isinstance(each, Lit) else each for each in atom.arguments))
 
 
 def testable_order(body: Sequence[Atom]) -> list[int]:
     """Order atoms as the rule does, but those that test or compute after all that bind their variables."""
     waiting = list(range(len(body)))
-    bound: set[str] = set()
+    known: set[str] = set()
     order: list[int] = []
     while waiting:
         ready = (
             number
             for number in waiting
-            if body[number].kind in FACT_KINDS or set(list(body[number].variables())[_outputs(body[number]) :]) <= bound
+            if body[number].kind in FACT_KINDS or set(list(body[number].variables())[_outputs(body[number]) :]) <= known
         )
         number = next(ready, waiting[0])
         waiting.remove(number)
         order.append(number)
-        bound |= set(body[number].variables())
+        known |= set(body[number].variables())
     return order
 
 
