@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING
 
 from suave_des.errors import InputError, shown
 from suave_des.estimates import estimate, t_quantile
+from suave_des.files import decode, read_bytes
 from suave_des.resources import find
 from suave_des.scenario.loader import LoadedScenario, value_at
-from suave_des.scenario.yamlfile import decode, read_bytes
 
 if TYPE_CHECKING:
     from suave_des.campaign.missions import MissionKey, Row

@@ -15,7 +15,7 @@ from suave_des.cli.options import grouped_options
 if TYPE_CHECKING:
     from suave_des.knowledge.ontology import Ontology
     from suave_des.workbench.state_input import StateBuilder
-    from suave_des.workbench.unusable_rules import UnusableRule
+    from suave_des.workbench.why_not import UnusableRule
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def _open(sources: Sources) -> tuple[Ontology, list[UnusableRule]]:
     from suave_des.knowledge.rules.syntax import RuleError
     from suave_des.scenario.loader import load_scenario
     from suave_des.scenario_knowledge import open_base
-    from suave_des.workbench.unusable_rules import open_without_unusable
+    from suave_des.workbench.why_not import open_without_unusable
 
     loaded = load_scenario(sources.scenario, **sources.replacements)
     try:

@@ -32,7 +32,8 @@ from rdflib.namespace import RDF as RDF_TERMS
 from rdflib.namespace import RDFS as RDFS_TERMS
 from rdflib.plugins.parsers.notation3 import BadSyntax
 
-from suave_des.errors import KnowledgeError
+from suave_des.errors import InputError, KnowledgeError
+from suave_des.files import read_bytes
 from suave_des.knowledge.vocabulary import MROS, OWL, RDF, XSD, local_name
 from suave_des.resources import shipped_folder
 
@@ -104,11 +105,14 @@ def read_ontology(path: Path, content: bytes | None = None) -> OntologyFile:
         content: its content, if it is not to be read from the file.
 
     Raises:
-        KnowledgeError: missing, a folder, empty, too large, not XML, not OWL in RDF/XML, or with external entities or
-            entities that expand too far; with the line where it is known.
+        InputError: missing, a folder, or too large.
+        KnowledgeError: empty, not XML, not OWL in RDF/XML, or with external entities or entities that expand too far;
+            with the line where it is known.
     """
     if content is None:
-        content = _read_bytes(path)
+        content = read_bytes(path, MAX_BYTES)
+    if not content.strip():
+        raise KnowledgeError("the file is empty", file=path, remedy=_SAVE_AS)
     root: Any = None if path.suffix in _FORMATS else _parse_xml(path, content)  # lxml-stubs lack sourceline
     graph = _parse_rdf(path, content)
     ontologies = sorted(graph.subjects(RDF_TERMS.type, OWL_TERMS.Ontology), key=str)
@@ -128,26 +132,6 @@ def read_ontology(path: Path, content: bytes | None = None) -> OntologyFile:
         imports=tuple(sorted(imports.items(), key=lambda item: (item[1], item[0]))),
         graph=graph,
     )
-
-
-def _read_bytes(path: Path) -> bytes:
-    if path.is_dir():
-        raise KnowledgeError("this is a folder", file=path, remedy="give an ontology file")
-    try:
-        if path.exists() and not path.is_file():  # a pipe would be waited for without end
-            raise KnowledgeError("is not a regular file", file=path, remedy="give an ontology file on disk")
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            problem = f"{size / 2**20:.0f} MiB is too large for an ontology"
-            raise KnowledgeError(problem, file=path, remedy=f"at most {MAX_BYTES // 2**20} MiB are read")
-        content = path.read_bytes()
-    except FileNotFoundError as error:
-        raise KnowledgeError("no such file", file=path, remedy="give an existing ontology file") from error
-    except OSError as error:
-        raise KnowledgeError(f"cannot be read: {error.strerror}", file=path) from error
-    if not content.strip():
-        raise KnowledgeError("the file is empty", file=path, remedy=_SAVE_AS)
-    return content
 
 
 _PLAIN: Final = re.compile(
@@ -348,7 +332,7 @@ def _beside(file: OntologyFile, iri: str) -> OntologyFile | None:
             if _name(iri).encode() not in path.read_bytes():
                 continue
             candidate = read_ontology(path)
-        except (KnowledgeError, OSError):
+        except (InputError, OSError):
             continue  # an unrelated file that happens to be in the folder
         if _comparable(iri) in map(_comparable, candidate.iris):
             return candidate

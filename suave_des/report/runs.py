@@ -18,8 +18,8 @@ import pandas
 from numpy.typing import NDArray
 
 from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.files import decode, read_bytes
 from suave_des.metrics.result import MissionMetrics
-from suave_des.scenario.yamlfile import decode, read_bytes
 
 METRICS = {"search_time_s": "search time (s)", "distance_inspected_m": "distance inspected (m)"}
 """Metrics that are compared, with their titles in figures."""

@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from suave_des.errors import InputError, KeyPath, did_you_mean, place_text, shown
+from suave_des.files import read_bytes
 from suave_des.resources import find, shipped_folder
 from suave_des.scenario.physical import VehicleDescription
 from suave_des.scenario.revision import Revision
-from suave_des.scenario.yamlfile import YamlDocument, read_bytes, read_yaml
+from suave_des.scenario.yamlfile import YamlDocument, read_yaml
 
 _KIND_KEYS = ("kind", "distribution")
 """Keys for the kind of a mapping: one of another kind replaces the base's, whose keys would not fit."""

@@ -12,6 +12,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from suave_des.errors import InputError, shown
+from suave_des.files import decode, read_bytes
 from suave_des.scenario.quantities import (
     LARGEST,
     LONGEST_S,
@@ -24,7 +25,6 @@ from suave_des.scenario.quantities import (
     Within,
     ordered,
 )
-from suave_des.scenario.yamlfile import decode, read_bytes
 
 
 class Monitor(Strict):

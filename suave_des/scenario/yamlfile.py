@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-import stat
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ import yaml
 from yaml.reader import ReaderError
 
 from suave_des.errors import InputError, KeyPath, place_text, shown
+from suave_des.files import decode, read_bytes
 
 SIZE_LIMIT_BYTES = 1_000_000
 NODE_LIMIT = 100_000
@@ -56,42 +56,6 @@ class YamlDocument:
         return InputError(problem, file=self.path, place=place_text(self.line(key_path), key_path), remedy=remedy)
 
 
-def read_bytes(path: Path, limit: int = SIZE_LIMIT_BYTES) -> bytes:
-    """Content of a file that the user named.
-
-    Raises:
-        InputError: missing, a folder, unreadable, or longer than `limit` bytes.
-    """
-    try:
-        if not stat.S_ISREG(path.stat().st_mode) and not path.is_dir():  # a pipe would be waited for without end
-            raise InputError("is not a regular file", file=path, remedy="name a file on disk")
-        with path.open("rb") as stream:
-            content = stream.read(limit + 1)
-    except IsADirectoryError:
-        raise InputError("is a folder", file=path, remedy="name a file in it") from None
-    except FileNotFoundError:
-        raise InputError("no such file", file=path, remedy="check the name") from None
-    except OSError as error:
-        remedy = "check the name and the rights"
-        raise InputError(f"cannot be read: {error.strerror}", file=path, remedy=remedy) from None
-    if len(content) > limit:
-        raise InputError(f"is larger than {limit:,} bytes", file=path, remedy="split it or shorten it")
-    return content
-
-
-def decode(path: Path, content: bytes) -> str:
-    """Content as text; a byte order mark is dropped.
-
-    Raises:
-        InputError: not UTF-8, with the line.
-    """
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise InputError("is not UTF-8 text", file=path, place=f"line {line}", remedy="save it as UTF-8") from None
-
-
 def read_yaml(path: Path | str) -> YamlDocument:
     """Read a YAML file whose top level is a mapping.
 
@@ -100,7 +64,7 @@ def read_yaml(path: Path | str) -> YamlDocument:
             documents, contains itself, expands to more than NODE_LIMIT values, or has another top level.
     """
     path = Path(path)
-    content = read_bytes(path)
+    content = read_bytes(path, SIZE_LIMIT_BYTES)
     text = decode(path, content)
     try:
         root = _Composer(text).get_single_node()

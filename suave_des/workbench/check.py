@@ -21,7 +21,7 @@ from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.regions import regions_of
 from suave_des.knowledge.rules.checks import check_rule
 from suave_des.knowledge.rules.files import RulesFile
-from suave_des.knowledge.rules.names import Vocabulary, rule_from_text
+from suave_des.knowledge.rules.names import Vocabulary
 from suave_des.knowledge.rules.syntax import Place, Rule
 from suave_des.knowledge.rules.writer import write_atom
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
@@ -123,11 +123,11 @@ def _rules_from_text(file: RulesFile, vocabulary: Vocabulary, findings: list[Fin
     """The rules of a file whose names are all known; the others, and syntax errors, become findings."""
     findings += map(finding_from, file.parsed.errors)
     rules = []
-    for parsed in file.parsed.rules:
-        try:
-            rules.append(rule_from_text(parsed, vocabulary, file.path))
-        except KnowledgeError as error:
-            findings.append(replace(finding_from(error), rule=parsed.name))
+    for name, rule in file.looked_up(vocabulary):
+        if isinstance(rule, Rule):
+            rules.append(rule)
+        else:
+            findings.append(replace(finding_from(rule), rule=name))
     return rules
 
 

@@ -12,6 +12,7 @@ from rdflib.plugins.parsers.notation3 import BadSyntax
 from rdflib.term import Node
 
 from suave_des.errors import InputError
+from suave_des.files import decode, read_bytes
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.model import Model, expectations
 from suave_des.knowledge.ontology_file import OntologyFile, without_log
@@ -36,6 +37,7 @@ _SH: Final = Namespace("http://www.w3.org/ns/shacl#")
 _REASON: Final = re.compile(r"Bad syntax \((.*?)\) at \^ in:", re.DOTALL)
 _LEVELS: Final = {_SH.Violation: Level.ERROR, _SH.Warning: Level.WARN, _SH.Info: Level.INFO}
 _TURTLE: Final = "give SHACL shapes in Turtle"
+_SHAPES_LIMIT_BYTES: Final = 8 * 2**20
 
 
 def undefined_names(
@@ -190,21 +192,13 @@ def _is_placeholder(node: Node | None, data: Graph) -> bool:
 
 
 def _read_shapes(path: Path) -> Graph:
-    graph = Graph()
-    try:
-        if path.exists() and not path.is_file() and not path.is_dir():  # a pipe would be waited for without end
-            raise InputError("is not a regular file", file=path, remedy=_TURTLE)
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", file=path, remedy=_TURTLE) from error
-    if content.lstrip().startswith((b"<?xml", b"<rdf:RDF")):
+    text = decode(path, read_bytes(path, _SHAPES_LIMIT_BYTES))
+    if text.lstrip().startswith(("<?xml", "<rdf:RDF")):
         raise InputError("this is XML, not Turtle", file=path, remedy=_TURTLE)
     place = None
     try:
         with without_log():
-            return graph.parse(data=content, format="turtle")
-    except UnicodeDecodeError as error:
-        raise InputError("is not UTF-8 text", file=path, remedy="save it as UTF-8") from error
+            return Graph().parse(data=text, format="turtle")
     except BadSyntax as error:
         found = _REASON.search(str(error))
         reason, place = found.group(1) if found else "bad syntax", f"line {error.lines + 1}"

@@ -11,19 +11,64 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.knowledge.content import with_rules
 from suave_des.knowledge.limit import TimeLimit
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import Lit, Triple, facts_of, value_of
 from suave_des.knowledge.rules.checks import RuleProblem, check_rule
-from suave_des.knowledge.rules.syntax import Atom, Rule
+from suave_des.knowledge.rules.files import RulesFile
+from suave_des.knowledge.rules.syntax import Atom, Rule, RuleError
 from suave_des.knowledge.rules.writer import write_atom
 from suave_des.knowledge.state import ContradictionError, Fact, KnowledgeState, Value, value_text
 from suave_des.knowledge.vocabulary import RDF_TYPE
+from suave_des.scenario.loader import LoadedScenario
+from suave_des.scenario_knowledge import open_base
 from suave_des.workbench.atom_failure import describe_failure
 from suave_des.workbench.matching import FACT_KINDS, Binding, Facts, NearestFinder, bound, unified
 from suave_des.workbench.prover import Prover, Situation
 from suave_des.workbench.tracing import Tracer
-from suave_des.workbench.unusable_rules import UnusableRule
+
+
+@dataclass(frozen=True)
+class UnusableRule:
+    """A rule of a text file that no knowledge base can be loaded with.
+
+    Attributes:
+        name: its name.
+        reason: what is wrong with it, where, and what would be right.
+    """
+
+    name: str
+    reason: str
+
+    @classmethod
+    def of(cls, name: str, error: RuleError) -> UnusableRule:
+        """Write an error as a reason."""
+        problem = error.problem.removeprefix(f"rule {name}: ")
+        where = f" ({error.place})" if error.place else ""
+        return cls(name, f"{problem}{where}" + (f"; {error.remedy}" if error.remedy else ""))
+
+
+def open_without_unusable(loaded: LoadedScenario) -> tuple[Ontology, list[UnusableRule]]:
+    """Open the knowledge base of a scenario with those of its rules as text that can be used, and list the others.
+
+    Raises:
+        InputError: something else cannot be read, or the text of a rule cannot be parsed.
+    """
+    scenario = loaded.scenario
+    knowledge = scenario.knowledge.model_copy(update={"disabled_rules": []})
+    base = open_base(replace(loaded, scenario=scenario.model_copy(update={"knowledge": knowledge}), rules=()))
+    usable: list[Rule] = []
+    unusable: list[UnusableRule] = []
+    for path in loaded.rules:
+        for name, rule in RulesFile.read(path).checked(base.vocabulary):
+            if isinstance(rule, Rule):
+                usable.append(rule)
+            else:
+                unusable.append(UnusableRule.of(name, rule))
+    broken = {each.name for each in unusable}
+    disabled = [name for name in scenario.knowledge.disabled_rules if name not in broken]
+    return replace(base, content=with_rules(base.content, [usable], disabled)), unusable
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from suave_des.errors import KnowledgeError
+from suave_des.errors import InputError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoners import make_reasoner
 from tests.helpers.knowledge_states import FOLLOW, searching
@@ -63,7 +63,7 @@ BAD_FILES: dict[str, tuple[str, str]] = {
 
 
 def problem_of(call: Callable[[], object]) -> str:
-    with pytest.raises(KnowledgeError) as error:
+    with pytest.raises(InputError) as error:
         call()
     assert "\n" not in str(error.value)
     return str(error.value)
@@ -81,7 +81,7 @@ def test_a_bad_file_is_told_with_its_place(tmp_path: Path, name: str) -> None:
 
 def test_a_missing_file_a_folder_and_bytes_are_told(tmp_path: Path) -> None:
     assert "no such file" in problem_of(lambda: Ontology.load([tmp_path / "none.owl"]))
-    assert "this is a folder" in problem_of(lambda: Ontology.load([tmp_path]))
+    assert "is a folder" in problem_of(lambda: Ontology.load([tmp_path]))
     path = tmp_path / "bytes.owl"
     path.write_bytes(b"\x00\xff\xfe\x01" * 50)
     assert "not well-formed XML" in problem_of(lambda: Ontology.load([path]))

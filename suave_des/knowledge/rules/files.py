@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from suave_des.errors import InputError
+from suave_des.files import decode, read_bytes
 from suave_des.knowledge.rules.checks import check_rule, first_error
 from suave_des.knowledge.rules.names import Vocabulary, rule_from_text
 from suave_des.knowledge.rules.parser import ParsedRules, parse_rules
-from suave_des.knowledge.rules.syntax import Rule
+from suave_des.knowledge.rules.syntax import Rule, RuleError
 
 MAX_BYTES: Final = 8 * 2**20
 
@@ -41,40 +42,44 @@ class RulesFile:
         text = _read_text(path)
         return cls(path, text, parse_rules(text, path))
 
+    def looked_up(self, vocabulary: Vocabulary) -> Iterator[tuple[str, Rule | RuleError]]:
+        """Look up the names in its rules: each rule by its name, or why it cannot be read."""
+        for parsed in self.parsed.rules:
+            try:
+                yield parsed.name, rule_from_text(parsed, vocabulary, self.path)
+            except RuleError as error:
+                yield parsed.name, error
+
+    def checked(self, vocabulary: Vocabulary) -> Iterator[tuple[str, Rule | RuleError]]:
+        """Look up and check its rules: each rule by its name, or why it cannot be used.
+
+        Raises:
+            RuleError: the text of a rule cannot be parsed; with line and column.
+        """
+        if self.parsed.errors:
+            raise self.parsed.errors[0]
+        for name, rule in self.looked_up(vocabulary):
+            if isinstance(rule, Rule) and rule.enabled:
+                yield name, first_error(rule, check_rule(rule, vocabulary)) or rule
+            else:
+                yield name, rule
+
     def rules(self, vocabulary: Vocabulary) -> tuple[Rule, ...]:
-        """Look up all names of its rules.
+        """Look up and check its rules.
 
         Raises:
             RuleError: a rule cannot be read or used; with line and column.
         """
-        if self.parsed.errors:
-            raise self.parsed.errors[0]
-        rules = tuple(rule_from_text(rule, vocabulary, self.path) for rule in self.parsed.rules)
-        for rule in rules:
-            error = first_error(rule, check_rule(rule, vocabulary)) if rule.enabled else None
-            if error is not None:
-                raise error
-        return rules
+        rules = []
+        for _, rule in self.checked(vocabulary):
+            if isinstance(rule, RuleError):
+                raise rule
+            rules.append(rule)
+        return tuple(rules)
 
 
 def _read_text(path: Path) -> str:
-    try:
-        if path.is_dir():
-            raise InputError("this is a folder", file=path, remedy="give a file of rules")
-        if path.exists() and not path.is_file():  # a pipe would be waited for without end
-            raise InputError("is not a regular file", file=path, remedy="give a file on disk")
-        if path.stat().st_size > MAX_BYTES:
-            raise InputError("too large for rules", file=path, remedy=f"at most {MAX_BYTES // 2**20} MiB are read")
-        content = path.read_bytes()
-    except FileNotFoundError as error:
-        raise InputError("no such file", file=path, remedy="give an existing file of rules") from error
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", file=path) from error
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content[: error.start].count(b"\n") + 1
-        raise InputError("is not UTF-8 text", file=path, place=f"line {line}", remedy="save it as UTF-8") from error
+    text = decode(path, read_bytes(path, MAX_BYTES))
     if text.lstrip().startswith("<?xml"):
         raise InputError("this is XML, not rules as text", file=path, remedy="give it with --ontology")
     return text.replace("\r\n", "\n").replace("\r", "\n")
