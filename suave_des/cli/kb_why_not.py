@@ -34,9 +34,7 @@ class StateAnywhere(StateParts):
 
     def add_to(self, builder: StateBuilder, measured: Sequence[str]) -> None:
         """Add all parts; those of --at come first, and the other options replace what they say."""
-        from suave_des.workbench.state_words import add_at
-
-        add_at(builder, self.at or ())
+        builder.add_at(self.at or ())
         super().add_to(builder, measured)
 
 

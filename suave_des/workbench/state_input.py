@@ -1,4 +1,4 @@
-"""States as people write them: mappings in Python, a YAML file, or NAME=VALUE on the command line."""
+"""States as people write them: mappings, YAML files, NAME=VALUE on the command line, or a recorded mission's time."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Any, Final
 
+from suave_des.campaign.knowledge_records import CAMPAIGN_KNOWLEDGE_FILE, KNOWLEDGE_FILE, read_knowledge, read_missions
 from suave_des.domain import GENERATE_SEARCH_PATH, MAINTAIN_MOTION
 from suave_des.errors import InputError, KeyPath, KnowledgeError, did_you_mean, shown
 from suave_des.knowledge.ontology import Ontology
@@ -15,13 +16,20 @@ from suave_des.knowledge.planning import calls
 from suave_des.knowledge.rdf import Lit
 from suave_des.knowledge.state import UNGROUNDED, KnowledgeState, ObjectiveState
 from suave_des.knowledge.vocabulary import TOMASYS, XSD, nearest
+from suave_des.metrics.result import KnowledgeRecord
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.yamlfile import read_yaml
 
 #: Functions that every task of the mission asks for.
 LASTING: Final = (MAINTAIN_MOTION,)
 _STATUSES: Final = {"components": "c_status", "objectives": "o_status"}
-_KEYS: Final = ("objectives", "groundings", "components", "measurements")
+_NOUNS: Final = {
+    "objectives": "function",
+    "groundings": "function",
+    "components": "component",
+    "measurements": "quality attribute",
+}
+_KEYS: Final = tuple(_NOUNS)
 
 
 @dataclass(frozen=True)
@@ -80,12 +88,8 @@ class StateBuilder:
         Raises:
             InputError: the knowledge base has no such name, or the value makes no sense.
         """
-        what, known = {
-            "components": ("component", self.base.components),
-            "measurements": ("quality attribute", self.base.quality_attributes),
-        }.get(kind, ("function", self.base.functions))
-        if name not in known:
-            raise InputError(f"there is no {what} {shown(name)}", remedy=did_you_mean(name, known))
+        if name not in (known := self._known(kind)):
+            raise InputError(f"there is no {_NOUNS[kind]} {shown(name)}", remedy=did_you_mean(name, known))
         if kind == "measurements":
             if isinstance(value, bool) or not isinstance(value, int | float | str | Decimal):
                 raise InputError(f"{name}: {shown(value)} is not a number", remedy=f"for instance {name}: 1.8")
@@ -101,6 +105,11 @@ class StateBuilder:
             remedy = did_you_mean(value, self.base.designs(name))
             raise InputError(f"{name} has no function design {shown(value)}", remedy=remedy)
         getattr(self, kind)[name] = value
+
+    def _known(self, kind: str) -> tuple[str, ...]:
+        """Names that parts of a kind can have."""
+        base = self.base
+        return {"components": base.components, "measurements": base.quality_attributes}.get(kind, base.functions)
 
     def _check_status(self, property_name: str, value: str) -> None:
         """Refuse a status that is nearly one that a rule mentions: nothing would follow from it."""
@@ -155,6 +164,52 @@ class StateBuilder:
                 except InputError as error:
                     raise document.error(error.problem, key_path, error.remedy) from None
 
+    def add_at(self, words: Iterable[str], option: str = "--at") -> None:
+        """Add parts of a state, each named as is shortest.
+
+        Args:
+            words: each NAME=VALUE (a quality attribute, a component, or a function with its design), a YAML file of a
+                state, or FOLDER@TIME for what a mission recorded last until a time in s.
+            option: for messages.
+
+        Raises:
+            InputError: it is none of these, or names what the knowledge base does not have.
+        """
+        for word in words:
+            folder, at, time = word.rpartition("@")
+            name, equals, value = word.partition("=")
+            try:
+                if equals and "/" not in name:
+                    self.add(self._kind(name.strip()), name.strip(), value.strip())
+                elif at:
+                    self.add_state(recorded_state(recorded_states(Path(folder)), _seconds(time)))
+                else:
+                    self.add_file(Path(word))
+            except InputError as error:
+                if error.file is not None and Path(word).is_file():
+                    raise
+                remedy = error.remedy or "NAME=VALUE, a YAML file, or FOLDER@SECONDS of a recorded mission"
+                raise InputError(error.problem, place=option, remedy=remedy) from None
+
+    def _kind(self, name: str) -> str:
+        kinds = ("measurements", "components", "groundings")
+        for kind in kinds:
+            if name in self._known(kind):
+                return kind
+        problem = f"there is no quality attribute, component or function {shown(name)}"
+        raise InputError(problem, remedy=did_you_mean(name, [each for kind in kinds for each in self._known(kind)]))
+
+    def add_state(self, state: KnowledgeState) -> None:
+        """Add all parts of a state; what monitors report of things that the ontologies do not have is left out.
+
+        Raises:
+            InputError: the knowledge base lacks a function or a design.
+        """
+        for kind, content in state_dict(state).items():
+            for name, value in content.items():
+                if kind in ("objectives", "groundings") or name in self._known(kind):
+                    self.add(kind, name, value)
+
     def state(self) -> KnowledgeState:
         """Build the state. Without objectives, it has those of the groundings, else those of the search task.
 
@@ -185,3 +240,44 @@ def state_dict(state: KnowledgeState) -> dict[str, Any]:
         "components": dict(state.components),
         "measurements": {name: format(value, "f") for name, value in state.measurements},
     }
+
+
+def _seconds(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{shown(text)} is not a time in s", remedy="such as flown@53.7") from None
+
+
+def recorded_states(folder: Path, run: int | None = None) -> tuple[KnowledgeRecord, ...]:
+    """The states of a recorded mission, or of one run of a campaign that recorded its knowledge.
+
+    Raises:
+        InputError: there are none, or the campaign has no such run.
+    """
+    if (folder / KNOWLEDGE_FILE).is_file():
+        return read_knowledge(folder / KNOWLEDGE_FILE)
+    if not (folder / CAMPAIGN_KNOWLEDGE_FILE).is_file():
+        remedy = "give the folder of suave-des run --manager metacontrol --out FOLDER"
+        raise InputError(f"{folder} has no recorded states", remedy=remedy)
+    missions = list(read_missions(folder / CAMPAIGN_KNOWLEDGE_FILE))
+    for mission in missions:
+        if mission.run == run:
+            return mission.records
+    runs = sorted({mission.run for mission in missions})
+    remedy = f"run: a number from {runs[0]} to {runs[-1]}" if runs else "record a campaign with --record-knowledge"
+    raise InputError(f"{folder} has no states of run {shown(run)}", remedy=remedy)
+
+
+def recorded_state(records: Iterable[KnowledgeRecord], at_s: float) -> KnowledgeState:
+    """The state that was recorded last until a mission time.
+
+    Raises:
+        InputError: the first one came later.
+    """
+    known = list(records)
+    before = [record for record in known if record.t_s <= at_s]
+    if not before:
+        first = f"the first one is at {known[0].t_s:.2f} s" if known else "there are none"
+        raise InputError(f"no state was recorded until {at_s:g} s", remedy=first)
+    return before[-1].state

@@ -15,8 +15,7 @@ from suave_des.workbench.fact_reader import FactReader
 from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.policy_space import ValueRange
 from suave_des.workbench.prover import Situation
-from suave_des.workbench.state_input import StateBuilder
-from suave_des.workbench.state_words import add_state, recorded_state, recorded_states
+from suave_des.workbench.state_input import StateBuilder, recorded_state, recorded_states
 from suave_des.workbench.testing.regions import measurements_in, parse_region
 from suave_des.workbench.testing.suite import RuleTest, check_keys, texts
 
@@ -201,4 +200,4 @@ class TestReader:
             raise self.error("the mission time is missing", ("given", "mission"), "at_s: 53.7")
         with self._at("given", "mission"):
             records = recorded_states(self.document.path.parent / folder, given.get("run"))
-            add_state(builder, recorded_state(records, at_s))
+            builder.add_state(recorded_state(records, at_s))

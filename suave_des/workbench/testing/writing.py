@@ -15,8 +15,7 @@ from suave_des.resources import find, shipped_folder
 from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.prover import Prover, Situation
 from suave_des.workbench.replay import mission_scenario
-from suave_des.workbench.state_input import state_dict
-from suave_des.workbench.state_words import recorded_states
+from suave_des.workbench.state_input import recorded_states, state_dict
 from suave_des.workbench.testing.suite import KnowledgeFiles
 
 
