@@ -1,14 +1,17 @@
 """Opens the knowledge base of a scenario, and checks that it fits the mission and the modes file."""
 
-from collections.abc import Hashable
+from collections.abc import Collection, Hashable, Sequence
 from decimal import Decimal
+from pathlib import Path
 from typing import Final
 
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.deliberation import Deliberation
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoners import make_reasoner
+from suave_des.resources import find
 from suave_des.scenario.loader import LoadedScenario
+from suave_des.scenario.models import Scenario
 
 OPENED: Final = 4
 _opened: dict[Hashable, Deliberation] = {}
@@ -21,18 +24,42 @@ def open_base(loaded: LoadedScenario) -> Ontology:
     Raises:
         KnowledgeError: the ontologies or rules cannot be read.
     """
-    knowledge = loaded.scenario.knowledge
-    values = {name: Decimal(repr(value)) for name, value in knowledge.values.items()}
     try:
-        return Ontology.load(
-            loaded.ontologies,
-            values=values,
-            rules=loaded.rules,
-            disabled_rules=knowledge.disabled_rules,
-            operators=loaded.scenario.revision.comparison_operators,
-        )
+        return read_base(loaded.scenario, loaded.ontologies, loaded.rules)
     except KnowledgeError as error:
         raise loaded.located(error) from None
+
+
+def read_base(
+    scenario: Scenario,
+    ontologies: Sequence[Path] | None = None,
+    rules: Sequence[Path] | None = None,
+    *,
+    more_rules: Sequence[Path] = (),
+    disabled_rules: Collection[str] = (),
+) -> Ontology:
+    """Read ontologies and rules with a scenario's values, and with what its revision assumes.
+
+    Args:
+        scenario: the scenario.
+        ontologies: files; None: those that the scenario names.
+        rules: files of rules as text; None: those that the scenario names.
+        more_rules: files of rules as text besides these.
+        disabled_rules: names of rules to switch off besides the scenario's.
+
+    Raises:
+        KnowledgeError: the ontologies or rules cannot be read.
+    """
+    knowledge = scenario.knowledge
+    named = [find(each, "ontology") for each in knowledge.ontologies] if ontologies is None else ontologies
+    texts = [find(each, "ontology") for each in knowledge.rules] if rules is None else rules
+    return Ontology.load(
+        named,
+        values={name: Decimal(repr(value)) for name, value in knowledge.values.items()},
+        rules=[*texts, *more_rules],
+        disabled_rules=[*knowledge.disabled_rules, *disabled_rules],
+        operators=scenario.revision.comparison_operators,
+    )
 
 
 def open_knowledge(loaded: LoadedScenario) -> Deliberation:

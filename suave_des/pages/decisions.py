@@ -18,7 +18,7 @@ from suave_des.knowledge.vocabulary import local_name
 from suave_des.pages.recorded import Recorded
 from suave_des.resources import find
 from suave_des.scenario.layers import Files
-from suave_des.scenario_knowledge import open_base
+from suave_des.scenario_knowledge import open_base, read_base
 from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.state_input import ManagingSettings
 from suave_des.workbench.tracing import Derivation
@@ -134,14 +134,10 @@ def _base(mission: Recorded) -> tuple[Ontology, str]:
     """Open the mission's ontologies, with a note where one of them has changed since."""
     if mission.loaded is not None:
         return open_base(mission.loaded), ""
-    used = mission.scenario.knowledge
-    paths = [find(each, "ontology") for each in used.ontologies]
-    rules = [find(each, "ontology") for each in used.rules]
-    values = {name: Decimal(repr(value)) for name, value in used.values.items()}
-    base = Ontology.load(paths, values=values, rules=rules, disabled_rules=used.disabled_rules)
+    base = read_base(mission.scenario)
     files = Files()
-    for path in (*paths, *rules):
-        files.ontology(path)
+    for name in (*mission.scenario.knowledge.ontologies, *mission.scenario.knowledge.rules):
+        files.ontology(find(name, "ontology"))
     before = {Path(name).name: digest for name, digest in mission.inputs.items()}
     changed = [
         Path(name).name for name, digest in files.inputs.items() if before.get(Path(name).name, digest) != digest

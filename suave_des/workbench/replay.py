@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +22,9 @@ from suave_des.knowledge.rules.files import RulesFile, hash_with_rules
 from suave_des.knowledge.rules.parser import parse_rule, parse_rules
 from suave_des.knowledge.state import ContradictionError, Fact, KnowledgeState, Value
 from suave_des.metrics.result import KnowledgeRecord
-from suave_des.resources import find
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import Scenario
+from suave_des.scenario_knowledge import read_base
 from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.state_input import ManagingSettings
 from suave_des.workbench.tracing import Tracer
@@ -236,23 +237,16 @@ class _Comparison:
 
     def __init__(self, scenario: Scenario, change: RuleChange) -> None:
         self.scenario = scenario
+        read = partial(read_base, more_rules=change.rules, disabled_rules=change.disabled_rules)
         if change.scenario is not None:
             loaded = load_scenario(change.scenario, values=change.values)
-            used, ontologies, rules = loaded.scenario, loaded.ontologies, loaded.rules
+            base = read(loaded.scenario, change.ontologies or loaded.ontologies, loaded.rules)
+            used = loaded.scenario
         elif change.values:
             problem = "the scenario that was recorded stays as it is"
             raise InputError(problem, place="--set", remedy="name one with --scenario")
         else:
-            used = scenario
-            named = () if change.ontologies else used.knowledge.ontologies
-            ontologies = tuple(find(each, "ontology") for each in named)
-            rules = tuple(find(each, "ontology") for each in used.knowledge.rules)
-        base = Ontology.load(
-            change.ontologies or ontologies,
-            values={name: Decimal(repr(value)) for name, value in used.knowledge.values.items()},
-            rules=[*rules, *change.rules],
-            disabled_rules=[*used.knowledge.disabled_rules, *change.disabled_rules],
-        )
+            used, base = scenario, read(scenario, change.ontologies or None)
         name = parse_rule(change.text, _GIVEN).name if change.text is not None else change.disabled
         settings, limit = ManagingSettings.of(used), TimeLimit(change.limit_s, "--time-limit")
         reasoner = change.reasoner or used.knowledge.reasoner
