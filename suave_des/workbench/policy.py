@@ -40,7 +40,7 @@ class PolicyCase:
         reports: what the components report.
         asked: functions that have an objective.
         statuses: what is inferred of objectives and groundings, as text, sorted.
-        choices: (function, what happens to its grounding), where that changes or no design is left.
+        choices: (function, design) decided; None for the design when none is left.
         marks: any of "inconsistent", "none left", "flip-flop".
         flipping: functions whose grounding flips back and forth.
         problem: what contradicts what, in an inconsistent state.
@@ -51,14 +51,19 @@ class PolicyCase:
     reports: ComponentReports
     asked: tuple[str, ...]
     statuses: tuple[str, ...] = ()
-    choices: tuple[tuple[str, str], ...] = ()
+    choices: tuple[tuple[str, str | None], ...] = ()
     marks: tuple[str, ...] = ()
     flipping: tuple[str, ...] = ()
     problem: str | None = None
 
     def outcome(self, function: str) -> str:
         """What happens to a function's grounding: a design, "stays", "none left" or "inconsistent"."""
-        return INCONSISTENT if INCONSISTENT in self.marks else dict(self.choices).get(function, STAYS)
+        if INCONSISTENT in self.marks:
+            return INCONSISTENT
+        choices = dict(self.choices)
+        if function not in choices or choices[function] == self.state.grounded(function) is not None:
+            return STAYS
+        return choices[function] or NONE_LEFT
 
     def outcome_text(self, function: str) -> str:
         """The outcome, and whether the choice flips back and forth."""
@@ -73,7 +78,7 @@ class PolicyCase:
     @property
     def after(self) -> tuple[tuple[str, str], ...]:
         """Groundings after the decisions."""
-        chosen = {function: design for function, design in self.choices if design != NONE_LEFT}
+        chosen = {function: design for function, design in self.choices if design is not None}
         return tuple(sorted({**dict(self.state.groundings), **chosen}.items()))
 
 
@@ -213,8 +218,8 @@ def _decide(case: PolicyCase, infer: Callable[[KnowledgeState], Conclusion]) -> 
         conclusion = infer(case.state)
     except ContradictionError as error:
         return replace(case, marks=(INCONSISTENT,), problem=error.problem)
-    marks = (NONE_LEFT,) if NONE_LEFT in conclusion.changes.values() else ()
-    choices = tuple(conclusion.changes.items())
+    choices = tuple((each.function, each.design) for each in conclusion.plan.decisions)
+    marks = (NONE_LEFT,) if any(design is None for _, design in choices) else ()
     return replace(case, statuses=tuple(sorted(conclusion.statuses)), choices=choices, marks=marks)
 
 
