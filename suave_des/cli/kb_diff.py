@@ -16,8 +16,8 @@ from suave_des.cli.options import Quiet, Seed, Workers, grouped_options
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from suave_des.workbench.difference import PolicyDifference
     from suave_des.workbench.mission_difference import MissionDifference
-    from suave_des.workbench.policy import PolicyDifference
 
 _MOST_RUNS = 10
 """Numbers of missions that are listed; all of them are in the JSON form."""
@@ -53,7 +53,7 @@ def diff(
     --ontology, --rules and --disable-rule count for both; an ontology given as A or B takes the place of the
     scenario's. Decisions are compared in every state; missions with the same numbers have common random numbers.
     """
-    from suave_des.workbench.axioms import compare_axioms
+    from suave_des.workbench.difference import compare_axioms
 
     benches = knowledge.with_file(one).bench(), knowledge.with_file(other).bench()
     axioms = compare_axioms(benches[0].base, benches[1].base)

@@ -178,7 +178,7 @@ def print_json(content: object) -> None:
 
 def _plain(value: Any) -> Any:
     from suave_des.knowledge.state import Fact, KnowledgeState
-    from suave_des.workbench.policy_space import ValueRange
+    from suave_des.workbench.ranges import ValueRange
     from suave_des.workbench.state_input import state_dict
 
     if isinstance(value, KnowledgeState):

@@ -23,9 +23,10 @@ if TYPE_CHECKING:
     from suave_des.knowledge.ontology import Ontology
     from suave_des.workbench import KnowledgeBase
     from suave_des.workbench.testing.mutants import Mutant
+    from suave_des.workbench.testing.reader import RuleTest
     from suave_des.workbench.testing.run import TestResult
     from suave_des.workbench.testing.suite import KnowledgeFiles as About
-    from suave_des.workbench.testing.suite import RuleTest, TestFile
+    from suave_des.workbench.testing.suite import TestFile
 
 FAILED = 1
 """Exit status when a test fails."""
@@ -100,7 +101,7 @@ def test(
     results = _run(console, suites, select)
     _print_failures(console, results)
     if junit_xml is not None:
-        from suave_des.workbench.testing.junit import junit_xml as written
+        from suave_des.workbench.testing.run import junit_xml as written
 
         write_files(junit_xml.parent, {junit_xml.name: written(results)})
     _print_summary(console, results, time.perf_counter() - began)
@@ -274,7 +275,7 @@ class _Dots:
 
 
 def _print_failures(console: Console, results: Sequence[TestResult]) -> None:
-    from suave_des.workbench.testing.junit import failure_lines
+    from suave_des.workbench.testing.run import failure_lines
 
     failed = [result for result in results if not result.passed]
     if not failed:

@@ -35,7 +35,8 @@ from suave_des.workbench.model_checks import (
     undefined_names,
     unused_individuals,
 )
-from suave_des.workbench.policy_space import has_effect, numbers_in, ranges_between
+from suave_des.workbench.policy_space import has_effect
+from suave_des.workbench.ranges import numbers_in, ranges_between
 
 #: States that Pellet is asked about; `kb policy` goes through all.
 MAX_STATES: Final = 300

@@ -15,8 +15,9 @@ from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import KnowledgeState, Number
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario_knowledge import open_base
+from suave_des.workbench.difference import PolicyDifference, compare_policies
 from suave_des.workbench.explain import Explanation, explain
-from suave_des.workbench.policy import Policy, PolicyDifference, compare, make_policy
+from suave_des.workbench.policy import Policy, make_policy
 from suave_des.workbench.policy_space import PolicySpace
 from suave_des.workbench.query import QueryResult, answer, graph_of
 from suave_des.workbench.state_input import ManagingSettings, StateBuilder
@@ -195,7 +196,7 @@ class KnowledgeBase:
             KnowledgeError: the reasoner takes too long for one of them.
         """
         space = PolicySpace.of(self.base, self.settings).common(PolicySpace.of(other.base, other.settings))
-        return compare(
+        return compare_policies(
             make_policy(self.base, self.settings, self.decide, max_failed, space),
             make_policy(other.base, other.settings, other.decide, max_failed, space),
         )

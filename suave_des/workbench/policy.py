@@ -15,13 +15,11 @@ from suave_des.knowledge.state import ContradictionError, KnowledgeState
 from suave_des.workbench.policy_space import (
     ComponentReports,
     PolicySpace,
-    ValueRange,
     component_reports,
     measured_attributes,
-    ranges_between,
     rules_that_compute,
-    values_in,
 )
+from suave_des.workbench.ranges import ValueRange, ranges_between, values_in
 from suave_des.workbench.state_input import LASTING, ManagingSettings
 
 #: Beyond this many inferences a policy is refused: at a millisecond and a half each it would take ten minutes.
@@ -245,108 +243,6 @@ def _with_flip_flops(cases: list[PolicyCase]) -> list[PolicyCase]:
         else case
         for case in cases
     ]
-
-
-@dataclass(frozen=True)
-class CasePair:
-    """One kind of state, as both knowledge bases decide it."""
-
-    one: PolicyCase
-    other: PolicyCase
-
-    @property
-    def functions(self) -> tuple[str, ...]:
-        """Functions whose grounding is decided differently."""
-        return tuple(name for name in self.one.asked if self.one.outcome(name) != self.other.outcome(name))
-
-
-@dataclass(frozen=True)
-class PolicyDifference:
-    """The difference between two policies.
-
-    Attributes:
-        compared: number of states that both have.
-        differing: kinds of states that they decide differently.
-        reported: kinds in which they decide alike, but infer different statuses.
-        only_one: function designs that only the first has; likewise only_other.
-        computing: rules that compute with numbers; if there are any, the ranges are samples and prove nothing.
-    """
-
-    compared: int
-    differing: tuple[CasePair, ...] = field(repr=False)
-    reported: tuple[CasePair, ...] = field(repr=False)
-    only_one: tuple[str, ...]
-    only_other: tuple[str, ...]
-    computing: tuple[str, ...]
-
-    @property
-    def states(self) -> int:
-        """Number of states that are decided differently."""
-        return sum(pair.one.reports.combinations for pair in self.differing)
-
-    @property
-    def states_reported(self) -> int:
-        """Number of states in which only statuses differ."""
-        return sum(pair.one.reports.combinations for pair in self.reported)
-
-    def lines(self) -> Iterator[str]:
-        """The difference as `kb diff` prints it."""
-        yield f"{self.states} of {self.compared} states are decided differently"
-        if self.reported:
-            yield f"{self.states_reported} more have other statuses, but the same decisions"
-        if self.computing:
-            yield no_proof(self.computing)
-        for which, designs in (("A", self.only_one), ("B", self.only_other)):
-            if designs:
-                yield f"only {which} has {', '.join(designs)}"
-        groups: dict[str, list[CasePair]] = {}
-        for pair in self.differing:
-            for name in pair.functions or pair.one.asked:
-                before, after = (case.outcome_text(name) for case in (pair.one, pair.other))
-                groups.setdefault(f"{name}, now {pair.one.present(name)}: A {before}, B {after}", []).append(pair)
-        for heading, pairs in groups.items():
-            yield heading
-            for ranges, states in _joined(pairs):
-                yield f"  {'; '.join(map(str, ranges))}: {states} states"
-            yield f"  for instance {pairs[0].one.state}"
-
-
-def compare(one: Policy, other: Policy) -> PolicyDifference:
-    """Compare two policies over the same space."""
-    there = {(case.ranges, case.state, case.asked): case for case in other.cases}
-    pairs = [
-        CasePair(case, there[case.ranges, case.state, case.asked])
-        for case in one.cases
-        if (case.ranges, case.state, case.asked) in there
-    ]
-    designs = [{design for case in policy.cases for _, design in case.state.groundings} for policy in (one, other)]
-    differing: list[CasePair] = []
-    alike: list[CasePair] = []
-    for pair in pairs:
-        (differing if pair.functions or pair.one.marks != pair.other.marks else alike).append(pair)
-    return PolicyDifference(
-        compared=sum(pair.one.reports.combinations for pair in pairs),
-        differing=tuple(differing),
-        reported=tuple(pair for pair in alike if pair.one.statuses != pair.other.statuses),
-        only_one=tuple(sorted(designs[0] - designs[1])),
-        only_other=tuple(sorted(designs[1] - designs[0])),
-        computing=tuple(sorted({*one.computing, *other.computing})),
-    )
-
-
-def _joined(pairs: Sequence[CasePair]) -> list[tuple[tuple[ValueRange, ...], int]]:
-    """Ranges of measured values with the number of states; neighbouring ranges of a single attribute are joined."""
-    counts: dict[tuple[ValueRange, ...], int] = {}
-    for pair in pairs:
-        counts[pair.one.ranges] = counts.get(pair.one.ranges, 0) + pair.one.reports.combinations
-    joined: list[tuple[tuple[ValueRange, ...], int]] = []
-    for ranges, states in counts.items():
-        last = joined[-1][0] if joined else ()
-        if len(ranges) == len(last) == 1 and last[0].high == ranges[0].low is not None:
-            joined[-1] = (last[0].joined(ranges[0]),), joined[-1][1] + states
-        else:
-            joined.append((ranges, states))
-    return joined
 
 
 def no_proof(computing: Sequence[str]) -> str:

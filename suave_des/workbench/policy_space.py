@@ -1,8 +1,6 @@
 """The states that a policy tells apart: ranges of measured values, and reports of interchangeable components.
 
-A rule that only compares numbers cannot tell two values apart that compare alike with every number in the knowledge
-base. So one value stands for each range between two numbers; equality with a number is a range of its own. Likewise
-only the number of components with a status counts where ontologies and rules treat components alike.
+Only the number of components with a status counts where ontologies and rules treat components alike.
 """
 
 from __future__ import annotations
@@ -16,108 +14,16 @@ from typing import Final
 
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import Lit, Triple
-from suave_des.knowledge.regions import regions_of
 from suave_des.knowledge.rules.builtins import COMPARISONS
 from suave_des.knowledge.rules.syntax import Atom, Named, Rule, Variable
-from suave_des.knowledge.state import exact
 from suave_des.knowledge.vocabulary import OWL, RDFS, TOMASYS, XSD
+from suave_des.workbench.ranges import numbers_in
 from suave_des.workbench.state_input import ManagingSettings
 
 _IS_QA_TYPE: Final = TOMASYS + "isQAtype"
 _HAS_VALUE: Final = TOMASYS + "hasValue"
 _OF_VALUES: Final = frozenset({_IS_QA_TYPE, _HAS_VALUE})
 _C_STATUS: Final = TOMASYS + "c_status"
-
-
-@dataclass(frozen=True, slots=True)
-class ValueRange:
-    """A range of measured values, or no measurement.
-
-    Attributes:
-        low, high: its ends; None: it has none there.
-        low_closed, high_closed: whether the end belongs to it.
-        is_missing: whether there is no measurement.
-
-    Example:
-        >>> str(ValueRange(Decimal("1.25"), Decimal("2.25"), low_closed=True))
-        '1.25 <= . < 2.25'
-    """
-
-    low: Decimal | None = None
-    high: Decimal | None = None
-    low_closed: bool = False
-    high_closed: bool = False
-    is_missing: bool = False
-
-    def __str__(self) -> str:
-        """In words: "not measured", "1.25", "< 1.25", ">= 1.25", "1.25 <= . < 2.25"."""
-        if self.is_missing:
-            return "not measured"
-        if self.is_number:
-            return str(self.low)
-        below = "" if self.high is None else f"{'<=' if self.high_closed else '<'} {self.high}"
-        if self.low is None:
-            return below or "any"
-        if self.high is None:
-            return f"{'>=' if self.low_closed else '>'} {self.low}"
-        return f"{self.low} {'<=' if self.low_closed else '<'} . {below}"
-
-    @property
-    def is_number(self) -> bool:
-        """Whether it is one number."""
-        return self.low is not None and self.low == self.high
-
-    def value(self, step: int = 0, steps: int = 1) -> Decimal | None:
-        """A value in it; in an open range the `step`-th of `steps` ascending ones."""
-        if self.is_missing or self.is_number:
-            return self.low
-        low = self.low if self.low is not None else (self.high or Decimal(0)) - 1
-        high = self.high if self.high is not None else low + 1
-        return exact(low + (high - low) * (step + 1) / Decimal(2 ** steps.bit_length()))
-
-    def joined(self, following: ValueRange) -> ValueRange:
-        """The range of this one and the one that follows it."""
-        return ValueRange(self.low, following.high, self.low_closed, following.high_closed)
-
-
-def numbers_in(base: Ontology) -> tuple[Decimal, ...]:
-    """Every number in the ontologies and enabled rules, ascending."""
-    return tuple(map(exact, regions_of(base).thresholds))
-
-
-def ranges_between(numbers: Sequence[Decimal]) -> tuple[ValueRange, ...]:
-    """No measurement, then each open range and each number, ascending."""
-    ends: list[Decimal | None] = [None, *numbers, None]
-    found = [ValueRange(is_missing=True)]
-    for low, high in itertools.pairwise(ends):
-        found.append(ValueRange(low, high))
-        if high is not None:
-            found.append(ValueRange(high, high, True, True))
-    return tuple(found)
-
-
-def values_in(ranges: Sequence[ValueRange]) -> Iterator[tuple[Decimal | None, ...]]:
-    """Values of several attributes, one in each given range, for every order that the values can have.
-
-    Values in different ranges are ordered by these; those in the same open range can be in any order, and equal.
-    """
-    places: dict[ValueRange, list[int]] = {}
-    for place, one in enumerate(ranges):
-        if not one.is_missing and not one.is_number:
-            places.setdefault(one, []).append(place)
-    shared = [(one, group) for one, group in places.items() if len(group) > 1]
-    for ranks in itertools.product(*(_weak_orders(len(group)) for _, group in shared)):
-        values = [one.value() for one in ranges]
-        for (one, group), order in zip(shared, ranks, strict=True):
-            for place, rank in zip(group, order, strict=True):
-                values[place] = one.value(rank, len(group))
-        yield tuple(values)
-
-
-def _weak_orders(size: int) -> Iterator[tuple[int, ...]]:
-    """All ways to rank things, ties allowed: ranks from 0 without gaps."""
-    ranks = itertools.product(range(size), repeat=size)
-    return (each for each in ranks if set(each) == set(range(max(each) + 1)))
 
 
 def rules_that_compute(base: Ontology) -> tuple[str, ...]:

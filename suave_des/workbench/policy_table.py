@@ -7,7 +7,8 @@ from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
 
 from suave_des.workbench.policy import Policy
-from suave_des.workbench.policy_space import ComponentReports, ValueRange
+from suave_des.workbench.policy_space import ComponentReports
+from suave_des.workbench.ranges import ValueRange
 
 _Groundings = tuple[tuple[str, str], ...]
 _Column = tuple[ValueRange, ...]

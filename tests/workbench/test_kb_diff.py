@@ -6,7 +6,7 @@ import pytest
 
 from suave_des.knowledge.ontology import Ontology
 from suave_des.resources import shipped_folder
-from suave_des.workbench.axioms import compare_axioms
+from suave_des.workbench.difference import compare_axioms
 from suave_des.workbench.mission_difference import MissionsToCompare, compare_missions
 from tests.helpers.owl_text import SUAVE, TOMASYS
 

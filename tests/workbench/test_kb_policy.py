@@ -16,13 +16,11 @@ from suave_des.workbench.policy import make_policy
 from suave_des.workbench.policy_figure import draw_policy
 from suave_des.workbench.policy_space import (
     PolicySpace,
-    ValueRange,
     component_reports,
     interchangeable_components,
-    ranges_between,
-    values_in,
 )
 from suave_des.workbench.policy_table import function_table
+from suave_des.workbench.ranges import ValueRange, ranges_between, values_in
 from suave_des.workbench.state_input import ManagingSettings
 
 MOTION, SEARCH = "f_maintain_motion", "f_generate_search_path"

@@ -6,8 +6,7 @@ from xml.etree import ElementTree
 import pytest
 
 from suave_des.errors import InputError
-from suave_des.workbench.policy_space import ranges_between
-from suave_des.workbench.testing.regions import measurements_in, parse_region
+from suave_des.workbench.ranges import measurements_in, parse_region, ranges_between
 from suave_des.workbench.testing.run import Runner
 from suave_des.workbench.testing.suite import TestFile, shipped_tests
 

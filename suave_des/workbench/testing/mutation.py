@@ -28,12 +28,12 @@ from suave_des.knowledge.state import ContradictionError, Fact, Inference, Knowl
 from suave_des.knowledge.vocabulary import DECISION_PROPERTIES, HAS_VALUE, TOMASYS, local_name
 from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.policy import PolicyCase, kinds_of_states
-from suave_des.workbench.policy_space import PolicySpace, numbers_in
+from suave_des.workbench.policy_space import PolicySpace
 from suave_des.workbench.prover import Body, Entailed, Outcome, Prover, Situation
-from suave_des.workbench.testing.effects import follows_anyway, is_horn, touching
-from suave_des.workbench.testing.mutants import Mutant
+from suave_des.workbench.ranges import numbers_in
+from suave_des.workbench.testing.mutants import Mutant, follows_anyway, is_horn, touching
+from suave_des.workbench.testing.reader import RuleTest
 from suave_des.workbench.testing.run import Runner
-from suave_des.workbench.testing.suite import RuleTest
 
 KILLED, EQUIVALENT, SURVIVED = "killed", "equivalent", "survived"
 

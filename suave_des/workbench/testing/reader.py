@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Final
 
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown
@@ -13,16 +14,42 @@ from suave_des.knowledge.state import Fact, KnowledgeState
 from suave_des.scenario.yamlfile import YamlDocument
 from suave_des.workbench.fact_reader import FactReader
 from suave_des.workbench.knowledge_base import KnowledgeBase
-from suave_des.workbench.policy_space import ValueRange
 from suave_des.workbench.prover import Situation
+from suave_des.workbench.ranges import ValueRange, measurements_in, parse_region
 from suave_des.workbench.state_input import StateBuilder, recorded_state, recorded_states
-from suave_des.workbench.testing.regions import measurements_in, parse_region
-from suave_des.workbench.testing.suite import RuleTest, check_keys, texts
 
 _TEST_KEYS: Final = ("name", "given", "follows", "follows_not", "decides", "contradiction", "without", "changes")
 _EXPECTATIONS: Final = ("follows", "follows_not", "decides", "contradiction", "changes")
 _STATE_KEYS: Final = ("objectives", "groundings", "components", "measurements")
 _GIVEN_KEYS: Final = (*_STATE_KEYS, "facts", "mission", "run", "at_s")
+
+
+@dataclass(frozen=True)
+class RuleTest:
+    """One test.
+
+    Attributes:
+        name: what it says of the rules.
+        file, line: where it is.
+        situations: one, or one for each region of measured values.
+        follows: facts that must follow, or be asserted.
+        follows_not: facts that must not.
+        decides: (function, what happens to its grounding: a design, "stays" or "none left").
+        contradicts: whether the situation must contradict itself.
+        without: names of rules of which it says what they change.
+        changes: (function, what happens without these rules, what happens with them).
+    """
+
+    name: str
+    file: Path
+    line: int
+    situations: tuple[Situation, ...] = field(repr=False)
+    follows: tuple[Fact, ...] = ()
+    follows_not: tuple[Fact, ...] = ()
+    decides: tuple[tuple[str, str], ...] = ()
+    contradicts: bool = False
+    without: tuple[str, ...] = ()
+    changes: tuple[tuple[str, str, str], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -201,3 +228,28 @@ class TestReader:
         with self._at("given", "mission"):
             records = recorded_states(self.document.path.parent / folder, given.get("run"))
             builder.add_state(recorded_state(records, at_s))
+
+
+def check_keys(document: YamlDocument, content: Any, place: KeyPath, known: Sequence[str]) -> None:
+    """Check that a part of a file is a mapping of known keys.
+
+    Raises:
+        InputError: it is not, with line and key.
+    """
+    if not isinstance(content, Mapping):
+        raise document.error(f"{shown(content)} is not a mapping", place, f"keys: {', '.join(known)}")
+    for key in content:
+        if key not in known:
+            raise document.error(f"{shown(key)} is not a key here", (*place, key), did_you_mean(key, known))
+
+
+def texts(document: YamlDocument, content: Any, place: KeyPath) -> list[str]:
+    """Read a text, or a list of texts.
+
+    Raises:
+        InputError: it is something else, with line and key.
+    """
+    given = [content] if isinstance(content, str) else content
+    if not isinstance(given, list) or not all(isinstance(each, str) for each in given):
+        raise document.error(f"{shown(content)} is not a list of texts", place, 'such as ["one", "another"]')
+    return given

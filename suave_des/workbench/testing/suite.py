@@ -14,18 +14,17 @@ The guide docs/guides/test-rules.md describes all keys.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from suave_des.errors import InputError, KeyPath, did_you_mean, shown
-from suave_des.knowledge.state import Fact
+from suave_des.errors import InputError, KeyPath, shown
 from suave_des.resources import find, shipped_folder
 from suave_des.scenario.loader import Replacements
 from suave_des.scenario.yamlfile import YamlDocument, read_yaml
 from suave_des.workbench.knowledge_base import KnowledgeBase
-from suave_des.workbench.prover import Situation
+from suave_des.workbench.testing.reader import RuleTest, TestReader, check_keys, texts
 
 _FILE_KEYS: Final = ("scenario", "ontologies", "rules", "disabled_rules", "tests")
 
@@ -77,34 +76,6 @@ class KnowledgeFiles:
 
 
 @dataclass(frozen=True)
-class RuleTest:
-    """One test.
-
-    Attributes:
-        name: what it says of the rules.
-        file, line: where it is.
-        situations: one, or one for each region of measured values.
-        follows: facts that must follow, or be asserted.
-        follows_not: facts that must not.
-        decides: (function, what happens to its grounding: a design, "stays" or "none left").
-        contradicts: whether the situation must contradict itself.
-        without: names of rules of which it says what they change.
-        changes: (function, what happens without these rules, what happens with them).
-    """
-
-    name: str
-    file: Path
-    line: int
-    situations: tuple[Situation, ...] = field(repr=False)
-    follows: tuple[Fact, ...] = ()
-    follows_not: tuple[Fact, ...] = ()
-    decides: tuple[tuple[str, str], ...] = ()
-    contradicts: bool = False
-    without: tuple[str, ...] = ()
-    changes: tuple[tuple[str, str, str], ...] = ()
-
-
-@dataclass(frozen=True)
 class TestFile:
     """A file of tests, read as far as that is possible without its knowledge base.
 
@@ -148,8 +119,6 @@ class TestFile:
         Raises:
             InputError: a name is unknown, or something is not as it must be, with line and key.
         """
-        from suave_des.workbench.testing.reader import TestReader
-
         count = len(self.document.data["tests"])
         return tuple(TestReader.of(self.document, bench, number).test() for number in range(count))
 
@@ -157,31 +126,6 @@ class TestFile:
 def shipped_tests() -> tuple[Path, ...]:
     """The tests of the shipped rules."""
     return tuple(sorted((shipped_folder("ontology") / "tests").glob("*.yaml")))
-
-
-def check_keys(document: YamlDocument, content: Any, place: KeyPath, known: Sequence[str]) -> None:
-    """Check that a part of a file is a mapping of known keys.
-
-    Raises:
-        InputError: it is not, with line and key.
-    """
-    if not isinstance(content, Mapping):
-        raise document.error(f"{shown(content)} is not a mapping", place, f"keys: {', '.join(known)}")
-    for key in content:
-        if key not in known:
-            raise document.error(f"{shown(key)} is not a key here", (*place, key), did_you_mean(key, known))
-
-
-def texts(document: YamlDocument, content: Any, place: KeyPath) -> list[str]:
-    """Read a text, or a list of texts.
-
-    Raises:
-        InputError: it is something else, with line and key.
-    """
-    given = [content] if isinstance(content, str) else content
-    if not isinstance(given, list) or not all(isinstance(each, str) for each in given):
-        raise document.error(f"{shown(content)} is not a list of texts", place, 'such as ["one", "another"]')
-    return given
 
 
 def _beside(document: YamlDocument, name: str, place: KeyPath) -> Path:

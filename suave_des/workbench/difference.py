@@ -1,0 +1,191 @@
+"""Compare two knowledge bases: their axioms and rules as text, and what they decide in every state."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import rdflib
+from rdflib.term import Node
+
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rdf import Lit, Triple, facts_of, is_fact, term_of
+from suave_des.knowledge.rules.writer import literal_text
+from suave_des.knowledge.vocabulary import RDF_TYPE, local_name
+from suave_des.workbench.policy import Policy, PolicyCase, no_proof
+from suave_des.workbench.ranges import ValueRange
+
+
+@dataclass(frozen=True)
+class AxiomDifference:
+    """Axioms and rules that only one of two knowledge bases has, as text.
+
+    Attributes:
+        removed: that only the first has.
+        added: that only the second has.
+    """
+
+    removed: tuple[str, ...]
+    added: tuple[str, ...]
+
+    def lines(self) -> Iterator[str]:
+        """The difference as `kb diff` prints it; nothing where there is none."""
+        if not self.removed and not self.added:
+            return
+        yield f"axioms and rules: {len(self.removed)} removed, {len(self.added)} added"
+        yield from (f"  - {text}" for text in self.removed)
+        yield from (f"  + {text}" for text in self.added)
+
+
+def compare_axioms(one: Ontology, other: Ontology) -> AxiomDifference:
+    """Compare the axioms, facts and rules of two knowledge bases; labels and comments do not count."""
+    before, after = frozenset(axioms_of(one)), frozenset(axioms_of(other))
+    return AxiomDifference(tuple(sorted(before - after)), tuple(sorted(after - before)))
+
+
+def axioms_of(base: Ontology) -> Iterator[str]:
+    """Give every axiom, fact and rule as text."""
+    for triple in (*base.content.triples, *base.model.triples()):
+        yield _triple(base, triple)
+    yield from _structure(base)
+    for rule in base.rules:
+        yield f"rule {rule.name}: {rule.text}" + ("" if rule.enabled else " (switched off)")
+
+
+def _triple(base: Ontology, triple: Triple) -> str:
+    if is_fact(triple):
+        return str(next(facts_of([triple], base.names)))
+    subject, predicate, value = triple
+    shown = literal_text(value) if isinstance(value, Lit) else base.names.short(value)
+    if predicate == RDF_TYPE:
+        return f"{shown}({base.names.short(subject)})"
+    return f"{base.names.short(subject)} {local_name(predicate)} {shown}"
+
+
+def _structure(base: Ontology) -> Iterator[str]:
+    """Axioms with class expressions: what has no name is written out in brackets."""
+    graph = rdflib.Graph().parse(data="".join(base.content.structure), format="nt")
+
+    def text(node: Node, above: frozenset[Node]) -> str:
+        if not isinstance(node, rdflib.BNode):
+            term = term_of(node)
+            return literal_text(term) if isinstance(term, Lit) else base.names.short(term)
+        if node in above:
+            return "[...]"
+        parts = sorted(
+            f"{local_name(str(predicate))} {text(value, above | {node})}"
+            for predicate, value in graph.predicate_objects(node)
+        )
+        return f"[{'; '.join(parts)}]"
+
+    for subject in sorted(set(graph.subjects()), key=str):
+        is_part = isinstance(subject, rdflib.BNode) and next(graph.subjects(object=subject), None) is not None
+        if is_part:
+            continue
+        if isinstance(subject, rdflib.BNode):
+            yield text(subject, frozenset())
+            continue
+        for predicate, value in graph.predicate_objects(subject):
+            yield f"{text(subject, frozenset())} {local_name(str(predicate))} {text(value, frozenset({subject}))}"
+
+
+@dataclass(frozen=True)
+class CasePair:
+    """One kind of state, as both knowledge bases decide it."""
+
+    one: PolicyCase
+    other: PolicyCase
+
+    @property
+    def functions(self) -> tuple[str, ...]:
+        """Functions whose grounding is decided differently."""
+        return tuple(name for name in self.one.asked if self.one.outcome(name) != self.other.outcome(name))
+
+
+@dataclass(frozen=True)
+class PolicyDifference:
+    """The difference between two policies.
+
+    Attributes:
+        compared: number of states that both have.
+        differing: kinds of states that they decide differently.
+        reported: kinds in which they decide alike, but infer different statuses.
+        only_one: function designs that only the first has; likewise only_other.
+        computing: rules that compute with numbers; if there are any, the ranges are samples and prove nothing.
+    """
+
+    compared: int
+    differing: tuple[CasePair, ...] = field(repr=False)
+    reported: tuple[CasePair, ...] = field(repr=False)
+    only_one: tuple[str, ...]
+    only_other: tuple[str, ...]
+    computing: tuple[str, ...]
+
+    @property
+    def states(self) -> int:
+        """Number of states that are decided differently."""
+        return sum(pair.one.reports.combinations for pair in self.differing)
+
+    @property
+    def states_reported(self) -> int:
+        """Number of states in which only statuses differ."""
+        return sum(pair.one.reports.combinations for pair in self.reported)
+
+    def lines(self) -> Iterator[str]:
+        """The difference as `kb diff` prints it."""
+        yield f"{self.states} of {self.compared} states are decided differently"
+        if self.reported:
+            yield f"{self.states_reported} more have other statuses, but the same decisions"
+        if self.computing:
+            yield no_proof(self.computing)
+        for which, designs in (("A", self.only_one), ("B", self.only_other)):
+            if designs:
+                yield f"only {which} has {', '.join(designs)}"
+        groups: dict[str, list[CasePair]] = {}
+        for pair in self.differing:
+            for name in pair.functions or pair.one.asked:
+                before, after = (case.outcome_text(name) for case in (pair.one, pair.other))
+                groups.setdefault(f"{name}, now {pair.one.present(name)}: A {before}, B {after}", []).append(pair)
+        for heading, pairs in groups.items():
+            yield heading
+            for ranges, states in _joined(pairs):
+                yield f"  {'; '.join(map(str, ranges))}: {states} states"
+            yield f"  for instance {pairs[0].one.state}"
+
+
+def compare_policies(one: Policy, other: Policy) -> PolicyDifference:
+    """Compare two policies over the same space."""
+    there = {(case.ranges, case.state, case.asked): case for case in other.cases}
+    pairs = [
+        CasePair(case, there[case.ranges, case.state, case.asked])
+        for case in one.cases
+        if (case.ranges, case.state, case.asked) in there
+    ]
+    designs = [{design for case in policy.cases for _, design in case.state.groundings} for policy in (one, other)]
+    differing: list[CasePair] = []
+    alike: list[CasePair] = []
+    for pair in pairs:
+        (differing if pair.functions or pair.one.marks != pair.other.marks else alike).append(pair)
+    return PolicyDifference(
+        compared=sum(pair.one.reports.combinations for pair in pairs),
+        differing=tuple(differing),
+        reported=tuple(pair for pair in alike if pair.one.statuses != pair.other.statuses),
+        only_one=tuple(sorted(designs[0] - designs[1])),
+        only_other=tuple(sorted(designs[1] - designs[0])),
+        computing=tuple(sorted({*one.computing, *other.computing})),
+    )
+
+
+def _joined(pairs: Sequence[CasePair]) -> list[tuple[tuple[ValueRange, ...], int]]:
+    """Ranges of measured values with the number of states; neighbouring ranges of a single attribute are joined."""
+    counts: dict[tuple[ValueRange, ...], int] = {}
+    for pair in pairs:
+        counts[pair.one.ranges] = counts.get(pair.one.ranges, 0) + pair.one.reports.combinations
+    joined: list[tuple[tuple[ValueRange, ...], int]] = []
+    for ranges, states in counts.items():
+        last = joined[-1][0] if joined else ()
+        if len(ranges) == len(last) == 1 and last[0].high == ranges[0].low is not None:
+            joined[-1] = (last[0].joined(ranges[0]),), joined[-1][1] + states
+        else:
+            joined.append((ranges, states))
+    return joined
