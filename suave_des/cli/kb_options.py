@@ -16,6 +16,7 @@ from suave_des.cli.options import KnowledgeFiles, Reasoner, key_and_value
 
 if TYPE_CHECKING:
     from suave_des.knowledge.state import KnowledgeState
+    from suave_des.scenario.loader import LoadedScenario
     from suave_des.workbench import KnowledgeBase
     from suave_des.workbench.state_input import StateBuilder
 
@@ -49,6 +50,12 @@ class Sources(KnowledgeFiles):
     """Options that name a scenario, ontologies and rules."""
 
     scenario: ScenarioOption = "seams2023"
+
+    def loaded(self) -> LoadedScenario:
+        """Load the scenario, with the ontologies, rules and values that are given."""
+        from suave_des.scenario.loader import load_scenario
+
+        return load_scenario(self.scenario, **self.replacements)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -94,10 +94,9 @@ def check(
 @grouped_options
 def rules(sources: Sources, form: AsFormat = Format.TEXT) -> None:
     """List all rules as text that --rules reads back."""
-    from suave_des.scenario.loader import load_scenario
     from suave_des.scenario_knowledge import open_base
 
-    base = open_base(load_scenario(sources.scenario, **sources.replacements))
+    base = open_base(sources.loaded())
     if form is Format.JSON:
         print_json([{"name": r.name, "enabled": r.enabled, "file": r.file, "text": r.text} for r in base.rules])
     else:

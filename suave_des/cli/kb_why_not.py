@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli.kb_options import AsFormat, Format, Sources, SourcesInState, StateParts, TimeLimitS, print_json
+from suave_des.cli.kb_options import AsFormat, Format, SourcesInState, StateParts, TimeLimitS, print_json
 from suave_des.cli.options import grouped_options
 
 if TYPE_CHECKING:
-    from suave_des.knowledge.ontology import Ontology
     from suave_des.workbench.state_input import StateBuilder
-    from suave_des.workbench.why_not import UnusableRule
 
 
 @dataclass(frozen=True)
@@ -56,16 +54,21 @@ def why_not(
     Exit status: 0 also if a rule fires.
     """
     from suave_des.knowledge.limit import TimeLimit
-    from suave_des.scenario.loader import load_scenario
+    from suave_des.knowledge.rules.syntax import RuleError
+    from suave_des.scenario_knowledge import open_base
     from suave_des.workbench.fact_reader import FactReader
     from suave_des.workbench.state_input import ManagingSettings, StateBuilder
-    from suave_des.workbench.why_not import RuleQuestions
+    from suave_des.workbench.why_not import RuleQuestions, UnusableRule, open_without_unusable
 
-    base, unusable = _open(sources)
+    loaded = sources.loaded()
+    try:
+        base, unusable = open_base(loaded), list[UnusableRule]()
+    except RuleError:
+        base, unusable = open_without_unusable(loaded)
     reader = FactReader(base)
     reader.declare(facts or ())
     base = base.with_facts(reader.triple(fact) for fact in facts or ())
-    builder = StateBuilder(base, ManagingSettings.of(load_scenario(sources.scenario, **sources.replacements).scenario))
+    builder = StateBuilder(base, ManagingSettings.of(loaded.scenario))
     parts.add_to(builder, sources.measured)
     state = builder.state()
     questions = RuleQuestions(base, tuple(unusable))
@@ -80,17 +83,3 @@ def why_not(
         print(answer)
     if not shown:
         print("all rules fire")
-
-
-def _open(sources: Sources) -> tuple[Ontology, list[UnusableRule]]:
-    """Open a knowledge base with those of its rules as text that can be used, and list the others."""
-    from suave_des.knowledge.rules.syntax import RuleError
-    from suave_des.scenario.loader import load_scenario
-    from suave_des.scenario_knowledge import open_base
-    from suave_des.workbench.why_not import open_without_unusable
-
-    loaded = load_scenario(sources.scenario, **sources.replacements)
-    try:
-        return open_base(loaded), []
-    except RuleError:
-        return open_without_unusable(loaded)

@@ -10,7 +10,7 @@ from typing import Final
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.content import Content
-from suave_des.knowledge.ontology_file import OntologyFile
+from suave_des.knowledge.ontology_file import OntologyFile, place_of
 from suave_des.knowledge.rdf import EXACT, Lit, Names, Triple, is_fact, value_of
 from suave_des.knowledge.state import KnowledgeState, Value
 from suave_des.knowledge.vocabulary import (
@@ -325,8 +325,5 @@ def _is_decimal(value: str | Lit) -> bool:
 def wrong_in(subject: str, sources: Sequence[OntologyFile], problem: str, remedy: str) -> KnowledgeError:
     """Return an error on an individual, with the file and line where it is described."""
     name = local_name(subject)
-    for source in sources:
-        place = source.line_of(name)
-        if place is not None:
-            return KnowledgeError(f"{name}: {problem}", file=source.path, place=place, remedy=remedy)
-    return KnowledgeError(f"{name}: {problem}", file=sources[0].path, remedy=remedy)
+    file, line = place_of(name, sources)
+    return KnowledgeError(f"{name}: {problem}", file=file, place=f"line {line}" if line else None, remedy=remedy)

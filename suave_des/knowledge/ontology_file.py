@@ -73,8 +73,8 @@ class OntologyFile:
         """Whether the file is RDF/XML."""
         return self.path.suffix not in _FORMATS
 
-    def line_of(self, name: str) -> str | None:
-        """Place of the first line that describes the thing of that name, as "line 12"."""
+    def line_of(self, name: str) -> int | None:
+        """The first line that describes the thing of that name."""
         # about="...#name", about="&suave;name", ID="name", or the label of a rule
         own = re.escape(name)
         described = re.compile(rf"""(?:about|ID)=["'](?:[^"']*[#;/])?{own}["']|label(?: [^>]*)?>\s*{own}\s*<""")
@@ -82,8 +82,14 @@ class OntologyFile:
             described = re.compile(rf"""(?:^|[\s"])[\w.-]*:{own}(?=[\s"])|[<"][^<>"]*[#/]{own}[>"]|label\s+"{own}\"""")
         for number, line in enumerate(text_of(self.content).splitlines(), start=1):
             if described.search(line):
-                return f"line {number}"
+                return number
         return None
+
+
+def place_of(name: str, sources: Sequence[OntologyFile]) -> tuple[Path, int | None]:
+    """Find the file and line that describe the thing of a name; the first file, where none does."""
+    lines = ((source.path, source.line_of(name)) for source in sources)
+    return next((place for place in lines if place[1] is not None), (sources[0].path, None))
 
 
 def text_of(content: bytes) -> str:

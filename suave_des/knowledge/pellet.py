@@ -213,7 +213,8 @@ def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> Contradic
 def _rule_with_place(ontology: Ontology, rule: Rule) -> str:
     """A rule's name with its file and line, as far as the file shows where it is."""
     files = {source.path: source for source in ontology.sources}
-    place = rule.place or (files[rule.file].line_of(rule.name) if rule.file in files else None)
+    line = files[rule.file].line_of(rule.name) if rule.file in files else None
+    place = rule.place or (f"line {line}" if line else None)
     return f"{rule.name} ({', '.join(filter(None, (rule.file.name, place)))})"
 
 

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from decimal import Decimal
 from functools import cached_property
 from math import inf
-from typing import Final
+from typing import Any, Final
 
-from suave_des.knowledge.inference_cache import Key
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import Lit
 from suave_des.knowledge.rules.builtins import COMPARISONS
@@ -24,6 +23,8 @@ from suave_des.knowledge.rules.syntax import EXPRESSION, Rule, Variable
 from suave_des.knowledge.state import MAX_EXPONENT, KnowledgeState
 from suave_des.knowledge.vocabulary import HAS_VALUE, OWL, RDF_TYPE, RDFS, XSD, local_name
 
+#: Objectives, groundings, components and measurements of a state, the last as regions or as exact values.
+Key = tuple[Any, ...]
 _SAME_VALUES: Final = (RDFS + "subPropertyOf", OWL + "equivalentProperty")
 _BINARY: Final = frozenset((XSD + "float", XSD + "double"))
 #: Datatypes of which a number is or is not by its size alone, or in which there is no number.

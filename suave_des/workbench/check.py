@@ -195,8 +195,7 @@ class _RuleFinding:
         found = re.search(rf"label[^<>]*>\s*{re.escape(self.rule.name)}\s*<", text)
         if found is not None:
             return text.count("\n", 0, found.start()) + 1
-        place = source.line_of(self.rule.name)
-        return int(place.removeprefix("line ")) if place else None
+        return source.line_of(self.rule.name)
 
 
 def _ask_pellet(subject: Subject, before: Sequence[Finding]) -> Iterator[Finding]:

@@ -9,7 +9,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from suave_des.errors import InputError
-from suave_des.knowledge.ontology_file import OntologyFile
+from suave_des.knowledge.ontology_file import OntologyFile, place_of
 
 
 class Level(StrEnum):
@@ -79,11 +79,8 @@ def finding_about(
     name: str, sources: Sequence[OntologyFile], level: Level, message: str, remedy: str | None = None
 ) -> Finding:
     """Make a finding about an individual, with the file and line where it is described."""
-    for source in sources:
-        place = source.line_of(name)
-        if place is not None:
-            return Finding(level, message, str(source.path), int(place.removeprefix("line ")), remedy=remedy)
-    return Finding(level, message, str(sources[0].path), remedy=remedy)
+    file, line = place_of(name, sources)
+    return Finding(level, message, str(file), line, remedy=remedy)
 
 
 def ordered(findings: Iterable[Finding]) -> tuple[Finding, ...]:

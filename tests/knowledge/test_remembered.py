@@ -15,8 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.cached_pellet import CachedPellet, cache_digest
-from suave_des.knowledge.inference_cache import InferenceCache
+from suave_des.knowledge.cached_pellet import CachedPellet, InferenceCache, cache_digest
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.knowledge.regions import Regions, regions_of
