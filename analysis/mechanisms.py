@@ -130,7 +130,7 @@ def agreement_2025(runs: int, change: Change) -> dict[str, float]:
     """
     (case,) = read_cases(["planta_exp1_campaign"], managers=ADAPTED_ALIKE)
     simulated, distance = simulated_and_distance(case, {**change.both, **change.of_2025}, runs * len(case.conditions))
-    compared = compare_conditions(case.real, simulated, case.managers, tuple(COMPARED))
+    compared = compare_conditions(case.real, simulated, case.managers, COMPARED)
     summaries = {(each.manager, each.metric): each for each in summarise(compared)}
     spread = summaries["none", "distance_inspected_m"]
     reactions = [

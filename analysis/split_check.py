@@ -20,10 +20,11 @@ from suave_des.calibration.fit import fit
 from suave_des.calibration.parameters import read_problem
 from suave_des.calibration.report import fitted_scenario, fitted_values
 from suave_des.estimates import estimate
-from suave_des.report.runs import METRICS, choose_managers, read_runs
+from suave_des.report.runs import read_runs
 from suave_des.resources import find
 from suave_des.validation.validation import sample
 
+METRICS = ("search_time_s", "distance_inspected_m")
 WITHIN_STD = 0.5
 """Greatest difference of a predicted mean, in published standard deviations, that counts as predicted."""
 
@@ -82,7 +83,7 @@ def main() -> None:
     chosen.out.mkdir(parents=True, exist_ok=True)
 
     published = read_runs(find("seams2023_runs.csv", "scenarios/published"))
-    managers = choose_managers(published, None)
+    managers = tuple(published.managers)
     predicted = {}
     for left_out in managers:
         (case,) = read_cases(["seams2023"], (), ",".join(name for name in managers if name != left_out))

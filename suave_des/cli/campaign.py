@@ -284,9 +284,9 @@ def reproduce(
 def print_comparison(console: Console, comparison: PaperComparison) -> None:
     """Print the paper's table beside the simulated results, with remarks on their differences."""
     from suave_des.cli.console import print_table
-    from suave_des.report.runs import METRICS
+    from suave_des.report.compared_metrics import PAPER_METRICS
 
-    for metric, title in METRICS.items():
+    for metric, title in PAPER_METRICS.items():
         figures = [figure for figure in comparison.figures if figure.metric == metric]
         table = _table(figures, is_narrow=False)
         if console.measure(table, options=console.options.update(width=1000)).maximum > console.width:

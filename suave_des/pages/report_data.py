@@ -23,20 +23,19 @@ from suave_des.report.compare_files import (
     search_table,
     summary_table,
 )
+from suave_des.report.compared_metrics import KNOWN, PAPER_METRICS
 from suave_des.report.grouping import grouped
 from suave_des.report.result_files import Missions
 
 MOST_DRAWN = 20_000
 """Missions whose values are in a page; of more, every second, third, ... run is, under all managers."""
 _DIGITS = 2
-_METRICS = ("search_time_s", "distance_inspected_m", "mean_reaction_time_s", "adaptations", "detection_x_m")
 _TITLES = {
-    "search_time_s": "search time (s)",
-    "distance_inspected_m": "distance inspected (m)",
-    "mean_reaction_time_s": "mean reaction time (s)",
-    "adaptations": "adaptations",
+    **PAPER_METRICS,
+    **{name: KNOWN[name].heading for name in ("mean_reaction_time_s", "adaptations")},
     "detection_x_m": "x of the first sight (m)",
 }
+"""Of the metrics in charts."""
 
 
 @dataclass(frozen=True)
@@ -158,7 +157,7 @@ def drawn(missions: Missions) -> Drawn:
     columns["seed"] = frame["seed"].astype(str).tolist()
     if len(set(columns["seed"])) == 1:
         columns["seed"] = columns["seed"][:1]
-    titles = {name: _TITLES[name] for name in _METRICS if name in frame and frame[name].notna().any()}
+    titles = {name: title for name, title in _TITLES.items() if name in frame and frame[name].notna().any()}
     found = frame["pipeline_found"].astype(float)
     columns["found"] = [None if value != value else int(value) for value in found.tolist()]
     for name in (*titles, *missions.swept):

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from suave_des.estimates import t_quantile
 from suave_des.report import style
+from suave_des.report.compared_metrics import PAPER_METRICS
 from suave_des.report.grouping import Group, time_limit_s
-from suave_des.report.runs import METRICS
 
 _ROW_IN = 0.62
 """Height of a row of a figure that has one for each manager."""
@@ -46,7 +46,7 @@ def draw_distributions(groups: Sequence[Group]) -> style.Picture:
     figure = style.Picture(figsize=(style.WIDTH_IN, 2.5 + _legend_height(labels)), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
     limit_s = _limit_of_lost(groups)
-    for axes, letter, (metric, title) in zip(panels, "ab", METRICS.items(), strict=True):
+    for axes, letter, (metric, title) in zip(panels, "ab", PAPER_METRICS.items(), strict=True):
         end = max(1.0, max(float(group.known_values(metric).max()) for group in groups) * 1.06)
         for number, group in enumerate(groups):
             values = np.sort(group.known_values(metric))
@@ -86,7 +86,7 @@ def draw_rainclouds(groups: Sequence[Group], published: Mapping[str, Group]) -> 
     height = _ROW_IN * len(groups) + 0.55 + _LEGEND_LINE_IN
     figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
-    for axes, letter, (metric, title) in zip(panels, "ab", METRICS.items(), strict=True):
+    for axes, letter, (metric, title) in zip(panels, "ab", PAPER_METRICS.items(), strict=True):
         for number, group in enumerate(groups):
             _raincloud(axes, number, group, metric, published.get(group.name))
         axes.set_xlabel(title)
@@ -169,7 +169,7 @@ def draw_convergence(groups: Sequence[Group]) -> style.Picture:
     labels = [*map(_label, groups), "95% interval of the mean"]
     figure = style.Picture(figsize=(style.WIDTH_IN, 2.5 + _legend_height(labels)), layout="constrained")
     panels = figure.subplots(1, 2)
-    for axes, letter, (metric, title) in zip(panels, "ab", METRICS.items(), strict=True):
+    for axes, letter, (metric, title) in zip(panels, "ab", PAPER_METRICS.items(), strict=True):
         for number, group in enumerate(groups):
             frame = group.frame.sort_values("run", kind="stable")
             values = frame[metric].to_numpy(float)

@@ -8,10 +8,9 @@ from textwrap import fill
 
 from suave_des.estimates import Interval
 from suave_des.report.compare import Comparison, Difference, Summary
-from suave_des.report.compared_metrics import FOUND, ComparedMetric
+from suave_des.report.compared_metrics import FOUND, PAPER_METRICS, ComparedMetric
 from suave_des.report.statistics import Tested
 
-PAPER_METRICS = ("search_time_s", "distance_inspected_m")
 _SUMMARY_HEADINGS = ("manager", "n", "mean", "95% interval", "std", "median", "quartiles")
 _DIFFERENCE_HEADINGS = ("difference", "n", "mean", "95% interval", "p", "p (Holm)", "effect")
 _RUNS_HEADINGS = ("difference", "for ±", "paired", "not paired", "variance ratio")

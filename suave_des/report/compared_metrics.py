@@ -60,7 +60,7 @@ class ComparedMetric:
         return self.half_width or 0.05 * max(abs(float(x.mean())), abs(float(y.mean())))
 
 
-_KNOWN = (
+_METRICS = (
     ComparedMetric(
         SEARCH_TIME,
         "search time",
@@ -107,7 +107,10 @@ _KNOWN = (
     ComparedMetric("detection_time_s", "time of the first sight", "s", -1),
 )
 _DEFAULTS = (SEARCH_TIME, "distance_inspected_m", FOUND, "mean_reaction_time_s")
-METRIC_NAMES = tuple(metric.name for metric in _KNOWN)
+KNOWN = {metric.name: metric for metric in _METRICS}
+"""Metrics by name."""
+PAPER_METRICS = {name: KNOWN[name].heading for name in (SEARCH_TIME, "distance_inspected_m")}
+"""Metrics of the paper's table, with their titles in figures."""
 
 
 def chosen_metrics(wanted: Sequence[str], groups: Sequence[Group]) -> tuple[ComparedMetric, ...]:
@@ -116,15 +119,14 @@ def chosen_metrics(wanted: Sequence[str], groups: Sequence[Group]) -> tuple[Comp
     Raises:
         InputError: there is no such metric, or no mission has it.
     """
-    known = {metric.name: metric for metric in _KNOWN}
     for name in wanted:
-        if name not in known:
-            remedy = did_you_mean(name, known, "there are")
+        if name not in KNOWN:
+            remedy = did_you_mean(name, KNOWN, "there are")
             raise InputError(f"{shown(name)} is no metric", place="metrics", remedy=remedy)
         if not _is_there(name, groups):
             raise InputError(f"no mission has a value of {name}", place="metrics", remedy="leave it out")
     names = wanted or [name for name in _DEFAULTS if _is_there(name, groups)]
-    return tuple(known[name] for name in dict.fromkeys(names))
+    return tuple(KNOWN[name] for name in dict.fromkeys(names))
 
 
 def _is_there(name: str, groups: Sequence[Group]) -> bool:

@@ -30,7 +30,7 @@ def conclusion(found: Difference, metric: ComparedMetric) -> str:
     return f"{claim} ({evidence})."
 
 
-def difference_claim(found: Difference, metric: ComparedMetric, *, names_second: bool = True) -> str:
+def difference_claim(found: Difference, metric: ComparedMetric) -> str:
     """Say who has more or less than whom, the better one first."""
     assert found.difference is not None
     value = found.difference.value

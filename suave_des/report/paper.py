@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 from suave_des.errors import InputError
 from suave_des.estimates import Estimate, Interval, estimate
+from suave_des.report.compared_metrics import PAPER_METRICS
 from suave_des.report.result_files import PAPER_ORDER
-from suave_des.report.runs import METRICS, read_runs
+from suave_des.report.runs import read_runs
 from suave_des.resources import shipped_folder
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ class PaperFigure:
 
     Attributes:
         manager: name of the managing subsystem.
-        metric: one of METRICS.
+        metric: one of PAPER_METRICS.
         statistic: "mean" or "std" (sample standard deviation).
         published: the paper's figure.
         published_interval: its 95% interval.
@@ -123,7 +124,7 @@ class PaperComparison:
             "| --- | --- | --- | ---: | ---: | ---: | ---: | ---: | --- |",
         ]
         for figure in self.figures:
-            cells = figure.manager, METRICS[figure.metric], figure.statistic, *figure.cells()
+            cells = figure.manager, PAPER_METRICS[figure.metric], figure.statistic, *figure.cells()
             lines.append(f"| {' | '.join(cells)} |".replace(MARK, f"\\{MARK}"))
         # A paragraph for each remark, in which the mark is not emphasis.
         return "\n".join([*lines, *(f"\n{remark.replace(MARK, chr(92) + MARK)}" for remark in self.remarks())]) + "\n"
@@ -165,7 +166,7 @@ def published_estimates(path: Path | None = None) -> Estimates:
     """
     runs = read_runs(path or published_runs())
     names = sorted(runs.managers, key=lambda name: (PAPER_ORDER.get(name, len(PAPER_ORDER)), name))
-    return _estimates(runs.frame, [(name, metric) for name in names for metric in METRICS])
+    return _estimates(runs.frame, [(name, metric) for name in names for metric in PAPER_METRICS])
 
 
 def compare(runs: pandas.DataFrame, published: Estimates) -> PaperComparison:

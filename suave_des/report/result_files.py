@@ -88,15 +88,6 @@ def missions_of(frame: pandas.DataFrame) -> Missions:
     return missions
 
 
-def swept_parameters(folder: Path) -> list[str]:
-    """Find the swept parameters of a campaign: columns of its summary.csv and runs.csv that are not metrics."""
-    try:
-        columns, known = _header(folder / "summary.csv"), _header(folder / _RUNS_FILE)
-    except (OSError, ValueError):
-        return []
-    return [name for name in columns if name in known and name not in OWN_COLUMNS]
-
-
 def _header(path: Path) -> list[str]:
     with path.open(encoding="utf-8-sig", newline="") as file:
         return [name.strip() for name in next(csv.reader(file), [])]

@@ -20,10 +20,9 @@ from numpy.typing import NDArray
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.files import decode, read_bytes
 from suave_des.metrics.result import MissionMetrics
+from suave_des.report.compared_metrics import PAPER_METRICS
 
-METRICS = {"search_time_s": "search time (s)", "distance_inspected_m": "distance inspected (m)"}
-"""Metrics that are compared, with their titles in figures."""
-COLUMNS = ("manager", *METRICS, "detection_x_m", "pipeline_found", "mean_reaction_time_s", "run", "seed")
+COLUMNS = ("manager", *PAPER_METRICS, "detection_x_m", "pipeline_found", "mean_reaction_time_s", "run", "seed")
 """Columns of a frame of missions.
 
 detection_x_m is nan where it is not known or nothing was detected, pipeline_found a nullable boolean, missing where the
@@ -191,15 +190,6 @@ def read_runs(
     frame = frame.assign(**{name: checked.numbers_or_words(name) for name in further})
     digest = hashlib.sha256(content).hexdigest()
     return Runs(path, frame.reset_index(drop=True), managers, scenarios, digest, tuple(averages), tuple(lines))
-
-
-def choose_managers(published: Runs, wanted: str | None) -> tuple[str, ...]:
-    """Choose the managers to compare: those named, separated by commas, or all of the published file.
-
-    Raises:
-        InputError: one is named twice, or has no published mission.
-    """
-    return choose_names(wanted, published.managers, str(published.path))
 
 
 def choose_names(wanted: str | None, managers: Iterable[str], source: str) -> tuple[str, ...]:

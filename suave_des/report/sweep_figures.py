@@ -13,8 +13,8 @@ from matplotlib.ticker import MaxNLocator
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.estimates import estimate
 from suave_des.report import style
+from suave_des.report.compared_metrics import PAPER_METRICS
 from suave_des.report.result_files import Missions
-from suave_des.report.runs import METRICS
 from suave_des.report.words import key_words, value_words
 
 _MOST_PARAMETERS, _COLUMNS = 9, 3
@@ -53,18 +53,18 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
     blocks = math.ceil(len(parameters) / columns)
     width_in = style.WIDTH_IN if columns > 1 else style.WIDTH_IN / 2
     figure = style.Picture(figsize=(width_in, 4.0 * blocks + 0.2 * math.ceil(len(managers) / 3)), layout="constrained")
-    panels = figure.subplots(len(METRICS) * blocks, columns, sharey="row", squeeze=False)
+    panels = figure.subplots(len(PAPER_METRICS) * blocks, columns, sharey="row", squeeze=False)
     for place, parameter in enumerate(parameters):
         block, column = divmod(place, columns)
-        for row, (metric, title) in enumerate(METRICS.items()):
-            axes = panels[len(METRICS) * block + row, column]
+        for row, (metric, title) in enumerate(PAPER_METRICS.items()):
+            axes = panels[len(PAPER_METRICS) * block + row, column]
             _draw_panel(axes, frame, names, parameter, metric)
-            axes.tick_params(labelbottom=row == len(METRICS) - 1)
+            axes.tick_params(labelbottom=row == len(PAPER_METRICS) - 1)
             if column == 0:
                 axes.set_ylabel(f"mean {title}")
-        panels[len(METRICS) * block + len(METRICS) - 1, column].set_xlabel(_folded(key_words(parameter)))
-    for row in range(len(METRICS)):
-        own = panels[row :: len(METRICS)].ravel()
+        panels[len(PAPER_METRICS) * block + len(PAPER_METRICS) - 1, column].set_xlabel(_folded(key_words(parameter)))
+    for row in range(len(PAPER_METRICS)):
+        own = panels[row :: len(PAPER_METRICS)].ravel()
         top = max(axes.get_ylim()[1] for axes in own if axes.has_data())
         for axes in own:
             axes.set_ylim(0.0, top)

@@ -15,8 +15,9 @@ from scipy.stats import binom
 
 from suave_des.estimates import CONFIDENCE
 from suave_des.report import style
+from suave_des.report.compared_metrics import KNOWN
 from suave_des.validation.statistics import Sample
-from suave_des.validation.validation import COMPARED, SampleComparison, Validation, sample, with_limit
+from suave_des.validation.validation import SampleComparison, Validation, sample, with_limit
 
 _SIMULATED, _PUBLISHED = style.BLUE, style.BLACK
 _PANEL_INCHES = (style.WIDTH_IN / 3.0, 2.0)
@@ -81,7 +82,7 @@ def _distribution(axis: Axes, compared: SampleComparison, published: Sample, sim
     axis.step(*_steps(published, top), where="post", color=_PUBLISHED, linewidth=0.9, label=real)
     axis.set_ylim(-0.015, 1.02)
     axis.set_xlim(0.0, top)
-    axis.set_xlabel(COMPARED[compared.metric])
+    axis.set_xlabel(KNOWN[compared.metric].heading)
     # A distribution function leaves the corner opposite to its bulk free.
     x, y, across, up = (
         (0.03, 0.97, "left", "top") if np.median(simulated) > top / 2.0 else (0.98, 0.05, "right", "bottom")
@@ -119,7 +120,7 @@ def detections_png(
             axis.plot(unplaced, np.ones(len(unplaced)), transform=axis.get_xaxis_transform(), **_TICK)
             axis.set_title(manager, pad=9)
             without = f"simulated without detection: {ours['detection_x_m'].isna().mean():.1%}"
-            axis.set_xlabel(f"{COMPARED['search_time_s']}\n{without}")
+            axis.set_xlabel(f"{KNOWN['search_time_s'].heading}\n{without}")
         axes[0, 0].set_ylabel("x of the point seen first (m)")
         axes[0, 0].margins(0.06, 0.12)
         circle: dict[str, Any] = {

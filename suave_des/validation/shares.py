@@ -89,15 +89,6 @@ def read_targets(path: Path) -> ShareList:
     return validated(Layer.of(read_yaml(path), 0), ShareList)
 
 
-def read_shares(path: Path) -> tuple[Share, ...]:
-    """Read the shares of such a file.
-
-    Raises:
-        InputError: with file and line: it cannot be read, or is not valid.
-    """
-    return read_targets(path).shares
-
-
 def shares_beside(data: Path) -> Path | None:
     """Find the file of shares of a data file: NAME.targets.yaml beside NAME.csv, if it is there."""
     path = data.with_suffix(".targets.yaml")

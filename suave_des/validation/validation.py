@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from suave_des.estimates import Estimate, Interval, estimate
-from suave_des.report.runs import METRICS
+from suave_des.report.compared_metrics import KNOWN
 from suave_des.streams import Streams
 from suave_des.validation.conditions import (
     CONDITION,
@@ -47,10 +47,8 @@ from suave_des.validation.statistics import (
 if TYPE_CHECKING:
     import pandas
 
-COMPARED = {**METRICS, "mean_reaction_time_s": "mean reaction time (s)"}
-"""Metrics that are compared where both sides have values, with their titles in figures."""
-LOWER_IS_BETTER = {"search_time_s": True, "distance_inspected_m": False, "mean_reaction_time_s": True}
-"""Which of two values of a metric is better, as the exemplar's own one-sided tests have it."""
+COMPARED = ("search_time_s", "distance_inspected_m", "mean_reaction_time_s")
+"""Metrics that are compared where both sides have values."""
 _LEAST_AGREEMENT = 0.5
 
 _Generators = Callable[[str], np.random.Generator]
@@ -225,7 +223,7 @@ def validate(
         for pair in combinations([manager for each, manager in cells if each == metric], 2)
     )
     counted = compare_shares(shares, published, simulated, managers)
-    conditions = compare_conditions(published, simulated, managers, tuple(COMPARED))
+    conditions = compare_conditions(published, simulated, managers, COMPARED)
     summaries = tuple(summarise(conditions))
     targets = (
         *_sample_targets(samples),
@@ -301,7 +299,7 @@ def _compare_samples(
 def _compare_managers(
     pair: tuple[str, str], metric: str, sides: Sequence[pandas.DataFrame], generators: _Generators
 ) -> ManagerComparison:
-    lower = LOWER_IS_BETTER[metric]
+    lower = KNOWN[metric].better < 0  # as the exemplar's own one-sided tests have it
     theirs, ours = ((sample(side, pair[0], metric), sample(side, pair[1], metric)) for side in sides)
     tests = conclude(*theirs, lower_is_better=lower)
     sizes = len(theirs[0]), len(theirs[1])

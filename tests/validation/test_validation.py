@@ -13,7 +13,7 @@ from suave_des.report.runs import read_runs
 from suave_des.resources import shipped_folder
 from suave_des.validation.figures import detections_png, distributions_png
 from suave_des.validation.files import JSON_FILE, TABLES, texts
-from suave_des.validation.shares import Share, read_shares, shares_beside
+from suave_des.validation.shares import Share, read_targets, shares_beside
 from suave_des.validation.validation import Target, validate
 
 MANAGERS = ("none", "random", "metacontrol")
@@ -33,7 +33,7 @@ def like_published(published):
 
 @pytest.fixture(scope="module")
 def good(published, like_published):
-    return validate(published, like_published, MANAGERS, shares=read_shares(shares_beside(DATA)))
+    return validate(published, like_published, MANAGERS, shares=read_targets(shares_beside(DATA)).shares)
 
 
 def missed(validation):
@@ -101,12 +101,12 @@ def test_a_cluster_that_is_averaged_away_fails_its_share(published, like_publish
     smeared = like_published.copy()
     late = smeared["search_time_s"].between(120, 130) & (smeared["manager"] == "metacontrol")
     smeared.loc[late, "search_time_s"] += 12
-    found = missed(validate(published, smeared, MANAGERS, shares=read_shares(shares_beside(DATA))))
+    found = missed(validate(published, smeared, MANAGERS, shares=read_targets(shares_beside(DATA)).shares))
     assert ("share", "metacontrol", "found at 120 to 130 s") in found
 
 
 def test_the_result_repeats_with_its_seed_and_ignores_the_other_managers(published, like_published, good):
-    shares = read_shares(shares_beside(DATA))
+    shares = read_targets(shares_beside(DATA)).shares
     assert validate(published, like_published, MANAGERS, shares=shares) == good
     alone = validate(published, like_published, ("none",))
     assert alone.samples == tuple(cell for cell in good.samples if cell.manager == "none")

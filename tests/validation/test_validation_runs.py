@@ -7,7 +7,7 @@ import pandas
 import pytest
 
 from suave_des.errors import InputError
-from suave_des.report.runs import choose_managers, read_runs
+from suave_des.report.runs import choose_names, read_runs
 from suave_des.resources import shipped_folder
 
 OWN = "manager,search_time_s,distance_inspected_m"
@@ -105,8 +105,8 @@ def test_a_binary_file_is_refused_with_its_line(tmp_path: Path):
 
 def test_managers_come_in_the_order_of_the_file_unless_chosen(write):
     runs = read_runs(write("runs.csv", f"{OWN}\nrandom,1,2\nnone,1,2\nrandom,1,2\n"))
-    assert choose_managers(runs, None) == ("random", "none")
-    assert choose_managers(runs, "none") == ("none",)
+    assert choose_names(None, runs.managers, "runs.csv") == ("random", "none")
+    assert choose_names("none", runs.managers, "runs.csv") == ("none",)
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ def test_managers_come_in_the_order_of_the_file_unless_chosen(write):
 def test_managers_without_missions_or_named_twice_are_refused(write, wanted, problem):
     runs = read_runs(write("runs.csv", f"{OWN}\nnone,1,2\n"))
     with pytest.raises(InputError, match=problem):
-        choose_managers(runs, wanted)
+        choose_names(wanted, runs.managers, str(runs.path))
 
 
 def test_a_simulated_file_must_have_each_manager(write):

@@ -13,7 +13,7 @@ from suave_des.validation.shares import (
     compare_places,
     compare_shares,
     count,
-    read_shares,
+    read_targets,
     shares_beside,
 )
 
@@ -86,7 +86,7 @@ def test_places_are_counted_to_the_nearest_half_metre_on_both_sides(missions):
 def test_the_shipped_shares_cover_each_manager_and_the_published_runs_meet_their_targets():
     data = shipped_folder("scenarios/published") / "seams2023_runs.csv"
     published = read_runs(data).frame
-    shares = read_shares(shares_beside(data))
+    shares = read_targets(shares_beside(data)).shares
     assert {share.manager for share in shares} == {"none", "random", "metacontrol"}
     with_target = [share for share in shares if share.target is not None]
     assert len(with_target) == 4
@@ -98,7 +98,9 @@ def test_the_shipped_shares_cover_each_manager_and_the_published_runs_meet_their
 def test_the_shipped_clusters_hold_the_published_runs_as_known():
     data = shipped_folder("scenarios/published") / "seams2023_runs.csv"
     published = read_runs(data).frame
-    counts = {(share.manager, share.name): count(share, published).count for share in read_shares(shares_beside(data))}
+    counts = {
+        (share.manager, share.name): count(share, published).count for share in read_targets(shares_beside(data)).shares
+    }
     assert counts["metacontrol", "found at 69 to 90 s"] == 10
     assert counts["metacontrol", "found at 124 to 128 s"] == 9
     assert counts["metacontrol", "in neither cluster, 300 s included"] == 1
@@ -132,7 +134,7 @@ ENTRY = "shares:\n  - manager: none\n    name: early\n    where: {where}\n"
 def test_a_wrong_file_of_shares_is_named_with_its_line(write, content, place, problem):
     path = write("runs.targets.yaml", content)
     with pytest.raises(InputError) as caught:
-        read_shares(path)
+        read_targets(path)
     assert caught.value.file == str(path)
     assert caught.value.place.startswith(place)
     assert problem in caught.value.problem
