@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import matplotlib
 import numpy as np
@@ -44,9 +44,8 @@ def draw_distributions(groups: Sequence[Group]) -> style.Picture:
     """Draw the empirical distribution functions of search time and inspected distance, a curve for each group."""
     labels = [*map(_label, groups), "marks at 0%: means"]
     figure = style.Picture(figsize=(style.WIDTH_IN, 2.5 + _legend_height(labels)), layout="constrained")
-    panels = figure.subplots(1, 2, sharey=True)
     limit_s = _limit_of_lost(groups)
-    for axes, letter, (metric, title) in zip(panels, "ab", PAPER_METRICS.items(), strict=True):
+    for axes, metric, title in _metric_panels(figure, sharey=True):
         end = max(1.0, max(float(group.known_values(metric).max()) for group in groups) * 1.06)
         for number, group in enumerate(groups):
             values = np.sort(group.known_values(metric))
@@ -56,11 +55,10 @@ def draw_distributions(groups: Sequence[Group]) -> style.Picture:
             mark = {"marker": style.marker(number), "color": look["color"], "ms": 5, "mec": "white", "mew": 0.5}
             axes.plot(float(values.mean()), 0.0, clip_on=False, zorder=5, **mark)
         axes.set(xlabel=title, xlim=(0.0, end))
-        axes.set_title(f"{letter}   {title.split(' (')[0].capitalize()}")
         if metric == "search_time_s" and limit_s is not None:
             _mark_not_found(axes, limit_s)
-    panels[0].set(ylabel="share of missions at or below", ylim=(0.0, 1.02))
-    panels[0].yaxis.set_major_formatter(PercentFormatter(1.0))
+    figure.axes[0].set(ylabel="share of missions at or below", ylim=(0.0, 1.02))
+    figure.axes[0].yaxis.set_major_formatter(PercentFormatter(1.0))
     handles = [*_handles(groups), Line2D([], [], lw=0, marker="o", mfc="none", ms=4, color=style.GREY)]
     _legend(figure, handles, labels)
     return figure
@@ -85,19 +83,18 @@ def draw_rainclouds(groups: Sequence[Group], published: Mapping[str, Group]) -> 
     """
     height = _ROW_IN * len(groups) + 0.55 + _LEGEND_LINE_IN
     figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
-    panels = figure.subplots(1, 2, sharey=True)
-    for axes, letter, (metric, title) in zip(panels, "ab", PAPER_METRICS.items(), strict=True):
+    for axes, metric, title in _metric_panels(figure, sharey=True):
         for number, group in enumerate(groups):
             _raincloud(axes, number, group, metric, published.get(group.name))
         axes.set_xlabel(title)
         axes.set_xlim(left=0.0)
-        axes.set_title(f"{letter}   {title.split(' (')[0].capitalize()}")
-    panels[0].set_yticks(range(len(groups)), [_label(group) for group in groups])
-    panels[0].set_ylim(len(groups) - 0.45, -0.6)
+    left = figure.axes[0]
+    left.set_yticks(range(len(groups)), [_label(group) for group in groups])
+    left.set_ylim(len(groups) - 0.45, -0.6)
     limit_s = _limit_of_lost(groups)
     if limit_s is not None:
-        panels[0].axvline(limit_s, color=style.GREY, lw=0.7, ls=":", zorder=1)
-        panels[0].annotate(
+        left.axvline(limit_s, color=style.GREY, lw=0.7, ls=":", zorder=1)
+        left.annotate(
             "not found",
             (limit_s, 1.0),
             (-2, -1),
@@ -168,13 +165,10 @@ def draw_convergence(groups: Sequence[Group]) -> style.Picture:
     """Draw the mean of the first n runs and its 95% interval over n, a curve for each group."""
     labels = [*map(_label, groups), "95% interval of the mean"]
     figure = style.Picture(figsize=(style.WIDTH_IN, 2.5 + _legend_height(labels)), layout="constrained")
-    panels = figure.subplots(1, 2)
-    for axes, letter, (metric, title) in zip(panels, "ab", PAPER_METRICS.items(), strict=True):
+    for axes, metric, title in _metric_panels(figure):
         for number, group in enumerate(groups):
             frame = group.frame.sort_values("run", kind="stable")
-            values = frame[metric].to_numpy(float)
-            values = values[~np.isnan(values)]
-            n, means, halves = running_means(values)
+            n, means, halves = running_means(frame[metric].dropna().to_numpy(float))
             look = style.line(number)
             axes.plot(n, means, label=_label(group), **look)
             low, high = means - halves, means + halves
@@ -184,8 +178,7 @@ def draw_convergence(groups: Sequence[Group]) -> style.Picture:
         axes.set_ylim(bottom=0.0)
         axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
         axes.xaxis.set_major_formatter("{x:,.0f}")
-        axes.set_title(f"{letter}   {title.split(' (')[0].capitalize()}")
-    _legend(figure, [*panels[0].lines, Patch(color=style.GREY, alpha=0.3)], labels)
+    _legend(figure, [*figure.axes[0].lines, Patch(color=style.GREY, alpha=0.3)], labels)
     return figure
 
 
@@ -280,6 +273,14 @@ def draw_reactions(groups: Sequence[Group]) -> style.Picture:
     right.set_title("b   Reaction time")
     _legend(figure, _handles(groups), [_label(group) for group in groups])
     return figure
+
+
+def _metric_panels(figure: style.Picture, *, sharey: bool = False) -> Iterator[tuple[Axes, str, str]]:
+    """Make the panels a and b for the metrics of the paper's table; yield each with its metric, and the axis' title."""
+    panels = figure.subplots(1, 2, sharey=sharey)
+    for axes, letter, (metric, title) in zip(panels, "ab", PAPER_METRICS.items(), strict=True):
+        axes.set_title(f"{letter}   {title.split(' (')[0].capitalize()}")
+        yield axes, metric, title
 
 
 def _handles(groups: Sequence[Group]) -> list[Artist]:

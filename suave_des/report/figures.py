@@ -11,7 +11,7 @@ import pandas
 from matplotlib.figure import Figure
 
 from suave_des.errors import InputError, did_you_mean, shown
-from suave_des.report import campaign_figures, mission_map, paths_figure, style, timeline_figure
+from suave_des.report import campaign_figures, mission_map, style, timeline_figure
 from suave_des.report.grouping import Group, grouped
 from suave_des.report.mission_record import MissionRecord, read_mission
 from suave_des.report.paper import published_runs
@@ -120,7 +120,7 @@ def _figure(
     if missions and len(missions) == len(folders) and kind not in (*CAMPAIGN_KINDS, SWEEP):
         records = [completed(folder, read_mission(folder)) for folder in folders]
         if kind == PATHS or (kind == AUTO and len(records) > 1):
-            return paths_figure.draw_paths(records)
+            return mission_map.draw_paths(records)
         if len(records) > 1:
             problem = f"the figure {kind} is of one mission, and {len(records)} are given"
             raise InputError(problem, remedy=f"give one of them, or --kind {PATHS}")

@@ -1,4 +1,4 @@
-"""A mission's map: the pipeline, the vehicle's way coloured by mode, what happened where, and altitude over time."""
+"""Maps: of a mission, with what happened where, and altitude over time; of many missions, their ways."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 from matplotlib.transforms import Bbox
+from numpy.typing import NDArray
 
 from suave_des.domain import SEA_BED_Z_M
 from suave_des.report import style
@@ -22,8 +23,8 @@ from suave_des.report.mission_record import MissionRecord, adaptations, battery_
 from suave_des.report.words import mode_words
 
 _IDLE_MODES = ("", "fd_unground", "inactive")
-_ZOOM_MARGIN_M = 0.6
-_PIPELINE_COLOUR, _PIPELINE_WIDTH = "#CFCFCF", 4.0
+_ZOOM_MARGIN_M, _PATHS_MARGIN_M = 0.6, 1.0
+_PIPELINE: dict[str, Any] = {"color": "#CFCFCF", "lw": 4.0}
 _VISIBILITY: dict[str, Any] = {"color": style.GREY, "lw": 1.0, "ls": (0, (4, 1.5))}
 _THRESHOLD_COLOUR = "#B5B5B5"
 _BATTERY_COLOUR = style.GREEN
@@ -59,9 +60,7 @@ def draw(record: MissionRecord) -> style.Picture:
     _draw_map(whole, record, colours, search)
     _draw_zoom(zoom, record, colours, marks, search)
     _draw_over_time(time, record, colours, marks)
-    metrics = record.metrics
-    name = f"{metrics['scenario']}, {metrics['manager']}, run {metrics['run']}, seed {metrics['seed']}"
-    whole.set_title(f"a   Mission: {style.text(name)}")
+    whole.set_title(f"a   Mission: {style.text(record.name)}")
     zoom.set_title("b   Search")
     time.set_title("c   Altitude and visibility")
     whole.legend(
@@ -75,7 +74,7 @@ def _legend(record: MissionRecord, colours: dict[str, str], marks: list[_Mark]) 
     if len(named) < len(colours):
         named.append((mode_words(_IDLE_MODES[1]), _IDLE_MODES[1]))
     lines = [Line2D([], [], label=style.text(name), **_way_look(colours, mode)) for name, mode in named]
-    lines.append(Line2D([], [], color=_PIPELINE_COLOUR, lw=_PIPELINE_WIDTH, label="pipeline"))
+    lines.append(Line2D([], [], **_PIPELINE, label="pipeline"))
     lines.append(Line2D([], [], **_VISIBILITY, label="visibility; dotted: thresholds (c)"))
     if battery_level(record) is not None:
         lines.append(Line2D([], [], color=_BATTERY_COLOUR, lw=1.0, ls="--", label="battery (c)"))
@@ -147,18 +146,21 @@ def _draw_way(axes: Axes, record: MissionRecord, colours: dict[str, str], across
 
 def _draw_plan(axes: Axes, record: MissionRecord, colours: dict[str, str]) -> None:
     """Draw what both maps show."""
-    vertices = np.array(record.scenario["pipeline"]["vertices_m"])
-    axes.plot(
-        vertices[:, 0], vertices[:, 1], color=_PIPELINE_COLOUR, lw=_PIPELINE_WIDTH, solid_capstyle="round", zorder=1.5
-    )
+    _draw_pipeline(axes, record)
     _draw_way(axes, record, colours, "x_m", "y_m")
     start = record.trajectory.iloc[0]
     axes.plot(start["x_m"], start["y_m"], "o", color=style.BLACK, ms=4)
     if battery := record.scenario.get("battery"):
         axes.plot(battery["station_x_m"], battery["station_y_m"], "P", color=_BATTERY_COLOUR, ms=5, zorder=3)
-    axes.set_aspect("equal")
     axes.set_xlabel("x, east (m)")
     axes.set_ylabel("y, north (m)")
+
+
+def _draw_pipeline(axes: Axes, record: MissionRecord) -> None:
+    """Draw the pipeline, from above."""
+    x_m, y_m = np.array(record.scenario["pipeline"]["vertices_m"])[:, :2].T
+    axes.plot(x_m, y_m, **_PIPELINE, solid_capstyle="round", zorder=1.5)
+    axes.set_aspect("equal")
 
 
 def _draw_letters(axes: Axes, marks: Sequence[_Mark], frame: Bbox) -> None:
@@ -210,12 +212,17 @@ def _draw_zoom(axes: Axes, record: MissionRecord, colours: dict[str, str], marks
 
 def _search_frame(record: MissionRecord) -> Bbox:
     """Where the vehicle was until the pipeline was found, and the point of it that was seen, with a margin."""
-    way = record.trajectory
-    search = way.loc[way["t_s"] <= record.metrics["search_time_s"], ["x_m", "y_m"]].to_numpy()
+    search = _search(record)
     if record.metrics["pipeline_found"]:
         seen = [record.metrics["detection_x_m"], record.metrics["detection_y_m"]]
         search = np.vstack([search, seen])
     return Bbox([search.min(axis=0) - _ZOOM_MARGIN_M, search.max(axis=0) + _ZOOM_MARGIN_M])
+
+
+def _search(record: MissionRecord) -> NDArray[np.float64]:
+    """Return the vehicle's way until it found the pipeline, or the mission ended; shape (n, 2)."""
+    way = record.trajectory
+    return np.asarray(way.loc[way["t_s"] <= record.metrics["search_time_s"], ["x_m", "y_m"]], dtype=float)
 
 
 def _draw_adaptations(axes: Axes, record: MissionRecord, colours: dict[str, str], across: str, up: str) -> None:
@@ -277,3 +284,49 @@ def _letter_rows(marks: Sequence[_Mark], end_s: float) -> list[int]:
         last_s[row : row + 1] = [mark.t_s]
         rows.append(row)
     return rows
+
+
+def draw_paths(records: Sequence[MissionRecord]) -> style.Picture:
+    """Draw the paths of missions, a panel for each manager, over the part of the sea bed that they search.
+
+    Args:
+        records: of missions; the pipeline is that of the first.
+    """
+    managers = list(dict.fromkeys(str(record.metrics["manager"]) for record in records))
+    columns = min(len(managers), 3)
+    rows = -(-len(managers) // columns)
+    searches = [_search(record) for record in records]
+    low = np.min([search.min(axis=0) for search in searches], axis=0) - _PATHS_MARGIN_M
+    high = np.max([search.max(axis=0) for search in searches], axis=0) + _PATHS_MARGIN_M
+    shape = (high[1] - low[1]) / (high[0] - low[0])
+    height = rows * (style.WIDTH_IN / columns * shape * 0.85 + 0.55) + 0.3
+    figure = style.Picture(figsize=(style.WIDTH_IN, min(height, 9.5)), layout="constrained")
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    for axes in panels.ravel()[len(managers) :]:
+        axes.set_visible(False)
+    for number, (axes, manager) in enumerate(zip(panels.ravel(), managers, strict=False)):
+        own = [record for record in records if str(record.metrics["manager"]) == manager]
+        colour = style.line(number)["color"]
+        _draw_pipeline(axes, records[0])
+        for record in own:
+            search = _search(record)
+            axes.plot(search[:, 0], search[:, 1], color=colour, lw=0.7, alpha=max(0.12, min(0.9, 4.0 / len(own))))
+        found = [record.metrics for record in own if record.metrics["pipeline_found"]]
+        seen = np.array([[each["detection_x_m"], each["detection_y_m"]] for each in found], dtype=float).reshape(-1, 2)
+        axes.plot(seen[:, 0], seen[:, 1], "o", color=style.BLACK, ms=3, mew=0, alpha=0.6, zorder=4)
+        starts = np.array([search[0] for search in map(_search, own)])
+        axes.plot(starts[:, 0], starts[:, 1], "s", color=style.BLACK, mfc="white", ms=3, mew=0.7, zorder=4)
+        axes.set_title(style.text(f"{manager}: {len(found)} of {len(own)} found it"))
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    for axes in panels[-1]:
+        axes.set_xlabel("x, east (m)")
+    for axes in panels[:, 0]:
+        axes.set_ylabel("y, north (m)")
+    handles = [
+        Line2D([], [], color=style.GREY, lw=0.9, label="way until the pipeline was found"),
+        Line2D([], [], **_PIPELINE, label="pipeline"),
+        Line2D([], [], color=style.BLACK, lw=0, marker="s", ms=3, mfc="white", label="start"),
+        Line2D([], [], color=style.BLACK, lw=0, marker="o", ms=3, label="point seen first"),
+    ]
+    figure.legend(handles=handles, loc="outside upper right", ncols=4)
+    return figure

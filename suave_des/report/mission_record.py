@@ -44,6 +44,12 @@ class MissionRecord:
     trajectory: pandas.DataFrame
     rules: Mapping[tuple[float, str], tuple[str, ...]] = field(default_factory=dict)
 
+    @property
+    def name(self) -> str:
+        """Scenario, manager, run and seed."""
+        metrics = self.metrics
+        return f"{metrics['scenario']}, {metrics['manager']}, run {metrics['run']}, seed {metrics['seed']}"
+
 
 def read_mission(folder: Path) -> MissionRecord:
     """Read mission.json, events.csv and trajectory.csv.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from string import ascii_uppercase
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,6 +25,9 @@ from suave_des.report.mission_record import (
 from suave_des.report.words import function_mode_words, function_words, is_off, plain
 
 _BAR = 0.62
+_BAR_POINTS = 6.5
+_LETTER_IN, _LINES_IN = _BAR_POINTS * 0.55 / 72.0, style.WIDTH_IN * 0.86
+"""Widths of a letter of a bar's text, about half its size, and of all lines."""
 _LISTED = 26
 """Adaptations that are listed; a manager that changes modes all the time has more."""
 _COLUMN_LETTERS = 66
@@ -57,9 +61,7 @@ def draw_timeline(record: MissionRecord) -> style.Picture:
     end_s = float(record.trajectory["t_s"].iloc[-1])
     panels[0].set_xlim(0.0, end_s)
     panels[-2].set_xlabel("mission time (s)")
-    metrics = record.metrics
-    name = f"{metrics['scenario']}, {metrics['manager']}, run {metrics['run']}, seed {metrics['seed']}"
-    panels[0].set_title(style.text(name), pad=16)
+    panels[0].set_title(style.text(record.name), pad=16)
     for axes in panels[:-1]:
         for each in changes:
             axes.axvline(each.t_s, color="#777777", lw=0.5, ls=":", zorder=1)
@@ -138,35 +140,20 @@ def _lines(record: MissionRecord) -> Iterator[tuple[str, list[tuple[Span, str, s
 
 
 def _draw_lines(axes: Axes, lines: Sequence[tuple[str, list[tuple[Span, str, str]]]]) -> None:
+    """Draw a bar for each span, with its text where it is no wider than the bar."""
+    end_s = max((span.end_s for _, bars in lines for span, _, _ in bars), default=1.0)
+    letter_s = _LETTER_IN / _LINES_IN * end_s
     for row, (_, bars) in enumerate(lines):
         for span, colour, text in bars:
             width_s = span.end_s - span.begin_s
             axes.barh(row, width_s, _BAR, span.begin_s, color=colour, edgecolor="white", lw=0.6, zorder=2)
-            if width_s > 0.0:
-                label = axes.text(
-                    span.begin_s + 1.0,
-                    row,
-                    style.text(text),
-                    va="center",
-                    fontsize=6.5,
-                    zorder=3,
-                    clip_on=True,
-                    color=_readable_on(colour),
-                )
-                label.set_gid(f"{width_s}")
+            label = style.text(text)
+            if 0.0 < width_s >= len(label) * letter_s:
+                look: dict[str, Any] = {"va": "center", "fontsize": _BAR_POINTS, "color": _readable_on(colour)}
+                axes.text(span.begin_s + 1.0, row, label, zorder=3, clip_on=True, **look)
     axes.set_yticks(range(len(lines)), [style.text(name) for name, _ in lines])
     axes.set_ylim(len(lines) - 0.5, -0.5)
     axes.grid(axis="y", visible=False)
-    _drop_wide_texts(axes)
-
-
-def _drop_wide_texts(axes: Axes) -> None:
-    """Remove texts that are wider than their bars, by about half their size a letter."""
-    inches = style.WIDTH_IN * 0.86
-    right_s = max((bar.get_x() + bar.get_width() for bar in axes.patches), default=1.0)  # type: ignore[attr-defined]
-    for label in list(axes.texts):
-        if len(label.get_text()) * 6.5 * 0.55 / 72.0 > float(label.get_gid() or 0.0) / right_s * inches:
-            label.remove()
 
 
 def _readable_on(colour: str) -> str:
