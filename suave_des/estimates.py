@@ -12,6 +12,12 @@ CONFIDENCE = 0.95
 Interval = tuple[float, float]
 
 
+def interval_columns(name: str, interval: Interval | None) -> dict[str, float | None]:
+    """Return the two columns of a table that have the ends of a figure's 95% interval, by their names."""
+    low, high = interval or (None, None)
+    return {f"{name}_ci95_low": low, f"{name}_ci95_high": high}
+
+
 @dataclass(frozen=True, slots=True)
 class Estimate:
     """Estimates from a sample; None where it has too few values.

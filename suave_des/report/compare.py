@@ -8,21 +8,19 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas
 
 from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.estimates import interval_columns
 from suave_des.report import statistics
 from suave_des.report.compared_metrics import FOUND, SEARCH_TIME, ComparedMetric, chosen_metrics, parse_half_widths
 from suave_des.report.conclusions import conclusion, overall_conclusion
 from suave_des.report.grouping import Group, grouped, time_limit_s
 from suave_des.report.result_files import Missions, missions_of, read_missions
 from suave_des.report.statistics import Estimated, Sample, SearchTimes, Tested
-
-if TYPE_CHECKING:
-    from suave_des.estimates import Interval
 
 
 @dataclass(frozen=True)
@@ -245,7 +243,7 @@ def _summary(group: Group, metric: ComparedMetric, horizon_s: float) -> Summary:
     if not len(sample):
         return found
     if metric.name == FOUND and group.is_of_missions:
-        mean = statistics.share_interval(int(sample.sum()), len(sample))
+        mean = statistics.share_estimate(int(sample.sum()), len(sample))
     else:
         mean = statistics.mean_interval(sample)
     low, median, high = np.percentile(sample, (25.0, 50.0, 75.0))
@@ -343,7 +341,7 @@ def _difference_row(each: Difference) -> dict[str, Any]:
     row |= {"test": tested["name"], "p": tested["p"], "p_holm": each.p_holm}
     row |= {"p_less": tested["p_less"], "p_greater": tested["p_greater"]}
     row |= {"effect_name": tested["effect_name"], "effect": tested["effect"]}
-    row |= _ends("effect", tested["effect_interval"]) | {"variance_ratio": each.variance_ratio}
+    row |= interval_columns("effect", tested["effect_interval"]) | {"variance_ratio": each.variance_ratio}
     needed = asdict(each.runs_needed) if each.runs_needed else dict.fromkeys(RunsNeeded.__dataclass_fields__)
     row |= {"half_width": needed["half_width"]}
     row |= {"runs_needed_paired": needed["paired"], "runs_needed_unpaired": needed["unpaired"]}
@@ -352,9 +350,4 @@ def _difference_row(each: Difference) -> dict[str, Any]:
 
 def _estimated(name: str, found: Estimated | None) -> dict[str, Any]:
     value, interval, method = (None, None, None) if found is None else (found.value, found.interval, found.method)
-    return {name: value} | _ends(name, interval) | {f"{name}_interval": method if interval else None}
-
-
-def _ends(name: str, interval: Interval | None) -> dict[str, float | None]:
-    low, high = interval or (None, None)
-    return {f"{name}_ci95_low": low, f"{name}_ci95_high": high}
+    return {name: value} | interval_columns(name, interval) | {f"{name}_interval": method if interval else None}

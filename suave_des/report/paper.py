@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from suave_des.errors import InputError
-from suave_des.estimates import Estimate, Interval, estimate
+from suave_des.estimates import Estimate, Interval, estimate, interval_columns
 from suave_des.report.compared_metrics import PAPER_METRICS
 from suave_des.report.result_files import PAPER_ORDER
 from suave_des.report.runs import read_runs
@@ -139,9 +139,9 @@ class PaperComparison:
                 "metric": figure.metric,
                 "statistic": figure.statistic,
                 "published": figure.published,
-                **_ends("published", figure.published_interval),
+                **interval_columns("published", figure.published_interval),
                 "ours": figure.ours,
-                **_ends("ours", figure.ours_interval),
+                **interval_columns("ours", figure.ours_interval),
                 "difference": figure.difference,
                 "inside_published_ci95": figure.is_inside,
             }
@@ -202,11 +202,6 @@ def _sizes(estimates: Estimates) -> str:
     if len(set(sizes.values())) == 1:
         return f"{next(iter(sizes.values()))} missions for each manager"
     return ", ".join(f"{n} {'mission' if n == 1 else 'missions'} of {manager}" for manager, n in sizes.items())
-
-
-def _ends(name: str, interval: Interval | None) -> dict[str, float | None]:
-    low, high = interval or (None, None)
-    return {f"{name}_ci95_low": low, f"{name}_ci95_high": high}
 
 
 def _rounded(value: object) -> object:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from suave_des.errors import InputError
 from suave_des.estimates import CONFIDENCE, Interval, t_quantile
 
 Sample = NDArray[np.float64]
+Statistic = Callable[..., NDArray[np.float64]]
 
 EXTRA = "compare"
 """The extra that installs statsmodels and lifelines."""
@@ -28,7 +29,7 @@ SIGNIFICANCE = 0.05
 BCA, STUDENT, WILSON, NEWCOMBE = "BCa bootstrap", "Student's t", "Wilson", "Newcombe"
 _LARGEST_BOOTSTRAP = 5_000
 """Of more values the interval of the mean is Student's: it agrees with the bootstrap's then, and takes no time."""
-_RESAMPLES, _FEWER_RESAMPLES, _MANY_VALUES = 9_999, 1_999, 1_000
+RESAMPLES, _FEWER_RESAMPLES, _MANY_VALUES = 9_999, 1_999, 1_000
 _BATCH_VALUES = 1_000_000
 """Resampled values in memory at a time."""
 _SEED = 20230209
@@ -94,25 +95,55 @@ def difference_interval(first: Sample, second: Sample) -> Estimated:
     return Estimated(difference, interval, BCA)
 
 
-def _bca(statistic: Callable[..., Any], *samples: Sample) -> Interval | None:
+def _bca(statistic: Statistic, *samples: Sample) -> Interval | None:
     """Return the BCa interval; none for samples of one value, or without spread."""
-    from scipy.stats import DegenerateDataWarning, bootstrap
-
-    if min(map(len, samples)) < 2 or all(np.ptp(sample) == 0.0 for sample in samples):
+    if all(np.ptp(sample) == 0.0 for sample in samples):
         return None
     largest = max(map(len, samples))
+    resamples = RESAMPLES if largest <= _MANY_VALUES else _FEWER_RESAMPLES
+    batch = max(1, _BATCH_VALUES // largest)
+    return bootstrap_interval(statistic, samples, "BCa", np.random.default_rng(_SEED), resamples, batch)
+
+
+def bootstrap_interval(
+    statistic: Statistic,
+    samples: Sequence[Sample],
+    method: Literal["BCa", "percentile"],
+    rng: np.random.Generator,
+    resamples: int = RESAMPLES,
+    batch: int | None = None,
+) -> Interval | None:
+    """Return the bootstrap interval of a statistic of one sample or of several independent ones.
+
+    Args:
+        statistic: takes arrays of shape (k, n) and an axis.
+        samples: are resampled with replacement.
+        method: as of scipy.stats.bootstrap.
+        rng: to resample with.
+        resamples: how many.
+        batch: resamples at a time, so that memory stays small.
+
+    Returns:
+        The interval; none for samples of one value, or where it or a resample's statistic is not finite.
+    """
+    from scipy.stats import DegenerateDataWarning, bootstrap
+
+    if min(map(len, samples)) < 2:
+        return None
     with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", DegenerateDataWarning)  # gives nan, which is no interval
         found = bootstrap(
             samples,
             statistic,
-            n_resamples=_RESAMPLES if largest <= _MANY_VALUES else _FEWER_RESAMPLES,
-            batch=max(1, _BATCH_VALUES // largest),
+            n_resamples=resamples,
+            batch=batch,
             vectorized=True,
             confidence_level=CONFIDENCE,
-            method="BCa",
-            rng=np.random.default_rng(_SEED),
+            method=method,
+            rng=rng,
         )
+    if not np.isfinite(found.bootstrap_distribution).all():
+        return None
     return _finite(found.confidence_interval.low, found.confidence_interval.high)
 
 
@@ -120,12 +151,17 @@ def _finite(low: float, high: float) -> Interval | None:
     return (float(low), float(high)) if math.isfinite(low) and math.isfinite(high) else None
 
 
-def share_interval(count: int, n: int) -> Estimated:
+def share_estimate(count: int, n: int) -> Estimated:
     """Estimate a share of one trial or more, with its interval by Wilson (1927)."""
+    return Estimated(count / n, share_interval(count, n, "wilson"), WILSON)
+
+
+def share_interval(count: int, n: int, method: Literal["wilson", "exact"]) -> Interval:
+    """Return the interval of a share of one trial or more, by Wilson (1927), or by Clopper and Pearson (1934)."""
     from scipy.stats import binomtest
 
-    low, high = binomtest(count, n).proportion_ci(CONFIDENCE, method="wilson")
-    return Estimated(count / n, (float(low), float(high)), WILSON)
+    low, high = binomtest(count, n).proportion_ci(CONFIDENCE, method=method)
+    return float(low), float(high)
 
 
 def share_difference(first: tuple[int, int], second: tuple[int, int]) -> Estimated:

@@ -16,7 +16,7 @@ from scipy.stats import binom
 from suave_des.estimates import CONFIDENCE
 from suave_des.report import style
 from suave_des.report.compared_metrics import KNOWN
-from suave_des.validation.statistics import Sample
+from suave_des.report.statistics import Sample
 from suave_des.validation.validation import SampleComparison, Validation, sample, with_limit
 
 _SIMULATED, _PUBLISHED = style.BLUE, style.BLACK

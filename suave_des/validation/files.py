@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict
 
-from suave_des.estimates import Estimate, Interval
+from suave_des.estimates import Estimate, interval_columns
 from suave_des.validation.conditions import ConditionComparison
 from suave_des.validation.shares import DetectionPlace, ShareComparison
 from suave_des.validation.validation import ManagerComparison, SampleComparison, Validation
@@ -64,7 +64,7 @@ def _tables(validation: Validation) -> dict[str, list[Record]]:
         "shares": [
             {"manager": each.share.manager, "name": each.share.name}
             | _proportions(each)
-            | _ends("target", each.share.target, "low", "high")
+            | dict(zip(("target_low", "target_high"), each.share.target or (None, None), strict=True))
             for each in validation.shares
         ],
         "positions": [
@@ -86,9 +86,9 @@ def _sample(compared: SampleComparison) -> Record:
         **_estimate("published", compared.published),
         **simulated,
         "difference_of_means": compared.difference,
-        **_ends("difference_of_means", compared.difference_interval),
+        **interval_columns("difference_of_means", compared.difference_interval),
         "std_ratio": compared.std_ratio,
-        **_ends("std_ratio", compared.std_ratio_interval),
+        **interval_columns("std_ratio", compared.std_ratio_interval),
         "ks_distance": ks.statistic,
         "ks_p": ks.p,
         "ad_statistic": ad and ad.statistic,
@@ -107,9 +107,9 @@ def _estimate(side: str, found: Estimate) -> Record:
     return {
         f"{side}_n": found.n,
         f"{side}_mean": found.mean,
-        **_ends(f"{side}_mean", found.mean_interval),
+        **interval_columns(f"{side}_mean", found.mean_interval),
         f"{side}_std": found.std,
-        **_ends(f"{side}_std", found.std_interval),
+        **interval_columns(f"{side}_std", found.std_interval),
         f"{side}_median": found.median,
     }
 
@@ -131,12 +131,8 @@ def _proportions(compared: ShareComparison | DetectionPlace) -> Record:
     row: Record = {}
     for side, found in (("published", compared.published), ("simulated", compared.simulated)):
         row |= {f"{side}_count": found.count, f"{side}_n": found.n, f"{side}_share": found.share}
-        row |= _ends(f"{side}_share", found.interval)
+        row |= interval_columns(f"{side}_share", found.interval)
     return row
-
-
-def _ends(name: str, interval: Interval | None, low: str = "ci95_low", high: str = "ci95_high") -> Record:
-    return dict(zip((f"{name}_{low}", f"{name}_{high}"), interval or (None, None), strict=True))
 
 
 def _rounded(record: Record) -> Record:

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from suave_des.estimates import Interval
+from suave_des.report.statistics import share_interval
 from suave_des.scenario.layers import Layer
 from suave_des.scenario.problems import validated
 from suave_des.scenario.quantities import Number, Strict, ordered, wrong
 from suave_des.scenario.yamlfile import read_yaml
-from suave_des.validation.statistics import share_interval
 
 if TYPE_CHECKING:
     import pandas
@@ -114,8 +114,8 @@ class Proportion:
 
     @property
     def interval(self) -> Interval | None:
-        """95% interval of the share, by Clopper and Pearson."""
-        return share_interval(self.count, self.n)
+        """95% interval of the share, by Clopper and Pearson; none for no missions."""
+        return share_interval(self.count, self.n, "exact") if self.n else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,21 +5,14 @@ A sample is a float array of shape (n,). What draws takes a generator, and is re
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from suave_des.estimates import CONFIDENCE, Interval
+from suave_des.estimates import Interval
+from suave_des.report.statistics import SIGNIFICANCE, Sample, bootstrap_interval
 
-Sample = NDArray[np.float64]
-Statistic = Callable[..., NDArray[np.float64]]
-
-SIGNIFICANCE = 0.05
-RESAMPLES = 9_999
 PERMUTATIONS = 999
 SUBSAMPLES = 2_000
 _BATCH = 500
@@ -43,7 +36,13 @@ def difference_interval(published: Sample, simulated: Sample, rng: np.random.Gen
 
     Both samples are resampled independently and with replacement (Efron and Tibshirani 1993, chapters 13 and 16).
     """
-    return _bootstrap(lambda x, y, axis: y.mean(axis=axis) - x.mean(axis=axis), published, simulated, rng)
+    return bootstrap_interval(
+        lambda x, y, axis: y.mean(axis=axis) - x.mean(axis=axis),
+        (published, simulated),
+        "percentile",
+        rng,
+        batch=_BATCH,
+    )
 
 
 def ratio_interval(published: Sample, simulated: Sample, rng: np.random.Generator) -> Interval | None:
@@ -51,34 +50,14 @@ def ratio_interval(published: Sample, simulated: Sample, rng: np.random.Generato
 
     None, too, where a resample of the published values has no spread to divide by.
     """
-    return _bootstrap(lambda x, y, axis: _std(y, axis) / _std(x, axis), published, simulated, rng)
+    return bootstrap_interval(
+        lambda x, y, axis: _std(y, axis) / _std(x, axis), (published, simulated), "percentile", rng, batch=_BATCH
+    )
 
 
 def _std(sample: Sample, axis: int) -> Sample:
     # Means of equal values are rounded; their spread must be zero all the same.
     return np.where(np.ptp(sample, axis=axis) > 0.0, sample.std(axis=axis, ddof=1), 0.0)
-
-
-def _bootstrap(statistic: Statistic, published: Sample, simulated: Sample, rng: np.random.Generator) -> Interval | None:
-    from scipy.stats import DegenerateDataWarning, bootstrap
-
-    if len(published) < 2 or len(simulated) < 2:
-        return None
-    with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore", DegenerateDataWarning)  # checked below
-        found = bootstrap(
-            (published, simulated),
-            statistic,
-            n_resamples=RESAMPLES,
-            batch=_BATCH,
-            vectorized=True,
-            confidence_level=CONFIDENCE,
-            method="percentile",
-            rng=rng,
-        )
-    if not np.isfinite(found.bootstrap_distribution).all():
-        return None
-    return float(found.confidence_interval.low), float(found.confidence_interval.high)
 
 
 def kolmogorov_smirnov(published: Sample, simulated: Sample) -> SampleTest:
@@ -187,13 +166,3 @@ def _mann_whitney(firsts: Sample, seconds: Sample, *, lower_is_better: bool) -> 
 
     less, greater = p("less"), p("greater")
     return (less, greater) if lower_is_better else (greater, less)
-
-
-def share_interval(count: int, n: int) -> Interval | None:
-    """95% interval of a share by Clopper and Pearson (1934); none for no trials."""
-    from scipy.stats import binomtest
-
-    if n == 0:
-        return None
-    low, high = binomtest(count, n).proportion_ci(CONFIDENCE, method="exact")
-    return float(low), float(high)

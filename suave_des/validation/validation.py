@@ -12,6 +12,7 @@ import numpy as np
 
 from suave_des.estimates import Estimate, Interval, estimate
 from suave_des.report.compared_metrics import KNOWN
+from suave_des.report.statistics import SIGNIFICANCE, Sample
 from suave_des.streams import Streams
 from suave_des.validation.conditions import (
     CONDITION,
@@ -31,9 +32,7 @@ from suave_des.validation.shares import (
     found_shares,
 )
 from suave_des.validation.statistics import (
-    SIGNIFICANCE,
     OneSidedTests,
-    Sample,
     SampleTest,
     agreement,
     anderson_darling,

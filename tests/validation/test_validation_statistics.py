@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from suave_des.validation.shares import Proportion
 from suave_des.validation.statistics import (
     agreement,
     anderson_darling,
@@ -11,7 +12,6 @@ from suave_des.validation.statistics import (
     difference_interval,
     kolmogorov_smirnov,
     ratio_interval,
-    share_interval,
     superiority,
 )
 
@@ -160,8 +160,8 @@ class TestManagers:
 @pytest.mark.parametrize(("count", "n"), [(0, 20), (9, 20), (20, 20), (1, 7)])
 def test_the_interval_of_a_share_is_scipys_exact_one(count, n):
     reference = stats.binomtest(count, n).proportion_ci(method="exact")
-    assert share_interval(count, n) == pytest.approx((reference.low, reference.high))
+    assert Proportion(count, n).interval == pytest.approx((reference.low, reference.high))
 
 
 def test_no_trials_have_no_interval():
-    assert share_interval(0, 0) is None
+    assert Proportion(0, 0).interval is None
