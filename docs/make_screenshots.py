@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 from PIL import Image
 
 from suave_des.campaign.campaign import run_campaign
+from suave_des.pages.recorded import Chosen, missions_run
 from suave_des.pages.replay import replay_page
 from suave_des.pages.report import report_page
-from suave_des.pages.sources import Chosen, missions_run
 from suave_des.scenario.loader import load_scenario
 
 if TYPE_CHECKING:

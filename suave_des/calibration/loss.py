@@ -152,12 +152,6 @@ def as_vectors(missions: pandas.DataFrame) -> Vectors:
     return vectors
 
 
-def published_vectors(frame: pandas.DataFrame, managers: Sequence[str]) -> dict[str, Vectors]:
-    """Scale published missions by manager; a component that is never known for a manager is left out."""
-    by_manager = {name: as_vectors(frame[frame["manager"] == name]) for name in managers}
-    return {name: vectors[:, ~np.isnan(vectors).all(axis=0)] for name, vectors in by_manager.items()}
-
-
 def simulate(simulator: Simulator, manager: str, runs: int, seed: int) -> pandas.DataFrame:
     """Simulate missions of one manager; a frame with the columns that are compared."""
     metrics = [simulator.run(manager, run, seed).metrics for run in range(1, runs + 1)]
@@ -214,8 +208,9 @@ def _pairs(case: Case, simulated: pandas.DataFrame, manager: str) -> Iterator[tu
     """
     ours, theirs = (side[side["manager"] == manager] for side in (simulated, case.real))
     for number in sorted(set(theirs[CONDITION])):
-        real = published_vectors(theirs[theirs[CONDITION] == number], [manager])[manager]
-        yield as_vectors(ours[ours[CONDITION] == number])[:, : real.shape[1]], real
+        real, simulated_ones = (as_vectors(side[side[CONDITION] == number]) for side in (theirs, ours))
+        known = ~np.isnan(real).all(axis=0)
+        yield simulated_ones[:, known], real[:, known]
 
 
 @dataclass(frozen=True, slots=True)

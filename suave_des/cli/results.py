@@ -148,7 +148,7 @@ def figure(
 def _with_rules(folder: Path, record: MissionRecord) -> MissionRecord:
     from dataclasses import replace
 
-    from suave_des.pages.adaptation_rules import adaptation_rules
+    from suave_des.pages.decisions import adaptation_rules
 
     return replace(record, rules=adaptation_rules(folder, record))
 
@@ -201,8 +201,8 @@ def replay(
     It needs no network, and shows the vehicle, what its camera sees, and what its manager knew, inferred and decided.
     """
     from suave_des.pages.page import check_page_file, write_page
+    from suave_des.pages.recorded import Chosen, missions_in, missions_run
     from suave_des.pages.replay import replay_page
-    from suave_des.pages.sources import Chosen, missions_in, missions_run
     from suave_des.scenario.loader import load_scenario
 
     folders = folders or []

@@ -2,19 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict
+import json
+import math
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
+
+import numpy as np
+import pandas
 
 from suave_des import __version__
 from suave_des.errors import InputError
 from suave_des.pages.page import compressed, page
 from suave_des.pages.paths import Paths, paths_of
-from suave_des.pages.report_data import check_page_size, made_from, results_of
-from suave_des.report.result_files import read_missions
+from suave_des.report.compare import Choices, Comparison, compare
+from suave_des.report.compare_files import (
+    Table,
+    difference_table,
+    remarks,
+    runs_table,
+    search_table,
+    summary_table,
+)
+from suave_des.report.compared_metrics import KNOWN, PAPER_METRICS
+from suave_des.report.grouping import grouped
+from suave_des.report.result_files import Missions, read_missions
 
 LIMIT_BYTES: Final = 5_000_000
 PATHS: Final = 12
@@ -22,6 +38,93 @@ PATHS: Final = 12
 _MOST_WAYS: Final = 120
 _STYLES: Final = ("common.css", "report.css")
 _SCRIPTS: Final = ("common.js", "charts.js", "report.js")
+MOST_DRAWN: Final = 20_000
+"""Missions whose values are in a page; of more, every second, third, ... run is, under all managers."""
+_DIGITS = 2
+_TITLES = {
+    **PAPER_METRICS,
+    **{name: KNOWN[name].heading for name in ("mean_reaction_time_s", "adaptations")},
+    "detection_x_m": "x of the first sight (m)",
+}
+"""Of the metrics in charts."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """Tables of one metric, as headings and rows of text.
+
+    Attributes:
+        title: metric with its unit.
+        tables: each with a title, which may be empty.
+        conclusions: what follows from each difference.
+    """
+
+    title: str
+    tables: Sequence[tuple[str, Table]]
+    conclusions: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Missions as columns, for the page's charts.
+
+    Attributes:
+        groups: names of the groups of missions, as the tables have them.
+        titles: of the metrics, by column.
+        columns: group number, run, seed, and each metric and swept parameter; None where there is no value.
+        swept: names of the swept parameters.
+        every: 1, or n if only each nth run is there.
+        missions: of all groups.
+        is_paired: whether runs of the same seed and number share their random numbers.
+    """
+
+    groups: Sequence[str]
+    titles: Mapping[str, str]
+    columns: Mapping[str, Sequence[Any]]
+    swept: Sequence[str]
+    every: int
+    missions: int
+    is_paired: bool
+
+
+@dataclass(frozen=True)
+class Made:
+    """How a campaign was made.
+
+    Attributes:
+        folder: its folder, as given.
+        facts: name and value of what decides its results.
+        command: that repeats it; empty: not known.
+        inputs: SHA-256 of each input file.
+        versions: of the software.
+    """
+
+    folder: str
+    facts: Sequence[tuple[str, str]] = ()
+    command: str = ""
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    versions: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Results:
+    """All that a report shows of results.
+
+    Attributes:
+        conclusion: what follows, in one sentence.
+        notes: what a reader should know of the data.
+        sections: tables by metric.
+        needed: how many runs an interval needs; None without a comparison.
+        remarks: how it was compared.
+        drawn: the missions.
+    """
+
+    conclusion: str
+    notes: Sequence[str]
+    sections: Sequence[Section]
+    needed: Table | None
+    remarks: Sequence[str]
+    drawn: Drawn
 
 
 def report_page(folders: Sequence[Path], runs: int = PATHS) -> str:
@@ -70,3 +173,105 @@ def plotly_script() -> str:
     except (ImportError, OSError):
         remedy = "pip install 'suave-des[report]'"
         raise InputError("the report's charts need plotly, which is not installed", remedy=remedy) from None
+
+
+def check_page_size(text: str, limit_bytes: int) -> None:
+    """See that a page can be sent by mail.
+
+    Raises:
+        InputError: it is too large.
+    """
+    size = len(text.encode())
+    if size > limit_bytes:
+        problem = f"the page would have {size / 1e6:.1f} MB, more than {limit_bytes / 1e6:g}"
+        raise InputError(problem, remedy="give fewer runs with --paths, or fewer folders")
+
+
+def results_of(missions: Missions) -> Results:
+    """Compare missions, and prepare them for the page.
+
+    Raises:
+        InputError: they cannot be compared.
+    """
+    found = compare(missions, Choices())
+    needed = runs_table(found) if found.differences else None
+    sections = [_section(found, metric.name) for metric in found.metrics]
+    return Results(found.conclusion, found.notes, sections, needed, remarks(found), drawn(missions))
+
+
+def _section(found: Comparison, name: str) -> Section:
+    metric = found.metric(name)
+    summaries, differences = found.of_metric(name)
+    tables: list[tuple[str, Table]] = [("", summary_table(metric, summaries))]
+    if censored := search_table(summaries):
+        tables.append(("with missions that never found the pipeline as censored (Kaplan-Meier)", censored))
+    if differences:
+        tables.append(("differences", difference_table(metric, differences)))
+    heading = metric.heading
+    return Section(heading[:1].upper() + heading[1:], tables, [each.conclusion for each in differences])
+
+
+def drawn(missions: Missions) -> Drawn:
+    """Put missions into columns, at most MOST_DRAWN of them."""
+    groups, _ = grouped(missions, (), ())
+    keys = list(dict.fromkeys(zip(missions.frame["manager"], missions.frame["source"], strict=True)))
+    numbers = {key: number for number, key in enumerate(keys)}
+    frame = missions.frame
+    every = max(1, math.ceil(len(frame) / MOST_DRAWN))
+    has_runs = bool(frame["run"].notna().all())
+    if every > 1:
+        place = frame["run"] if has_runs else pandas.Series(np.arange(len(frame)), frame.index)
+        frame = frame[(place % every) == (1 if has_runs else 0)]
+    pairs = zip(frame["manager"], frame["source"], strict=True)
+    columns: dict[str, list[Any]] = {"group": [numbers[pair] for pair in pairs]}
+    columns["run"] = _plain(frame["run"]) if has_runs else list(range(1, len(frame) + 1))
+    columns["seed"] = frame["seed"].astype(str).tolist()
+    if len(set(columns["seed"])) == 1:
+        columns["seed"] = columns["seed"][:1]
+    titles = {name: title for name, title in _TITLES.items() if name in frame and frame[name].notna().any()}
+    found = frame["pipeline_found"].astype(float)
+    columns["found"] = [None if value != value else int(value) for value in found.tolist()]
+    for name in (*titles, *missions.swept):
+        columns[name] = _plain(frame[name])
+    is_paired = has_runs and bool((frame["seed"] != "").all()) and len(keys) > 1
+    names = [each.name for each in groups]
+    return Drawn(names, titles, columns, missions.swept, every, len(missions.frame), is_paired)
+
+
+def _plain(column: pandas.Series) -> list[Any]:
+    """Return values as JSON has them: numbers with few digits, None where there is none."""
+    if not pandas.api.types.is_numeric_dtype(column):
+        return column.astype(str).tolist()
+    values = column.astype(float).round(_DIGITS).tolist()
+    return [None if not math.isfinite(value) else int(value) if value.is_integer() else value for value in values]
+
+
+def made_from(folder: Path) -> Made:
+    """Read how the campaign in a folder was made; little is known of other folders."""
+    try:
+        manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+        return Made(
+            str(folder),
+            list(_facts(manifest)),
+            _command(manifest),
+            dict(manifest.get("inputs_sha256", {})),
+            dict(manifest.get("versions", {})),
+        )
+    except (OSError, ValueError, AttributeError, TypeError):
+        return Made(str(folder))
+
+
+def _facts(manifest: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    for key in ("scenario", "managers", "runs", "seed", "reasoner", "machine"):
+        if key in manifest:
+            value = manifest[key]
+            yield key, ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+    missions = manifest.get("missions", {})
+    yield "missions", ", ".join(f"{number} {what.replace('_', ' ')}" for what, number in missions.items())
+    for key in ("sweep", "perturbations"):
+        if manifest.get(key):
+            yield key, json.dumps(manifest[key])
+
+
+def _command(manifest: Mapping[str, Any]) -> str:
+    return shlex.join(map(str, manifest.get("command", ())))

@@ -69,10 +69,9 @@ def overall_conclusion(
     parts = []
     for each in shown:
         assert each.difference is not None
-        phrase = (metric.less if metric.better < 0 else metric.more).format(metric.amount(abs(each.difference.value)))
-        _, _, words = phrase.partition(metric.amount(abs(each.difference.value)))
-        amount = f"{metric.amount(abs(each.difference.value))}{words}"
-        parts.append(f"{amount} {_other(each, best)} ({interval_text(each, metric)}{_basis(each)})")
+        _, _, words = (metric.less if metric.better < 0 else metric.more).partition("{}")
+        amount = metric.amount(abs(each.difference.value))
+        parts.append(f"{amount}{words} {_other(each, best)} ({interval_text(each, metric)}{_basis(each)})")
     sentence = f"{best} {metric.most}: {_listed(parts)}"
     ps = max(each.p_holm or 0.0 for each in shown)
     sentence += f"; {p_text(ps)} after Holm's correction" + (", the greatest of them" if len(shown) > 1 else "")

@@ -17,9 +17,9 @@ from suave_des.calibration.loss import (
     FreeParameter,
     Problem,
     as_vectors,
+    compare,
     energy_distance,
     evaluate,
-    published_vectors,
     resampling_spread,
     simulate,
 )
@@ -60,10 +60,10 @@ def test_missions_are_scaled_to_comparable_numbers() -> None:
 
 
 def test_a_component_that_is_never_known_for_a_manager_is_left_out() -> None:
-    columns = {"search_time_s": 80.0, "distance_inspected_m": 24.0, "detection_x_m": [-18.0, math.nan, math.nan]}
-    frame = pandas.DataFrame({"manager": ["none", "none", "random"], **columns})
-    vectors = published_vectors(frame, ["none", "random"])
-    assert (vectors["none"].shape, vectors["random"].shape) == ((2, 3), (1, 2))
+    columns = {"condition": 1, "search_time_s": 80.0, "distance_inspected_m": 24.0}
+    real = pandas.DataFrame({"manager": ["none", "random"], "detection_x_m": [-18.0, math.nan], **columns})
+    case = Case("any", load_scenario("seams2023"), real)
+    assert compare(case, real.assign(detection_x_m=-15.0)).distances == {"none": 2.0 * 2.0, "random": 0.0}
 
 
 @pytest.mark.parametrize(("unit", "value"), [(0.0, 1.0), (1.0, 3.0), (0.25, 1.5), (-0.25, 1.5), (1.25, 2.5)])

@@ -7,9 +7,8 @@ import pytest
 from suave_des.campaign.campaign import run_campaign
 from suave_des.campaign.single import run_mission
 from suave_des.cli.main import main
-from suave_des.pages.recorded import read_recorded
+from suave_des.pages.recorded import Chosen, missions_in, read_recorded
 from suave_des.pages.replay import mission_on_page
-from suave_des.pages.sources import Chosen, missions_in
 
 
 def status(*arguments):
