@@ -9,12 +9,13 @@ import os
 from collections.abc import Iterator
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import typer
 
 from suave_des.cli import kb_diff, kb_rules, kb_test, kb_why_not
 from suave_des.cli.console import output, plain_table, print_table, print_trimmed
+from suave_des.cli.headings import CommandsUnderHeadings, Headings, add_commands
 from suave_des.cli.kb_options import (
     AsFormat,
     Asked,
@@ -37,21 +38,8 @@ if TYPE_CHECKING:
 
 _EXAMPLES = 5
 _WIDE = 300
-app = typer.Typer(
-    name="kb",
-    add_completion=False,
-    rich_markup_mode=None,
-    help="Look at the knowledge base, edit its rules, and ask what they do.",
-)
 
 
-@app.callback(invoke_without_command=True)
-def _help(context: typer.Context) -> None:
-    if context.invoked_subcommand is None:
-        print(context.get_help())
-
-
-@app.command()
 @grouped_options
 def infer(knowledge: AskedInState, parts: StateParts, form: AsFormat = Format.TEXT) -> None:
     """Show what the reasoner infers in a state, and what Metacontrol would do."""
@@ -84,7 +72,6 @@ def infer(knowledge: AskedInState, parts: StateParts, form: AsFormat = Format.TE
             print(f"    not {rejection.design}: {rejection.reason}")
 
 
-@app.command()
 @grouped_options
 def explain(
     knowledge: AskedInState,
@@ -107,7 +94,6 @@ def explain(
         print(explanation)
 
 
-@app.command()
 @grouped_options
 def policy(
     knowledge: Asked,
@@ -226,7 +212,6 @@ class TableFormat(StrEnum):
     JSON = "json"
 
 
-@app.command()
 @grouped_options
 def query(
     knowledge: AskedInState,
@@ -261,12 +246,28 @@ def query(
             print("no rows")
 
 
-app.command("diff")(kb_diff.diff)
-app.command("test")(kb_test.test)
-app.command("why-not")(kb_why_not.why_not)
-app.command("try")(kb_rules.try_rule)
-for _command in (
-    *(kb_rules.check, kb_rules.rules, kb_rules.add_rule),
-    *(kb_rules.remove_rule, kb_rules.enable_rule, kb_rules.disable_rule),
-):
-    app.command()(_command)
+class _Commands(CommandsUnderHeadings):
+    headings: ClassVar[Headings] = {
+        "Ask": (infer, explain, kb_why_not.why_not, policy, query),
+        "Check, test and compare": (kb_rules.check, kb_test.test, kb_rules.try_, kb_diff.diff),
+        "Rules and OWL files": (
+            *(kb_rules.rules, kb_rules.add_rule, kb_rules.remove_rule),
+            *(kb_rules.enable_rule, kb_rules.disable_rule),
+        ),
+    }
+
+
+app = typer.Typer(
+    name="kb",
+    cls=_Commands,
+    add_completion=False,
+    rich_markup_mode=None,
+    help="Look at the knowledge base, edit its rules, and ask what they do.",
+)
+add_commands(app, _Commands.headings)
+
+
+@app.callback(invoke_without_command=True)
+def _help(context: typer.Context) -> None:
+    if context.invoked_subcommand is None:
+        print(context.get_help())

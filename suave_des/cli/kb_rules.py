@@ -162,7 +162,7 @@ def _switch(file: Path, name: str, *, enabled: bool) -> None:
 
 
 @grouped_options
-def try_rule(
+def try_(
     knowledge: Replayed,
     on: Annotated[
         Path,

@@ -7,16 +7,15 @@ import gc
 import os
 import signal
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from itertools import chain
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import typer
-from typer.core import TyperGroup
 
 from suave_des import __version__
 from suave_des.cli import bench, calibrate, campaign, files, kb, missions, results, validate
+from suave_des.cli.headings import CommandsUnderHeadings, Headings, add_commands
 from suave_des.cli.options import remember_command_line
 from suave_des.cli.terminal import plain, write_what_the_terminal_has
 from suave_des.errors import InputError, SuaveDesError
@@ -26,31 +25,16 @@ BAD_INPUT, MISSIONS_MISSING = 2, 3
 """Exit statuses besides 0 and those of signals; 3: done, but failed missions have no row."""
 
 
-_Command = Callable[..., None] | typer.Typer
-_GROUPS: Mapping[str, tuple[_Command, ...]] = {
-    "Run missions": (campaign.reproduce, missions.run, campaign.campaign, missions.train, missions.serve),
-    "Look at results": (results.compare, results.figure, results.report, results.replay, validate.validate),
-    "Knowledge, rules and trees": (kb.app, files.tree),
-    "Files": (files.import_config, files.scenarios, files.schema),
-    "Other": (calibrate.calibrate, bench.bench),
-}
-"""Headings of the help, and their commands, each named as its function."""
+class _Commands(CommandsUnderHeadings):
+    """Handles interruptions before typer does, which would not report what is kept."""
 
-
-def _name(command: _Command) -> str:
-    return str(command.info.name) if isinstance(command, typer.Typer) else command.__name__.replace("_", "-")
-
-
-class _Commands(TyperGroup):
-    """Handles interruptions before typer does, which would not report what is kept; groups commands in the help."""
-
-    def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write the commands under headings, each with the whole first line of its help."""
-        for heading, group in _GROUPS.items():
-            with formatter.section(heading):
-                formatter.write_dl(
-                    [(_name(each), self.commands[_name(each)].get_short_help_str(200)) for each in group]
-                )
+    headings: ClassVar[Headings] = {
+        "Run missions": (campaign.reproduce, missions.run, campaign.campaign, missions.train, missions.serve),
+        "Look at results": (results.compare, results.figure, results.report, results.replay, validate.validate),
+        "Knowledge, rules and trees": (kb.app, files.tree),
+        "Files": (files.import_config, files.scenarios, files.schema),
+        "Other": (calibrate.calibrate, bench.bench),
+    }
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command."""
@@ -85,11 +69,7 @@ app = typer.Typer(
     help="SUAVE, the self-adaptive underwater vehicle exemplar, as a repeatable discrete-event simulation.",
     epilog="Exit status: 0 done; 2 bad input; 3 done, but missions failed; 130 interrupted, 143 by kill.",
 )
-for _command in chain.from_iterable(_GROUPS.values()):
-    if isinstance(_command, typer.Typer):
-        app.add_typer(_command, name=_name(_command))
-    else:
-        app.command(_name(_command))(_command)
+add_commands(app, _Commands.headings)
 
 
 def _print_version(wanted: bool) -> None:

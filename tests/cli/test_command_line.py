@@ -70,6 +70,10 @@ class TestHelp:
         for name in ("run", "campaign", "reproduce", "figure", "scenarios", "schema"):
             assert f"  {name} " in ended.out
 
+    @pytest.mark.parametrize("group", [(), ("kb",)])
+    def test_summaries_are_whole(self, command, group: tuple[str, ...]) -> None:
+        assert "..." not in command(*group, "--help").out.replace("[ARGS]...", "")
+
     def test_imports_nothing_heavy(self) -> None:
         code = (
             "import sys\n"
