@@ -13,11 +13,10 @@ from pydantic import Field, model_validator
 from suave_des.calibration.cases import Case
 from suave_des.calibration.loss import FreeParameter, Problem
 from suave_des.errors import InputError, did_you_mean, shown
-from suave_des.scenario.layers import Layer
 from suave_des.scenario.loader import LoadedScenario, value_at, with_values
 from suave_des.scenario.problems import validated
 from suave_des.scenario.quantities import Number, Strict, ordered
-from suave_des.scenario.yamlfile import read_yaml
+from suave_des.scenario.yamlfile import Layer, read_yaml
 
 
 class FreeEntry(Strict):
@@ -64,7 +63,7 @@ def read_parameters(
     Raises:
         InputError: the file, or a path or value in it, cannot be used.
     """
-    layer = Layer.of(read_yaml(path), 0)
+    layer = read_yaml(path)
     content = validated(layer, CalibrationFile)
     formed = {name: _formed(layer, content.form, loaded) for name, loaded in scenarios.items()}
     parameters = tuple(_parameter(layer, index, entry, formed) for index, entry in enumerate(content.free))

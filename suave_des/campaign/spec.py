@@ -17,10 +17,11 @@ from suave_des.errors import InputError, shown
 from suave_des.metrics.result import MissionMetrics
 from suave_des.registry import manager_class
 from suave_des.resources import find
-from suave_des.scenario.layers import Files, Layer, find_named
+from suave_des.scenario.layers import Files, find_named
 from suave_des.scenario.loader import Replacements
 from suave_des.scenario.problems import validated
 from suave_des.scenario.quantities import Number, Strict
+from suave_des.scenario.yamlfile import Layer
 
 FORMAT = 1
 """Version of the format of campaign files."""
@@ -372,7 +373,7 @@ def read_campaign_file(name: str | Path) -> CampaignFile | None:
         InputError: it cannot be read, is of another version, or has a value that cannot be right.
     """
     files = Files()
-    layer = Layer.of(files.yaml(find(name, "scenarios")), 0)
+    layer = files.yaml(find(name, "scenarios"))
     if "campaign" not in layer.data:
         return None
     version = layer.data["campaign"]

@@ -20,9 +20,10 @@ from suave_des.scenario.exemplar_files import (
     read_configuration,
 )
 from suave_des.scenario.exemplar_settings import RELEASES, Release, Setting, Settings, release_of, settings_of
-from suave_des.scenario.layers import Files, Layer, Location, merge, scenario_layer
+from suave_des.scenario.layers import Files, merge, scenario_layer
 from suave_des.scenario.loader import LoadedScenario, load_layer
 from suave_des.scenario.models import Scenario
+from suave_des.scenario.yamlfile import Layer, Location
 
 VISIBILITY = "signals.water_visibility."
 """Begins the key paths of the visibility's settings."""
@@ -165,7 +166,7 @@ def _layer(settings: Settings, configuration: Configuration, release: Release, o
             file = parameter.document.path
             places[path] = Location(0, parameter.line, file)
             for index in range(len(parameter.value) if isinstance(parameter.value, list) else 0):
-                places[(*path, index)] = Location(0, parameter.document.line((*parameter.key_path, index)), file)
+                places[(*path, index)] = parameter.document.place((*parameter.key_path, index))
     if configuration.modes:
         first, *others = configuration.modes
         if any(other.sha256 != first.sha256 for other in others):

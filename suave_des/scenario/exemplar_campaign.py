@@ -23,10 +23,10 @@ from suave_des.scenario.exemplar_files import (
     json_object,
     unknown_key,
 )
-from suave_des.scenario.layers import Layer, Location
 from suave_des.scenario.loader import LoadedScenario, value_at
 from suave_des.scenario.problems import input_error
 from suave_des.scenario.quantities import LONGEST_S, Within, wrong
+from suave_des.scenario.yamlfile import Layer, Location
 
 _INTERVAL = "_random_interval"
 _NOMINAL = {"initial_pos_x": -17.0, "initial_pos_y": 2.0}
@@ -207,9 +207,9 @@ def _checked(runner: Mapping[str, Parameter]) -> _Runner:
     data = {node: {key: parameter.value for key, parameter in runner.items()}}
     places: dict[KeyPath, Location] = {}
     for key, parameter in runner.items():
-        for path, line in parameter.document.lines.items():
+        for path, place in parameter.document.places.items():
             if path[:3] == parameter.key_path:
-                places[(node, key, *path[3:])] = Location(0, line, parameter.document.path)
+                places[(node, key, *path[3:])] = place
     try:
         return _NODES.validate_python(data)[node]
     except ValidationError as error:

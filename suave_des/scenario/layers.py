@@ -3,89 +3,21 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from suave_des.errors import InputError, KeyPath, did_you_mean, place_text, shown
+from suave_des.errors import InputError, KeyPath, did_you_mean, shown
 from suave_des.files import read_bytes
 from suave_des.resources import find, shipped_folder
 from suave_des.scenario.physical import VehicleDescription
 from suave_des.scenario.revision import Revision
-from suave_des.scenario.yamlfile import YamlDocument, read_yaml
+from suave_des.scenario.yamlfile import Layer, YamlDocument, read_yaml
 
 _KIND_KEYS = ("kind", "distribution")
 """Keys for the kind of a mapping: one of another kind replaces the base's, whose keys would not fit."""
 
 _REMOVABLE_IN: tuple[KeyPath, ...] = (("signals",), ("knowledge", "values"))
 """Mappings of freely named entries, in which a null removes the base's entry."""
-
-
-class Location(NamedTuple):
-    """File and line of a value; depth 0 is the file that the user named, its base is 1, and so on."""
-
-    depth: int
-    line: int
-    file: Path
-
-
-@dataclass(frozen=True)
-class Layer:
-    """Plain data of one or several merged files, with the location of each key path."""
-
-    data: dict[str, Any]
-    places: Mapping[KeyPath, Location]
-
-    @staticmethod
-    def of(document: YamlDocument, depth: int) -> Layer:
-        """The layer of one file."""
-        places = {path: Location(depth, line, document.path) for path, line in document.lines.items()}
-        return Layer(document.data, places)
-
-    def place(self, key_path: KeyPath) -> Location:
-        """Location of a key path, or of the nearest part that holds it."""
-        for length in range(len(key_path), 0, -1):
-            if (place := self.places.get(key_path[:length])) is not None:
-                return place
-        return self.places[()]
-
-    def has(self, key_path: KeyPath) -> bool:
-        """Whether a key path is in a file, and not a default."""
-        return key_path in self.places
-
-    def key_path(self, place: str) -> KeyPath:
-        """Split a place such as "sweep.grid.start.x_m" into keys that are there; these may have points in them."""
-        path: list[str | int] = []
-        here: Any = self.data
-        while place and isinstance(here, Mapping):
-            key = next((key for key in here if place == key or place.startswith(f"{key}.")), None)
-            if key is None:
-                break
-            path.append(key)
-            here, place = here[key], place[len(key) + 1 :]
-        return tuple(path)
-
-    def error(self, problem: str, key_path: KeyPath, remedy: str | None) -> InputError:
-        """An error about the value at a key path."""
-        place = self.place(key_path)
-        return InputError(problem, file=place.file, place=place_text(place.line, key_path), remedy=remedy)
-
-    def without(self, key: str) -> Layer:
-        """The same without one key of the top level."""
-        data = {other: value for other, value in self.data.items() if other != key}
-        return Layer(data, {path: place for path, place in self.places.items() if path[:1] != (key,)})
-
-    def below(self, key: str) -> Layer:
-        """The mapping under a key."""
-        places = {path[1:]: place for path, place in self.places.items() if path[:1] == (key,)}
-        return Layer(self.data[key], places)
-
-    def replaced(self, key: str, value: Layer) -> Layer:
-        """The same with another mapping under a key."""
-        others = self.without(key)
-        places = {(key, *path): place for path, place in value.places.items()}
-        return Layer({**others.data, key: value.data}, {**others.places, **places})
 
 
 def merge(base: Layer, over: Layer) -> Layer:
@@ -150,9 +82,9 @@ class Files:
     def __init__(self) -> None:
         self.inputs: dict[str, str] = {}
 
-    def yaml(self, path: Path) -> YamlDocument:
+    def yaml(self, path: Path, depth: int = 0) -> YamlDocument:
         """Read a YAML file."""
-        document = read_yaml(path)
+        document = read_yaml(path, depth)
         self.note(path, document.sha256)
         return document
 
@@ -184,7 +116,7 @@ def scenario_layer(files: Files, path: Path, above: tuple[Path, ...] = ()) -> La
     Raises:
         InputError: a file that cannot be read, or is its own base; a revision that is not known.
     """
-    layer = Layer.of(files.yaml(path), len(above))
+    layer: Layer = files.yaml(path, len(above))
     base = None
     if "base" in layer.data:
         base = find_named(layer, ("base",), layer.data["base"], "scenarios")
@@ -263,7 +195,7 @@ def _part_layer(
         remedy = f"{did_you_mean(name, shipped, 'shipped')}; or the path of a {part.key} file"
         raise named.error(f"there is no {part.key} {shown(name)}", key_path, remedy) from None
     _check_chain(named, key_path, (*above, path))
-    layer = Layer.of(files.yaml(path), depth)
+    layer: Layer = files.yaml(path, depth)
     if "base" not in layer.data:
         return layer
     below = _part_layer(files, layer, ("base",), layer.data["base"], part, depth + 1, (*above, path))

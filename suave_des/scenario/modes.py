@@ -11,7 +11,6 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, TypeAdapter, ValidationError
 
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown
-from suave_des.scenario.layers import Layer
 from suave_des.scenario.problems import input_error
 from suave_des.scenario.quantities import Length, Strict, wrong
 from suave_des.scenario.yamlfile import YamlDocument, read_yaml
@@ -155,7 +154,7 @@ def modes_of(document: YamlDocument) -> ModeTable:
     try:
         content = _FILE.validate_python(document.data)
     except ValidationError as error:
-        raise input_error(error, Layer.of(document, 0), dict[str, _Entry]) from None
+        raise input_error(error, document, dict[str, _Entry]) from None
     systems: dict[str, _System] = {}
     nodes: dict[str, dict[str, dict[str, Value]]] = {}
     for name, key in keys.items():

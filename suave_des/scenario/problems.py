@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from suave_des.errors import InputError, KeyPath, did_you_mean, place_text, shown
-from suave_des.scenario.layers import Layer, Location
+from suave_des.scenario.yamlfile import Layer, Location
 
 _MAPPING = ("expected a mapping of keys to values, got {value}", "write `key: value` lines under it, or leave it out")
 _NUMBER = ("expected a number, got {value}", "such as 12.5, without quotes")

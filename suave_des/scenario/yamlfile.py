@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 from yaml.reader import ReaderError
@@ -28,36 +28,89 @@ _SHORTER = "write it out, with fewer values or aliases"
 _TAG = "tag:yaml.org,2002:"
 
 
+class Location(NamedTuple):
+    """File and line of a value; depth 0 is the file that the user named, its base is 1, and so on."""
+
+    depth: int
+    line: int
+    file: Path
+
+
 @dataclass(frozen=True)
-class YamlDocument:
-    """One YAML file: plain data, and the line of each part of it.
+class Layer:
+    """Plain data of one or several merged files, with the location of each key path."""
+
+    data: dict[str, Any]
+    places: Mapping[KeyPath, Location]
+
+    def place(self, key_path: KeyPath) -> Location:
+        """Location of a key path, or of the nearest part that holds it."""
+        for length in range(len(key_path), 0, -1):
+            if (place := self.places.get(key_path[:length])) is not None:
+                return place
+        return self.places[()]
+
+    def has(self, key_path: KeyPath) -> bool:
+        """Whether a key path is in a file, and not a default."""
+        return key_path in self.places
+
+    def key_path(self, place: str) -> KeyPath:
+        """Split a place such as "sweep.grid.start.x_m" into keys that are there; these may have points in them."""
+        path: list[str | int] = []
+        here: Any = self.data
+        while place and isinstance(here, Mapping):
+            key = next((key for key in here if place == key or place.startswith(f"{key}.")), None)
+            if key is None:
+                break
+            path.append(key)
+            here, place = here[key], place[len(key) + 1 :]
+        return tuple(path)
+
+    def error(self, problem: str, key_path: KeyPath, remedy: str | None) -> InputError:
+        """An error about the value at a key path."""
+        place = self.place(key_path)
+        return InputError(problem, file=place.file, place=place_text(place.line, key_path), remedy=remedy)
+
+    def without(self, key: str) -> Layer:
+        """The same without one key of the top level."""
+        data = {other: value for other, value in self.data.items() if other != key}
+        return Layer(data, {path: place for path, place in self.places.items() if path[:1] != (key,)})
+
+    def below(self, key: str) -> Layer:
+        """The mapping under a key."""
+        places = {path[1:]: place for path, place in self.places.items() if path[:1] == (key,)}
+        return Layer(self.data[key], places)
+
+    def replaced(self, key: str, value: Layer) -> Layer:
+        """The same with another mapping under a key."""
+        others = self.without(key)
+        places = {(key, *path): place for path, place in value.places.items()}
+        return Layer({**others.data, key: value.data}, {**others.places, **places})
+
+
+@dataclass(frozen=True)
+class YamlDocument(Layer):
+    """One YAML file: its top-level mapping, of str, int, float, bool, None, list and dict with str keys.
 
     Attributes:
         path: the file.
-        data: its top-level mapping, of str, int, float, bool, None, list and dict with str keys.
-        lines: line (from 1) of each key path.
         sha256: of the file's bytes, in hex.
     """
 
     path: Path
-    data: dict[str, Any]
-    lines: Mapping[KeyPath, int]
     sha256: str
 
     def line(self, key_path: KeyPath) -> int:
         """Line of a key path, or of the nearest part of the file that holds it."""
-        for length in range(len(key_path), -1, -1):
-            if (line := self.lines.get(key_path[:length])) is not None:
-                return line
-        return 1
-
-    def error(self, problem: str, key_path: KeyPath, remedy: str | None = None) -> InputError:
-        """An error about the value at a key path."""
-        return InputError(problem, file=self.path, place=place_text(self.line(key_path), key_path), remedy=remedy)
+        return self.place(key_path).line
 
 
-def read_yaml(path: Path | str) -> YamlDocument:
+def read_yaml(path: Path | str, depth: int = 0) -> YamlDocument:
     """Read a YAML file whose top level is a mapping.
+
+    Args:
+        path: of the file.
+        depth: of its places: 0 for a file that the user named, 1 for its base, and so on.
 
     Raises:
         InputError: with the line: the file cannot be read, is not YAML, has a tag, a duplicate key or several
@@ -79,9 +132,9 @@ def read_yaml(path: Path | str) -> YamlDocument:
     if not isinstance(root, yaml.MappingNode):
         problem = "is not a mapping at its top level"
         raise InputError(problem, file=path, place=f"line {_line(root)}", remedy="write `key: value` lines")
-    reading = _Reading(path)
+    reading = _Reading(path, depth)
     data = reading.plain(root, (), ())
-    return YamlDocument(path, data, reading.lines, hashlib.sha256(content).hexdigest())
+    return YamlDocument(data, reading.places, path, hashlib.sha256(content).hexdigest())
 
 
 def read_value(text: str, option: str) -> Any:
@@ -163,11 +216,11 @@ _SCALARS: dict[str, Callable[[str], Any]] = {
 
 
 class _Reading:
-    """Turns nodes into plain data and notes the line of each key path."""
+    """Turns nodes into plain data and notes the place of each key path."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.lines: dict[KeyPath, int] = {(): 1}
+    def __init__(self, path: Path, depth: int = 0) -> None:
+        self.path, self._depth = path, depth
+        self.places: dict[KeyPath, Location] = {(): Location(depth, 1, path)}
         self._count = 0
 
     def plain(self, node: yaml.Node, key_path: KeyPath, above: tuple[int, ...]) -> Any:
@@ -175,7 +228,7 @@ class _Reading:
         self._count += 1
         if self._count > NODE_LIMIT or len(above) > DEPTH_LIMIT:
             error = _TooMuchError(node.start_mark, deep=self._count <= NODE_LIMIT)
-            raise self._error(self.lines[key_path[:1]], key_path[:1], str(error.problem), _SHORTER)
+            raise self._error(self.places[key_path[:1]].line, key_path[:1], str(error.problem), _SHORTER)
         line = _line(node)
         if id(node) in above:
             raise self._error(line, key_path, "an alias stands for something that holds it", "write it out")
@@ -184,7 +237,7 @@ class _Reading:
             return self._mapping(node, key_path, inside)
         if isinstance(node, yaml.SequenceNode) and node.tag == _TAG + "seq":
             for index, item in enumerate(node.value):
-                self.lines[(*key_path, index)] = _line(item)
+                self.places[(*key_path, index)] = Location(self._depth, _line(item), self.path)
             return [self.plain(item, (*key_path, index), inside) for index, item in enumerate(node.value)]
         tag = node.tag.replace(_TAG, "!!")
         if not isinstance(node, yaml.ScalarNode) or node.tag not in _SCALARS:
@@ -206,11 +259,11 @@ class _Reading:
                 remedy = "use a short name of letters and digits"
                 raise self._error(line, key_path, f"{shown(key)} is not a valid key", remedy)
             if key in data:
-                problem = f"the key {shown(key)} appears twice, first in line {self.lines[below]}"
+                problem = f"the key {shown(key)} appears twice, first in line {self.places[below].line}"
                 raise self._error(line, below, problem, "keep one of them")
             if key == "<<":
                 raise self._error(line, key_path, "the merge key << is not supported", "write the keys out")
-            self.lines[below] = line
+            self.places[below] = Location(self._depth, line, self.path)
             data[key] = self.plain(value_node, below, inside)
         return data
 

@@ -12,7 +12,6 @@ from pydantic import Field, model_validator
 
 from suave_des.estimates import Interval
 from suave_des.report.statistics import share_interval
-from suave_des.scenario.layers import Layer
 from suave_des.scenario.problems import validated
 from suave_des.scenario.quantities import Number, Strict, ordered, wrong
 from suave_des.scenario.yamlfile import read_yaml
@@ -86,7 +85,7 @@ def read_targets(path: Path) -> ShareList:
     Raises:
         InputError: with file and line: it cannot be read, or is not valid.
     """
-    return validated(Layer.of(read_yaml(path), 0), ShareList)
+    return validated(read_yaml(path), ShareList)
 
 
 def shares_beside(data: Path) -> Path | None:
