@@ -1,4 +1,4 @@
-"""Which Python files a user's own managers and functions are in, so that these can travel to other machines."""
+"""How a user's own managers and functions come to other processes and machines: by their files, or by value."""
 
 from __future__ import annotations
 
@@ -122,6 +122,8 @@ def _imports(path: Path, package: str) -> Iterator[str]:
             yield name
             yield from (f"{name}.{alias.name}" for alias in node.names)
 
+
+# Managers of a notebook or a prompt, which worker processes could not import.
 
 _MAIN = "__main__"
 
