@@ -25,7 +25,7 @@ from suave_des.scenario.exemplar_files import (
 )
 from suave_des.scenario.loader import LoadedScenario, value_at
 from suave_des.scenario.problems import input_error
-from suave_des.scenario.quantities import LONGEST_S, Within, wrong
+from suave_des.scenario.quantities import LONGEST_S, Real, Within, wrong
 from suave_des.scenario.yamlfile import Layer, Location
 
 _INTERVAL = "_random_interval"
@@ -43,7 +43,7 @@ def _interval(value: Any) -> Any:
     return value
 
 
-_Limit = Annotated[float, Field(strict=True), Within(-LONGEST_S, LONGEST_S)]
+_Limit = Annotated[Real, Within(-LONGEST_S, LONGEST_S)]
 _Interval = Annotated[tuple[_Limit, _Limit], BeforeValidator(_interval)]
 
 

@@ -25,6 +25,7 @@ from suave_des.scenario.quantities import (
     Number,
     OffsetDistribution,
     Period,
+    Real,
     Strict,
     Within,
     wrong,
@@ -63,7 +64,7 @@ class FunctionSettings(Strict):
 class MissionSettings(Strict):
     """The coordinator's limit, and what its tasks need."""
 
-    time_limit_s: Annotated[float, Field(strict=True), Within(gt=0, le=_LONGEST_MISSION_S, unit="s")] = 300.0
+    time_limit_s: Annotated[Real, Within(gt=0, le=_LONGEST_MISSION_S, unit="s")] = 300.0
     """When the current task is cancelled and the metrics are taken."""
     functions: MissionFunctions = MissionFunctions()
     """Functions that are needed besides the exemplar's."""
@@ -85,17 +86,17 @@ class Latencies(Strict):
 class Calibration(Strict):
     """Parameters of vehicle, autopilot and simulator that the sources leave open, alike for every manager."""
 
-    position_gain_per_s: Annotated[float, Field(strict=True), Within(gt=0, le=100, unit="1/s")] = 1.0
+    position_gain_per_s: Annotated[Real, Within(gt=0, le=100, unit="1/s")] = 1.0
     """Horizontal velocity demanded for each metre of position error; ArduSub's default."""
-    jerk_m_per_s3: Annotated[float, Field(strict=True), Within(gt=0, le=1000, unit="m/s^3")] = 0.5
+    jerk_m_per_s3: Annotated[Real, Within(gt=0, le=1000, unit="m/s^3")] = 0.5
     """Jerk with which the autopilot's target moves along a leg to a set-point."""
-    velocity_gain_per_s: Annotated[float, Field(strict=True), Within(gt=0, le=10, unit="1/s")] = 4.0
+    velocity_gain_per_s: Annotated[Real, Within(gt=0, le=10, unit="1/s")] = 4.0
     """Horizontal acceleration demanded for each m/s of velocity error."""
-    velocity_integral_gain_per_s2: Annotated[float, Field(strict=True), Within(0, 10, unit="1/s^2")] = 1.2
+    velocity_integral_gain_per_s2: Annotated[Real, Within(0, 10, unit="1/s^2")] = 1.2
     """Horizontal acceleration demanded for each metre that the velocity error sums up to; each new leg starts anew."""
-    heading_frequency_rad_per_s: Annotated[float, Field(strict=True), Within(gt=0, le=10, unit="rad/s")] = 4.5
+    heading_frequency_rad_per_s: Annotated[Real, Within(gt=0, le=10, unit="rad/s")] = 4.5
     """Natural frequency of heading control."""
-    heading_integral_gain_per_s3: Annotated[float, Field(strict=True), Within(0, 100, unit="1/s^3")] = 0.0
+    heading_integral_gain_per_s3: Annotated[Real, Within(0, 100, unit="1/s^3")] = 0.0
     """Angular acceleration demanded for each rad s that the heading error sums up to."""
     altitude_error_m: OffsetDistribution = 0.0
     """Steady error of the held altitude whose cause is not explained, drawn once a run: set-point plus this."""

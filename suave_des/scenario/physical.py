@@ -24,6 +24,7 @@ from suave_des.scenario.quantities import (
     HeadingDistribution,
     Length,
     Period,
+    Real,
     ShiftDistribution,
     Strict,
     TimeDistribution,
@@ -33,16 +34,16 @@ from suave_des.scenario.quantities import (
 )
 from suave_des.scenario.signal_kinds import Monitor
 
-Positive = Annotated[float, Field(strict=True), Within(gt=0, le=1e6)]
-Offset = Annotated[float, Field(strict=True), Within(-FARTHEST_M, FARTHEST_M, unit="m")]
-Component = Annotated[float, Field(strict=True), Within(-1.0, 1.0)]
+Positive = Annotated[Real, Within(gt=0, le=1e6)]
+Offset = Annotated[Real, Within(-FARTHEST_M, FARTHEST_M, unit="m")]
+Component = Annotated[Real, Within(-1.0, 1.0)]
 _UNIT_TOLERANCE = 1e-3
 
 
 class Camera(Strict):
     """The camera, which looks straight down."""
 
-    field_of_view_deg: Annotated[float, Field(strict=True), Within(gt=0, lt=180, unit="degrees")]
+    field_of_view_deg: Annotated[Real, Within(gt=0, lt=180, unit="degrees")]
     """Full angle of view, in x and in y alike; the search spaces the turns of its spiral by it, too."""
 
     @property
@@ -100,7 +101,7 @@ class CurrentWaveDescription(Strict):
     """Mean speed, drawn once a run."""
     amplitude_m_per_s: CurrentDistribution = 0.0
     """How far the speed departs from it, drawn once a run."""
-    period_s: Annotated[float, Field(strict=True), Within(1.0, LONGEST_S, unit="s")] = 120.0
+    period_s: Annotated[Real, Within(1.0, LONGEST_S, unit="s")] = 120.0
     """Time from one greatest speed to the next."""
     shift_s: ShiftDistribution = 0.0
     """Added to mission time, drawn once a run."""
@@ -211,7 +212,7 @@ class Battery(Monitor):
     """Added to each measurement of the level, drawn anew each time."""
     approach_altitude_m: Length = 1.25
     """Altitude above the sea bed at which the station is approached."""
-    mission_ends_at_level: Annotated[float, Field(strict=True), Within(0.0, lt=1.0)] | None = None
+    mission_ends_at_level: Annotated[Real, Within(0.0, lt=1.0)] | None = None
     """Level at which, or below which, the mission ends; left out: it goes on with an empty battery."""
     resend_period_s: Period = 10.0
     """Period at which the station is sent to the autopilot again."""

@@ -118,15 +118,15 @@ class Within:
         return f"{' and '.join(near)} {self.unit}".rstrip()
 
 
-_Float = Annotated[float, Field(strict=True)]
+Real = Annotated[float, Field(strict=True)]
 """A number written as one: "80" in quotes and true are none."""
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_.-]*$", max_length=100)]
-Number = Annotated[_Float, Within(-LARGEST, LARGEST)]
-NotNegative = Annotated[_Float, Within(0, LARGEST)]
-Coordinate = Annotated[_Float, Within(-FARTHEST_M, FARTHEST_M, unit="m")]
-Length = Annotated[_Float, Within(gt=0, le=FARTHEST_M, unit="m")]
-Duration = Annotated[_Float, Within(gt=0, le=LONGEST_S, unit="s")]
-Period = Annotated[_Float, Within(0.001, LONGEST_S, unit="s")]
+Number = Annotated[Real, Within(-LARGEST, LARGEST)]
+NotNegative = Annotated[Real, Within(0, LARGEST)]
+Coordinate = Annotated[Real, Within(-FARTHEST_M, FARTHEST_M, unit="m")]
+Length = Annotated[Real, Within(gt=0, le=FARTHEST_M, unit="m")]
+Duration = Annotated[Real, Within(gt=0, le=LONGEST_S, unit="s")]
+Period = Annotated[Real, Within(0.001, LONGEST_S, unit="s")]
 """Period of something that happens in mission time; the lower limit keeps a slip from stopping the clock."""
 
 
@@ -233,7 +233,7 @@ def _tag(value: Any) -> str | None:
 
 
 Distribution = Annotated[
-    Annotated[_Float, Tag("number")]
+    Annotated[Real, Tag("number")]
     | Annotated[Normal, Tag("normal")]
     | Annotated[Uniform, Tag("uniform")]
     | Annotated[Exponential, Tag("exponential")]

@@ -14,6 +14,7 @@ from suave_des.scenario.quantities import (
     NotNegative,
     OffsetDistribution,
     Period,
+    Real,
     Strict,
     Within,
     support,
@@ -28,7 +29,7 @@ class CoordinatorRevision(Strict):
 
     poll_period_s: Period
     """Period of its loop."""
-    limit_check_period_s: Annotated[float, Field(strict=True), Within(0.001, 1000, unit="s")]
+    limit_check_period_s: Annotated[Real, Within(0.001, 1000, unit="s")]
     """Period at which the time limit is checked."""
     search_time: Literal["poll", "detection"]
     """Time of the poll that saw the detection, or of the detection itself; cut to whole seconds."""
@@ -47,7 +48,7 @@ class SpiralRevision(Strict):
     """Whether a spiral that goes on sends its way-point at once (else when it has waited for it long enough)."""
     tick_period_s: Period
     """Period of its timer; at most one way-point is reached a tick."""
-    angle_step_rad: Annotated[float, Field(strict=True), Within(gt=0, le=6.3, unit="rad")]
+    angle_step_rad: Annotated[Real, Within(gt=0, le=6.3, unit="rad")]
     """Angle from one way-point to the next."""
     acceptance_m: Length
     """A way-point is reached when dx, dy and dz are all at most this."""
@@ -102,7 +103,7 @@ class MonitorsRevision(Strict):
     """Period at which it is checked whether a thruster event is due: at most one happens at a time."""
     visibility_publishing_period_s: Period
     """Period at which signals are measured that give none themselves."""
-    detected_point_height_m: Annotated[float, Field(strict=True), Within(0, FARTHEST_M, unit="m")]
+    detected_point_height_m: Annotated[Real, Within(0, FARTHEST_M, unit="m")]
     """Height above the pipeline's points at which the detection mock-up looks for them."""
 
 
@@ -111,7 +112,7 @@ class ThrusterFailureRevision(Strict):
 
     effective_from_s: NotNegative = 0.0
     """A failure before this mission time does not."""
-    loss_probability: Annotated[float, Field(strict=True), Within(0.0, 1.0)] = 0.0
+    loss_probability: Annotated[Real, Within(0.0, 1.0)] = 0.0
     """Chance that a later one does not, for each on its own."""
 
 

@@ -19,6 +19,7 @@ from suave_des.scenario.quantities import (
     NotNegative,
     Number,
     Period,
+    Real,
     ShiftDistribution,
     Strict,
     ValueDistribution,
@@ -30,7 +31,7 @@ from suave_des.scenario.quantities import (
 class Monitor(Strict):
     """What can be wrong with any monitor."""
 
-    dropout_probability: Annotated[float, Field(strict=True), Within(0.0, 1.0)] = 0.0
+    dropout_probability: Annotated[Real, Within(0.0, 1.0)] = 0.0
     """Chance that a message is lost, each for itself."""
     outages_s: tuple[tuple[NotNegative, NotNegative], ...] = ()
     """Intervals of mission time, [from, to], in which every message is lost."""
