@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Collection, Iterator
-from contextlib import closing, contextmanager
+from contextlib import chdir, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -82,21 +81,10 @@ def opened_campaign(folder: Path, named: Collection[str] = ()) -> Iterator[Opene
         raise InputError("has no campaign whose missions could be run again", file=folder, remedy=remedy)
     with closing(Store(path)) as store:
         spec = CampaignSpec.of_stored(store.about("request"))
-    with _where_started(spec.folder):
+    with chdir(spec.folder if Path(spec.folder).is_dir() else Path.cwd()):
         file = read_campaign_file(spec.scenario)
         spec = spec.with_file(file)
         check_trusted(spec.managers, named, folder, confirmed=False)
         spec.check()
         loaded, variation, _ = read_inputs(spec, file)
         yield OpenedCampaign(spec, loaded, variation)
-
-
-@contextmanager
-def _where_started(folder: str) -> Iterator[None]:
-    before = Path.cwd()
-    if folder and Path(folder).is_dir():
-        os.chdir(folder)
-    try:
-        yield
-    finally:
-        os.chdir(before)

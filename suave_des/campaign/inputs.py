@@ -21,7 +21,7 @@ from suave_des.campaign.variation import Variation, vary
 from suave_des.errors import InputError, shown
 from suave_des.managing.learned import read_file
 from suave_des.registry import is_built_in, is_installed, manager_class, takes_argument
-from suave_des.scenario.layers import Files
+from suave_des.scenario.layers import Files, sha256_of
 from suave_des.scenario.loader import LoadedScenario, load_scenario
 from suave_des.simulation.functions import own_functions
 
@@ -95,7 +95,7 @@ def check_inputs(
         for manager in managers:
             manager_class(manager).check(each)
         found |= declared_files([each], managers)
-    return {**loaded.inputs, **files.inputs, **{name: _sha256(path) for name, path in found.items()}}
+    return {**loaded.inputs, **files.inputs, **{name: sha256_of(path, _LIMIT_BYTES) for name, path in found.items()}}
 
 
 def _modules(managers: Iterable[str]) -> Iterator[tuple[str, Path]]:
@@ -112,18 +112,6 @@ def _modules(managers: Iterable[str]) -> Iterator[tuple[str, Path]]:
             yield f"{module.replace('.', '/')}{'/__init__' if is_package else ''}{path.suffix}", path
         if path.suffix == ".py":
             yield from own_modules([manager]).items()
-
-
-def _sha256(path: Path) -> str:
-    try:
-        if path.stat().st_size > _LIMIT_BYTES:
-            raise InputError("is too large", file=path, remedy=f"at most {_LIMIT_BYTES:,} bytes")
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        raise InputError(
-            f"cannot be read: {error.strerror}", file=path, remedy="check the name and the rights"
-        ) from None
 
 
 def default_time_out_s(loaded: LoadedScenario, variation: Variation) -> float:

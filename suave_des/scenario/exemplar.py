@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from suave_des.errors import InputError, KeyPath
 from suave_des.resources import find, shipped_folder
-from suave_des.scenario.exemplar_campaign import RunnerImport, campaign_text, commented, flow, heading, one_line
+from suave_des.scenario.exemplar_campaign import campaign_text, commented, flow, heading, one_line
 from suave_des.scenario.exemplar_files import (
     NODES,
     NOT_NEEDED,
     RUNNER,
     Configuration,
-    is_extended,
+    ImportOptions,
     read_configuration,
 )
 from suave_des.scenario.exemplar_settings import RELEASES, Release, Setting, Settings, release_of, settings_of
@@ -27,25 +27,6 @@ from suave_des.scenario.yamlfile import Layer, Location
 
 VISIBILITY = "signals.water_visibility."
 """Begins the key paths of the visibility's settings."""
-
-
-@dataclass(frozen=True)
-class ImportOptions:
-    """What an import is to give.
-
-    Attributes:
-        base: scenario to build on; None: the shipped one of the files' revision.
-        revision: of the exemplar, which the files are read as; None: the base's, or the only one that they fit.
-        campaign: where the campaign will be; None: no campaign is imported.
-        runner_seed: of the exemplar's own draws, which become the campaign's conditions; None: values are drawn anew.
-        managers: names of the managers that can be run.
-    """
-
-    base: str | None = None
-    revision: str | None = None
-    campaign: Path | None = None
-    runner_seed: int | None = None
-    managers: Collection[str] = ()
 
 
 @dataclass(frozen=True)
@@ -100,14 +81,13 @@ def import_config(files: Sequence[Path], out: Path, options: ImportOptions) -> I
         loaded = load_layer(reader, merge(below, _layer(settings, configuration, release, out)), out)
     except InputError as error:
         raise _in_their_terms(error, settings) from None
-    names = [path.name for path in files]
-    text = _campaign(configuration, loaded, out, names, options, notes)
+    text = _campaign(configuration, loaded, out, options, notes)
     if unused := _not_needed(configuration):
         notes.append(unused)
     is_shipped = base_path.is_relative_to(shipped_folder("scenarios"))
     shown_base = base_path.stem if is_shipped else _relative(base_path, out)
     lines = [
-        *heading(names),
+        *heading(configuration.files),
         "# Values that are not given here are those of the base.",
         commented(0, f"base: {flow(shown_base)}", why),
         *_revision_lines(release),
@@ -191,30 +171,22 @@ def _in_their_terms(error: InputError, settings: Settings) -> InputError:
 
 
 def _campaign(
-    configuration: Configuration,
-    loaded: LoadedScenario,
-    out: Path,
-    files: Sequence[str],
-    options: ImportOptions,
-    notes: list[str],
+    configuration: Configuration, loaded: LoadedScenario, out: Path, options: ImportOptions, notes: list[str]
 ) -> str | None:
     """Text of the campaign file, if a campaign is configured and asked for; else a note for each of its parameters."""
-    runner = {each.key: each for each in configuration.parameters if each.kind == RUNNER}
     if options.campaign is None:
         notes += [
             f"{parameter.place}: no counterpart: a scenario has none; --campaign FILE writes a campaign file"
-            for key, parameter in runner.items()
+            for key, parameter in configuration.runner.items()
             if key not in (*NODES[RUNNER], *NOT_NEEDED)
         ]
         return None
     if RUNNER not in configuration.nodes:
         raise InputError(
-            f"there is no campaign to import: no node {RUNNER} in {', '.join(files)}",
+            f"there is no campaign to import: no node {RUNNER} in {', '.join(configuration.files)}",
             remedy="give the campaign's configuration too, or leave --campaign out",
         )
-    scenario, extended = _relative(out, options.campaign), is_extended(configuration)
-    wanted = RunnerImport(scenario, options.managers, files, extended, options.runner_seed)
-    return campaign_text(runner, loaded, wanted, notes)
+    return campaign_text(configuration, loaded, _relative(out, options.campaign), options, notes)
 
 
 def _not_needed(configuration: Configuration) -> str | None:

@@ -16,9 +16,11 @@ from suave_des.scenario.exemplar_files import (
     NODES,
     NOT_NEEDED,
     RUNNER,
+    Configuration,
     Count,
     Experiment,
     Experiments,
+    ImportOptions,
     Parameter,
     json_object,
     unknown_key,
@@ -91,63 +93,48 @@ class _Perturbation:
         return f"  {self.path}: {flow(drawn)}"
 
 
-@dataclass(frozen=True)
-class RunnerImport:
-    """What is to become of the runner's configuration.
-
-    Attributes:
-        scenario: how the campaign file names the imported scenario.
-        managers: names of the managers that can be run.
-        files: names of the files given.
-        extended: whether the mission's configuration asks for the extended mission.
-        seed: of the exemplar's own draws, which are written out; None: values are drawn anew.
-    """
-
-    scenario: str
-    managers: Collection[str]
-    files: Sequence[str]
-    extended: bool = False
-    seed: int | None = None
-
-
 def campaign_text(
-    runner: Mapping[str, Parameter], loaded: LoadedScenario, wanted: RunnerImport, notes: list[str]
+    configuration: Configuration, loaded: LoadedScenario, scenario: str, options: ImportOptions, notes: list[str]
 ) -> str:
     """The campaign file for the runner's parameters.
 
     Args:
-        runner: its parameters by key.
+        configuration: with the runner's parameters.
         loaded: the imported scenario.
-        wanted: what is to become of them.
+        scenario: how the campaign file names it.
+        options: what is to become of the parameters.
         notes: gets a line for each key without a counterpart.
 
     Raises:
         InputError: a value cannot be right, or there is nothing to run.
     """
+    runner = configuration.runner
     known = (*NODES[RUNNER], *_Runner.model_fields)
     notes += [unknown_key(parameter, known) for key, parameter in runner.items() if key not in (*known, *NOT_NEEDED)]
     if "experiments" not in runner:
         raise InputError(f"{RUNNER} has no experiments", remedy="add them: they name the managers to run")
     settings = _checked(runner)
     mission = runner.get("mission_config_file")
-    if mission is not None and PurePath(str(mission.value)).name not in wanted.files:
+    if mission is not None and PurePath(str(mission.value)).name not in configuration.files:
         notes.append(f"{mission.place}: not taken over: {shown(mission.value)} is none of the files given")
-    names, runs = _experiments(runner["experiments"], settings.experiments, wanted, notes)
+    names, runs = _experiments(configuration, settings.experiments, options.managers, notes)
     perturbations = list(_perturbations(runner, settings, loaded, notes))
     if not perturbations and "random_interval" in runner:
         notes.append(f"{runner['random_interval'].place}: no counterpart: nothing is drawn at random")
-    if wanted.seed is not None:
-        varied = _conditions(perturbations, settings, runs, wanted.seed, notes)
+    if options.runner_seed is not None:
+        varied = _conditions(perturbations, settings, runs, options.runner_seed, notes)
         runs = min(runs, settings.random_interval) if perturbations else runs
     else:
         varied = _drawn_anew(perturbations, _said("random_interval", settings.random_interval, runner))
     where = _source(runner["experiments"])
     lines = [
-        *heading(wanted.files),
+        *heading(configuration.files),
         commented(0, "campaign: 1", "version of this file's form"),
-        f"scenario: {flow(wanted.scenario)}",
+        f"scenario: {flow(scenario)}",
         commented(0, f"managers: {flow(names)}", where),
-        commented(0, f"runs: {runs}", f"{where}; at each of the conditions" if wanted.seed is not None else where),
+        commented(
+            0, f"runs: {runs}", f"{where}; at each of the conditions" if options.runner_seed is not None else where
+        ),
         commented(0, f"seed: {settings.random_seed}", _said("random_seed", "", runner)[1]),
         *varied,
     ]
@@ -217,19 +204,19 @@ def _checked(runner: Mapping[str, Parameter]) -> _Runner:
 
 
 def _experiments(
-    parameter: Parameter, experiments: Sequence[Experiment], wanted: RunnerImport, notes: list[str]
+    configuration: Configuration, experiments: Sequence[Experiment], known: Collection[str], notes: list[str]
 ) -> tuple[list[str], int]:
     """Managers, and runs for each."""
-    runs: dict[str, int] = {}
+    parameter, runs = configuration.runner["experiments"], dict[str, int]()
     for index, experiment in enumerate(experiments):
         line = parameter.document.line((*parameter.key_path, index))
         place = f"{parameter.document.path}: line {line}, {parameter.keys}[{index}]"
         for key in json_object(parameter.value[index]):
             if key not in Experiment.model_fields:
                 notes.append(f"{place}.{' '.join(key.split())}: not taken over: unknown key")
-        manager, number = experiment.manager(extended=wanted.extended), experiment.num_runs
-        if manager not in wanted.managers:
-            hint = did_you_mean(manager, wanted.managers)
+        manager, number = experiment.manager(extended=configuration.is_extended), experiment.num_runs
+        if manager not in known:
+            hint = did_you_mean(manager, known)
             notes.append(f"{place}: not taken over: there is no manager {shown(manager)} ({hint})")
             continue
         if manager in runs:
@@ -237,7 +224,7 @@ def _experiments(
             notes.append(f"{place}: not taken over: {manager} {reason}")
         runs[manager] = max(runs.get(manager, 0), number)
     if not runs:
-        raise parameter.error("none of its managers can be run", f"known: {', '.join(wanted.managers)}")
+        raise parameter.error("none of its managers can be run", f"known: {', '.join(known)}")
     most = max(runs.values())
     if fewer := [f"{manager} {number}" for manager, number in runs.items() if number < most]:
         notes.append(

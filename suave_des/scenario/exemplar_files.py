@@ -131,20 +131,61 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class ImportOptions:
+    """What an import is to give.
+
+    Attributes:
+        base: scenario to build on; None: the shipped one of the files' revision.
+        revision: of the exemplar, which the files are read as; None: the base's, or the only one that they fit.
+        campaign: where the campaign will be; None: no campaign is imported.
+        runner_seed: of the exemplar's own draws, which become the campaign's conditions; None: values are drawn anew.
+        managers: names of the managers that can be run.
+    """
+
+    base: str | None = None
+    revision: str | None = None
+    campaign: Path | None = None
+    runner_seed: int | None = None
+    managers: Collection[str] = ()
+
+
+@dataclass(frozen=True)
 class Configuration:
     """Content of the user's files.
 
     Attributes:
+        files: their names.
         parameters: of known nodes, file by file.
         modes: System Modes files, each read and checked.
         nodes: the entries of NODES that are in the files.
         notes: what is not understood, a line each.
     """
 
+    files: tuple[str, ...]
     parameters: tuple[Parameter, ...]
     modes: tuple[YamlDocument, ...]
     nodes: tuple[str, ...]
     notes: tuple[str, ...]
+
+    @property
+    def runner(self) -> dict[str, Parameter]:
+        """The parameters of a campaign, by key."""
+        return {each.key: each for each in self.parameters if each.kind == RUNNER}
+
+    @property
+    def is_extended(self) -> bool:
+        """Whether any mission is the extended one."""
+        for parameter in self.parameters:
+            if parameter.key == "mission_name" and parameter.value == EXTENDED:
+                return True
+            if parameter.kind == RUNNER and parameter.key == "experiments" and isinstance(parameter.value, list):
+                for each in parameter.value:
+                    try:
+                        if Experiment.model_validate(json_object(each)).is_extended:
+                            return True
+                    except ValueError:  # reported where the campaign is imported
+                        continue
+        return False
 
 
 def read_configuration(files: Sequence[Path]) -> Configuration:
@@ -178,7 +219,9 @@ def read_configuration(files: Sequence[Path]) -> Configuration:
                 "has nothing of SUAVE in it", (first,), did_you_mean(_name(first), _NAMES, "its nodes")
             )
         nodes += filter(None, kinds)
-    return Configuration(tuple(parameters), tuple(modes), tuple(dict.fromkeys(nodes)), tuple(notes))
+    return Configuration(
+        tuple(path.name for path in files), tuple(parameters), tuple(modes), tuple(dict.fromkeys(nodes)), tuple(notes)
+    )
 
 
 _NAMES = tuple(name for name in NODES if name != REASONER)
@@ -297,18 +340,3 @@ class Experiment(BaseModel):
 
 
 Experiments = tuple[Annotated[Experiment, BeforeValidator(json_object)], ...]
-
-
-def is_extended(configuration: Configuration) -> bool:
-    """Return whether any mission of a configuration is the extended one."""
-    for parameter in configuration.parameters:
-        if parameter.key == "mission_name" and parameter.value == EXTENDED:
-            return True
-        if parameter.kind == RUNNER and parameter.key == "experiments" and isinstance(parameter.value, list):
-            for each in parameter.value:
-                try:
-                    if Experiment.model_validate(json_object(each)).is_extended:
-                        return True
-                except ValueError:  # reported where the campaign is imported
-                    continue
-    return False

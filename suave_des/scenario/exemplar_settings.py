@@ -20,7 +20,6 @@ from suave_des.scenario.exemplar_files import (
     RUNNER,
     Configuration,
     Parameter,
-    is_extended,
     unknown_key,
 )
 
@@ -123,7 +122,7 @@ def _defaults(configuration: Configuration, release: Release, given: Settings, n
     """The values of nodes that are not in the files, or not in full; none if no mission is configured at all."""
     if not set(configuration.nodes) - {RUNNER, REASONER}:
         return {}
-    battery = release.battery == "all" or is_extended(configuration)
+    battery = release.battery == "all" or configuration.is_extended
     battery = battery or (release.battery == "configured" and "battery_monitor" in configuration.nodes)
     defaults = {path: each for path, each in defaults_of(release, battery=battery).items() if path not in given}
     if defaults:

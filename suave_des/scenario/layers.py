@@ -90,11 +90,16 @@ class Files:
 
     def ontology(self, path: Path) -> None:
         """Hash an ontology or a file of rules, which is parsed elsewhere."""
-        self.note(path, hashlib.sha256(read_bytes(path, _ONTOLOGY_LIMIT_BYTES)).hexdigest())
+        self.note(path, sha256_of(path, _ONTOLOGY_LIMIT_BYTES))
 
     def note(self, path: Path, sha256: str) -> None:
         """Keep the hash of a file that was read."""
         self.inputs[_shown_name(path)] = sha256
+
+
+def sha256_of(path: Path, limit: int) -> str:
+    """SHA-256 of a file; raises as read_bytes does."""
+    return hashlib.sha256(read_bytes(path, limit)).hexdigest()
 
 
 def _shown_name(path: Path) -> str:
