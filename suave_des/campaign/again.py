@@ -81,7 +81,8 @@ def opened_campaign(folder: Path, named: Collection[str] = ()) -> Iterator[Opene
         raise InputError("has no campaign whose missions could be run again", file=folder, remedy=remedy)
     with closing(Store(path)) as store:
         spec = CampaignSpec.of_stored(store.about("request"))
-    with chdir(spec.folder if Path(spec.folder).is_dir() else Path.cwd()):
+    started_in = Path(spec.folder)
+    with chdir(started_in if started_in.is_dir() else Path.cwd()):
         file = read_campaign_file(spec.scenario)
         spec = spec.with_file(file)
         check_trusted(spec.managers, named, folder, confirmed=False)
