@@ -9,6 +9,7 @@ import signal
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import lru_cache
 from typing import Annotated, Any, ClassVar
 
 import typer
@@ -87,6 +88,11 @@ def _options(
     """Options of the command itself."""
 
 
+@lru_cache(maxsize=1)
+def _command_line() -> Any:
+    return typer.main.get_command(app)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command `suave-des`; an error that is meant for the user is reported in one line, with an exit status.
 
@@ -102,10 +108,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     atexit.unregister(gc.freeze)  # as of an earlier call
     atexit.register(gc.freeze)  # a last collection of all that was imported would take a tenth of a second
     abandoned = _abandoned()
-    command = typer.main.get_command(app)
     try:
         with signals_raised():
-            status = command.main(arguments, prog_name="suave-des", standalone_mode=False) or 0
+            status = _command_line().main(arguments, prog_name="suave-des", standalone_mode=False) or 0
             if was_interrupted() and status == 128 + signal.SIGINT:  # typer's for any signal before the command began
                 status = exit_status()
     except SuaveDesError as error:

@@ -10,6 +10,7 @@ import hashlib
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -120,7 +121,7 @@ def read_yaml(path: Path | str, depth: int = 0) -> YamlDocument:
     content = read_bytes(path, SIZE_LIMIT_BYTES)
     text = decode(path, content)
     try:
-        root = _Composer(text).get_single_node()
+        root = _composed(text)
     except ReaderError as error:
         place = f"line {text.count(chr(10), 0, error.position) + 1}"
         problem = f"holds the character {chr(error.character)!r}, which is not allowed in YAML"
@@ -149,6 +150,11 @@ def read_value(text: str, option: str) -> Any:
     except (ReaderError, yaml.MarkedYAMLError, InputError) as error:
         problem = error.problem if isinstance(error, InputError) else "is not YAML"
         raise InputError(f"{shown(text)}: {problem}", place=option, remedy="put text in quotes") from None
+
+
+@lru_cache(maxsize=32)  # parts of scenarios are read again with each scenario that names them
+def _composed(text: str) -> yaml.Node | None:
+    return _Composer(text).get_single_node()
 
 
 def _yaml_error(path: Path, error: yaml.MarkedYAMLError) -> InputError:

@@ -215,7 +215,7 @@ class TestLimits:
         process = subprocess.Popen(
             [*COMMAND, "kb", "query", self.CATASTROPHIC], cwd=tmp_path, stderr=subprocess.PIPE, text=True
         )
-        time.sleep(6)
+        time.sleep(3)
         process.terminate()
         assert process.communicate(timeout=30)[1] == "suave-des: interrupted\n"
         assert process.returncode == 143
