@@ -145,7 +145,7 @@ class _Explainer:
         self.conclusion = conclusion
         self.tracer = tracer
         self.triples: dict[Fact, Triple] = {}
-        for triple in sorted(tracer.entailed(), key=lambda each: (each not in tracer.asserted, str(each))):
+        for triple in sorted(tracer.entailed, key=lambda each: (each not in tracer.asserted, str(each))):
             for fact in facts_of([triple], base.names):
                 self.triples.setdefault(fact, triple)
 

@@ -124,6 +124,7 @@ class Tracer:
         """What ontologies and state assert."""
         return frozenset((*self.base.content.triples, *self.situation))
 
+    @cached_property
     def entailed(self) -> frozenset[Triple]:
         """All that follows in the state.
 
@@ -137,7 +138,7 @@ class Tracer:
         """All that follows and that rules mention, in canonical form and in a fixed order."""
         text = self.base.content.n_triples() + "".join(map(n_triple, self.situation))
         mentioned = [atom for rule in self.base.content.enabled_rules for atom in rule.atoms]
-        entailed = self.entailed().union(_values_of(load_n_triples(text), mentioned))
+        entailed = self.entailed.union(_values_of(load_n_triples(text), mentioned))
         jvm.take_warnings()
         return tuple(sorted({_canonical(triple) for triple in entailed if is_fact(triple)}, key=str))
 

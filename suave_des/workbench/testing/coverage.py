@@ -8,16 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Final
+from typing import Final, NamedTuple
 
 from suave_des.knowledge.rules.builtins import COMPARISON_OF, COMPARISONS
-from suave_des.knowledge.rules.syntax import Atom, Rule
+from suave_des.knowledge.rules.syntax import Rule
 from suave_des.knowledge.rules.writer import write_atom
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.matching import testable_order
-from suave_des.workbench.policy import kinds_of_states
+from suave_des.workbench.policy import PolicyCase, kinds_of_states
 from suave_des.workbench.policy_space import PolicySpace
 from suave_des.workbench.prover import Body, Prover, Situation
 
@@ -58,78 +57,48 @@ class Goal:
         return f"{self.rule}: {self.text} {_WORDS.get(self.outcome, self.outcome)}"
 
 
-@dataclass(frozen=True)
-class _Questions:
-    """What to ask Pellet about the rules, and what the answers cover."""
+class _Question(NamedTuple):
+    """When a goal is covered: where one conjunction of atoms holds (an empty one always does), and another fails."""
 
-    rules: tuple[Rule, ...]
-
-    @cached_property
-    def bodies(self) -> dict[Body, int]:
-        """All conjunctions to ask for, numbered."""
-        found: dict[Body, int] = {}
-        for rule in self.rules:
-            atoms = _ordered(rule)
-            for number, atom in enumerate(atoms):
-                for body in (atoms[: number + 1], *(_compared(atoms, number, order) for order in _orders(atom))):
-                    found.setdefault(body, len(found))
-        return found
-
-    def goals(self) -> set[Goal]:
-        """All that can be covered."""
-        found = set()
-        for rule in self.rules:
-            found |= {Goal(rule.name, -1, FIRES), Goal(rule.name, -1, FIRES_NOT)}
-            for number, atom in enumerate(_ordered(rule)):
-                outcomes = _orders(atom) or (HOLDS, FAILS)
-                found |= {Goal(rule.name, number, outcome, write_atom(atom)) for outcome in outcomes}
-        return found
-
-    def covered(self, holding: frozenset[int]) -> Iterator[Goal]:
-        """What a situation covers, by the numbers of the conjunctions that hold in it."""
-        for rule in self.rules:
-            atoms = _ordered(rule)
-            before = True
-            for number, atom in enumerate(atoms):
-                holds = self.bodies[atoms[: number + 1]] in holding
-                for order in _orders(atom):
-                    if self.bodies[_compared(atoms, number, order)] in holding:
-                        yield Goal(rule.name, number, order, write_atom(atom))
-                if before and not _orders(atom):
-                    yield Goal(rule.name, number, HOLDS if holds else FAILS, write_atom(atom))
-                before = holds
-            yield Goal(rule.name, -1, FIRES if before else FIRES_NOT)
-
-    def needed(self, goals: set[Goal]) -> Iterator[int]:
-        """Numbers of conjunctions of which one must hold wherever one of these goals is covered."""
-        for rule in self.rules:
-            atoms = _ordered(rule)
-            for number, atom in enumerate(atoms):
-                for outcome in _orders(atom):
-                    if Goal(rule.name, number, outcome) in goals:
-                        yield self.bodies[_compared(atoms, number, outcome)]
-                if Goal(rule.name, number, HOLDS) in goals:
-                    yield self.bodies[atoms[: number + 1]]
-                if Goal(rule.name, number, FAILS) in goals and number:
-                    yield self.bodies[atoms[:number]]
-            if Goal(rule.name, -1, FIRES) in goals:
-                yield self.bodies[atoms]
-
-    def always(self, goals: set[Goal]) -> bool:
-        """Whether a goal may be covered where no conjunction holds."""
-        return any(goal.outcome == FIRES_NOT or (goal.outcome == FAILS and goal.atom == 0) for goal in goals)
+    goal: Goal
+    holds: Body
+    fails: Body | None = None
 
 
-def _ordered(rule: Rule) -> Body:
-    return tuple(rule.body[number] for number in testable_order(rule.body))
+def _questions(rules: Iterable[Rule]) -> Iterator[_Question]:
+    for rule in rules:
+        atoms = tuple(rule.body[number] for number in testable_order(rule.body))
+        yield _Question(Goal(rule.name, -1, FIRES), atoms)
+        yield _Question(Goal(rule.name, -1, FIRES_NOT), (), atoms)
+        for number, atom in enumerate(atoms):
+            before, text = atoms[:number], write_atom(atom)
+            if atom.predicate in COMPARISONS and len(atom.arguments) == 2:
+                for order, builtin in ORDERS.items():
+                    compared = replace(atom, predicate=builtin, places=())
+                    yield _Question(Goal(rule.name, number, order, text), (*before, compared))
+            else:
+                yield _Question(Goal(rule.name, number, HOLDS, text), (*before, atom))
+                yield _Question(Goal(rule.name, number, FAILS, text), before, (*before, atom))
 
 
-def _orders(atom: Atom) -> tuple[str, ...]:
-    return tuple(ORDERS) if atom.predicate in COMPARISONS and len(atom.arguments) == 2 else ()
+class _Asked:
+    """A knowledge base that is asked which goals situations cover."""
 
+    def __init__(self, bench: KnowledgeBase, questions: Iterable[_Question]) -> None:
+        self.questions = tuple(questions)
+        self.bodies = list(dict.fromkeys(body for each in self.questions for body in (each.holds, each.fails) if body))
+        self.prover = Prover.of(bench, bodies=self.bodies)
 
-def _compared(atoms: Body, number: int, order: str) -> Body:
-    return (*atoms[:number], replace(atoms[number], predicate=ORDERS[order], places=()))
+    def covered(self, situation: Situation) -> frozenset[Goal]:
+        """The goals that a situation covers."""
+        holding = {(), *(self.bodies[number] for number in self.prover.holding(situation))}
+        return frozenset(goal for goal, holds, fails in self.questions if holds in holding and fails not in holding)
+
+    def may_cover(self, cases: Sequence[PolicyCase]) -> Iterable[PolicyCase]:
+        """Leave out cases that cover no goal."""
+        needed = {each.holds for each in self.questions}
+        wanted = frozenset(number for number, body in enumerate(self.bodies) if body in needed)
+        return cases if () in needed else self.prover.may_hold(cases, wanted)
 
 
 @dataclass(frozen=True)
@@ -191,12 +160,14 @@ def measure_coverage(bench: KnowledgeBase, situations: Iterable[Situation], max_
         InputError: there would be too many states.
         KnowledgeError: the reasoner takes too long.
     """
-    questions = _Questions(tuple(rule for rule in bench.base.content.enabled_rules if rule.body))
-    prover = Prover.of(bench, bodies=tuple(questions.bodies))
-    by_situation = [set(questions.covered(prover.holding(each))) for each in dict.fromkeys(situations)]
+    questions = list(_questions(rule for rule in bench.base.content.enabled_rules if rule.body))
+    asked = _Asked(bench, questions)
+    by_situation = [asked.covered(each) for each in dict.fromkeys(situations)]
     covered = set[Goal]().union(*by_situation)
-    missing = questions.goals() - covered
-    candidates, states = _reached(bench, missing, max_failed) if missing else ({}, 0)
+    goals = {each.goal for each in questions}
+    missing = goals - covered
+    open_questions = [each for each in questions if each.goal in missing]
+    candidates, states = _reached(bench, open_questions, max_failed) if missing else ({}, 0)
     reachable = set[Goal]().union(*candidates.values())
     kinds = (covered, missing & reachable, missing - reachable)
     rules = tuple(
@@ -204,30 +175,26 @@ def measure_coverage(bench: KnowledgeBase, situations: Iterable[Situation], max_
             name,
             sum(Goal(name, -1, FIRES) in each for each in by_situation),
             sum(Goal(name, -1, FIRES_NOT) in each for each in by_situation),
-            *(tuple(sorted(goal for goal in goals if goal.rule == name)) for goals in kinds),
+            *(tuple(sorted(goal for goal in kind if goal.rule == name)) for kind in kinds),
         )
-        for name in sorted({rule.name for rule in questions.rules})
+        for name in sorted({goal.rule for goal in goals})
     )
     chosen = least_cover(candidates)
     return Coverage(rules, tuple((state, tuple(sorted(candidates[state]))) for state in chosen), states, max_failed)
 
 
 def _reached(
-    bench: KnowledgeBase, missing: set[Goal], max_failed: int
+    bench: KnowledgeBase, questions: Iterable[_Question], max_failed: int
 ) -> tuple[dict[KnowledgeState, frozenset[Goal]], int]:
-    """Which of the goals that are missing each state of the policy covers; one state for each different set of them."""
-    names = {goal.rule for goal in missing}
-    rules = (rule for rule in bench.base.content.enabled_rules if rule.name in names and rule.body)
-    questions = _Questions(tuple(rules))
-    prover = Prover.of(bench, bodies=tuple(questions.bodies))
-    wanted, everywhere = frozenset(questions.needed(missing)), questions.always(missing)
+    """Which goals each state of the policy covers; one state for each different set of them."""
+    asked = _Asked(bench, questions)
     space = PolicySpace.of(bench.base, bench.settings)
     found: dict[frozenset[Goal], KnowledgeState] = {}
     states = 0
     for kinds in kinds_of_states(bench.base, bench.settings, max_failed, space):
         states += len(kinds)
-        for case in kinds if everywhere else prover.may_hold(kinds, wanted):
-            goals = frozenset(questions.covered(prover.holding(Situation(case.state)))) & missing
+        for case in asked.may_cover(kinds):
+            goals = asked.covered(Situation(case.state))
             if goals:
                 found.setdefault(goals, case.state)
     return {state: goals for goals, state in found.items()}, states
