@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from suave_des.workbench.testing.mutants import Mutant
     from suave_des.workbench.testing.reader import RuleTest
     from suave_des.workbench.testing.run import TestResult
-    from suave_des.workbench.testing.suite import KnowledgeFiles as About
-    from suave_des.workbench.testing.suite import TestFile
+    from suave_des.workbench.testing.suite import TestedKnowledge, TestFile
 
 FAILED = 1
 """Exit status when a test fails."""
@@ -111,7 +110,7 @@ def test(
         if not all(result.passed for result in results):
             console.print("no mutants while a test fails: each of them would count as killed", soft_wrap=True)
         else:
-            _mutate(console, suites, _Wanted(tuple(only or ()), mutants), max_failed)
+            _mutate(console, suites, only or (), mutants, max_failed)
     if not all(result.passed for result in results):
         raise typer.Exit(FAILED)
 
@@ -142,12 +141,11 @@ def _cover(console: Console, suites: Sequence[Suite], max_failed: int, file: Pat
     from suave_des.workbench.testing.coverage import measure_coverage
     from suave_des.workbench.testing.writing import NamedState, tests_text
 
-    benches = {id(suite.bench): suite for suite in suites}
+    benches = _together(suites)
     if file is not None and len(benches) > 1:
         remedy = "give files of tests of one knowledge base"
         raise InputError("the tests are about several knowledge bases", place="--write", remedy=remedy)
-    for one, suite in benches.items():
-        tests = [test for each in suites if id(each.bench) == one for test in each.tests]
+    for suite, tests in benches:
         situations = [situation for test in tests for situation in test.situations]
         found = measure_coverage(suite.bench, situations, max_failed)
         print_coverage(console, found)
@@ -161,34 +159,25 @@ def _cover(console: Console, suites: Sequence[Suite], max_failed: int, file: Pat
             )
 
 
-@dataclass(frozen=True)
-class _Wanted:
-    """Which mutants are wanted: of which rules or individuals, all if there are none, and how many at most."""
+def _mutants(base: Ontology, only: Sequence[str], most: int | None) -> tuple[Mutant, ...]:
+    """The mutants of a knowledge base that are wanted: of some rules or individuals, all if there are none."""
+    from suave_des.workbench.testing.mutants import mutants_of, sample
 
-    only: tuple[str, ...]
-    most: int | None
-
-    def of(self, base: Ontology) -> tuple[Mutant, ...]:
-        """The mutants of a knowledge base that are wanted."""
-        from suave_des.workbench.testing.mutants import mutants_of, sample
-
-        found = mutants_of(base)
-        names = list(dict.fromkeys(mutant.name for mutant in found))
-        for name in self.only:
-            if name not in names:
-                remedy = did_you_mean(name, names)
-                raise InputError(f"no mutant is of {shown(name)}", place="--only", remedy=remedy)
-        return sample([mutant for mutant in found if not self.only or mutant.name in self.only], self.most)
+    found = mutants_of(base)
+    names = list(dict.fromkeys(mutant.name for mutant in found))
+    for name in only:
+        if name not in names:
+            raise InputError(f"no mutant is of {shown(name)}", place="--only", remedy=did_you_mean(name, names))
+    return sample([mutant for mutant in found if not only or mutant.name in only], most)
 
 
-def _mutate(console: Console, suites: Sequence[Suite], wanted: _Wanted, max_failed: int) -> None:
+def _mutate(console: Console, suites: Sequence[Suite], only: Sequence[str], most: int | None, max_failed: int) -> None:
     """Show which mutants of each knowledge base the tests kill."""
     from suave_des.cli.kb_test_reports import print_mutation
     from suave_des.workbench.testing.mutation import mutate
 
-    for one, suite in {id(suite.bench): suite for suite in suites}.items():
-        tests = [test for each in suites if id(each.bench) == one for test in each.tests]
-        chosen = wanted.of(suite.bench.base)
+    for suite, tests in _together(suites):
+        chosen = _mutants(suite.bench.base, only, most)
         with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
             task = progress.add_task("mutants", total=len(chosen))
             report = mutate(suite.bench, tests, chosen, max_failed, partial(progress.advance, task))
@@ -200,7 +189,7 @@ class Suite:
     """A file of tests with its knowledge base."""
 
     file: TestFile
-    about: About
+    about: TestedKnowledge
     bench: KnowledgeBase
     tests: tuple[RuleTest, ...]
 
@@ -209,7 +198,7 @@ def _suites(knowledge: Tested, files: Sequence[Path], time_limit_s: float) -> li
     """Read all files before anything runs, so that a mistake in the last one comes first."""
     from suave_des.workbench.testing.suite import TestFile, shipped_tests
 
-    benches: dict[About, KnowledgeBase] = {}
+    benches: dict[TestedKnowledge, KnowledgeBase] = {}
     suites = []
     for file in [TestFile.read(path) for path in files or shipped_tests()]:
         about = file.knowledge.with_replacements(knowledge.scenario, knowledge.replacements)
@@ -217,6 +206,14 @@ def _suites(knowledge: Tested, files: Sequence[Path], time_limit_s: float) -> li
             benches[about] = about.load(time_limit_s, knowledge.values)
         suites.append(Suite(file, about, benches[about], file.tests(benches[about])))
     return suites
+
+
+def _together(suites: Iterable[Suite]) -> list[tuple[Suite, list[RuleTest]]]:
+    """Each knowledge base once: the first file that is about it, and the tests of all such files."""
+    found: dict[int, tuple[Suite, list[RuleTest]]] = {}
+    for suite in suites:
+        found.setdefault(id(suite.bench), (suite, []))[1].extend(suite.tests)
+    return list(found.values())
 
 
 def _run(console: Console, suites: Iterable[Suite], select: str | None) -> list[TestResult]:

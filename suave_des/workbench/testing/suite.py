@@ -30,7 +30,7 @@ _FILE_KEYS: Final = ("scenario", "ontologies", "rules", "disabled_rules", "tests
 
 
 @dataclass(frozen=True)
-class KnowledgeFiles:
+class TestedKnowledge:
     """The knowledge base that a file of tests is about.
 
     Attributes:
@@ -45,10 +45,10 @@ class KnowledgeFiles:
     rules: tuple[Path, ...] = ()
     disabled_rules: tuple[str, ...] = ()
 
-    def with_replacements(self, scenario: str | None, more: Replacements) -> KnowledgeFiles:
+    def with_replacements(self, scenario: str | None, more: Replacements) -> TestedKnowledge:
         """Replace scenario and ontologies where others are given, and add rules and names of disabled ones."""
         ontologies = tuple(map(Path, more.get("ontologies", ())))
-        return KnowledgeFiles(
+        return TestedKnowledge(
             scenario or self.scenario,
             ontologies or self.ontologies,
             (*self.rules, *map(Path, more.get("rules", ()))),
@@ -86,7 +86,7 @@ class TestFile:
 
     __test__ = False  # pytest takes it for a test otherwise
     document: YamlDocument
-    knowledge: KnowledgeFiles
+    knowledge: TestedKnowledge
 
     @classmethod
     def read(cls, path: Path) -> TestFile:
@@ -105,13 +105,13 @@ class TestFile:
             names = enumerate(texts(document, data.get(key, []), (key,)))
             return tuple(_beside(document, name, (key, at)) for at, name in names)
 
-        scenario = data.get("scenario", KnowledgeFiles.scenario)
+        scenario = data.get("scenario", TestedKnowledge.scenario)
         if not isinstance(scenario, str):
             raise document.error(f"{shown(scenario)} is not a scenario", ("scenario",), "a name or a path")
         if (path.parent / scenario).is_file():
             scenario = str(path.parent / scenario)
         disabled = texts(document, data.get("disabled_rules", []), ("disabled_rules",))
-        return cls(document, KnowledgeFiles(scenario, files("ontologies"), files("rules"), tuple(disabled)))
+        return cls(document, TestedKnowledge(scenario, files("ontologies"), files("rules"), tuple(disabled)))
 
     def tests(self, bench: KnowledgeBase) -> tuple[RuleTest, ...]:
         """Read the tests themselves, with all their names looked up in a knowledge base.

@@ -16,7 +16,7 @@ from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.prover import Prover, Situation
 from suave_des.workbench.replay import mission_scenario
 from suave_des.workbench.state_input import recorded_states, state_dict
-from suave_des.workbench.testing.suite import KnowledgeFiles
+from suave_des.workbench.testing.suite import TestedKnowledge
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class NamedState:
     state: KnowledgeState
 
 
-def tests_text(about: KnowledgeFiles, prover: Prover, states: Iterable[NamedState], comment: str) -> str:
+def tests_text(about: TestedKnowledge, prover: Prover, states: Iterable[NamedState], comment: str) -> str:
     """Write tests that expect what follows in states now.
 
     Args:
@@ -100,7 +100,7 @@ def mission_states(folder: Path, bench: KnowledgeBase, run: int | None = None) -
             yield NamedState(f"{folder.name} at {record.t_s:.2f} s", record.state)
 
 
-def mission_knowledge(folder: Path) -> KnowledgeFiles:
+def mission_knowledge(folder: Path) -> TestedKnowledge:
     """The knowledge base of a recorded mission, as a file of tests names it.
 
     Raises:
@@ -112,10 +112,10 @@ def mission_knowledge(folder: Path) -> KnowledgeFiles:
         find(scenario.name, "scenarios")
         name = scenario.name
     except InputError:
-        name = KnowledgeFiles.scenario
+        name = TestedKnowledge.scenario
     files = [find(each, "ontology") for each in knowledge.ontologies]
     shipped = shipped_folder("ontology")
-    return KnowledgeFiles(
+    return TestedKnowledge(
         name,
         () if all(file.parent == shipped for file in files) else tuple(file.absolute() for file in files),
         tuple(find(each, "ontology").absolute() for each in knowledge.rules),
