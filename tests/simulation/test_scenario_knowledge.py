@@ -8,7 +8,8 @@ import pytest
 from suave_des.errors import InputError
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario
-from suave_des.scenario_knowledge import open_base, open_knowledge
+from suave_des.scenario_knowledge import open_base, open_knowledge, read_base
+from tests.helpers.exemplar_files import write_as_owlready2_saves_it
 
 
 @pytest.fixture(autouse=True)
@@ -64,3 +65,11 @@ def test_an_error_in_the_ontology_itself_names_the_ontology():
 def test_a_known_individual_is_taken(name):
     Path("mine.yaml").write_text(f"base: seams2023.yaml\nknowledge: {{values: {{{name}: 0.7}}}}\n")
     assert open_base(load_scenario("mine.yaml")).functions
+
+
+def test_the_knowledge_of_a_recorded_mission_assumes_what_its_revision_does():
+    write_as_owlready2_saves_it(Path("own.owl"))
+    Path("mine.yaml").write_text("base: seams2023.yaml\nknowledge:\n  ontologies: [own.owl]\n")
+    recorded = load_scenario("mine.yaml")
+    assert read_base(recorded.scenario).assumptions == open_base(recorded).assumptions
+    assert open_base(recorded).assumptions
