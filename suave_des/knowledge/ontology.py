@@ -86,9 +86,12 @@ class Ontology:
         files = [RulesFile.read(Path(path)) for path in rules]
         content = with_rules(content, [file.rules(vocabulary) for file in files], disabled_rules)
         check_property_use(merged.triples, content.enabled_rules)
+        digest = _content_hash(sources, values or {}, added)
         return cls(
             files=(*sorted(source.path for source in sources), *(file.path for file in files)),
-            content_hash=hash_with_rules(_content_hash(sources, values or {}, added), files, disabled_rules),
+            content_hash=hash_with_rules(
+                _content_hash(sources, values or {}, added), [file.text for file in files], disabled_rules
+            ),
             content=content,
             names=names,
             model=model,

@@ -135,15 +135,14 @@ def _rules_from_text(file: RulesFile, vocabulary: Vocabulary, findings: list[Fin
 def _check_rules(content: Content, vocabulary: Vocabulary, sources: Mapping[Path, OntologyFile]) -> Iterator[Finding]:
     names = Counter(rule.name for rule in content.rules)
     for rule in content.rules:
-        found = _RuleFinding(rule, sources)
         if names[rule.name] > 1:
-            yield found(Level.WARN, f"{names[rule.name]} rules have this name", "rename one")
+            yield _about(rule, sources, Level.WARN, f"{names[rule.name]} rules have this name", "rename one")
         for problem in check_rule(rule, vocabulary):
             if rule.enabled:
                 level, message = Level.ERROR if problem.is_fatal else Level.WARN, problem.message
             else:
                 level, message = Level.INFO, f"switched off; {problem.message}"
-            yield found(level, message, problem.remedy, problem.place)
+            yield _about(rule, sources, level, message, problem.remedy, problem.place)
 
 
 def _replacing_rules(rules: Sequence[Rule], groups: Sequence[Sequence[Rule]]) -> Iterator[Finding]:
@@ -154,7 +153,7 @@ def _replacing_rules(rules: Sequence[Rule], groups: Sequence[Sequence[Rule]]) ->
             old = before.get(rule.name)
             if old is not None and (old.text, old.enabled) != (rule.text, rule.enabled):
                 message = f"takes the place of the rule of this name in {relative_path(old.file)}"
-                yield _RuleFinding(rule, {})(Level.WARN, message, "give it a name of its own, unless that is meant")
+                yield _about(rule, {}, Level.WARN, message, "give it a name of its own, unless that is meant")
         before |= {rule.name: rule for rule in group}
 
 
@@ -170,32 +169,32 @@ def _dead_rules(
             dead.append((rule, atom, message, f"add a hasQAestimation of type {attribute} to a design"))
     for rule, atom, message, remedy in dead:
         level = Level.WARN if rule.file.resolve() in given else Level.INFO
-        yield _RuleFinding(rule, sources)(level, f"can never fire: {message}", remedy or None, atom.place())
+        yield _about(rule, sources, level, f"can never fire: {message}", remedy or None, atom.place())
 
 
-@dataclass(frozen=True)
-class _RuleFinding:
-    """Makes findings about a rule, with the line where it begins, or where an atom of it is."""
+def _about(
+    rule: Rule,
+    sources: Mapping[Path, OntologyFile],
+    level: Level,
+    message: str,
+    remedy: str | None = None,
+    at: Place | None = None,
+) -> Finding:
+    """Make a finding about a rule, with the line where it begins, or where an atom of it is."""
+    if rule.place is None:
+        line = _line_in_ontology(rule.name, sources.get(rule.file))
+    else:
+        line = int(rule.place.removeprefix("line ")) if at is None else at.line
+    return Finding(level, message, str(rule.file), line, rule.name, at.column if at else None, remedy)
 
-    rule: Rule
-    sources: Mapping[Path, OntologyFile]
 
-    def __call__(self, level: Level, message: str, remedy: str | None = None, at: Place | None = None) -> Finding:
-        rule = self.rule
-        line = int(rule.place.removeprefix("line ")) if rule.place is not None else self._line_in_ontology()
-        if at is not None and rule.place is not None:
-            line = at.line
-        return Finding(level, message, str(rule.file), line, rule.name, at.column if at else None, remedy)
-
-    def _line_in_ontology(self) -> int | None:
-        source = self.sources.get(self.rule.file)
-        if source is None:
-            return None
-        text = source.content.decode("utf-8", "replace")
-        found = re.search(rf"label[^<>]*>\s*{re.escape(self.rule.name)}\s*<", text)
-        if found is not None:
-            return text.count("\n", 0, found.start()) + 1
-        return source.line_of(self.rule.name)
+def _line_in_ontology(name: str, source: OntologyFile | None) -> int | None:
+    """The line of a rule's label, else that of the first thing of its name."""
+    if source is None:
+        return None
+    text = source.content.decode("utf-8", "replace")
+    found = re.search(rf"label[^<>]*>\s*{re.escape(name)}\s*<", text)
+    return source.line_of(name) if found is None else text.count("\n", 0, found.start()) + 1
 
 
 def _ask_pellet(subject: Subject, before: Sequence[Finding]) -> Iterator[Finding]:

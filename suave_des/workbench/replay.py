@@ -18,8 +18,8 @@ from suave_des.knowledge.content import with_rules
 from suave_des.knowledge.deliberation import NONE_LEFT
 from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rules.files import RulesFile, hash_with_rules
-from suave_des.knowledge.rules.parser import parse_rule, parse_rules
+from suave_des.knowledge.rules.files import hash_with_rules, read_rule
+from suave_des.knowledge.rules.parser import parse_rule
 from suave_des.knowledge.state import ContradictionError, Fact, KnowledgeState, Value
 from suave_des.metrics.result import KnowledgeRecord
 from suave_des.scenario.loader import load_scenario
@@ -280,14 +280,14 @@ class _Comparison:
 
 
 def _changed(base: Ontology, change: RuleChange) -> Ontology:
-    files = [] if change.text is None else [RulesFile(_GIVEN, change.text, parse_rules(change.text, _GIVEN))]
+    texts = [] if change.text is None else [change.text]
     disabled = [] if change.disabled is None else [change.disabled]
-    groups = [file.rules(base.vocabulary) for file in files]
+    rules = [[read_rule(text, base.vocabulary, _GIVEN)] for text in texts]
     try:
-        content = with_rules(base.content, groups, disabled)
+        content = with_rules(base.content, rules, disabled)
     except KnowledgeError as error:
         raise KnowledgeError(error.problem, place="--disable", remedy=error.remedy) from None
-    digest = hash_with_rules(base.content_hash, files, disabled)
+    digest = hash_with_rules(base.content_hash, texts, disabled)
     return replace(base, content=content, content_hash=digest)
 
 

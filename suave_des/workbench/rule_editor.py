@@ -27,9 +27,7 @@ from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, read_ontology
 from suave_des.knowledge.rdf import RdfTriple
-from suave_des.knowledge.rules.checks import check_rule, first_error
-from suave_des.knowledge.rules.names import rule_from_text
-from suave_des.knowledge.rules.parser import parse_rule
+from suave_des.knowledge.rules.files import read_rule
 from suave_des.knowledge.rules.rdf import rules_of
 from suave_des.knowledge.rules.syntax import Rule
 from suave_des.knowledge.vocabulary import RDF as RDF_NS
@@ -164,10 +162,7 @@ def add_rule(path: Path, text: str) -> Rule:
         KnowledgeError: the file cannot be read or has a rule of that name already, or the rule is wrong.
     """
     base = Ontology.load([path])
-    rule = rule_from_text(parse_rule(text, _GIVEN), base.vocabulary, _GIVEN)
-    error = first_error(rule, check_rule(rule, base.vocabulary))
-    if error is not None:
-        raise error
+    rule = read_rule(text, base.vocabulary, _GIVEN)
     file = read_ontology(path)
     if rule.name in {each.name for each in rules_of(file)}:
         raise KnowledgeError(

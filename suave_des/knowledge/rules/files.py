@@ -12,7 +12,7 @@ from suave_des.errors import InputError
 from suave_des.files import decode, read_bytes
 from suave_des.knowledge.rules.checks import check_rule, first_error
 from suave_des.knowledge.rules.names import Vocabulary, rule_from_text
-from suave_des.knowledge.rules.parser import ParsedRules, parse_rules
+from suave_des.knowledge.rules.parser import ParsedRules, parse_rule, parse_rules
 from suave_des.knowledge.rules.syntax import Rule, RuleError
 
 MAX_BYTES: Final = 8 * 2**20
@@ -78,6 +78,24 @@ class RulesFile:
         return tuple(rules)
 
 
+def read_rule(text: str, vocabulary: Vocabulary, file: Path) -> Rule:
+    """Parse, look up and check one rule, as it is given on a command line.
+
+    Args:
+        text: "name: body -> head".
+        vocabulary: of the ontologies.
+        file: what messages call the text.
+
+    Raises:
+        RuleError: it is not one rule, or cannot be used.
+    """
+    rule = rule_from_text(parse_rule(text, file), vocabulary, file)
+    error = first_error(rule, check_rule(rule, vocabulary))
+    if error is not None:
+        raise error
+    return rule
+
+
 def _read_text(path: Path) -> str:
     text = decode(path, read_bytes(path, MAX_BYTES))
     if text.lstrip().startswith("<?xml"):
@@ -85,9 +103,9 @@ def _read_text(path: Path) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def hash_with_rules(digest: str, files: Iterable[RulesFile], disabled: Collection[str]) -> str:
-    """Extend a content hash by files of rules, in their order, and by disabled rules."""
-    parts = [*(f"rules {file.text}" for file in files), *(f"disabled {name}" for name in sorted(set(disabled)))]
+def hash_with_rules(digest: str, texts: Iterable[str], disabled: Collection[str]) -> str:
+    """Extend a content hash by rules as text, in their order, and by disabled rules."""
+    parts = [*(f"rules {text}" for text in texts), *(f"disabled {name}" for name in sorted(set(disabled)))]
     if not parts:
         return digest
     total = hashlib.sha256(digest.encode())
