@@ -89,9 +89,7 @@ class Ontology:
         digest = _content_hash(sources, values or {}, added)
         return cls(
             files=(*sorted(source.path for source in sources), *(file.path for file in files)),
-            content_hash=hash_with_rules(
-                _content_hash(sources, values or {}, added), [file.text for file in files], disabled_rules
-            ),
+            content_hash=hash_with_rules(digest, [file.text for file in files], disabled_rules),
             content=content,
             names=names,
             model=model,
