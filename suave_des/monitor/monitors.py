@@ -98,19 +98,10 @@ def thruster_monitor(
             counted_from = tick
 
 
-def pose_monitor(
-    env: simpy.Environment, bus: DiagnosticsBus, pose: Callable[[], Pose], period_s: float = 1.0
+def state_monitor(
+    env: simpy.Environment, bus: DiagnosticsBus, kind: Kind, key: str, state: Callable[[], Pose | float]
 ) -> Process:
-    """Publish the vehicle's pose, from t = 0 on."""
+    """Publish the vehicle's pose, or the distance inspected so far, once a second from t = 0 on."""
     while True:
-        bus.publish(Diagnostic(env.now, Kind.POSE, "pose", pose()))
-        yield env.timeout(period_s)
-
-
-def distance_monitor(
-    env: simpy.Environment, bus: DiagnosticsBus, distance_m: Callable[[], float], period_s: float = 1.0
-) -> Process:
-    """Publish the distance inspected so far, from t = 0 on."""
-    while True:
-        bus.publish(Diagnostic(env.now, Kind.DISTANCE, "distance_inspected_m", distance_m()))
-        yield env.timeout(period_s)
+        bus.publish(Diagnostic(env.now, kind, key, state()))
+        yield env.timeout(1.0)

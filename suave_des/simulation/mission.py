@@ -31,10 +31,9 @@ from suave_des.monitor.monitors import (
     LossyPublisher,
     ThrusterFault,
     battery_monitor,
-    distance_monitor,
     leak_monitor,
-    pose_monitor,
     signal_monitor,
+    state_monitor,
     thruster_monitor,
 )
 from suave_des.scenario.physical import Battery
@@ -264,10 +263,12 @@ class MissionRun:
                 self.env.process(signal_monitor(self.env, self._bus, measurements))
             if self._battery is not None:
                 self.env.process(battery_monitor(self.env, self._bus, self._battery))
-        if self._bus.has_subscribers(Kind.POSE):
-            self.env.process(pose_monitor(self.env, self._bus, lambda: self._vehicle.pose(self.env.now)))
-        if self._bus.has_subscribers(Kind.DISTANCE):
-            self.env.process(distance_monitor(self.env, self._bus, lambda: self._follow.distance_m))
+        for kind, key, state in (
+            (Kind.POSE, "pose", lambda: self._vehicle.pose(self.env.now)),
+            (Kind.DISTANCE, "distance_inspected_m", lambda: self._follow.distance_m),
+        ):
+            if self._bus.has_subscribers(kind):
+                self.env.process(state_monitor(self.env, self._bus, kind, key, state))
         if self._bus.has_subscribers(Kind.DETECTION):
             self._detector.detected.callbacks.append(self._publish_detection)
         self._start_thruster_monitor()
