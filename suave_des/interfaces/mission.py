@@ -113,9 +113,18 @@ class Mission:
         if self._is_managed:
             raise InputError("the mission has a manager, which changes modes", remedy="leave the manager out")
         if not self._run.modes.change_mode(function, mode):
-            known = self.modes
-            if function not in known:
-                raise InputError(f"there is no function {shown(function)}", remedy=did_you_mean(function, known))
+            self.check_mode(function, mode)
+
+    def check_mode(self, function: str, mode: str) -> None:
+        """See that a mode can be requested.
+
+        Raises:
+            InputError: there is no such function or mode.
+        """
+        known = self.modes
+        if function not in known:
+            raise InputError(f"there is no function {shown(function)}", remedy=did_you_mean(function, known))
+        if mode not in known[function]:
             remedy = did_you_mean(mode, known[function], "its modes")
             raise InputError(f"function {function} has no mode {shown(mode)}", remedy=remedy)
 

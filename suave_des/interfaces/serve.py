@@ -9,14 +9,14 @@ from __future__ import annotations
 import json
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from math import inf, isfinite
 from typing import Any, Final
 
-from suave_des.errors import InputError, SuaveDesError, did_you_mean, shown
+from suave_des.errors import InputError, SuaveDesError, shown
 from suave_des.interfaces.mission import Mission
 from suave_des.scenario.modes import DEFAULT_MODE, UNGROUND_MODE
 from suave_des.simulation.simulator import Simulator
@@ -110,13 +110,8 @@ class Session:
     def _execute(self, content: Any) -> Json:
         wanted = _object(content)
         step_s = _seconds(wanted.pop(_ADVANCE, 0.0))
-        known = self._mission.modes
         for function, mode in wanted.items():
-            if function not in known:
-                raise InputError(f"there is no function {shown(function)}", remedy=did_you_mean(function, known))
-            if mode not in known[function]:
-                remedy = did_you_mean(mode, known[function], "its modes")
-                raise InputError(f"function {function} has no mode {shown(mode)}", remedy=remedy)
+            self._mission.check_mode(function, mode)
         if not self._mission.is_over:
             for function, mode in wanted.items():
                 self._mission.change_mode(function, mode)
@@ -124,9 +119,7 @@ class Session:
         return {"time_s": round(self._mission.now_s, 6), "is_over": self._mission.is_over}
 
     def _advance(self, content: Any) -> Json:
-        wanted = _object(content)
-        if unknown := [key for key in wanted if key not in (_ADVANCE, "until_s")]:
-            raise InputError(f"unknown key {shown(unknown[0])}", remedy=f"give {_ADVANCE} or until_s")
+        wanted = _object(content, (_ADVANCE, "until_s"))
         if len(wanted) != 1:
             raise InputError("says nothing, or too much", remedy=f"give {_ADVANCE} or until_s")
         now_s = self._mission.now_s
@@ -135,14 +128,12 @@ class Session:
         return self._monitor()
 
     def _start(self, content: Any) -> Json:
-        wanted = _object(content)
-        if unknown := [key for key in wanted if key not in ("run", "seed")]:
-            raise InputError(f"unknown key {shown(unknown[0])}", remedy="give run and seed")
+        wanted = _object(content, ("run", "seed"))
         self._begin(wanted.get("run", self._run), wanted.get("seed", self._seed))
         return self._monitor()
 
     def _metrics(self) -> Json:
-        return {key: value for key, value in asdict(self._mission.metrics()).items() if key != "further"}
+        return asdict(self._mission.metrics())
 
     def _monitor_schema(self) -> Json:
         number, text, either = {"type": "number"}, {"type": "string"}, {"type": ["number", "null"]}
@@ -171,9 +162,12 @@ def _schema(properties: Json, *, required: bool) -> Json:
     }
 
 
-def _object(content: Any) -> Json:
+def _object(content: Any, known: Sequence[str] = ()) -> Json:
+    """Return a copy of an object; where its keys are known beforehand, it may have no others."""
     if not isinstance(content, dict):
         raise InputError(f"expected an object, got {shown(content)}", remedy='such as {"advance_s": 2.0}')
+    if known and (unknown := [key for key in content if key not in known]):
+        raise InputError(f"unknown key {shown(unknown[0])}", remedy=f"give {' or '.join(known)}")
     return dict(content)
 
 

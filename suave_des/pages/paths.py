@@ -27,7 +27,6 @@ class Way:
     Attributes:
         group: number of its group of missions.
         run: number of the run.
-        point: of the sweep.
         t_s: times; x_m, y_m: where it was; altitude_m: above the sea bed; visibility_m: as measured.
         modes: times at which the mode of the function that moves it changed, with its name.
         events: times of mode requests, component reports and the first sight, with their detail.
@@ -35,7 +34,6 @@ class Way:
 
     group: int
     run: int
-    point: int
     t_s: Sequence[float]
     x_m: Sequence[float]
     y_m: Sequence[float]
@@ -118,7 +116,6 @@ def _path(group: int, run: int, result: MissionResult) -> Way:
     return Way(
         group,
         run,
-        0,
         [round(each.t_s, 1) for each in some],
         _rounded([each.x_m for each in some]),
         _rounded([each.y_m for each in some]),

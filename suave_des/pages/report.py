@@ -213,7 +213,7 @@ def _section(found: Comparison, name: str) -> Section:
 
 def drawn(missions: Missions) -> Drawn:
     """Put missions into columns, at most MOST_DRAWN of them."""
-    groups, _ = grouped(missions, (), ())
+    groups, _ = grouped(missions)
     keys = list(dict.fromkeys(zip(missions.frame["manager"], missions.frame["source"], strict=True)))
     numbers = {key: number for number, key in enumerate(keys)}
     frame = missions.frame

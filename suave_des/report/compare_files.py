@@ -179,9 +179,9 @@ def runs_table(comparison: Comparison) -> Table:
 
 def _summary_cells(each: Summary, metric: ComparedMetric) -> Cells:
     """Write a row of summary_table."""
-    low, median, high = each.quartiles or (None, None, None)
     mean, interval = (None, None) if each.mean is None else (each.mean.value, each.mean.interval)
-    spread = (number(each.std, metric), number(median, metric), interval_cell(_both(low, high), metric))
+    median, quartiles = (each.quartiles[1], each.quartiles[::2]) if each.quartiles else (None, None)
+    spread = (number(each.std, metric), number(median, metric), interval_cell(quartiles, metric))
     return each.group, f"{each.n:,}", number(mean, metric), interval_cell(interval, metric), *spread
 
 
@@ -261,10 +261,6 @@ def p_cell(p: float | None) -> str:
     if p < 1e-300:  # next to the least that a float can hold
         return "<1e-300"
     return f"{p:.3f}" if p >= 0.001 else f"{p:.0e}"
-
-
-def _both(low: float | None, high: float | None) -> Interval | None:
-    return None if low is None or high is None else (low, high)
 
 
 def remarks(comparison: Comparison) -> list[str]:

@@ -27,7 +27,7 @@ def _rainclouds(groups: Sequence[Group]) -> Figure:
     scenarios = {
         str(name) for group in groups if "scenario" in group.frame for name in group.frame["scenario"].unique()
     }
-    published = grouped(read_missions([published_runs()]), (), ())[0] if scenarios == {_PUBLISHED_SCENARIO} else []
+    published = grouped(read_missions([published_runs()]))[0] if scenarios == {_PUBLISHED_SCENARIO} else []
     names = [group.name for group in groups]
     return campaign_figures.draw_rainclouds(groups, {group.name: group for group in published if group.name in names})
 
@@ -158,4 +158,4 @@ def _of_missions(missions: Missions, kind: str, parameters: Sequence[str]) -> Fi
     name = "distributions" if kind == AUTO else kind
     if name not in CAMPAIGN_KINDS:
         raise InputError(f"the figure {name} is of a mission", place="kind", remedy=did_you_mean(name, CAMPAIGN_KINDS))
-    return CAMPAIGN_KINDS[name](grouped(missions, (), ())[0])
+    return CAMPAIGN_KINDS[name](grouped(missions)[0])

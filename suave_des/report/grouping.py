@@ -61,7 +61,7 @@ def time_limit_s(groups: Sequence[Group]) -> float:
     return math.floor(limit_s) or limit_s
 
 
-def grouped(missions: Missions, managers: Sequence[str], by: Sequence[str]) -> tuple[list[Group], list[str]]:
+def grouped(missions: Missions, managers: Sequence[str] = (), by: Sequence[str] = ()) -> tuple[list[Group], list[str]]:
     """Group missions by manager, source and the chosen parameters of a sweep.
 
     Args:

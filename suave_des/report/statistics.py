@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -255,6 +256,13 @@ class Tested:
 
 WILCOXON, MANN_WHITNEY = "Wilcoxon signed-rank", "Mann-Whitney"
 MCNEMAR, FISHER = "McNemar, exact", "Fisher, exact"
+_ALTERNATIVES: tuple[Literal["two-sided", "less", "greater"], ...] = ("two-sided", "less", "greater")
+
+
+def _ps(found: Sequence[Any]) -> tuple[float, float, float]:
+    """Return the p-values of a test with each of _ALTERNATIVES."""
+    p, p_less, p_greater = (float(each.pvalue) for each in found)
+    return p, p_less, p_greater
 
 
 def signed_rank_test(first: Sample, second: Sample) -> Tested:
@@ -269,12 +277,9 @@ def signed_rank_test(first: Sample, second: Sample) -> Tested:
     if differing == 0:
         return Tested(WILCOXON, 1.0, 1.0, 1.0, 0.0, None, "rank-biserial")
     with _quiet():
-        two_sided, less, greater = (
-            wilcoxon(first, second, alternative=each) for each in ("two-sided", "less", "greater")
-        )
-    effect = 4.0 * float(greater.statistic) / (differing * (differing + 1)) - 1.0
-    p, p_less, p_greater = (float(each.pvalue) for each in (two_sided, less, greater))
-    return Tested(WILCOXON, p, p_less, p_greater, effect, None, "rank-biserial")
+        found = [wilcoxon(first, second, alternative=each) for each in _ALTERNATIVES]
+    effect = 4.0 * float(found[-1].statistic) / (differing * (differing + 1)) - 1.0
+    return Tested(WILCOXON, *_ps(found), effect, None, "rank-biserial")
 
 
 def rank_sum_test(first: Sample, second: Sample) -> Tested:
@@ -287,10 +292,8 @@ def rank_sum_test(first: Sample, second: Sample) -> Tested:
 
     if np.ptp(np.concatenate([first, second])) == 0.0:
         return Tested(MANN_WHITNEY, 1.0, 1.0, 1.0, 0.5, None, "A12")
-    two_sided, less, greater = (
-        mannwhitneyu(first, second, alternative=each) for each in ("two-sided", "less", "greater")
-    )
-    effect = float(two_sided.statistic) / (len(first) * len(second))
+    found = [mannwhitneyu(first, second, alternative=each) for each in _ALTERNATIVES]
+    effect = float(found[0].statistic) / (len(first) * len(second))
     interval: Interval | None = None
     if min(len(first), len(second)) > 1:
         with _quiet():
@@ -298,8 +301,7 @@ def rank_sum_test(first: Sample, second: Sample) -> Tested:
             low, high = ranks.conf_int(alpha=1.0 - CONFIDENCE)
         if _finite(low, high):  # samples that do not overlap give none
             interval = max(0.0, float(low)), min(1.0, float(high))
-    p, p_less, p_greater = (float(each.pvalue) for each in (two_sided, less, greater))
-    return Tested(MANN_WHITNEY, p, p_less, p_greater, effect, interval, "A12")
+    return Tested(MANN_WHITNEY, *_ps(found), effect, interval, "A12")
 
 
 def shares_test(first: tuple[int, int], second: tuple[int, int]) -> Tested:
@@ -307,10 +309,7 @@ def shares_test(first: tuple[int, int], second: tuple[int, int]) -> Tested:
     from scipy.stats import fisher_exact
 
     table = [[count, n - count] for count, n in (first, second)]
-    p, p_less, p_greater = (
-        float(fisher_exact(table, alternative=each).pvalue) for each in ("two-sided", "less", "greater")
-    )
-    return Tested(FISHER, p, p_less, p_greater)
+    return Tested(FISHER, *_ps([fisher_exact(table, alternative=each) for each in _ALTERNATIVES]))
 
 
 def paired_shares_test(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> Tested:
@@ -342,12 +341,5 @@ def runs_for(spread: float, half_width: float) -> int | None:
     def suffices(runs: int) -> bool:
         return t_quantile(runs - 1) * spread / math.sqrt(runs) <= half_width
 
-    low, high = 1, 2
-    while not suffices(high):
-        if high > _MOST_RUNS:
-            return None
-        low, high = high, 2 * high
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if suffices(middle) else (middle, high)
-    return high
+    least = bisect_left(range(_MOST_RUNS + 1), True, lo=2, key=suffices)
+    return least if least <= _MOST_RUNS else None

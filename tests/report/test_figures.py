@@ -71,7 +71,7 @@ def test_the_map_shows_every_mode_and_what_happened(mission: Path) -> None:
 
 
 def test_the_distributions_have_a_curve_for_each_manager_that_reaches_1(campaign: Path) -> None:
-    figure = draw_distributions(grouped(read_missions([campaign]), (), ())[0])
+    figure = draw_distributions(grouped(read_missions([campaign]))[0])
     for axes in figure.axes:
         curves = [line for line in axes.get_lines() if len(line.get_xdata()) > 2]
         assert [line.get_label() for line in curves] == ["none (n = 3)", "random (n = 3)"]
@@ -181,27 +181,27 @@ def test_more_managers_than_colours_differ_in_their_lines() -> None:
         for number, name in enumerate(names)
         for run in (1, 2)
     )
-    figure = draw_distributions(grouped(missions_of(frame), (), ())[0])
+    figure = draw_distributions(grouped(missions_of(frame))[0])
     curves = [line for line in figure.axes[0].get_lines() if len(line.get_xdata()) > 2]
     assert len({(line.get_color(), str(line._unscaled_dash_pattern)) for line in curves}) == 14
 
 
 def test_missions_that_never_found_the_pipeline_are_named_at_the_time_limit() -> None:
-    figure = draw_distributions(grouped(read_missions([published_runs()]), (), ())[0])
+    figure = draw_distributions(grouped(read_missions([published_runs()]))[0])
     (text,) = [text for text in figure.axes[0].texts if "not found" in text.get_text()]
     assert text.get_position()[0] == 300.0
 
 
 def test_a_raincloud_shows_the_published_runs_beside_the_missions(campaign: Path) -> None:
-    groups = grouped(read_missions([campaign]), (), ())[0]
-    published = grouped(read_missions([published_runs()]), (), ())[0]
+    groups = grouped(read_missions([campaign]))[0]
+    published = grouped(read_missions([published_runs()]))[0]
     figure = draw_rainclouds(groups, {group.name: group for group in published[:2]})
     crosses = [line for line in figure.axes[0].get_lines() if line.get_marker() == "x"]
     assert [len(line.get_xdata()) for line in crosses] == [20, 20]
 
 
 def test_detections_are_shares_of_all_missions(campaign: Path) -> None:
-    groups = grouped(read_missions([campaign]), (), ())[0]
+    groups = grouped(read_missions([campaign]))[0]
     figure = draw_detections(groups)
     above = figure.subfigs[0].axes[0]
     found = groups[0].frame["detection_x_m"].notna().mean()

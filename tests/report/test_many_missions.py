@@ -66,7 +66,7 @@ def test_figures_of_many_missions_are_written_from_few_points() -> None:
     frame = pandas.DataFrame(
         {"manager": "none", "run": np.arange(1, n + 1), "seed": 1, "search_time_s": _times_s(n)}
     ).assign(distance_inspected_m=20.0, pipeline_found=True, scenario="seams2023")
-    groups, _ = grouped(missions_of(frame), (), ())
+    groups, _ = grouped(missions_of(frame))
     for figure in (draw_convergence(groups), draw_rainclouds(groups, {})):
         for axes in figure.axes:
             assert all(len(line.get_xdata()) <= 2_000 for line in axes.lines)
@@ -76,7 +76,7 @@ def test_figures_of_many_missions_are_written_from_few_points() -> None:
 def test_a_legend_of_long_names_stays_within_the_figure() -> None:
     names = [f"a manager with a long name {number}" for number in range(4)]
     frame = pandas.DataFrame({"manager": names * 10, "run": np.repeat(np.arange(1, 11), 4), "seed": 1})
-    groups, _ = grouped(missions_of(frame.assign(search_time_s=_times_s(40), distance_inspected_m=20.0)), (), ())
+    groups, _ = grouped(missions_of(frame.assign(search_time_s=_times_s(40), distance_inspected_m=20.0)))
     for draw in (draw_convergence, draw_distributions, draw_reactions):
         with style.publication():
             figure = draw(groups)
