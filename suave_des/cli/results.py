@@ -227,7 +227,7 @@ def replay(
     else:
         missions = missions_in(folders, chosen)
     write_page(page_file, replay_page(missions), show=show)
-    print(f"{' and '.join(each.name for each in missions)}: {page_file}")
+    print(f"{' and '.join(each.record.name for each in missions)}: {page_file}")
 
 
 def report(

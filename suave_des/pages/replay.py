@@ -14,6 +14,7 @@ from suave_des.managed.follow import InspectionPath
 from suave_des.pages.decisions import Cycles, explained
 from suave_des.pages.page import page
 from suave_des.pages.recorded import Recorded
+from suave_des.report.mission_record import details, mode_spans
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.modes import UNGROUND_MODE
 from suave_des.world.pipeline import sample_points, there_and_back
@@ -77,34 +78,31 @@ def replay_page(missions: Sequence[Recorded]) -> str:
         },
         "missions": [asdict(mission_on_page(each)) for each in missions],
     }
-    title = " and ".join(dict.fromkeys(each.name for each in missions))
+    title = " and ".join(dict.fromkeys(each.record.name for each in missions))
     return page("replay.html", f"Replay: {title}", content, STYLES, SCRIPTS)
 
 
 def mission_on_page(mission: Recorded) -> MissionOnPage:
     """Prepare a mission for the page."""
-    modes: dict[str, list[tuple[float, str]]] = {}
+    record, metrics = mission.record, mission.record.metrics
+    modes = {function: [(span.begin_s, span.what) for span in spans] for function, spans in mode_spans(record).items()}
     thrusters: list[tuple[float, int, bool]] = []
-    for event in mission.events:
-        if event.event == "mode_set":
-            function, _, mode = event.detail.partition(" = ")
-            modes.setdefault(function, []).append((event.t_s, mode))
-        elif event.event == "component_status":
-            component, _, status = event.detail.partition(" ")
-            number = component.rpartition("_")[2]
-            if number.isdecimal():
-                thrusters.append((event.t_s, int(number), status != "FALSE"))
-    metrics = mission.metrics
+    for t_s, detail in details(record, "component_status"):
+        component, _, status = detail.partition(" ")
+        number = component.rpartition("_")[2]
+        if number.isdecimal():
+            thrusters.append((t_s, int(number), status != "FALSE"))
+    events = record.events[["t_s", "source", "event", "detail"]].itertuples(index=False, name=None)
     way = _way(mission)
     x_m, y_m, seen_s = (metrics.get(name) for name in ("detection_x_m", "detection_y_m", "detection_time_s"))
     is_seen = isinstance(seen_s, float) and isinstance(x_m, float | int) and isinstance(y_m, float | int)
     return MissionOnPage(
-        name=mission.name,
+        name=record.name,
         metrics=metrics,
-        track={name: _rounded(values) for name, values in mission.track.items()},
+        track={str(name): _rounded(values.tolist()) for name, values in record.trajectory.items()},
         modes=modes,
         thrusters=thrusters,
-        events=[(round(each.t_s, 2), each.source, each.event, each.detail) for each in mission.events],
+        events=[(round(t_s, 2), *words) for t_s, *words in events],
         inspected=_inspected(mission, way, modes.get(FOLLOW_PIPELINE, ())),
         way=[] if way is None else [(round(x, _DECIMALS), round(y, _DECIMALS)) for x, y, _ in way.points_m.tolist()],
         seen=(seen_s, x_m, y_m) if is_seen else None,  # type: ignore[arg-type]
@@ -118,19 +116,22 @@ def _station(scenario: Scenario) -> list[float] | None:
 
 
 def _rounded(values: Sequence[Any]) -> list[Any]:
-    return [round(value, _DECIMALS) if isinstance(value, float) else value for value in values]
+    """Round numbers; none where a value is missing."""
+    return [
+        None if value is None or value != value else round(value, _DECIMALS) if isinstance(value, float) else value
+        for value in values
+    ]
 
 
 def _way(mission: Recorded) -> InspectionPath | None:
     """The way along the pipeline from the point that was seen first."""
-    for event in mission.events:
-        if event.event == "pipeline_detected":
-            pipeline = mission.scenario.pipeline
-            altitude_m = mission.scenario.revision.follow.altitude_m
-            points = sample_points(pipeline.vertices_m, pipeline.points_per_piece)
-            number = event.detail.rpartition(" ")[2]
-            if number.isdecimal() and int(number) < len(points):
-                return InspectionPath.along(there_and_back(points), altitude_m).from_point(int(number))
+    pipeline = mission.scenario.pipeline
+    altitude_m = mission.scenario.revision.follow.altitude_m
+    points = sample_points(pipeline.vertices_m, pipeline.points_per_piece)
+    for _, detail in details(mission.record, "pipeline_detected"):
+        number = detail.rpartition(" ")[2]
+        if number.isdecimal() and int(number) < len(points):
+            return InspectionPath.along(there_and_back(points), altitude_m).from_point(int(number))
     return None
 
 
@@ -144,7 +145,7 @@ def _inspected(
     mode_times = [t_s for t_s, _ in modes]
     lengths_m = list(accumulate(way.lengths_m))
     points = way.points_m[:, :2].tolist()
-    track = mission.track
+    track = mission.record.trajectory
     found: list[tuple[float, int, float]] = []
     next_point, was_following, start_m = 0, False, 0.0
     for t_s, x_m, y_m in zip(track["t_s"], track["x_m"], track["y_m"], strict=True):

@@ -145,7 +145,7 @@ def mode_spans(record: MissionRecord) -> dict[str, list[Span]]:
     """Return by function when it had which mode."""
     spans: dict[str, list[Span]] = {}
     end_s = float(record.trajectory["t_s"].iloc[-1])
-    for t_s, detail in _details(record, "mode_set"):
+    for t_s, detail in details(record, "mode_set"):
         function, _, mode = detail.partition(" = ")
         own = spans.setdefault(function, [])
         if own:
@@ -158,7 +158,7 @@ def failure_spans(record: MissionRecord) -> dict[str, list[Span]]:
     """Return by component, of those that failed, from when to when."""
     spans: dict[str, list[Span]] = {}
     end_s = float(record.trajectory["t_s"].iloc[-1])
-    for t_s, detail in _details(record, "component_status"):
+    for t_s, detail in details(record, "component_status"):
         component, _, status = detail.partition(" ")
         own = spans.setdefault(component, [])
         is_failed = bool(own) and own[-1].end_s == end_s
@@ -210,7 +210,7 @@ def _with_cause(found: Adaptation, record: MissionRecord) -> Adaptation:
             causes += [(span.begin_s, f"{name} failed") for span in spans]
             causes += [(span.end_s, f"{name} recovered") for span in spans]
     else:
-        crossings = _details(record, "visibility_crossing")
+        crossings = details(record, "visibility_crossing")
         causes += [(t_s, f"visibility {detail.split(' (')[0]}") for t_s, detail in crossings]
     recent = [(t_s, text) for t_s, text in causes if 0.0 <= found.t_s - t_s <= _LATEST_REACTION_S]
     return replace(found, cause=max(recent)[1]) if recent else found
@@ -235,6 +235,7 @@ def battery_level(record: MissionRecord) -> pandas.Series[float] | None:
     return record.trajectory.get("battery_level")
 
 
-def _details(record: MissionRecord, event: str) -> list[tuple[float, str]]:
+def details(record: MissionRecord, event: str) -> list[tuple[float, str]]:
+    """Return times and details of the events of one kind."""
     own = record.events[record.events["event"] == event]
     return list(zip(own["t_s"].astype(float), own["detail"], strict=True))

@@ -34,8 +34,10 @@ def campaign(tmp_path_factory):
 def test_a_mission_of_a_campaign_is_the_one_that_run_records(campaign, mission):
     (again,) = missions_in([campaign], Chosen(("bt",), run=2))
     recorded = read_recorded(mission)
-    assert again.metrics["search_time_s"] == recorded.metrics["search_time_s"]
-    assert again.track["x_m"] == pytest.approx(recorded.track["x_m"], abs=1e-6)
+    assert again.record.metrics["search_time_s"] == recorded.record.metrics["search_time_s"]
+    assert again.record.trajectory["x_m"].tolist() == pytest.approx(
+        recorded.record.trajectory["x_m"].tolist(), abs=1e-6
+    )
 
 
 def test_what_was_inspected_adds_up_to_the_metric_of_the_mission(tmp_path):
@@ -43,7 +45,7 @@ def test_what_was_inspected_adds_up_to_the_metric_of_the_mission(tmp_path):
     recorded = read_recorded(tmp_path / "mission")
     page = mission_on_page(recorded)
     _, _, distance_m = page.inspected[-1]
-    assert distance_m == pytest.approx(recorded.metrics["distance_inspected_m"], abs=1.5)
+    assert distance_m == pytest.approx(recorded.record.metrics["distance_inspected_m"], abs=1.5)
     assert [t_s for t_s, _, _ in page.inspected] == sorted(t_s for t_s, _, _ in page.inspected)
 
 

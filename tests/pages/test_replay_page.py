@@ -93,8 +93,8 @@ def test_playing_moves_the_vehicle_until_it_is_paused(one, browser):
 
 
 def test_scrubbing_shows_the_vehicle_where_it_was_then(one, missions, browser):
-    track = missions["metacontrol"].track
-    index = track["t_s"].index(50.0)
+    track = missions["metacontrol"].record.trajectory
+    index = track["t_s"].tolist().index(50.0)
     with opened(browser, one) as found:
         found.page.evaluate(
             "(s => { s.value = 50; s.dispatchEvent(new Event('input')); })(document.querySelector('#scrub'))"
@@ -145,7 +145,8 @@ def test_names_are_text_never_markup(missions, tmp_path, browser):
     from dataclasses import replace
 
     name = "</script><img src=x onerror=alert(1)><b>mine</b>"
-    mission = replace(missions["none"], metrics={**missions["none"].metrics, "manager": name})
+    record = missions["none"].record
+    mission = replace(missions["none"], record=replace(record, metrics={**record.metrics, "manager": name}))
     file = tmp_path / "replay.html"
     file.write_text(replay_page([mission]), encoding="utf-8")
     with opened(browser, file) as found:
