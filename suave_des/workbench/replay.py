@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from suave_des.knowledge.content import with_rules
 from suave_des.knowledge.deliberation import NONE_LEFT
 from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet import InProcessPellet
 from suave_des.knowledge.rules.files import hash_with_rules, read_rule
 from suave_des.knowledge.rules.parser import parse_rule
 from suave_des.knowledge.state import ContradictionError, Fact, KnowledgeState, Value
@@ -257,6 +258,11 @@ class _Comparison:
             self.with_rule, self.without_rule = self.before, self.after
         self.rules = [rule for rule in self.with_rule.base.content.enabled_rules if rule.name == name]
 
+    @cached_property
+    def _pellet(self) -> InProcessPellet:
+        base = self.with_rule.base
+        return InProcessPellet(base, base.content.all_terms())
+
     def replay(self, record: KnowledgeRecord) -> ReplayedCycle | None:
         """What the change does in a recorded reasoning cycle; None: nothing."""
         state = record.state
@@ -265,7 +271,7 @@ class _Comparison:
         if contradiction is not None:
             return ReplayedCycle(record.t_s, state, (), (), contradiction)
         without = self.without_rule.decide(state).inference
-        tracer = Tracer(self.with_rule.base, state)
+        tracer = Tracer(self.with_rule.base, state, self._pellet)
         firings = tuple(
             Firing(facts, bindings, is_new=not (without.facts | without.asserted).issuperset(facts))
             for rule in self.rules

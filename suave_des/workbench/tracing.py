@@ -107,10 +107,17 @@ class Clash:
 
 @dataclass(frozen=True, eq=False)
 class Tracer:
-    """Derives the facts of one state."""
+    """Derives the facts of one state.
+
+    Attributes:
+        base: the ontology.
+        state: whose facts are derived.
+        pellet: with that ontology and all its terms loaded, for who asks about many states; None: one of its own.
+    """
 
     base: Ontology
     state: KnowledgeState
+    pellet: InProcessPellet | None = field(default=None, repr=False)
     _steps: dict[object, frozenset[Triple]] = field(default_factory=dict, repr=False)
     _found: dict[Triple, Derivation] = field(default_factory=dict, repr=False)
 
@@ -131,7 +138,8 @@ class Tracer:
         Raises:
             KnowledgeError: the state contradicts itself.
         """
-        return InProcessPellet(self.base, self.base.content.all_terms()).infer(self.situation) | self.asserted
+        pellet = self.pellet or InProcessPellet(self.base, self.base.content.all_terms())
+        return pellet.infer(self.situation) | self.asserted
 
     @cached_property
     def known(self) -> tuple[Triple, ...]:
