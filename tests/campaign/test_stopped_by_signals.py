@@ -39,8 +39,7 @@ def wait_for(path: Path, size: int = 0) -> None:
         time.sleep(0.002)
 
 
-@pytest.mark.parametrize("number", STATUS)
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize(("number", "workers"), [*zip(STATUS, (1, 2), strict=True)])
 def test_what_is_done_is_kept(number: signal.Signals, workers: int, scenario: Path, tmp_path: Path) -> None:
     asked = [str(scenario), "--managers", "none", "--runs", str(RUNS), "--workers", str(workers), "--out", "out"]
     process = chaos.start(asked, tmp_path)

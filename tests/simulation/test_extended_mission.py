@@ -112,8 +112,17 @@ def test_a_mission_without_battery_has_no_column_for_it() -> None:
     assert point.further == {}
 
 
-@pytest.mark.parametrize("level", [1.0, 0.25, 0.2])
-@pytest.mark.parametrize("design", ["fd_recharge", "fd_no_recharge"])
+@pytest.mark.parametrize(
+    ("design", "level"),
+    [
+        ("fd_recharge", 0.25),
+        ("fd_no_recharge", 0.2),
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in (("fd_recharge", 1.0), ("fd_recharge", 0.2), ("fd_no_recharge", 1.0), ("fd_no_recharge", 0.25))
+        ),
+    ],
+)
 def test_stock_pellet_infers_the_same_of_the_extended_ontology(level: float, design: str) -> None:
     base = Ontology.load([find("suave_extended.owl", "ontology")])
     state = KnowledgeState.of(
