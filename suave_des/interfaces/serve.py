@@ -69,7 +69,7 @@ class Session:
             ("GET", "/adaptation_options_schema"): lambda _: self._options_schema(),
             ("POST", "/advance"): self._advance,
             ("POST", "/start"): self._start,
-            ("GET", "/metrics"): lambda _: self._metrics(),
+            ("GET", "/metrics"): lambda _: asdict(self._mission.metrics()),
         }
 
     def _begin(self, run: int, seed: int) -> None:
@@ -131,9 +131,6 @@ class Session:
         wanted = _object(content, ("run", "seed"))
         self._begin(wanted.get("run", self._run), wanted.get("seed", self._seed))
         return self._monitor()
-
-    def _metrics(self) -> Json:
-        return asdict(self._mission.metrics())
 
     def _monitor_schema(self) -> Json:
         number, text, either = {"type": "number"}, {"type": "string"}, {"type": ["number", "null"]}

@@ -253,7 +253,7 @@ def made_from(folder: Path) -> Made:
         return Made(
             str(folder),
             list(_facts(manifest)),
-            _command(manifest),
+            shlex.join(map(str, manifest.get("command", ()))),
             dict(manifest.get("inputs_sha256", {})),
             dict(manifest.get("versions", {})),
         )
@@ -271,7 +271,3 @@ def _facts(manifest: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     for key in ("sweep", "perturbations"):
         if manifest.get(key):
             yield key, json.dumps(manifest[key])
-
-
-def _command(manifest: Mapping[str, Any]) -> str:
-    return shlex.join(map(str, manifest.get("command", ())))

@@ -56,7 +56,8 @@ def draw_distributions(groups: Sequence[Group]) -> style.Picture:
             axes.plot(float(values.mean()), 0.0, clip_on=False, zorder=5, **mark)
         axes.set(xlabel=title, xlim=(0.0, end))
         if metric == "search_time_s" and limit_s is not None:
-            _mark_not_found(axes, limit_s)
+            axes.axvline(limit_s, color=style.GREY, lw=0.7, ls=":", zorder=1)
+            axes.text(limit_s, 0.03, "not found ", color="#555555", fontsize=7, rotation=90, ha="right", va="bottom")
     figure.axes[0].set(ylabel="share of missions at or below", ylim=(0.0, 1.02))
     figure.axes[0].yaxis.set_major_formatter(PercentFormatter(1.0))
     handles = [*_handles(groups), Line2D([], [], lw=0, marker="o", mfc="none", ms=4, color=style.GREY)]
@@ -67,11 +68,6 @@ def draw_distributions(groups: Sequence[Group]) -> style.Picture:
 def _limit_of_lost(groups: Sequence[Group]) -> float | None:
     """Return when missions ended that never found the pipeline; None if all found it."""
     return time_limit_s(groups) if any((group.values("pipeline_found") < 1.0).any() for group in groups) else None
-
-
-def _mark_not_found(axes: Axes, limit_s: float) -> None:
-    axes.axvline(limit_s, color=style.GREY, lw=0.7, ls=":", zorder=1)
-    axes.text(limit_s, 0.03, "not found ", color="#555555", fontsize=7, rotation=90, ha="right", va="bottom")
 
 
 def draw_rainclouds(groups: Sequence[Group], published: Mapping[str, Group]) -> style.Picture:

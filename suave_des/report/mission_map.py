@@ -236,7 +236,6 @@ def _draw_adaptations(axes: Axes, record: MissionRecord, colours: dict[str, str]
 def _draw_over_time(axes: Axes, record: MissionRecord, colours: dict[str, str], marks: Sequence[_Mark]) -> None:
     """Draw altitude, visibility with its thresholds, and battery."""
     way = record.trajectory.assign(altitude_m=record.trajectory["z_m"] - SEA_BED_Z_M)
-    end_s = float(way["t_s"].iloc[-1])
     for threshold_m in record.scenario.get("reaction_metric", {}).get("visibility_thresholds_m", ()):
         axes.axhline(threshold_m, color=_THRESHOLD_COLOUR, lw=0.7, ls=":", zorder=1)
     axes.plot(way["t_s"], way["visibility_m"], **_VISIBILITY)
@@ -244,7 +243,7 @@ def _draw_over_time(axes: Axes, record: MissionRecord, colours: dict[str, str], 
     _draw_way(axes, timed, colours, "t_s", "altitude_m")
     _draw_adaptations(axes, timed, colours, "t_s", "altitude_m")
     tallest = max(way["altitude_m"].max(), way["visibility_m"].max())
-    rows = _letter_rows(marks, end_s)
+    rows = _letter_rows(marks, record.end_s)
     top = tallest * (1.06 + _LETTER_ROW_SHARE * (max(rows, default=0) + 1))
     for mark, row in zip(marks, rows, strict=True):
         axes.axvline(mark.t_s, color=mark.colour, lw=0.7, ls=":")
@@ -260,7 +259,7 @@ def _draw_over_time(axes: Axes, record: MissionRecord, colours: dict[str, str], 
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
         )
     axes.set_ylim(0.0, top)
-    axes.set_xlim(0.0, end_s)
+    axes.set_xlim(0.0, record.end_s)
     axes.set_xlabel("mission time (s)")
     axes.set_ylabel("altitude; visibility (m)")
     level = battery_level(record)

@@ -50,6 +50,11 @@ class MissionRecord:
         metrics = self.metrics
         return f"{metrics['scenario']}, {metrics['manager']}, run {metrics['run']}, seed {metrics['seed']}"
 
+    @property
+    def end_s(self) -> float:
+        """Time of the trajectory's last point."""
+        return float(self.trajectory["t_s"].iloc[-1])
+
 
 def read_mission(folder: Path) -> MissionRecord:
     """Read mission.json, events.csv and trajectory.csv.
@@ -143,21 +148,20 @@ _TASK_END_S = 3.0
 
 def mode_spans(record: MissionRecord) -> dict[str, list[Span]]:
     """Return by function when it had which mode."""
-    spans: dict[str, list[Span]] = {}
-    end_s = float(record.trajectory["t_s"].iloc[-1])
+    changes: dict[str, list[tuple[float, str]]] = {}
     for t_s, detail in details(record, "mode_set"):
         function, _, mode = detail.partition(" = ")
-        own = spans.setdefault(function, [])
-        if own:
-            own[-1] = Span(own[-1].begin_s, t_s, own[-1].what)
-        own.append(Span(t_s, end_s, mode))
-    return spans
+        changes.setdefault(function, []).append((t_s, mode))
+    return {
+        function: [Span(begin_s, end_s, mode) for (begin_s, mode), (end_s, _) in pairwise([*own, (record.end_s, "")])]
+        for function, own in changes.items()
+    }
 
 
 def failure_spans(record: MissionRecord) -> dict[str, list[Span]]:
     """Return by component, of those that failed, from when to when."""
     spans: dict[str, list[Span]] = {}
-    end_s = float(record.trajectory["t_s"].iloc[-1])
+    end_s = record.end_s
     for t_s, detail in details(record, "component_status"):
         component, _, status = detail.partition(" ")
         own = spans.setdefault(component, [])
@@ -178,8 +182,7 @@ def task_spans(record: MissionRecord) -> list[Span]:
             open_s[detail] = float(t_s)
         elif event in ("task_done", "task_cancelled") and detail in open_s:
             spans.append(Span(open_s.pop(detail), float(t_s), detail))
-    end_s = float(record.trajectory["t_s"].iloc[-1])
-    return [*spans, *(Span(begin_s, end_s, task) for task, begin_s in open_s.items())]
+    return [*spans, *(Span(begin_s, record.end_s, task) for task, begin_s in open_s.items())]
 
 
 def adaptations(record: MissionRecord) -> list[Adaptation]:

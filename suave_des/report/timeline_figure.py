@@ -58,8 +58,7 @@ def draw_timeline(record: MissionRecord) -> style.Picture:
     _draw_lines(panels[-2], lines)
     for axes in panels[:-2]:
         axes.tick_params(labelbottom=False)
-    end_s = float(record.trajectory["t_s"].iloc[-1])
-    panels[0].set_xlim(0.0, end_s)
+    panels[0].set_xlim(0.0, record.end_s)
     panels[-2].set_xlabel("mission time (s)")
     panels[0].set_title(style.text(record.name), pad=16)
     for axes in panels[:-1]:
@@ -88,7 +87,7 @@ def _draw_altitude(axes: Axes, record: MissionRecord, changes: Sequence[Adaptati
     axes.set_ylim(bottom=0.0)
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderaxespad=0.2, handlelength=2.4)
     last_s, row = -1e9, 0
-    near_s = 0.022 * float(way["t_s"].iloc[-1])
+    near_s = 0.022 * record.end_s
     for number, each in enumerate(changes[:_LISTED]):
         row = row + 1 if each.t_s - last_s < near_s else 0
         last_s = each.t_s
@@ -120,7 +119,7 @@ def _altitude_asked_for(record: MissionRecord) -> tuple[list[float], list[float]
             asked[function] = _SPIRAL_ALTITUDES_M.get(mode, np.nan) if function == _SEARCH else follow_m
         times_s.append(t_s)
         altitudes_m.append(next(reversed(asked.values()), np.nan))
-    return [*times_s, float(record.trajectory["t_s"].iloc[-1])], [*altitudes_m, altitudes_m[-1]]
+    return [*times_s, record.end_s], [*altitudes_m, altitudes_m[-1]]
 
 
 def _lines(record: MissionRecord) -> Iterator[tuple[str, list[tuple[Span, str, str]]]]:
