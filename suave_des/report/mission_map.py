@@ -298,7 +298,7 @@ def draw_paths(records: Sequence[MissionRecord]) -> style.Picture:
     low = np.min([search.min(axis=0) for search in searches], axis=0) - _PATHS_MARGIN_M
     high = np.max([search.max(axis=0) for search in searches], axis=0) + _PATHS_MARGIN_M
     shape = (high[1] - low[1]) / (high[0] - low[0])
-    height = rows * (style.WIDTH_IN / columns * shape * 0.85 + 0.55) + 0.3
+    height = rows * (style.WIDTH_IN / columns * shape * 0.93 + 0.55) + 0.3
     figure = style.Picture(figsize=(style.WIDTH_IN, min(height, 9.5)), layout="constrained")
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for axes in panels.ravel()[len(managers) :]:
