@@ -11,7 +11,7 @@ import pytest
 from suave_des import InputError, run_campaign, run_mission
 from suave_des.campaign.single import blocks, train
 from tests.helpers import AWKWARD
-from tests.helpers.command import suave_des_command
+from tests.helpers.command import command_here, suave_des_command
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "docs" / "examples"
 
@@ -165,7 +165,7 @@ class Loops(ManagingSubsystem):
 )
 def test_mistakes_in_a_class_are_told_early(tmp_path: Path, name: str, status: int, words: str) -> None:
     (tmp_path / "mistakes.py").write_text(MISTAKES)
-    done = suave_des_command("run", "seams2023", "--manager", f"mistakes:{name}", cwd=tmp_path)
+    done = command_here("run", "seams2023", "--manager", f"mistakes:{name}", cwd=tmp_path)
     assert done.returncode == status and words in done.stderr and "Traceback" not in done.stderr
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from suave_des import InputError, load_scenario, run_campaign, run_mission, with_values
-from tests.helpers.command import suave_des_command
+from tests.helpers.command import command_here, suave_des_command
 
 SETTABLE = """
 from suave_des.managing.simple import NoManager
@@ -94,7 +94,7 @@ def test_options_of_the_command_line(folder: Path, settable: str) -> None:
     ],
 )
 def test_options_that_make_no_sense_are_bad_input(tmp_path: Path, options: tuple[str, ...], words: str) -> None:
-    done = suave_des_command("run", "seams2023", "--manager", "none", *options, cwd=tmp_path)
+    done = command_here("run", "seams2023", "--manager", "none", *options, cwd=tmp_path)
     assert done.returncode == 2 and words in done.stderr and "Traceback" not in done.stderr
 
 
@@ -157,5 +157,5 @@ class TestReceivedFolder:
         assert "manager_code_sha256" in done.stderr  # the code is another one than the campaign began with
 
     def test_a_manager_that_it_does_not_have_cannot_be_added(self, received: Path) -> None:
-        done = suave_des_command("campaign", "--resume", "out", "--managers", "bt", cwd=received)
+        done = command_here("campaign", "--resume", "out", "--managers", "bt", cwd=received)
         assert done.returncode == 2 and "the campaign has no manager 'bt'" in done.stderr

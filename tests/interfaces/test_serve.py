@@ -15,7 +15,7 @@ import pytest
 from suave_des import InputError, Mission, load_scenario
 from suave_des.interfaces.serve import Server, Session
 from suave_des.simulation.simulator import Simulator
-from tests.helpers.command import suave_des_command
+from tests.helpers.command import command_here
 
 SEARCH = "f_generate_search_path"
 
@@ -164,7 +164,7 @@ def test_a_port_in_use_is_bad_input(port: int, simulator: Simulator) -> None:
 
 @pytest.mark.parametrize("options", [("--real-time-factor", "-1"), ("--host", "no.such.host.example")])
 def test_options_that_make_no_sense_are_bad_input(tmp_path: Path, options: tuple[str, str]) -> None:
-    done = suave_des_command("serve", "seams2023", "--port", "0", *options, cwd=tmp_path)
+    done = command_here("serve", "seams2023", "--port", "0", *options, cwd=tmp_path)
     assert done.returncode == 2 and "Traceback" not in done.stderr
 
 
