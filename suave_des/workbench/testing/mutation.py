@@ -192,11 +192,8 @@ class _Changed:
 
     def outcome(self, situation: Situation) -> Outcome:
         """Conclude what follows in a situation."""
-        found = self.original.entailed(situation)
-        if found is None or self.touches(situation):
+        if self.touches(situation):
             return self.prover.outcome(situation)
-        if self.known == self.original.known:
-            return self.original.outcome(self.original.bench.base, self.known, situation)
         return self.original.outcome(self.base, self.known, situation)
 
 
