@@ -61,10 +61,9 @@ class _StateCache:
         return self._cached(state)
 
     def _infer(self, state: KnowledgeState) -> Inference:
-        assertions = self._ontology.assertions(state)
-        asserted = self._ontology.facts.union(facts_of(assertions, self._ontology.names))
-        entailed = facts_of(self._entailed(state, assertions), self._ontology.names)
-        return Inference(state, asserted, frozenset(entailed) - asserted)
+        asserted = self._ontology.asserted(state)
+        entailed = self._entailed(state, self._ontology.assertions(state))
+        return Inference(state, asserted, frozenset(facts_of(entailed, self._ontology.names)) - asserted)
 
 
 def _pellet(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Reasoner:
@@ -94,11 +93,9 @@ def _owlready2(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Rea
             found = stock.infer(assertions, limit.seconds)
         except TimeoutError:
             raise limit.exceeded(reasoning_on(state), ontology.rules) from None
-        return (
-            limit.run(lambda: checker[0].infer(assertions), reasoning_on(state), ontology.rules)
-            if found is None
-            else found
-        )
+        if found is not None:
+            return found
+        return limit.run(lambda: checker[0].infer(assertions), reasoning_on(state), ontology.rules)
 
     return _StateCache("owlready2", ontology, entailed)
 

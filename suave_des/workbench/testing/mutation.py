@@ -88,7 +88,7 @@ class _Original:
 
     Attributes:
         bench: the knowledge base.
-        probes: for all mutants.
+        prover: with a probe for each conjunction on which mutants depend.
         touched_by: numbers of the probes of a mutant, by its number.
         is_horn: whether a mutant changes nothing where none of its probes holds.
     """
