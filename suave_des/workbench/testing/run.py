@@ -203,8 +203,7 @@ def _missing(base: Ontology, situation: Situation, fact: Fact) -> Iterator[str]:
     near = min((answer.failing for answer in answers if answer.failing), default=0)
     yield from (str(answer) for answer in answers if answer.failing in (0, near))
     if not answers:
-        what = f"membership in {fact.value}" if fact.property == "type" else fact.property
-        yield f"no rule concludes {what}"
+        yield f"no rule concludes {fact}"
 
 
 def _same(chosen: str, wanted: str, situation: Situation, function: str) -> bool:
