@@ -160,9 +160,10 @@ class Prover:
         found = self.known.get(situation)
         if found is None:
             try:
-                triples = self._infer(self._assertions(situation), situation.state)
-                facts = facts_of((each for each in triples if not each[0].startswith(_PROBE)), self.base.names)
-                found = Entailed(frozenset(facts) - self._asserted(situation), _holding(triples))
+                assertions, names = self._assertions(situation), self.base.names
+                triples = self._infer(assertions, situation.state)
+                facts = frozenset(facts_of((each for each in triples if not each[0].startswith(_PROBE)), names))
+                found = Entailed(facts.difference(self.base.facts, facts_of(assertions, names)), _holding(triples))
             except ContradictionError as error:
                 found = error
             self.known[situation] = found
