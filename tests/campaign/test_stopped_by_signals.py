@@ -47,7 +47,7 @@ def test_what_is_done_is_kept(number: signal.Signals, workers: int, scenario: Pa
     children = chaos.workers_of(process)
     process.send_signal(number)
     status, err = chaos.ended(process)
-    assert status == STATUS[number]
+    assert status == STATUS[number], err
     assert err.startswith("suave-des: interrupted; ")
     assert err.endswith(
         f" of {RUNS} missions are done, and kept in out; suave-des campaign --resume out does the rest\n"
@@ -68,7 +68,7 @@ def test_no_empty_folder_is_left(number: signal.Signals, moment: str, scenario: 
         time.sleep(0.3)
     process.send_signal(number)
     status, err = chaos.ended(process)
-    assert status == STATUS[number]
+    assert status == STATUS[number], err
     if (tmp_path / "out").exists():
         assert "--resume out does the rest" in err, list((tmp_path / "out").iterdir())
         assert sorted(path.name for path in (tmp_path / "out").iterdir()) == FILES
