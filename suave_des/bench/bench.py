@@ -87,7 +87,7 @@ class Bench:
 
 
 @dataclass(frozen=True)
-class Row:
+class GoalRow:
     """A figure and its goal.
 
     Attributes:
@@ -176,7 +176,7 @@ def _campaign(folder: Path, environment: Mapping[str, str], missions: int, worke
     return CampaignTime(missions, workers, ended.wall_s, ended.cpu_s, rate, ended.parent_mb, ended.worker_mb)
 
 
-def goal_rows(bench: Bench) -> list[Row]:
+def goal_rows(bench: Bench) -> list[GoalRow]:
     """Compare the figures with their goals, in the order of the goals."""
     warm, cold, one = (bench.campaigns[name] for name in ("warm", "cold", "one_worker"))
     values = (
@@ -190,24 +190,24 @@ def goal_rows(bench: Bench) -> list[Row]:
     rows = []
     for (what, (sense, unit, limit, for_all)), value in zip(_GOALS.items(), values, strict=True):
         met = None if for_all and bench.missions < MISSIONS else value >= limit if sense == ">=" else value <= limit
-        rows.append(Row(what.format(f"{bench.missions:,} missions"), f"{sense} {limit:,} {unit}", value, unit, met))
+        rows.append(GoalRow(what.format(f"{bench.missions:,} missions"), f"{sense} {limit:,} {unit}", value, unit, met))
     return [*rows, *_memory_rows(bench)]
 
 
-def _memory_rows(bench: Bench) -> Iterator[Row]:
+def _memory_rows(bench: Bench) -> Iterator[GoalRow]:
     for process, goal in (("parent", _PARENT_MB), ("worker", _WORKER_MB)):
         names = [name for name in ("small", "warm", "large", "cold") if name in bench.campaigns]
         peaks_mb: dict[str, float | None] = {name: getattr(bench.campaigns[name], f"{process}_mb") for name in names}
         for name, peak_mb in peaks_mb.items():
             which = "cold start" if name == "cold" else f"{bench.campaigns[name].missions:,} missions"
             met = None if peak_mb is None else peak_mb <= goal
-            yield Row(f"memory of a {process}, {which}", f"<= {goal:g} MB", peak_mb, "MB", met)
+            yield GoalRow(f"memory of a {process}, {which}", f"<= {goal:g} MB", peak_mb, "MB", met)
         known = [peak_mb for name, peak_mb in peaks_mb.items() if peak_mb is not None and name != "cold"]
         if len(known) > 1:
             growth = max(known) / min(known) - 1.0
             met = growth <= _SAME_SHARE if bench.missions >= MISSIONS else None
             what = f"  the same for few and many: {process}"
-            yield Row(what, f"within {_SAME_SHARE:.0%}", 100 * growth, "%", met)
+            yield GoalRow(what, f"within {_SAME_SHARE:.0%}", 100 * growth, "%", met)
 
 
 def programs(bench: Bench) -> list[Program]:

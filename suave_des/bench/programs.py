@@ -29,7 +29,7 @@ class MeasurementError(SuaveDesError):
 
 
 @dataclass(frozen=True)
-class Measured:
+class FinishedProgram:
     """A program that has ended.
 
     Attributes:
@@ -47,7 +47,7 @@ class Measured:
     worker_mb: float | None
 
 
-def run(arguments: Sequence[str], folder: Path, environment: Mapping[str, str]) -> Measured:
+def run(arguments: Sequence[str], folder: Path, environment: Mapping[str, str]) -> FinishedProgram:
     """Run `python -m ARGUMENTS` to its end.
 
     Args:
@@ -87,7 +87,7 @@ def run(arguments: Sequence[str], folder: Path, environment: Mapping[str, str]) 
         message = " ".join(log.read_text(errors="replace").split())[-400:]
         raise MeasurementError(f"{' '.join(arguments)} ended with status {process.returncode}: {message}")
     parent_mb = peaks_mb.pop(process.pid, None)
-    return Measured(wall_s, _cpu_s() - cpu_before_s, out, parent_mb, max(peaks_mb.values(), default=None))
+    return FinishedProgram(wall_s, _cpu_s() - cpu_before_s, out, parent_mb, max(peaks_mb.values(), default=None))
 
 
 def _cpu_s() -> float:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 
 import suave_des
 from suave_des.campaign.inputs import declared_files, manager_code, scenarios_of, versions
-from suave_des.campaign.missions import Failure, Finished, JobSpec, MissionKey, WorkerError
+from suave_des.campaign.missions import Finished, JobSpec, MissionFailure, MissionKey, WorkerError
 from suave_des.campaign.own_modules import own_modules
 from suave_des.errors import InputError, SuaveDesError
 
@@ -128,7 +128,7 @@ class Unpacked:
     def with_known_names(self, finished: Finished) -> Finished:
         """Return an outcome that names the user's own files."""
         key, outcome = finished
-        if isinstance(outcome, Failure):
+        if isinstance(outcome, MissionFailure):
             return key, outcome._replace(cause=self._renamed(outcome.cause))
         return finished
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Sequence
 
-from suave_des.campaign.missions import Failure, Finished, JobSpec, MissionKey, WorkerError
+from suave_des.campaign.missions import Finished, JobSpec, MissionFailure, MissionKey, WorkerError
 from suave_des.errors import InputError
 
 LARGE = 1_000_000
@@ -68,7 +68,11 @@ class FirstFailures:
             if key.manager in self._works:
                 continue
             causes = self._causes.setdefault(key.manager, [])
-            if not isinstance(outcome, Failure) or not outcome.lasting or (causes and outcome.cause != causes[0]):
+            if (
+                not isinstance(outcome, MissionFailure)
+                or not outcome.lasting
+                or (causes and outcome.cause != causes[0])
+            ):
                 self._works.add(key.manager)
                 continue
             causes.append(outcome.cause)

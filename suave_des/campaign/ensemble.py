@@ -168,7 +168,7 @@ def _overlap(one: str, other: str) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
+class MemberDifferences:
     """The difference of two managers in a metric, over the runs that both have.
 
     Attributes:
@@ -216,7 +216,7 @@ class Difference:
 
 def differences(
     rows: Iterable[tuple[MissionKey, Row]], managers: Sequence[str], metrics: Mapping[str, int], ensemble: Ensemble
-) -> Iterator[Difference]:
+) -> Iterator[MemberDifferences]:
     """Yield the difference of each pair of managers in each metric, point by point.
 
     Args:
@@ -243,11 +243,11 @@ def _float(cell: object) -> float:
 
 def _difference(
     pair: tuple[str, str], metric: str, point: int, by_run: Mapping[int, float], ensemble: Ensemble
-) -> Difference:
+) -> MemberDifferences:
     by_member: dict[int, list[float]] = {}
     for run, value in by_run.items():
         by_member.setdefault(ensemble.member(run), []).append(value)
     over_all = estimate(list(by_run.values()))
     assert over_all.mean is not None
     means = tuple(fmean(by_member[member]) for member in sorted(by_member))
-    return Difference(*pair, metric, point, len(by_run), over_all.mean, over_all.mean_interval, means)
+    return MemberDifferences(*pair, metric, point, len(by_run), over_all.mean, over_all.mean_interval, means)

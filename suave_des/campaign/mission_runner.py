@@ -14,7 +14,16 @@ from dataclasses import replace
 from types import FrameType
 
 from suave_des.campaign.knowledge_records import mission_line
-from suave_des.campaign.missions import Failure, Finished, JobSpec, MissionKey, Outcome, Remark, further_of, row_of
+from suave_des.campaign.missions import (
+    Finished,
+    JobSpec,
+    MissionFailure,
+    MissionKey,
+    MissionOutcome,
+    Remark,
+    further_of,
+    row_of,
+)
 from suave_des.campaign.variation import cell_of
 from suave_des.errors import MissionError
 from suave_des.metrics.result import MissionResult
@@ -49,7 +58,7 @@ class MissionRunner:
         short = job.loaded.scenario.model_copy(update={"mission": MissionSettings(time_limit_s=1.0)})
         Simulator(replace(job.loaded, scenario=short)).run("none", 1, 0)
         self._is_own = [not is_built_in(name) for name in job.managers]
-        self._first: dict[int, tuple[MissionKey, Outcome]] = {}
+        self._first: dict[int, tuple[MissionKey, MissionOutcome]] = {}
         self._number: dict[int, int] = {}
         self._refused: dict[tuple[str, str], int] = {}
         self._remarks: tuple[str, ...] = ()
@@ -67,7 +76,7 @@ class MissionRunner:
                 yield key, outcome
                 if (
                     self._is_own[key.manager]
-                    and not isinstance(outcome, Failure)
+                    and not isinstance(outcome, MissionFailure)
                     and self._differs(key, outcome, limit)
                 ):
                     yield key, Remark(self._job.managers[key.manager], NOT_REPEATABLE)
@@ -78,7 +87,7 @@ class MissionRunner:
                     yield key, Remark(self._job.managers[key.manager], text, 0)
                 self._remarks = ()
 
-    def _differs(self, key: MissionKey, outcome: Outcome, limit: _Limit) -> bool:
+    def _differs(self, key: MissionKey, outcome: MissionOutcome, limit: _Limit) -> bool:
         """Whether a manager's first mission in this process gives another outcome when it is run again.
 
         It is after its 2nd, 4th, 16th, 64th mission and so on: what a class keeps from mission to mission shows, and
@@ -90,9 +99,9 @@ class MissionRunner:
             return False
         refused, again = self._refused, self._outcome(first[0], limit)
         self._refused = refused
-        return again != first[1] and not (isinstance(again, Failure) and not again.lasting)
+        return again != first[1] and not (isinstance(again, MissionFailure) and not again.lasting)
 
-    def _outcome(self, key: MissionKey, limit: _Limit) -> Outcome:
+    def _outcome(self, key: MissionKey, limit: _Limit) -> MissionOutcome:
         job = self._job
         if key.point != self._point:
             self._go_to(key.point)
@@ -102,8 +111,8 @@ class MissionRunner:
             with limit(job.time_out_s):
                 result = simulator.run(job.managers[key.manager], key.run, job.seed, record=job.record_knowledge)
         except MissionError as error:
-            return Failure(error.manager, error.run, error.time_s, error.cause, point=key.point)
-        except TimeOut:
+            return MissionFailure(error.manager, error.run, error.time_s, error.cause, point=key.point)
+        except MissionTimeOut:
             return job.timed_out(key)[1]
         drawn = (result.drawn[path] for path in self._drawn)
         members = () if member is None else (member,)
@@ -139,12 +148,12 @@ class MissionRunner:
 # Time limits, so that a manager that never returns costs its own mission only.
 
 
-class TimeOut(BaseException):
+class MissionTimeOut(BaseException):
     """A mission took too long; not an Exception, so that a manager that catches those does not catch this."""
 
 
 _Limit = Callable[[float], AbstractContextManager[None]]
-"""Makes the context in which TimeOut is raised after some seconds."""
+"""Makes the context in which MissionTimeOut is raised after some seconds."""
 
 
 @contextmanager
@@ -162,7 +171,7 @@ def _time_limits(exit_after_s: float | None) -> Iterator[_Limit]:
 
 
 def _raise(number: int, frame: FrameType | None) -> None:
-    raise TimeOut
+    raise MissionTimeOut
 
 
 @contextmanager
@@ -207,6 +216,6 @@ class _Watchdog:
                 now = time.monotonic()
                 if now > self._next_s:
                     self._next_s = now + _REPEAT_S
-                    ctypes.pythonapi.PyThreadState_SetAsyncExc(self._target, ctypes.py_object(TimeOut))
+                    ctypes.pythonapi.PyThreadState_SetAsyncExc(self._target, ctypes.py_object(MissionTimeOut))
                 if now > self._deadline_s + self._exit_after_s:
                     os._exit(signal.SIGALRM)

@@ -31,7 +31,7 @@ class MissionKey(NamedTuple):
 
 
 Chunk = tuple[MissionKey, ...]
-Group = tuple[int, int]
+MissionGroup = tuple[int, int]
 """Point and manager: the missions that differ in the run only."""
 
 
@@ -39,8 +39,8 @@ def plan(
     points: int,
     managers: int,
     runs: int,
-    settled: Callable[[Group], Collection[int]] = lambda group: (),
-    is_over: Callable[[Group, int], bool] = lambda group, run: False,
+    settled: Callable[[MissionGroup], Collection[int]] = lambda group: (),
+    is_over: Callable[[MissionGroup, int], bool] = lambda group, run: False,
     *,
     run_by_run: bool = False,
 ) -> Iterator[MissionKey]:
@@ -83,7 +83,7 @@ def further_of(result: MissionResult) -> Row:
     return tuple(rounded(cell) if isinstance(cell, float) else cell for cell in result.further.values())
 
 
-class Failure(NamedTuple):
+class MissionFailure(NamedTuple):
     """A mission that has no row.
 
     Attributes:
@@ -128,8 +128,8 @@ class Remark(NamedTuple):
         return f"manager {self.manager}: {self.text}{f' ({self.times} times)' if self.times > 1 else ''}"
 
 
-Outcome = Row | Failure | Remark
-Finished = tuple[MissionKey, Outcome]
+MissionOutcome = Row | MissionFailure | Remark
+Finished = tuple[MissionKey, MissionOutcome]
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,7 @@ class JobSpec:
 
     def failed(self, key: MissionKey, cause: str) -> Finished:
         """Return the outcome of a mission that was ended from outside."""
-        return key, Failure(self.managers[key.manager], key.run, None, cause, lasting=False, point=key.point)
+        return key, MissionFailure(self.managers[key.manager], key.run, None, cause, lasting=False, point=key.point)
 
     def timed_out(self, key: MissionKey) -> Finished:
         """Return the outcome of a mission that took too long."""

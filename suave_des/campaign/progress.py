@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
-from suave_des.campaign.missions import COLUMNS, Failure, Finished, Group, Outcome
+from suave_des.campaign.missions import COLUMNS, Finished, MissionFailure, MissionGroup, MissionOutcome
 from suave_des.campaign.spec import FEWEST_PAIRS, FEWEST_RUNS, SEARCH_TIME, UntilCi
 from suave_des.estimates import RunningMean
 
@@ -172,16 +172,16 @@ class GroupTracker:
         self.is_narrow = False
         self.values = RunningMean()
 
-    def add(self, run: int, outcome: Outcome) -> None:
+    def add(self, run: int, outcome: MissionOutcome) -> None:
         """Count an outcome, unless its run is counted already or lies beyond the last one."""
-        self._add(run, outcome if isinstance(outcome, Failure) else outcome[self._index])
+        self._add(run, outcome if isinstance(outcome, MissionFailure) else outcome[self._index])
 
     def _add(self, run: int, found: object) -> None:
         """Count a value of the metric, or a failure."""
         if run > self.runs or run < self._next or run in self._waiting:
             return
         self.done += 1
-        self.failed += isinstance(found, Failure)
+        self.failed += isinstance(found, MissionFailure)
         self._waiting[run] = found
         if self._values is not None:
             self._values[run] = found
@@ -192,7 +192,7 @@ class GroupTracker:
                 # The run before the next one is the last; what is known of later ones does not count.
                 self.is_narrow = True
                 self.runs = self.done = self._next - 1
-                self.failed -= sum(isinstance(outcome, Failure) for outcome in self._waiting.values())
+                self.failed -= sum(isinstance(outcome, MissionFailure) for outcome in self._waiting.values())
                 self._waiting.clear()
 
     def ended_at(self, run: int) -> GroupTracker:
@@ -235,9 +235,9 @@ class ProgressTracker:
     def __init__(self, points: int, managers: Sequence[str], runs: int, until: UntilCi | None) -> None:
         self._managers, self._runs, self._until = managers, runs, until
         self._groups_in_all = points * len(managers)
-        self._under_way: dict[Group, GroupTracker] = {}
-        self._complete: dict[Group, GroupProgress] = {}
-        self._latest_complete: deque[tuple[Group, GroupProgress]] = deque(maxlen=GROUPS_SHOWN)
+        self._under_way: dict[MissionGroup, GroupTracker] = {}
+        self._complete: dict[MissionGroup, GroupProgress] = {}
+        self._latest_complete: deque[tuple[MissionGroup, GroupProgress]] = deque(maxlen=GROUPS_SHOWN)
         self.done = self.failed = self._before = 0
         self.total = runs * self._groups_in_all
         self._pairs: dict[int, PairTracker] = {}
@@ -267,13 +267,13 @@ class ProgressTracker:
                 if self._until is not None:
                     self._complete[group] = complete
 
-    def _follow_pair(self, point: int, manager: int, run: int, outcome: Outcome) -> None:
+    def _follow_pair(self, point: int, manager: int, run: int, outcome: MissionOutcome) -> None:
         """Take an outcome into the difference of its point, and end all managers there when that is known."""
         assert self._until is not None
         if manager not in self._sides or point in self._last_runs:
             return
         pair = self._pairs.setdefault(point, PairTracker(self._until.half_width))
-        value = None if isinstance(outcome, Failure) else outcome[COLUMNS.index(self._until.metric)]
+        value = None if isinstance(outcome, MissionFailure) else outcome[COLUMNS.index(self._until.metric)]
         last = pair.add(self._sides[manager], run, value)
         if last is None:
             return
@@ -312,10 +312,10 @@ class ProgressTracker:
     def _metric(self) -> str:
         return SEARCH_TIME if self._until is None else self._until.metric
 
-    def _progress_of(self, group: Group, tracker: GroupTracker) -> GroupProgress:
+    def _progress_of(self, group: MissionGroup, tracker: GroupTracker) -> GroupProgress:
         return tracker.progress(group[0], self._managers[group[1]])
 
-    def is_over(self, group: Group, run: int) -> bool:
+    def is_over(self, group: MissionGroup, run: int) -> bool:
         """Return whether a group needs neither this run nor later ones, because an interval is narrow."""
         return group in self._complete or run > self._last_runs.get(group[0], run)
 

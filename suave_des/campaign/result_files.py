@@ -13,7 +13,7 @@ from typing import Any
 from suave_des.campaign.ensemble import ENSEMBLE_COLUMNS, ENSEMBLE_FILE
 from suave_des.campaign.inputs import provenance
 from suave_des.campaign.knowledge_records import CAMPAIGN_KNOWLEDGE_FILE
-from suave_des.campaign.missions import COLUMNS, Failure, Row
+from suave_des.campaign.missions import COLUMNS, MissionFailure, Row
 from suave_des.campaign.output import csv_pieces, csv_text, json_text, make_output_folder, write_files
 from suave_des.campaign.results import CampaignResult
 
@@ -109,7 +109,7 @@ def _varied(result: CampaignResult) -> dict[str, Any]:
 def _numbered(result: CampaignResult, manager: int) -> Iterator[tuple[int, Row]]:
     """Yield a manager's rows with the number of their mission in the campaign, from 1, whether or not all have one."""
     for key, outcome in result.outcomes():
-        if key.manager == manager and not isinstance(outcome, Failure):
+        if key.manager == manager and not isinstance(outcome, MissionFailure):
             yield (key.point * len(result.spec.managers) + key.manager) * result.spec.runs + key.run, outcome
 
 

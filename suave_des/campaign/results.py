@@ -9,9 +9,9 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from suave_des.campaign.ensemble import Difference, differences
+from suave_des.campaign.ensemble import MemberDifferences, differences
 from suave_des.campaign.knowledge_records import scenario_line
-from suave_des.campaign.missions import COLUMNS, Failure, Finished, Group, Row
+from suave_des.campaign.missions import COLUMNS, Finished, MissionFailure, MissionGroup, Row
 from suave_des.campaign.output import rounded
 from suave_des.campaign.progress import GroupProgress, PairProgress, ProgressTracker
 from suave_des.campaign.spec import FEWEST_PAIRS, FEWEST_RUNS, CampaignSpec, UntilCi
@@ -62,7 +62,7 @@ class CampaignResult:
     planned: int
     done: int
     stops: tuple[GroupProgress, ...]
-    failures: tuple[Failure, ...]
+    failures: tuple[MissionFailure, ...]
     summary: tuple[Row, ...]
     outcomes: Callable[[], Iterator[Finished]]
     remarks: tuple[str, ...]
@@ -96,7 +96,7 @@ class CampaignResult:
     def stream(self) -> Iterator[Row]:
         """Yield the rows of runs.csv one by one, in its order and with its columns, read as they are requested."""
         width = len(self.columns)
-        return (outcome[:width] for _, outcome in self.outcomes() if not isinstance(outcome, Failure))
+        return (outcome[:width] for _, outcome in self.outcomes() if not isinstance(outcome, MissionFailure))
 
     @property
     def rows(self) -> tuple[Row, ...]:
@@ -134,14 +134,14 @@ class CampaignResult:
         """Yield the lines of knowledge_states.jsonl; none of managers that do not reason."""
         yield scenario_line(self.loaded.scenario)
         for _, outcome in self.outcomes():
-            if not isinstance(outcome, Failure) and (line := outcome[len(self.columns)]):
+            if not isinstance(outcome, MissionFailure) and (line := outcome[len(self.columns)]):
                 yield str(line)
 
-    def differences(self) -> tuple[Difference, ...]:
+    def differences(self) -> tuple[MemberDifferences, ...]:
         """Return how managers differ, over the members of the ensemble; empty without one."""
         if self.variation.ensemble is None:
             return ()
-        kept = ((key, outcome) for key, outcome in self.outcomes() if not isinstance(outcome, Failure))
+        kept = ((key, outcome) for key, outcome in self.outcomes() if not isinstance(outcome, MissionFailure))
         metrics = {metric: COLUMNS.index(metric) for metric in METRICS}
         return tuple(differences(kept, self.spec.managers, metrics, self.variation.ensemble))
 
@@ -172,7 +172,7 @@ class CampaignResult:
         """Return the rows of summary.csv by its columns."""
         return [dict(zip(self.summary_columns, row, strict=True)) for row in self.summary]
 
-    def difference_row(self, found: Difference) -> Row:
+    def difference_row(self, found: MemberDifferences) -> Row:
         """Return the row of ensemble.csv of a difference."""
         low, high = found.interval or (None, None)
         low_of_sets, high_of_sets = found.range or (None, None)
@@ -225,12 +225,12 @@ def gather(
         tracker: knows which of them count, as it was given all of them.
         remarks: what users should know about managers.
     """
-    failures: list[Failure] = []
+    failures: list[MissionFailure] = []
     summary: list[Row] = []
     done = reached = 0
     tally = _Tally()
 
-    def summarise_before(group: Group) -> None:
+    def summarise_before(group: MissionGroup) -> None:
         """Add the groups before this one that are not summarised yet; the tally is of the first of them."""
         nonlocal tally
         while (next_group := divmod(len(summary), len(spec.managers))) < group:
@@ -242,7 +242,7 @@ def gather(
     for key, outcome in tracker.counted(outcomes()):
         summarise_before((key.point, key.manager))
         reached = key.point
-        if isinstance(outcome, Failure):
+        if isinstance(outcome, MissionFailure):
             failures.append(outcome)
         else:
             done += 1

@@ -18,7 +18,7 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
-from suave_des.campaign.missions import Failure, Finished, Group, MissionKey
+from suave_des.campaign.missions import Finished, MissionFailure, MissionGroup, MissionKey
 from suave_des.errors import InputError, SuaveDesError
 
 STORE_FILE = "campaign.sqlite"
@@ -199,7 +199,7 @@ class Store:
         with _user_errors(self.path):
             self._db.execute("DELETE FROM outcomes WHERE kind = ?", (_PASSING,))
 
-    def settled(self, group: Group) -> set[int]:
+    def settled(self, group: MissionGroup) -> set[int]:
         """Return the runs of a group that have an outcome."""
         with _user_errors(self.path):
             found = self._db.execute("SELECT run FROM outcomes WHERE point = ? AND manager = ?", group)
@@ -305,7 +305,7 @@ def _note_crc(name: str, text: object) -> int:
 
 def _record(finished: Finished) -> tuple[int, int, int, int, str, int]:
     key, outcome = finished
-    kind = _ROW if not isinstance(outcome, Failure) else _LASTING if outcome.lasting else _PASSING
+    kind = _ROW if not isinstance(outcome, MissionFailure) else _LASTING if outcome.lasting else _PASSING
     content = json.dumps(outcome)
     return (*key, kind, content, _crc(key, kind, content))
 
@@ -319,7 +319,7 @@ def _finished(record: tuple[int, int, int, int, str, int], path: Path | None) ->
     if _crc(key, kind, content) != crc:
         raise _damaged(path, f"the outcome of run {key.run} is not what was written")
     cells = json.loads(content)
-    return key, tuple(cells) if kind == _ROW else Failure(*cells)
+    return key, tuple(cells) if kind == _ROW else MissionFailure(*cells)
 
 
 def _crc(key: MissionKey, kind: int, content: str) -> int:

@@ -34,7 +34,7 @@ _DISTRIBUTION: TypeAdapter[Any] = TypeAdapter(Distribution)
 
 
 @dataclass(frozen=True)
-class Sample:
+class SampledPoints:
     """A sampled design: points that fill a box evenly.
 
     Attributes:
@@ -63,7 +63,7 @@ class Sweep:
 
     grid: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     zipped: Mapping[str, Sequence[Any]] = field(default_factory=dict)
-    sample: Sample | None = None
+    sample: SampledPoints | None = None
     seed: int = 0
 
     @property
@@ -309,7 +309,7 @@ def _repeated(values: Sequence[Any]) -> Any:
     return None
 
 
-def _sample(given: Any) -> Sample:
+def _sample(given: Any) -> SampledPoints:
     place = "sweep.sample"
     keys = ("method", "points", "ranges")
     if not isinstance(given, Mapping):
@@ -335,7 +335,7 @@ def _sample(given: Any) -> Sample:
         numbers = [each for each in pair if isinstance(each, int | float) and not isinstance(each, bool)]
         if len(pair) != 2 or len(numbers) != 2 or not numbers[0] < numbers[1]:
             raise _wrong(f"{place}.ranges.{name}", f"expected a range, got {shown(pair)}", "give [smallest, greatest]")
-    return Sample(method, points, {name: (float(low), float(high)) for name, (low, high) in bounds.items()})
+    return SampledPoints(method, points, {name: (float(low), float(high)) for name, (low, high) in bounds.items()})
 
 
 def _check_each_once(perturbed: Mapping[str, str], swept: Mapping[str, str]) -> None:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from suave_des.campaign.campaign import CampaignResult
-    from suave_des.campaign.missions import Failure
+    from suave_des.campaign.missions import MissionFailure
     from suave_des.report.paper import PaperComparison, PaperFigure
 
 _FAILURES_SHOWN = 20
@@ -43,7 +43,7 @@ _MANAGERS, _RUNS = "none,random,metacontrol", "20"
 _WORKERS = 2
 
 
-class Format(StrEnum):
+class ResultFormat(StrEnum):
     """Result files to write besides our own."""
 
     SUAVE = "suave"
@@ -65,7 +65,7 @@ class NewCampaign(OptionGroup):
     ] = None
     time_out: TimeOut = None
     format: Annotated[
-        list[Format] | None,
+        list[ResultFormat] | None,
         typer.Option(
             help="Write the exemplar's own files into DIR/suave, or runs.parquet, besides; repeat it for both."
         ),
@@ -183,8 +183,8 @@ def campaign(
                 out,
                 on_progress=show,
                 **options,
-                suave_format=Format.SUAVE in (new.format or ()),
-                parquet=Format.PARQUET in (new.format or ()),
+                suave_format=ResultFormat.SUAVE in (new.format or ()),
+                parquet=ResultFormat.PARQUET in (new.format or ()),
                 record_knowledge=new.record_knowledge,
                 time_out_s=new.time_out,
                 until_ci=until_ci,
@@ -211,7 +211,7 @@ def exit_telling_failures(result: CampaignResult) -> None:
         console.print(f"suave-des: {remark}", soft_wrap=True, markup=False)
     if not result.failures:
         return
-    alike: dict[tuple[str, str], list[Failure]] = {}
+    alike: dict[tuple[str, str], list[MissionFailure]] = {}
     for failure in result.failures:
         alike.setdefault((failure.manager, failure.cause), []).append(failure)
     groups = list(alike.values())

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _TEXT_WIDTH = 95
 
 
-class Format(StrEnum):
+class CompareFormat(StrEnum):
     """How a comparison is printed."""
 
     TABLE = "table"
@@ -58,7 +58,7 @@ def compare(
     unpaired: Annotated[
         bool, typer.Option("--unpaired", help="Take runs as independent though they share random numbers.")
     ] = False,
-    as_format: Annotated[Format, typer.Option("--format", help="What to print.")] = Format.TABLE,
+    as_format: Annotated[CompareFormat, typer.Option("--format", help="What to print.")] = CompareFormat.TABLE,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write .csv, .json, .md or .tex instead of printing.")
     ] = None,
@@ -87,7 +87,7 @@ def compare(
 
         write_files(out.parent, {out.name: WRITERS[ENDINGS[out.suffix.lower()]](comparison)})
         print(f"compared in {out}")
-    elif as_format is Format.TABLE:
+    elif as_format is CompareFormat.TABLE:
         print(plain_text(comparison, min(output().width, _TEXT_WIDTH)), end="")
     else:
         print(WRITERS[as_format.value](comparison), end="")
@@ -103,7 +103,7 @@ def _check_out(out: Path, endings: Iterable[str]) -> None:
     check_output_file(out, overwrite=True)
 
 
-class Kind(StrEnum):
+class FigureKind(StrEnum):
     """What is drawn; as in report.figures, which is not imported for --help."""
 
     AUTO = "auto"
@@ -124,12 +124,12 @@ def figure(
     ],
     out: Annotated[Path, typer.Option(metavar="FILE", help="Picture to write: .png, .pdf or .svg.")],
     kind: Annotated[
-        Kind,
+        FigureKind,
         typer.Option(
             help="Of a mission: map, timeline; of several: paths; of a campaign: distributions, raincloud, detections,"
             " convergence, reactions; of a sweep: sweep."
         ),
-    ] = Kind.AUTO,
+    ] = FigureKind.AUTO,
     parameters: Annotated[
         str | None, typer.Option(metavar="KEY,...", help="Of a sweep: draw these.", show_default="all")
     ] = None,
@@ -141,7 +141,9 @@ def figure(
     """
     from suave_des.report.figures import draw_results
 
-    draw_results(folders, out, kind.value, comma_separated(parameters), _with_rules if kind is Kind.TIMELINE else None)
+    draw_results(
+        folders, out, kind.value, comma_separated(parameters), _with_rules if kind is FigureKind.TIMELINE else None
+    )
     print(f"drawn in {out}")
 
 

@@ -65,7 +65,7 @@ class Section:
 
 
 @dataclass(frozen=True)
-class Drawn:
+class ChartColumns:
     """Missions as columns, for the page's charts.
 
     Attributes:
@@ -107,7 +107,7 @@ class Made:
 
 
 @dataclass(frozen=True)
-class Results:
+class ReportContent:
     """All that a report shows of results.
 
     Attributes:
@@ -124,7 +124,7 @@ class Results:
     sections: Sequence[Section]
     needed: Table | None
     remarks: Sequence[str]
-    drawn: Drawn
+    drawn: ChartColumns
 
 
 def report_page(folders: Sequence[Path], runs: int = PATHS) -> str:
@@ -187,7 +187,7 @@ def check_page_size(text: str, limit_bytes: int) -> None:
         raise InputError(problem, remedy="give fewer runs with --paths, or fewer folders")
 
 
-def results_of(missions: Missions) -> Results:
+def results_of(missions: Missions) -> ReportContent:
     """Compare missions, and prepare them for the page.
 
     Raises:
@@ -196,7 +196,7 @@ def results_of(missions: Missions) -> Results:
     found = compare(missions, Choices())
     needed = runs_table(found) if found.differences else None
     sections = [_section(found, metric.name) for metric in found.metrics]
-    return Results(found.conclusion, found.notes, sections, needed, remarks(found), drawn(missions))
+    return ReportContent(found.conclusion, found.notes, sections, needed, remarks(found), drawn(missions))
 
 
 def _section(found: Comparison, name: str) -> Section:
@@ -211,7 +211,7 @@ def _section(found: Comparison, name: str) -> Section:
     return Section(heading[:1].upper() + heading[1:], tables, [each.conclusion for each in differences])
 
 
-def drawn(missions: Missions) -> Drawn:
+def drawn(missions: Missions) -> ChartColumns:
     """Put missions into columns, at most MOST_DRAWN of them."""
     groups, _ = grouped(missions)
     keys = list(dict.fromkeys(zip(missions.frame["manager"], missions.frame["source"], strict=True)))
@@ -235,7 +235,7 @@ def drawn(missions: Missions) -> Drawn:
         columns[name] = _plain(frame[name])
     is_paired = has_runs and bool((frame["seed"] != "").all()) and len(keys) > 1
     names = [each.name for each in groups]
-    return Drawn(names, titles, columns, missions.swept, every, len(missions.frame), is_paired)
+    return ChartColumns(names, titles, columns, missions.swept, every, len(missions.frame), is_paired)
 
 
 def _plain(column: pandas.Series) -> list[Any]:

@@ -18,7 +18,7 @@ from suave_des.scenario.yamlfile import YamlDocument, read_yaml
 DEFAULT_MODE = "__DEFAULT__"
 UNGROUND_MODE = "fd_unground"
 
-Value = float | str | bool
+ParameterValue = float | str | bool
 _STATES = "inactive, active or active.NODE_MODE"
 
 
@@ -76,7 +76,7 @@ class ModeTable:
         return self.table[function]
 
 
-def _value(value: Any) -> Value:
+def _value(value: Any) -> ParameterValue:
     if isinstance(value, bool | str):
         return value
     if not isinstance(value, int | float):
@@ -90,7 +90,7 @@ class _Parameters(BaseModel):
     """Parameters of a node's mode; those that the managed subsystem computes with have a type."""
 
     model_config = ConfigDict(extra="allow", allow_inf_nan=False)
-    __pydantic_extra__: dict[str, Annotated[Value, PlainValidator(_value)]]
+    __pydantic_extra__: dict[str, Annotated[ParameterValue, PlainValidator(_value)]]
 
     spiral_altitude: Length | None = None
 
@@ -103,7 +103,7 @@ class _Node(Strict):
     type: Literal["node"]
     modes: Annotated[dict[str, _NodeMode], Field(min_length=1)] | None = None
 
-    def parameters(self) -> dict[str, dict[str, Value]]:
+    def parameters(self) -> dict[str, dict[str, ParameterValue]]:
         """Parameters of each mode; each has those of __DEFAULT__ that it does not set itself."""
         own = {
             name: {} if mode.ros__parameters is None else mode.ros__parameters.model_dump(exclude_unset=True)
@@ -156,7 +156,7 @@ def modes_of(document: YamlDocument) -> ModeTable:
     except ValidationError as error:
         raise input_error(error, document, dict[str, _Entry]) from None
     systems: dict[str, _System] = {}
-    nodes: dict[str, dict[str, dict[str, Value]]] = {}
+    nodes: dict[str, dict[str, dict[str, ParameterValue]]] = {}
     for name, key in keys.items():
         part = content[key].ros__parameters
         if isinstance(part, _System):
@@ -185,7 +185,7 @@ def _mode(
     document: YamlDocument,
     path: KeyPath,
     states: Mapping[str, Any],
-    nodes: Mapping[str, Mapping[str, dict[str, Value]]],
+    nodes: Mapping[str, Mapping[str, dict[str, ParameterValue]]],
 ) -> Mode:
     """A mode of a function: the parameters that it sets on each of the function's nodes that are active in it."""
     function, name = str(path[0]).removeprefix("/"), str(path[-1])
@@ -194,7 +194,7 @@ def _mode(
         if part not in nodes:
             problem = f"mode {name} sets {shown(part)}, which is not a part of {function}"
             raise document.error(problem, (*path, key), did_you_mean(part, nodes, "its parts"))
-    active, parameters = False, dict[str, Value]()
+    active, parameters = False, dict[str, ParameterValue]()
     for node, modes in nodes.items():
         if node not in keys:
             raise document.error(f"mode {name} of {function} does not set {node}", path, f"add {node}: {_STATES}")

@@ -45,11 +45,11 @@ _UNION_KEYS = ("kind", "distribution", "type")
 _NAME, _INDEX = "NAME", "[]"
 """Stand for any name, and any number of an entry, in the location of a model."""
 ModelPath = tuple[str, ...]
-Model = TypeVar("Model", bound=BaseModel)
+AnyModel = TypeVar("AnyModel", bound=BaseModel)
 Models = Sequence[tuple[ModelPath, type[BaseModel]]]
 
 
-def validated(layer: Layer, model: type[Model]) -> Model:
+def validated(layer: Layer, model: type[AnyModel]) -> AnyModel:
     """Return the data of a layer as a model.
 
     Raises:

@@ -26,7 +26,7 @@ from suave_des.knowledge.pellet import (
     trace_contradiction,
 )
 from suave_des.knowledge.rdf import Lit, Triple, canonical, facts_of, is_fact, n_triple, value_of
-from suave_des.knowledge.rules.syntax import Atom, Kind, Rule
+from suave_des.knowledge.rules.syntax import Atom, AtomKind, Rule
 from suave_des.knowledge.state import Fact, KnowledgeState, Value
 from suave_des.knowledge.vocabulary import OWL, RDF_TYPE
 from suave_des.workbench.matching import Binding, Facts, matched
@@ -213,7 +213,7 @@ class Tracer:
 
     def _by_schema(self, triple: Triple, above: frozenset[Triple]) -> Iterator[Derivation]:
         """What follows from one other fact about the same thing: a class by a domain, an inverse, a sub-property."""
-        kind: Kind = "class" if triple[1] == RDF_TYPE else "data" if isinstance(triple[2], Lit) else "object"
+        kind: AtomKind = "class" if triple[1] == RDF_TYPE else "data" if isinstance(triple[2], Lit) else "object"
         asked = Atom(kind, str(triple[2]) if kind == "class" else triple[1], ())
         for other in self.known:
             about_same = {triple[0], triple[2]} & {other[0], other[2]}

@@ -15,7 +15,7 @@ import pytest
 from suave_des.campaign import dask_worker
 from suave_des.campaign.dask_worker import Parcel, Unpacked, pack
 from suave_des.campaign.mission_runner import MissionRunner
-from suave_des.campaign.missions import Failure, Finished, JobSpec, MissionKey
+from suave_des.campaign.missions import Finished, JobSpec, MissionFailure, MissionKey
 from suave_des.campaign.own_modules import own_modules
 from suave_des.campaign.variation import Variation
 from suave_des.errors import InputError, KnowledgeError
@@ -110,8 +110,8 @@ def test_errors_name_the_user_s_files(tmp_path: Path) -> None:
     known = unpacked.error_with_known_names(error)
     assert type(known) is KnowledgeError
     assert str(known) == "own/suave.owl: line 2: supplies it, and so does tomasys.owl (give one)"
-    failure: Finished = (MissionKey(0, 0, 1), Failure("none", 1, 3.0, f"{suave}: broken"))
-    assert unpacked.with_known_names(failure)[1] == Failure("none", 1, 3.0, "own/suave.owl: broken")
+    failure: Finished = (MissionKey(0, 0, 1), MissionFailure("none", 1, 3.0, f"{suave}: broken"))
+    assert unpacked.with_known_names(failure)[1] == MissionFailure("none", 1, 3.0, "own/suave.owl: broken")
 
 
 class TestOnAWorker:
@@ -144,8 +144,8 @@ class TestOnAWorker:
         thread.start()
         thread.join(60.0)
         (finished,) = outcomes
-        assert [isinstance(outcome, Failure) for _, outcome in finished] == [False, True, False]
-        assert finished[1][1] == Failure(
+        assert [isinstance(outcome, MissionFailure) for _, outcome in finished] == [False, True, False]
+        assert finished[1][1] == MissionFailure(
             f"{AWKWARD}:HangsInSome", 2, None, "not done after 1 s (time-out)", lasting=False
         )
 

@@ -14,7 +14,7 @@ from rich.console import Console
 from benchmarks import chaos
 from suave_des.campaign import display
 from suave_des.campaign.campaign import CampaignInterrupted, resume_campaign, run_campaign
-from suave_des.campaign.missions import COLUMNS, Failure, Finished, MissionKey
+from suave_des.campaign.missions import COLUMNS, Finished, MissionFailure, MissionKey
 from suave_des.campaign.progress import GROUPS_SHOWN, OnProgress, Progress, ProgressTracker
 from suave_des.campaign.spec import UntilCi
 from suave_des.estimates import estimate
@@ -25,7 +25,7 @@ PLACE = COLUMNS.index("search_time_s")
 
 def outcome(point: int, manager: int, run: int, value: float | None) -> Finished:
     if value is None:
-        return MissionKey(point, manager, run), Failure("none", run, None, "failed")
+        return MissionKey(point, manager, run), MissionFailure("none", run, None, "failed")
     return MissionKey(point, manager, run), tuple(value if place == PLACE else None for place in range(len(COLUMNS)))
 
 

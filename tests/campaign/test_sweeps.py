@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from suave_des.campaign.campaign import resume_campaign, run_campaign
 from suave_des.campaign.knowledge_records import CAMPAIGN_KNOWLEDGE_FILE, read_missions
-from suave_des.campaign.variation import Sample, Sweep
+from suave_des.campaign.variation import SampledPoints, Sweep
 from suave_des.errors import InputError
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
@@ -72,13 +72,13 @@ def test_points_with_each_value_have_each_value(sizes: list[int]) -> None:
 @pytest.mark.parametrize("method", ["latin_hypercube", "sobol"])
 def test_a_sampled_design_fills_each_range_evenly_and_repeats(method: str) -> None:
     ranges = {"start.x_m": (-18.0, -16.0), "visibility.period_s": (40.0, 120.0)}
-    sweep = Sweep(sample=Sample(method, 16, ranges), seed=3)
+    sweep = Sweep(sample=SampledPoints(method, 16, ranges), seed=3)
     points = [sweep.values(point) for point in range(16)]
     for path, (low, high) in ranges.items():
         strata = [int((point[path] - low) / (high - low) * 16) for point in points]
         assert sorted(strata) == list(range(16))
-    assert points == [Sweep(sample=Sample(method, 16, ranges), seed=3).values(point) for point in range(16)]
-    assert points != [Sweep(sample=Sample(method, 16, ranges), seed=4).values(point) for point in range(16)]
+    assert points == [Sweep(sample=SampledPoints(method, 16, ranges), seed=3).values(point) for point in range(16)]
+    assert points != [Sweep(sample=SampledPoints(method, 16, ranges), seed=4).values(point) for point in range(16)]
 
 
 def test_perturbations_are_the_same_for_all_managers_and_points_and_within_their_bounds(tmp_path: Path) -> None:

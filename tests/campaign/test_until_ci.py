@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from benchmarks import chaos
 from suave_des.campaign.campaign import CampaignInterrupted, Progress, resume_campaign, run_campaign
-from suave_des.campaign.missions import COLUMNS, Failure, Outcome
+from suave_des.campaign.missions import COLUMNS, MissionFailure, MissionOutcome
 from suave_des.campaign.progress import GroupTracker, OnProgress
 from suave_des.campaign.spec import FEWEST_RUNS, METRICS
 from suave_des.errors import InputError
@@ -33,7 +33,7 @@ def scenario(tmp_path: Path) -> Path:
     return path
 
 
-def row(value: float | None) -> Outcome:
+def row(value: float | None) -> MissionOutcome:
     return tuple(value if column == "search_time_s" else None for column in COLUMNS)
 
 
@@ -56,7 +56,7 @@ class TestGroupTracker:
         self, values: list[float | str | None], half_width: float, chance: random.Random
     ) -> None:
         outcomes = [
-            Failure("none", 1, None, "failed") if value == "failed" else row(value)  # type: ignore[arg-type]
+            MissionFailure("none", 1, None, "failed") if value == "failed" else row(value)  # type: ignore[arg-type]
             for value in values
         ]
         last = len(values)

@@ -17,7 +17,7 @@ from suave_des.knowledge.rules.syntax import (
     DIFFERENT,
     SAME,
     Atom,
-    Kind,
+    AtomKind,
     Named,
     ParsedRule,
     Place,
@@ -169,7 +169,7 @@ def _iri(name: str, place: Place | None, vocabulary: Vocabulary, file: Path, kin
     raise RuleError(f"{name} is not defined", file=file, place=where, remedy=vocabulary.guess(name, kinds))
 
 
-def _kind(predicate: str, arguments: tuple[Term, ...], vocabulary: Vocabulary) -> Kind:
+def _kind(predicate: str, arguments: tuple[Term, ...], vocabulary: Vocabulary) -> AtomKind:
     """What an atom uses its name as: as it is declared where that is possible, else as its arguments suggest."""
     if predicate in (SAME, DIFFERENT):
         return "same" if predicate == SAME else "different"

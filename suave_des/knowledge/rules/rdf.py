@@ -12,7 +12,18 @@ from rdflib.term import Node
 
 from suave_des.knowledge.ontology_file import OntologyFile
 from suave_des.knowledge.rdf import RdfTriple, literal
-from suave_des.knowledge.rules.syntax import DIFFERENT, EXPRESSION, KINDS, SAME, Atom, Kind, Named, Rule, Term, Variable
+from suave_des.knowledge.rules.syntax import (
+    DIFFERENT,
+    EXPRESSION,
+    KINDS,
+    SAME,
+    Atom,
+    AtomKind,
+    Named,
+    Rule,
+    Term,
+    Variable,
+)
 from suave_des.knowledge.rules.writer import distinct_variables, line_of_rule
 from suave_des.knowledge.vocabulary import SWRL, SWRLA, local_name
 
@@ -108,7 +119,7 @@ def _sides(graph: Graph, rule: Node) -> list[tuple[Atom, ...]]:
 
 def _read_atom(graph: Graph, node: Node) -> Atom:
     kinds = sorted(str(kind) for kind in graph.objects(node, RDF.type))
-    kind: Kind = next((KINDS[name] for name in kinds if name in KINDS), "")
+    kind: AtomKind = next((KINDS[name] for name in kinds if name in KINDS), "")
     predicates = (graph.value(node, URIRef(SWRL + name)) for name in dict.fromkeys(_PREDICATE_OF.values()))
     predicate = next((term for term in predicates if term is not None), None)
     if kind == "builtin":

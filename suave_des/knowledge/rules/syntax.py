@@ -46,9 +46,9 @@ class Place(NamedTuple):
 
 Term = Variable | Named | Lit
 #: The kinds of atoms that SWRL has; "" is an atom whose name has not been looked up yet.
-Kind = Literal["", "class", "object", "data", "range", "same", "different", "builtin"]
+AtomKind = Literal["", "class", "object", "data", "range", "same", "different", "builtin"]
 #: Kind by the name of the RDF class of an atom.
-KINDS: Final[dict[str, Kind]] = {
+KINDS: Final[dict[str, AtomKind]] = {
     SWRL + "ClassAtom": "class",
     SWRL + "IndividualPropertyAtom": "object",
     SWRL + "DatavaluedPropertyAtom": "data",
@@ -74,7 +74,7 @@ class Atom:
         places: of the predicate and of each argument; empty when it was not read from text.
     """
 
-    kind: Kind
+    kind: AtomKind
     predicate: str
     arguments: tuple[Term, ...]
     places: tuple[Place, ...] = field(default=(), compare=False)
