@@ -28,7 +28,7 @@ from suave_des.scenario.models import Scenario
 from suave_des.scenario_knowledge import read_base
 from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.state_input import ManagingSettings
-from suave_des.workbench.tracing import Tracer
+from suave_des.workbench.tracing import Tracer, pellet_for
 
 _MISSION_FILE = "mission.json"
 _GIVEN = Path("the rule to try")
@@ -260,8 +260,7 @@ class _Comparison:
 
     @cached_property
     def _pellet(self) -> InProcessPellet:
-        base = self.with_rule.base
-        return InProcessPellet(base, base.content.all_terms())
+        return pellet_for(self.with_rule.base)
 
     def replay(self, record: KnowledgeRecord) -> ReplayedCycle | None:
         """What the change does in a recorded reasoning cycle; None: nothing."""

@@ -15,7 +15,7 @@ from functools import cached_property
 from typing import Any, Final
 
 from suave_des.knowledge import jvm
-from suave_des.knowledge.content import Content
+from suave_des.knowledge.content import Content, Terms
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import (
     InProcessPellet,
@@ -112,7 +112,7 @@ class Tracer:
     Attributes:
         base: the ontology.
         state: whose facts are derived.
-        pellet: with that ontology and all its terms loaded, for who asks about many states; None: one of its own.
+        pellet: made by `pellet_for`, for who asks about many states; None: one of its own.
     """
 
     base: Ontology
@@ -138,17 +138,12 @@ class Tracer:
         Raises:
             KnowledgeError: the state contradicts itself.
         """
-        pellet = self.pellet or InProcessPellet(self.base, self.base.content.all_terms())
-        return pellet.infer(self.situation) | self.asserted
+        return (self.pellet or pellet_for(self.base)).infer(self.situation) | self.asserted
 
     @cached_property
     def known(self) -> tuple[Triple, ...]:
         """All that follows and that rules mention, in canonical form and in a fixed order."""
-        text = self.base.content.n_triples() + "".join(map(n_triple, self.situation))
-        mentioned = [atom for rule in self.base.content.enabled_rules for atom in rule.atoms]
-        entailed = self.entailed.union(_values_of(load_n_triples(text), mentioned))
-        jvm.take_warnings()
-        return tuple(sorted({_canonical(triple) for triple in entailed if is_fact(triple)}, key=str))
+        return tuple(sorted({_canonical(triple) for triple in self.entailed if is_fact(triple)}, key=str))
 
     @cached_property
     def facts(self) -> Facts:
@@ -320,6 +315,17 @@ class Tracer:
 
     def _fact(self, triple: Triple) -> Fact:
         return next(facts_of([triple], self.base.names))
+
+
+def pellet_for(base: Ontology) -> InProcessPellet:
+    """Load an ontology into Pellet, to read all its terms and those that its rules mention."""
+    terms = base.content.all_terms()
+    atoms = [atom for rule in base.content.enabled_rules for atom in rule.atoms]
+    properties = {atom.predicate for atom in atoms if atom.kind in ("object", "data")}
+    classes = {atom.predicate for atom in atoms if atom.kind == "class"}
+    return InProcessPellet(
+        base, Terms(tuple(sorted(properties.union(terms.properties))), tuple(sorted(classes.union(terms.classes))))
+    )
 
 
 def _matches(rule: Rule, binding: Binding, facts: Facts) -> list[tuple[Binding, tuple[Triple, ...]]]:

@@ -189,7 +189,7 @@ def test_a_package_registers_its_manager_by_name(tmp_path: Path) -> None:
     assert "cautious" in done.stdout
     inputs = json.loads((tmp_path / "out" / "manifest.json").read_text())["inputs_sha256"]
     assert "suave_cautious/__init__.py" in inputs
-    done = suave_des_command("campaign", "--resume", "out", "--runs", "3", cwd=tmp_path, **there)
+    done = suave_des_command("campaign", "--resume", "out", "--runs", "3", "--workers", "1", cwd=tmp_path, **there)
     assert done.returncode == 0, done.stderr  # what a package registers is installed on purpose
 
 

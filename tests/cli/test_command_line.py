@@ -376,7 +376,9 @@ class TestCampaign:
 
 class TestReproduce:
     def test_prints_the_papers_table_beside_ours_and_writes_it(self, tmp_path: Path) -> None:
-        ended = suave_des_command("reproduce", "--runs", "2", "--seed", "1", "--quiet", *OUT, cwd=tmp_path)
+        ended = suave_des_command(
+            "reproduce", "--runs", "2", "--seed", "1", "--workers", "1", "--quiet", *OUT, cwd=tmp_path
+        )
         assert (ended.returncode, ended.stderr) == (0, "")
         for figure in ("187.85", "42.40", "31.40", "13.00", "180.15", "82.05", "3.88", "3.19"):
             assert figure in ended.stdout
