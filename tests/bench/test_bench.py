@@ -19,7 +19,7 @@ import pytest
 
 import suave_des
 from suave_des.bench.bench import Bench, CampaignTime, goal_rows, in_words, is_busy, machine, programs
-from suave_des.bench.programs import Measured, MeasurementError, run
+from suave_des.bench.programs import FinishedProgram, MeasurementError, run
 from suave_des.bench.ratio import MANAGER, SCENARIO, SEED, KernelCall, Replay, record
 from suave_des.bench.stock_reasoner import SEARCH, SEARCHING_HIGH, STATES, MissionState, StockReasoner
 from suave_des.cli.main import main
@@ -86,12 +86,12 @@ RATIO |= {"mission_cpu_us": 990.0, "kernel_cpu_us": 495.0}
 STOCK = {"inferences_measured": 2.0, "inferences_a_mission": 150.0, "mission_s": 300.0, "inference_s": 2.0}
 
 
-def as_if_measured(arguments, folder, environment) -> Measured:
+def as_if_measured(arguments, folder, environment) -> FinishedProgram:
     """What the programs print that `bench` runs, without running them."""
     (folder / f"{arguments[0]}.txt").touch()
     figures = {"suave_des.bench.ratio": RATIO, "suave_des.bench.stock_reasoner": STOCK}.get(arguments[0], {})
     worker_mb = 200.0 if "2" in arguments else None
-    return Measured(wall_s=4.0, cpu_s=6.0, out=json.dumps(figures), parent_mb=150.0, worker_mb=worker_mb)
+    return FinishedProgram(wall_s=4.0, cpu_s=6.0, out=json.dumps(figures), parent_mb=150.0, worker_mb=worker_mb)
 
 
 @pytest.fixture(scope="module", params=["as if measured", pytest.param("measured", marks=pytest.mark.slow)])
