@@ -77,6 +77,16 @@ def mission_status(scenario: str, console: Console) -> Iterator[Callable[[float,
         yield show
 
 
+@contextmanager
+def counted(what: str, console: Console) -> Iterator[Callable[[int, int], None]]:
+    """Show, while it takes and where the console is a terminal, how many of how many are done."""
+    from rich.progress import Progress
+
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
 def plain_table(headings: Iterable[str] = (), *, right: Container[str] = (), **look: Any) -> Table:
     """Make a table that reads well on a terminal and in a plain log.
 

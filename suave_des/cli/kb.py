@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import typer
 
 from suave_des.cli import kb_diff, kb_rules, kb_test, kb_why_not
-from suave_des.cli.console import output, plain_table, print_table, print_trimmed
+from suave_des.cli.console import counted, errors, output, plain_table, print_table, print_trimmed
 from suave_des.cli.headings import CommandsUnderHeadings, Headings, add_commands
 from suave_des.cli.kb_options import (
     AsFormat,
@@ -113,7 +113,8 @@ def policy(
 
     if csv is not None and csv.is_dir():
         raise InputError("is a folder", file=csv, remedy="name a file, such as policy.csv")
-    found = knowledge.bench().policy(max_failed)
+    with counted("states", errors()) as on_count:
+        found = knowledge.bench().policy(max_failed, on_count)
     if png is not None:
         from suave_des.workbench.policy_figure import draw_policy
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from suave_des.cli.console import output, plain_table, print_trimmed, progress
+from suave_des.cli.console import counted, errors, output, plain_table, print_trimmed, progress
 from suave_des.cli.kb_options import AsFormat, Asked, Format, MaxFailed, print_json
 from suave_des.cli.options import Quiet, Seed, Workers, grouped_options
 
@@ -57,7 +57,8 @@ def diff(
 
     benches = knowledge.with_file(one).bench(), knowledge.with_file(other).bench()
     axioms = compare_axioms(benches[0].base, benches[1].base)
-    difference = benches[0].diff(benches[1], max_failed)
+    with counted("states", errors()) as on_count:
+        difference = benches[0].diff(benches[1], max_failed, on_count)
     missions = None if flown.missions is None else _missions(knowledge, (one, other), flown)
     if form is Format.JSON:
         print_json({"axioms": axioms, **_decisions(difference), "missions": missions})

@@ -17,7 +17,7 @@ from suave_des.scenario.loader import load_scenario
 from suave_des.scenario_knowledge import open_base
 from suave_des.workbench.difference import PolicyDifference, compare_policies
 from suave_des.workbench.explain import Explanation, explain
-from suave_des.workbench.policy import Policy, make_policy
+from suave_des.workbench.policy import OnCount, Policy, make_policy
 from suave_des.workbench.policy_space import PolicySpace
 from suave_des.workbench.query import QueryResult, answer, graph_of
 from suave_des.workbench.state_input import ManagingSettings, StateBuilder
@@ -179,16 +179,20 @@ class KnowledgeBase:
             lambda: explain(self.base, state, question, self.settings.improves_exceeded), doing, self.base.rules
         )
 
-    def policy(self, max_failed: int = 2) -> Policy:
+    def policy(self, max_failed: int = 2, on_count: OnCount = lambda done, total: None) -> Policy:
         """Decide every state, with at most so many components that report anything.
+
+        `on_count` is called again and again with how many kinds of states of how many are decided.
 
         Raises:
             InputError: there would be too many states.
             KnowledgeError: the reasoner takes too long for one of them.
         """
-        return make_policy(self.base, self.settings, self.decide, max_failed)
+        return make_policy(self.base, self.settings, self.decide, max_failed, on_count=on_count)
 
-    def diff(self, other: KnowledgeBase, max_failed: int = 2) -> PolicyDifference:
+    def diff(
+        self, other: KnowledgeBase, max_failed: int = 2, on_count: OnCount = lambda done, total: None
+    ) -> PolicyDifference:
         """Find the states that another knowledge base decides differently, over all that either of them tells apart.
 
         Raises:
@@ -197,8 +201,8 @@ class KnowledgeBase:
         """
         space = PolicySpace.of(self.base, self.settings).common(PolicySpace.of(other.base, other.settings))
         return compare_policies(
-            make_policy(self.base, self.settings, self.decide, max_failed, space),
-            make_policy(other.base, other.settings, other.decide, max_failed, space),
+            make_policy(self.base, self.settings, self.decide, max_failed, space, on_count),
+            make_policy(other.base, other.settings, other.decide, max_failed, space, on_count),
         )
 
     def query(self, text: str, state: KnowledgeState | None = None, *, inferred: bool = False) -> QueryResult:

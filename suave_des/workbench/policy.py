@@ -26,6 +26,7 @@ from suave_des.workbench.state_input import LASTING, ManagingSettings
 LARGEST: Final = 400_000
 INCONSISTENT, FLIP_FLOP = "inconsistent", "flip-flop"
 NO_GROUNDING: Final = "ungrounded"
+OnCount = Callable[[int, int], object]
 
 
 @dataclass(frozen=True)
@@ -129,6 +130,7 @@ def make_policy(
     infer: Callable[[KnowledgeState], Conclusion],
     max_failed: int,
     space: PolicySpace | None = None,
+    on_count: OnCount = lambda done, total: None,
 ) -> Policy:
     """Decide every kind of state.
 
@@ -138,6 +140,7 @@ def make_policy(
         infer: analyzes a state and plans on it.
         max_failed: at most so many components report anything.
         space: what to tell apart; None: what can have an effect.
+        on_count: called again and again with how many kinds of states of how many are decided.
 
     Raises:
         InputError: max_failed is negative, or there would be too many states.
@@ -155,8 +158,10 @@ def make_policy(
     attributes = space.attributes
     between = ranges_between(space.numbers)
     cases: list[PolicyCase] = []
+    total = _number_of_kinds(base, max_failed, space)
     for kinds in kinds_of_states(base, settings, max_failed, space):
         cases += _with_flip_flops([_decide(case, infer) for case in kinds])
+        on_count(len(cases), total)
     return Policy(
         attributes=attributes,
         ranges=dict.fromkeys(attributes, between),
@@ -176,15 +181,15 @@ def kinds_of_states(
     Raises:
         InputError: there would be too many states.
     """
-    between = ranges_between(space.numbers)
-    combinations = list(component_reports(space.alike, space.statuses, max_failed))
-    tasks = list(_tasks(base))
-    total = len(between) ** len(space.attributes) * len(combinations) * len(tasks)
+    total = _number_of_kinds(base, max_failed, space)
     if total > LARGEST:
         raise InputError(
             f"the policy has {total:,} kinds of states, which is too many",
             remedy=f"at most {LARGEST:,}; lower --max-failed, or give a scenario that measures less",
         )
+    between = ranges_between(space.numbers)
+    combinations = list(component_reports(space.alike, space.statuses, max_failed))
+    tasks = list(_tasks(base))
     for ranges in itertools.product(between, repeat=len(space.attributes)):
         for values in values_in(ranges):
             known = {name: value for name, value in zip(space.attributes, values, strict=True) if value is not None}
@@ -199,6 +204,12 @@ def kinds_of_states(
                     )
                     part.append(PolicyCase(ranges, state, each, asked))
                 yield part
+
+
+def _number_of_kinds(base: Ontology, max_failed: int, space: PolicySpace) -> int:
+    measured: int = len(ranges_between(space.numbers)) ** len(space.attributes)
+    reports = sum(1 for _ in component_reports(space.alike, space.statuses, max_failed))
+    return measured * reports * sum(1 for _ in _tasks(base))
 
 
 def _tasks(base: Ontology) -> Iterator[tuple[tuple[str, ...], dict[str, str]]]:

@@ -183,6 +183,13 @@ class TestPolicy:
             make_policy(bench.base, ManagingSettings(), bench.infer, 9, many)
 
 
+def test_it_says_how_far_it_is(bench):
+    counts: list[tuple[int, int]] = []
+    found = bench.policy(max_failed=0, on_count=lambda done, total: counts.append((done, total)))
+    assert counts == sorted(counts)
+    assert {total for _, total in counts} == {len(found.cases)} == {counts[-1][0]}
+
+
 class TestFiles:
     @pytest.mark.parametrize(
         ("words", "said"),
