@@ -127,6 +127,7 @@ class TestStopped:
         program = (
             "import os, signal, sys, threading, time\n"
             "from suave_des.entry import main\n"
+            "signal.signal(signal.SIGHUP, signal.SIG_DFL)\n"  # under nohup it is ignored
             f"threading.Timer({after_s}, os.kill, (os.getpid(), signal.{number})).start()\n"
             "sys.argv[1:] = sys.argv[2:]\n"
             "main()\n"
