@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import atexit
+import ctypes
 import os
 import queue
 import threading
+import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from typing import Any, Final, TypeVar
@@ -21,7 +24,8 @@ LONGEST_S: Final = 1e6
 #: What a reasoner does at first, for the message.
 LOADING: Final = "loading the ontologies"
 _Result = TypeVar("_Result")
-_Jobs = queue.SimpleQueue[tuple["Future[Any]", Callable[[], Any]]]
+#: How long the end of the process waits for reasoners to leave Java, in s.
+_LEAVE_JAVA_S: Final = 0.5
 _abandoned: Final[list[str]] = []
 
 
@@ -48,7 +52,7 @@ class TimeLimit:
             raise KnowledgeError(problem, remedy=f"give seconds above 0, at most {LONGEST_S:g}")
         self.seconds = seconds
         self._option = option
-        self._jobs: _Jobs | None = None
+        self._thread: _ReasonerThread | None = None
         self._process = 0
         self._stuck: str | None = None
 
@@ -65,16 +69,18 @@ class TimeLimit:
         """
         if self._stuck is not None:
             raise KnowledgeError(f"the reasoner is still {self._stuck}", remedy="start anew, with other rules")
-        if self._jobs is None or self._process != os.getpid():  # a process that was forked has none of the threads
-            self._jobs, self._process = queue.SimpleQueue(), os.getpid()
-            threading.Thread(target=_do_all, args=(self._jobs,), daemon=True, name="reasoner").start()
+        if self._thread is None or self._process != os.getpid():  # a process that was forked has none of the threads
+            self._thread, self._process = _ReasonerThread(), os.getpid()
+            self._thread.start()
         future: Future[_Result] = Future()
-        self._jobs.put((future, work))
+        self._thread.jobs.put((future, work))
         try:
             return future.result(self.seconds)
         except BaseException as error:
             if future.done():
                 raise
+            if not _abandoned:
+                atexit.register(_end_all)  # comes before the end of Java, which was registered earlier
             _abandoned.append(doing)
             if not isinstance(error, TimeoutError):  # Ctrl-C: Java crashes if the process ends as usual meanwhile
                 raise
@@ -95,14 +101,36 @@ class TimeLimit:
         return KnowledgeError(problem, remedy=f"{remedy}{more}")
 
 
-def _do_all(jobs: _Jobs) -> None:
-    while True:
-        future, work = jobs.get()
-        try:
-            future.set_result(work())
-        except BaseException as error:  # raised again by the thread that waits
-            future.set_exception(error)
-        del future, work  # or the last result would be kept until the next piece of work
+class _ReasonerThread(threading.Thread):
+    """Does one job after another; None ends it."""
+
+    def __init__(self) -> None:
+        super().__init__(name="reasoner", daemon=True)
+        self.jobs: queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None] = queue.SimpleQueue()
+
+    def run(self) -> None:
+        while (job := self.jobs.get()) is not None:
+            future, work = job
+            try:
+                future.set_result(work())
+            except BaseException as error:  # raised again by the thread that waits
+                future.set_exception(error)
+            del job, future, work  # or the last result would be kept until the next piece of work
+
+
+def _end_all() -> None:
+    """End the threads of all reasoners, except one in a long call of Java.
+
+    A thread that comes back from Java while Java ends is stopped there for ever, holding the interpreter's lock: the
+    process would never end.
+    """
+    threads = [thread for thread in threading.enumerate() if isinstance(thread, _ReasonerThread)]
+    for thread in threads:
+        thread.jobs.put(None)
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident or 0), ctypes.py_object(SystemExit))
+    deadline = time.monotonic() + _LEAVE_JAVA_S
+    for thread in threads:
+        thread.join(max(0.0, deadline - time.monotonic()))
 
 
 def reasoning_on(state: KnowledgeState) -> str:

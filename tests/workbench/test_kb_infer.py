@@ -234,3 +234,24 @@ sys.exit(5)
 """
         done = _python("-c", program)
         assert (done.returncode, done.stderr) == (5, "")
+
+    def test_abandoned_work_no_longer_calls_java_when_java_ends(self):
+        # A call that returns at that very moment keeps Python's lock for ever, and the process never ends.
+        program = """
+import atexit, sys, threading
+from suave_des.errors import KnowledgeError
+from suave_des.knowledge import jvm
+from suave_des.knowledge.limit import TimeLimit
+thread = jvm.java_class("java.lang.Thread")
+atexit.register(lambda: print([each.name for each in threading.enumerate() if each.name == "reasoner"]))
+inner = TimeLimit()  # as a reasoner has its own limit
+def for_ever():
+    while True:
+        inner.run(lambda: thread.sleep(20), "sleeping")
+try:
+    TimeLimit(0.1).run(for_ever, "sleeping")
+except KnowledgeError:
+    sys.exit(5)
+"""
+        done = _python("-c", program)
+        assert (done.returncode, done.stdout, done.stderr) == (5, "[]\n", "")
