@@ -13,6 +13,9 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from suave_des.caches import private_cache
+from tests.helpers.quick_workers import _warm_process, quick_workers
+
+__all__ = ["_warm_process", "quick_workers"]
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("repeatable")

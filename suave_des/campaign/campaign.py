@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Unpack
 
 from suave_des.campaign.early_checks import FirstFailures, check_size
-from suave_des.campaign.executors import InProcess, LocalWorkers
+from suave_des.campaign.executors import InProcess, LocalWorkers, end_worker_of_script
 from suave_des.campaign.inputs import (
     check_same,
     check_trusted,
@@ -219,6 +219,7 @@ class _Campaign:
         self, spec: CampaignSpec, file: CampaignFile | None, stack: ExitStack, loaded: LoadedScenario | None = None
     ) -> None:
         self.spec = spec = spec.with_file(file)
+        end_worker_of_script(spec.managers, spec.workers)
         try:
             spec.check()
         except InputError as error:

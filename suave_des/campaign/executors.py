@@ -8,7 +8,7 @@ import signal
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, nullcontext, suppress
@@ -46,6 +46,9 @@ _STOP_TIMEOUT_S = 5.0
 _SAFE_PATH = "PYTHONSAFEPATH"
 _OUT_OF_MEMORY = 12
 """Exit status of a worker that could not get the memory it asked for (the system's number of that error)."""
+_RUNS_THE_SCRIPT = 10
+"""Exit status of a worker in which the script began its campaign anew."""
+_NAME = "suave-des worker"
 
 
 class InProcess:
@@ -85,7 +88,7 @@ class LocalWorkers:
         self._is_done = False
         self._in_a_row = 0
         self._again: deque[_Task] = deque()
-        self._ended: SimpleQueue[Future[list[Finished]]] = SimpleQueue()
+        self._ended: SimpleQueue[Future[list[Finished]] | None] = SimpleQueue()
 
     def __enter__(self) -> Self:
         """Start the workers."""
@@ -111,7 +114,7 @@ class LocalWorkers:
         remaining = iter(missions)
         self._tasks = map(_Task, iter(lambda: tuple(islice(remaining, size)), ()))
         for worker in self._workers:
-            worker.prepare(job, self._definitions)
+            self._prepare(worker)
         self._hand_out()
         while busy := [worker for worker in self._workers if worker.tasks]:
             future = self._next_ended(busy)
@@ -142,6 +145,10 @@ class LocalWorkers:
             problem = f"a worker process cannot be started: {error.strerror}"
             raise WorkerError(f"{problem} (raise the limit, see ulimit -a, or give --workers 1)") from None
 
+    def _prepare(self, worker: _Worker) -> None:
+        """Give a worker what all missions have in common; when it has that, its chunk is due earlier than before."""
+        worker.prepare(self._job, self._definitions, lambda: self._ended.put(None))
+
     def _hand_out(self) -> None:
         """Give every worker its share, as long as there is something to do."""
         for share in range(1, _AHEAD + 1):
@@ -169,6 +176,8 @@ class LocalWorkers:
         """Put a new worker in the place of one that ended; of its chunks, the first was under way."""
         worker.stop(wait=False)
         status = worker.join()
+        if self._needs_script and status == _RUNS_THE_SCRIPT:
+            raise WorkerError(f"the campaign would begin anew in each worker process{_SCRIPT_HINT}")
         self._in_a_row += 1
         if self._in_a_row >= _IN_A_ROW:
             raise WorkerError(
@@ -188,7 +197,7 @@ class LocalWorkers:
             yield [self._job.failed(suspect.chunk[0], cause)]
         self._again.extend(others)
         fresh = self._start_worker(self._workers.index(worker))
-        fresh.prepare(self._job, self._definitions)
+        self._prepare(fresh)
         self._hand_out()
 
 
@@ -220,15 +229,17 @@ class _Worker:
         self.process = context.process
         context.close_writer()
 
-    def prepare(self, job: JobSpec, definitions: bytes | None) -> None:
+    def prepare(self, job: JobSpec, definitions: bytes | None, when_ready: Callable[[], None]) -> None:
         """Give it what all its missions have in common; the first thing to do."""
+
+        def is_ready(_: object) -> None:
+            self.since_s, self._start_s = time.monotonic(), 0.0
+            when_ready()
+
         with suppress(BrokenProcessPool):  # it has ended, as the first chunk will show
             if definitions is not None:
                 self._pool.submit(define_in_main, definitions)
-            self._pool.submit(_prepare, job).add_done_callback(self._is_ready)
-
-    def _is_ready(self, _: object) -> None:
-        self.since_s, self._start_s = time.monotonic(), 0.0
+            self._pool.submit(_prepare, job).add_done_callback(is_ready)
 
     def give(self, task: _Task) -> Future[list[Finished]]:
         """Give it a chunk of missions, to be run when those before are done."""
@@ -285,7 +296,7 @@ class _Context(SpawnContext):
         self._results._writer.close()
 
     def Process(self, *arguments: Any, **named: Any) -> BaseProcess:  # type: ignore[override]  # noqa: N802
-        self.process = SpawnProcess(*arguments, **named)
+        self.process = SpawnProcess(*arguments, **(named | {"name": _NAME}))
         return self.process
 
 
@@ -319,6 +330,14 @@ def _without_current_folder() -> Iterator[None]:
 
 
 # What runs in a worker process.
+
+
+def end_worker_of_script(managers: Sequence[str], workers: int) -> None:
+    """End this process if it is a worker that imports the script, and the script's campaign cannot be run in it."""
+    is_starting = multiprocessing.current_process().name == _NAME and multiprocessing.parent_process() is None
+    if is_starting and (workers > 1 or any(name.startswith("__main__:") for name in managers)):
+        os._exit(_RUNS_THE_SCRIPT)
+
 
 _jobs: list[JobSpec] = []
 

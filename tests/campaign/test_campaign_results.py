@@ -73,6 +73,7 @@ def test_the_search_time_of_a_mission_without_detection_is_the_limit(tmp_path: P
         assert row["distance_inspected_m"] == "0.0"
 
 
+@pytest.mark.usefixtures("quick_workers")
 def test_equal_campaigns_give_equal_bytes_on_one_and_two_workers(folder: Path, tmp_path: Path) -> None:
     for name, workers in (("again", 1), ("two", 2)):
         run_campaign("seams2023", ["none", "random"], 6, 3, workers, tmp_path / name)
@@ -80,6 +81,7 @@ def test_equal_campaigns_give_equal_bytes_on_one_and_two_workers(folder: Path, t
             assert (tmp_path / name / file).read_bytes() == (folder / file).read_bytes()
 
 
+@pytest.mark.usefixtures("quick_workers")
 def test_metacontrol_gives_equal_bytes_on_one_and_two_workers(tmp_path: Path) -> None:
     for name, workers in (("one", 1), ("two", 2)):
         run_campaign("seams2023", ["metacontrol"], 3, 5, workers, tmp_path / name)

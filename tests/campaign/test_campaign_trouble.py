@@ -6,6 +6,7 @@ import csv
 import json
 import os
 import re
+import time
 from pathlib import Path
 from typing import IO, Any
 
@@ -18,6 +19,7 @@ from suave_des.campaign.missions import WorkerError
 from suave_des.errors import InputError
 from tests.helpers import AWKWARD
 
+pytestmark = pytest.mark.usefixtures("quick_workers")
 RUNS = 12
 
 
@@ -127,6 +129,14 @@ def test_a_mission_that_cannot_be_interrupted_ends_with_its_worker(monkeypatch: 
     result = run_campaign("seams2023", [f"{AWKWARD}:BlocksInSome"], 3, 1, 2, time_out_s=8.0)
     assert [(failure.run, failure.cause) for failure in result.failures] == [(2, "not done after 8 s (time-out)")]
     assert result.done == 2
+
+
+def test_it_does_so_too_when_no_other_mission_ends_after_it_began(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(executors, "_MARGIN_S", 1.0)
+    started_s = time.monotonic()
+    result = run_campaign("seams2023", [f"{AWKWARD}:BlocksInSome"], 2, 201, 2, time_out_s=1.0)
+    assert [failure.run for failure in result.failures] == [1, 2]
+    assert time.monotonic() < started_s + 45.0  # long before the missions come back, and before a start is overdue
 
 
 def test_missions_run_in_as_many_processes_as_asked_for() -> None:

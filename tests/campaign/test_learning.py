@@ -39,6 +39,7 @@ def test_training_goes_on_from_a_file(learner: str, tmp_path: Path) -> None:
     assert sum(missions for missions, _ in more.learned.values()) == 12
 
 
+@pytest.mark.usefixtures("quick_workers")
 def test_a_frozen_policy_gives_the_same_rows_for_any_number_of_workers(learner: str) -> None:
     train("seams2023", learner, 9, "policy.json")
     options = {learner: {"learned": "policy.json"}}
@@ -79,6 +80,7 @@ def test_blocks_have_the_means_of_their_missions() -> None:
 
 
 @pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.usefixtures("quick_workers")
 def test_a_class_that_keeps_something_from_mission_to_mission_is_found_out(workers: int) -> None:
     with pytest.warns(UserWarning, match="gave another row"):
         frame = run_campaign("seams2023", [f"{AWKWARD}:Remembers"], 24, workers=workers)
@@ -98,6 +100,7 @@ def test_modes_that_there_are_not_are_counted_and_reported(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.usefixtures("quick_workers")
 def test_a_name_that_nothing_measures_is_reported_once(workers: int, tmp_path: Path) -> None:
     with pytest.warns(UserWarning, match="depends_on has 'water_visiblity', which nothing measures"):
         run_campaign("seams2023", [f"{AWKWARD}:WaitsInVain"], 6, workers=workers, out=tmp_path / "out")

@@ -54,6 +54,7 @@ def interrupted(scenario: Path, folder: Path, runs: int = 20, missions: int = 15
 
 
 @pytest.mark.parametrize(("before", "after"), [(1, 1), (1, 2), (2, 1)])
+@pytest.mark.usefixtures("quick_workers")
 def test_resumed_on_any_number_of_workers_the_bytes_are_the_same(
     before: int, after: int, scenario: Path, tmp_path: Path
 ) -> None:

@@ -186,6 +186,7 @@ def test_in_a_notebook_one_output_is_replaced(monkeypatch: pytest.MonkeyPatch) -
 
 class TestDuringACampaign:
     @pytest.mark.parametrize("workers", [1, 2])
+    @pytest.mark.usefixtures("quick_workers")
     def test_the_last_that_is_told_is_what_summary_csv_says(self, workers: int, tmp_path: Path) -> None:
         seen: list[Progress] = []
         managers = ["none", f"{AWKWARD}:RaisesInHalf"]

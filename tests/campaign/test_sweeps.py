@@ -129,6 +129,7 @@ def test_more_points_managers_or_noise_change_no_other_row(seed: int, periods: l
     assert alone == {row[:-2] for row in rows(["none"], 1, periods, perturbations=noisier)}
 
 
+@pytest.mark.usefixtures("quick_workers")
 def test_a_sweep_gives_the_same_bytes_on_any_number_of_workers_and_when_resumed(tmp_path: Path) -> None:
     text = HEAD + f"perturbations:\n  start.x_m: {UNIFORM % (-18, -16)}\n"
     path = write(
@@ -212,6 +213,7 @@ def test_a_failure_in_a_sweep_names_its_point(tmp_path: Path) -> None:
     assert '"visibility.period_s": 80.0' in (tmp_path / "out" / "manifest.json").read_text(encoding="utf-8")
 
 
+@pytest.mark.usefixtures("quick_workers")
 def test_knowledge_states_are_kept_as_run_keeps_them_and_resumed_to_the_same_bytes(tmp_path: Path) -> None:
     sweep = {"visibility.period_s": [40.0, 80.0]}
     managers = ["none", "metacontrol"]

@@ -103,6 +103,7 @@ def test_running_sums_give_what_the_whole_sample_gives(values: list[float]) -> N
 
 
 @pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
+@pytest.mark.usefixtures("quick_workers")
 def test_the_same_bytes_on_any_number_of_workers_and_after_any_interruption(
     seed: int, scenario: Path, tmp_path: Path
 ) -> None:

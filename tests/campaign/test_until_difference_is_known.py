@@ -48,6 +48,7 @@ def test_all_managers_end_after_the_first_run_at_which_the_difference_is_known(t
     assert told["half_width"] == pytest.approx(half_width(len(differences)), abs=1e-6)
 
 
+@pytest.mark.usefixtures("quick_workers")
 def test_the_same_bytes_on_two_workers_and_after_interruptions(tmp_path: Path) -> None:
     managers = ["bt", "metacontrol"]
     run_campaign("seams2023", managers, 200, 3, 1, tmp_path / "one", until_ci=LIMIT)

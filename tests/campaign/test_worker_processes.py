@@ -12,9 +12,10 @@ import pytest
 
 import suave_des
 from benchmarks import chaos
+from suave_des import run_campaign
 
 GUARD = 'if __name__ == "__main__":\n    '
-CALL = "print(run_campaign({scenario!r}, {managers}, runs=12, seed=1, workers={workers}).to_csv(index=False))\n"
+CALL = "print(run_campaign({scenario!r}, {managers}, runs=12, seed=1, workers=2).to_csv(index=False))\n"
 MINE = "from suave_des.managing.simple import RandomManager\nclass Mine(RandomManager):\n    pass\n"
 
 
@@ -39,35 +40,34 @@ def run_script(text: str, folder: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-def call(scenario: Path, managers: list[str], workers: int) -> str:
-    return CALL.format(scenario=str(scenario), managers=managers, workers=workers)
+def call(scenario: Path, managers: list[str]) -> str:
+    return CALL.format(scenario=str(scenario), managers=managers)
 
 
-def test_a_script_needs_no_guard(scenario: Path, tmp_path: Path) -> None:
-    shared = run_script(call(scenario, ["random", "none"], 2), tmp_path)
-    assert (shared.returncode, shared.stderr) == (0, "")
-    assert shared.stdout.count("\n") == 1 + 24 + 1
-    assert run_script(call(scenario, ["random", "none"], 1), tmp_path).stdout == shared.stdout
+def without_workers(scenario: Path, managers: list[str]) -> str:
+    """What the script prints of managers that do as these do."""
+    return run_campaign(str(scenario), managers, runs=12, seed=1, progress=False).to_csv(index=False)
+
+
+def test_a_script_needs_no_guard_nor_loads_the_compiler(scenario: Path, tmp_path: Path) -> None:
+    look = "import sys\nprint('numba' in sys.modules)\n"
+    done = run_script(call(scenario, ["random", "none"]) + look, tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == without_workers(scenario, ["random", "none"]) + "\nFalse\n"
+    assert "numba" in sys.modules  # as the missions of this process need it
 
 
 def test_a_manager_that_the_script_defines_needs_one(scenario: Path, tmp_path: Path) -> None:
     managers = ["__main__:Mine"]
-    alone = run_script(MINE + call(scenario, managers, 1), tmp_path)
-    shared = run_script(MINE + GUARD + call(scenario, managers, 2), tmp_path)
-    assert (shared.returncode, shared.stderr) == (0, "")
-    assert alone.stdout == shared.stdout
-    without = run_script(MINE + call(scenario, managers, 2), tmp_path)
+    done = run_script(MINE + GUARD + call(scenario, managers), tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == without_workers(scenario, ["random"]).replace(",random,", ",__main__:Mine,") + "\n"
+    without = run_script(MINE + call(scenario, managers), tmp_path)
     assert without.returncode == 1
+    assert without.stderr.count("Traceback") == 1  # of the script itself: its workers say nothing
     last = without.stderr.splitlines()[-1]
-    assert "worker processes in a row ended before a mission was done" in last
+    assert "the campaign would begin anew in each worker process; " in last
     assert 'into a module of its own, or the campaign under `if __name__ == "__main__":`' in last
-
-
-def test_the_process_that_calls_does_not_load_the_compiler(scenario: Path, tmp_path: Path) -> None:
-    look = "import sys\nprint('numba' in sys.modules)\n"
-    for workers, loaded in ((2, "False"), (1, "True")):
-        done = run_script(call(scenario, ["random", "bt"], workers) + look, tmp_path)
-        assert done.stdout.splitlines()[-1] == loaded, done.stderr
 
 
 def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
@@ -98,13 +98,15 @@ class Writer(NoManager):
 """
 
 
-def test_what_a_manager_has_written_is_there_when_workers_have_ended(scenario: Path, tmp_path: Path) -> None:
+def test_what_a_manager_has_written_is_there_when_workers_have_ended(
+    scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "writer.py").write_text(WRITER)
-    done = run_script(call(scenario, ["writer:Writer"], 2), tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert (
-        sum(path.read_text().count("a mission") for path in tmp_path.glob("written_*.txt")) >= 12
-    )  # some are repeated
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    assert len(run_campaign(str(scenario), ["writer:Writer"], runs=12, workers=2, progress=False)) == 12
+    written = [path.read_text().count("a mission") for path in tmp_path.glob("written_*.txt")]
+    assert sum(written) >= 12  # some are repeated
 
 
 CUT = """
@@ -130,11 +132,14 @@ class Cut(NoManager):
 """
 
 
-def test_a_worker_that_dies_in_the_middle_of_a_result_costs_nothing(scenario: Path, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("quick_workers")
+def test_a_worker_that_dies_in_the_middle_of_a_result_costs_nothing(
+    scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "cut.py").write_text(CUT)
-    alone = run_script(call(scenario, ["cut:Cut"], 1), tmp_path)
-    assert not (tmp_path / "cut.txt").exists()
-    shared = run_script(call(scenario, ["cut:Cut"], 2), tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    shared = run_campaign(str(scenario), ["cut:Cut"], runs=12, seed=1, workers=2, progress=False)
     assert (tmp_path / "cut.txt").exists()
-    assert (shared.returncode, shared.stderr) == (0, "")
-    assert shared.stdout == alone.stdout
+    assert shared.to_csv(index=False) == without_workers(scenario, ["none"]).replace(",none,", ",cut:Cut,")
+    assert capfd.readouterr().err == ""

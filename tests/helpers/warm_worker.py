@@ -1,0 +1,7 @@
+"""What a worker process has imported and loaded before its first mission: modules and machine code."""
+
+from suave_des.campaign import mission_runner  # noqa: F401
+from suave_des.scenario.loader import load_scenario
+from suave_des.simulation.simulator import Simulator
+
+Simulator(load_scenario("seams2023")).run("none", 1, 1)
