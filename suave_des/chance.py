@@ -19,11 +19,24 @@ from suave_des.streams import Streams
 from suave_des.world import signals
 
 
+class Distributions(dict[str, Distribution]):
+    """What a scenario gives, a number or a distribution, by key path; looked up in the scenario when first needed."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        super().__init__()
+        self._scenario = scenario
+
+    def __missing__(self, path: str) -> Distribution:
+        found: Distribution = attrgetter(path)(self._scenario)
+        self[path] = found
+        return found
+
+
 class Chance(Streams):
     """The random streams of a run, and what was drawn from them.
 
     Args:
-        scenario: where the distributions are.
+        distributions: of the scenario.
         seed: the campaign's.
         run: number of the run, from 1.
         runs_per_draw: how many runs in a row share the value drawn for a key path; one, if the path is not in it.
@@ -32,15 +45,14 @@ class Chance(Streams):
         drawn: values that hold for the whole run, by key path.
     """
 
-    def __init__(self, scenario: Scenario, seed: int, run: int, runs_per_draw: Mapping[str, int]) -> None:
+    def __init__(self, distributions: Distributions, seed: int, run: int, runs_per_draw: Mapping[str, int]) -> None:
         super().__init__(seed, run)
-        self._scenario, self._seed, self._run, self._runs_per_draw = scenario, seed, run, runs_per_draw
+        self._distributions, self._seed, self._run, self._runs_per_draw = distributions, seed, run, runs_per_draw
         self.drawn: dict[str, float] = {}
 
     def value(self, path: str, node: str = "") -> float:
         """The run's value of what the scenario gives at a key path; each node may have its own."""
-        distribution: Distribution = attrgetter(path)(self._scenario)
-        return self.draw(f"{path}/{node}" if node else path, distribution)
+        return self.draw(f"{path}/{node}" if node else path, self._distributions[path])
 
     def draw(self, key: str, distribution: Distribution, least: float = -math.inf) -> float:
         """The run's value of a distribution, at least `least`; a plain number is its own."""
@@ -48,8 +60,8 @@ class Chance(Streams):
             shared_by = self._runs_per_draw.get(key, 1)
             first = (self._run - 1) // shared_by * shared_by + 1  # of the runs that share the value
             distribution = draw(distribution, Streams(self._seed, first).stream(_stream_name(key, distribution)))
-        self.drawn[key] = max(least, distribution)
-        return self.drawn[key]
+        value = self.drawn[key] = max(least, distribution)
+        return value
 
     def sampler(self, key: str, distribution: Distribution) -> Callable[[], float]:
         """A function that draws a new value at each call."""

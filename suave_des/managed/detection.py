@@ -3,29 +3,18 @@
 import math
 from dataclasses import dataclass
 
-import numpy as np
 import simpy
 
 from suave_des.clock import Alarm
 from suave_des.compiling import Array
 from suave_des.managed.node import Log
-from suave_des.vehicle.vehicle import STEP_S, Vehicle
+from suave_des.vehicle.vehicle import STEP_S, Vehicle, rows_at
 from suave_des.world.pipeline import first_detection
 
 _FEWEST_ROWS = 22
-_MARGIN_ROWS = 2
-"""How far to look at least, and beyond what guidance has looked at: where that ends, the set-point mostly changes."""
-
-
-def measured_at_rows(times_s: Array, values: Array, at_rows: Array) -> None:
-    """Write the value measured last at each row of a track into `at_rows`, shape (rows,); nan before the first."""
-    if len(times_s) == 0:  # nothing is ever published
-        at_rows[:] = np.nan
-        return
-    first = np.minimum(np.rint(times_s / STEP_S).astype(np.int64), len(at_rows))  # rounded as Vehicle does
-    at_rows[: first[0]] = np.nan
-    at_rows[first[0] : first[-1]] = np.repeat(values[:-1], first[1:] - first[:-1])
-    at_rows[first[-1] :] = values[-1]
+"""How far to look at least; else as far as guidance has looked. Where that ends, the set-point mostly changes."""
+_AFTER_CONTROL_S = 0.6 * STEP_S
+"""From there to looking on, which is not needed if control changes: after what is rounded to the same row."""
 
 
 @dataclass(eq=False)
@@ -36,7 +25,7 @@ class PipelineDetector:
     present control, and again when control changes; so the moment does not depend on when the position is read.
 
     Attributes:
-        visibility_m: measured water visibility at each row of the vehicle's track.
+        visibility: measured water visibility: the times, s, at which the value changes, and the values, m.
         points: points as the detection places them, shape (n, 3), m.
         view_tangent: tangent of half the camera's field of view.
         detected: the event of the first sight.
@@ -46,7 +35,7 @@ class PipelineDetector:
 
     env: simpy.Environment
     vehicle: Vehicle
-    visibility_m: Array
+    visibility: tuple[Array, Array]
     points: Array
     view_tangent: float
     log: Log
@@ -57,22 +46,27 @@ class PipelineDetector:
 
     def __post_init__(self) -> None:
         self.detected: simpy.Event = self.env.event()
+        times_s, visibility_m = self.visibility
+        self._visibility = rows_at(times_s), visibility_m
         self._alarm = Alarm(self.env, self._arrive)
         self.vehicle.control_listeners.append(self._look_ahead)
         self._look_ahead(0)
 
     def _look_ahead(self, row: int) -> None:
         """Check the rows from one on; return at the first sight, or where no later row has been checked."""
-        last = min(max(row + _FEWEST_ROWS, self.vehicle.computed_row + _MARGIN_ROWS), self.vehicle.last_row)
+        last = min(max(row + _FEWEST_ROWS, self.vehicle.computed_row), self.vehicle.last_row)
         if row >= last:
             self._alarm.cancel()
             return
         self.vehicle.look_ahead(last)
         seen_row, self._seen = first_detection(
-            self.vehicle.track, row, last, self.visibility_m, self.points, self.view_tangent
+            self.vehicle.track, row, last, self._visibility, self.points, self.view_tangent
         )
-        self._row = last if self._seen < 0 else seen_row
-        self._alarm.set(self._row * STEP_S)
+        if self._seen < 0:
+            self._row = last
+            self._alarm.set(last * STEP_S + _AFTER_CONTROL_S)
+        else:
+            self._alarm.set(seen_row * STEP_S)
 
     def _arrive(self) -> None:
         if self._seen < 0:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
+import numpy as np
 import simpy
 
 from suave_des.compiling import Array
@@ -14,7 +15,7 @@ from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.measurements import BatteryLevel, Measured
 from suave_des.scenario.models import FURTHER_METRICS, Requirement, Scenario
 from suave_des.scenario.modes import Mode
-from suave_des.vehicle.vehicle import Vehicle, row_at
+from suave_des.vehicle.vehicle import Vehicle, row_at, rows_at
 from suave_des.world.coverage import covered_area_m2
 
 MetricValue = float | int | None
@@ -28,7 +29,6 @@ class FurtherMetrics:
         env: the mission's clock.
         scenario: says which are asked for.
         vehicle: has the track.
-        visibility_m: measured water visibility at each row of the track.
         measured: what monitors have measured, by quality attribute.
         battery: its level; none if there is no battery.
         adaptations_undone: changes of a function's mode that were soon taken back: indecision.
@@ -39,7 +39,6 @@ class FurtherMetrics:
     env: simpy.Environment
     scenario: Scenario
     vehicle: Vehicle
-    visibility_m: Array
     measured: Mapping[str, Measured]
     battery: BatteryLevel | None
     adaptations_undone: int = 0
@@ -107,8 +106,10 @@ class FurtherMetrics:
                 return self._operational_thrusters()
             case "area_covered_m2":
                 self.vehicle.position(now_s)  # fills the track until now
-                tangent = self.scenario.vehicle.camera.tangent
-                return covered_area_m2(self.vehicle.track, row_at(now_s), self.visibility_m, SEA_BED_Z_M, tangent)
+                track, tangent = self.vehicle.track, self.scenario.vehicle.camera.tangent
+                visibility = self.measured["water_visibility"]
+                visibility_m = measured_at_rows(visibility.times_s, visibility.values, len(track))
+                return covered_area_m2(track, row_at(now_s), visibility_m, SEA_BED_Z_M, tangent)
             case "surfacing_time_s":
                 return self.surfacing_time_s
         assert self.battery is not None
@@ -122,6 +123,12 @@ class FurtherMetrics:
             return float(all_thrusters)
         steps = [(0.0, all_thrusters), *self._working, (self.env.now, 0)]
         return sum((later - since) * count for (since, count), (later, _) in pairwise(steps)) / self.env.now
+
+
+def measured_at_rows(times_s: Sequence[float], values: Sequence[float], rows: int) -> Array:
+    """The value measured last at each row of a track, shape (rows,); nan before the first."""
+    places = np.searchsorted(rows_at(np.array(times_s)), np.arange(rows), side="right")
+    return np.append(np.nan, values)[places]
 
 
 def fulfilments(

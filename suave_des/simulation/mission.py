@@ -9,9 +9,10 @@ from simpy.core import StopSimulation
 from suave_des import domain
 from suave_des.chance import Chance
 from suave_des.clock import advance
+from suave_des.compiling import Array
 from suave_des.errors import SuaveDesError
 from suave_des.managed.coordinator import MissionCoordinator, MissionTiming
-from suave_des.managed.detection import PipelineDetector, measured_at_rows
+from suave_des.managed.detection import PipelineDetector
 from suave_des.managed.follow import NO_PATH, FollowPipeline, InspectionPath
 from suave_des.managed.mode_manager import ModeManager
 from suave_des.managed.motion import MaintainMotion
@@ -38,7 +39,7 @@ from suave_des.monitor.monitors import (
 )
 from suave_des.scenario.physical import Battery
 from suave_des.simulation.host import RAISED, ManagerHost
-from suave_des.simulation.simulator import MissionMemory, Simulator
+from suave_des.simulation.simulator import Simulator
 from suave_des.simulation.vehicles import draw_start, make_vehicle
 from suave_des.vehicle.guidance import SetPointSender
 from suave_des.world.signals import Signal
@@ -56,7 +57,7 @@ class MissionRun:
         manager: str,
         run: int,
         seed: int,
-        memory: MissionMemory,
+        track: Array,
         *,
         record: bool,
         kind: type[ManagingSubsystem] | None = None,
@@ -65,8 +66,8 @@ class MissionRun:
         self._scenario = simulator.loaded.scenario
         self._revision = self._scenario.revision
         self._manager, self._run_number, self._seed = manager, run, seed
-        self.memory = memory
-        self._chance = Chance(self._scenario, seed, run, simulator.runs_per_draw)
+        self.track = track
+        self._chance = Chance(simulator.distributions, seed, run, simulator.runs_per_draw)
         self.env = simpy.Environment()
         self._recorder = Recorder(self.env, enabled=record)
         self._bus = DiagnosticsBus()
@@ -75,7 +76,7 @@ class MissionRun:
 
         self._start = draw_start(self._chance)
         self._vehicle = make_vehicle(
-            self._scenario, simulator.vehicle_model, self._chance, self._start, simulator.duration_s, memory.track
+            self._scenario, simulator.vehicle_model, self._chance, self._start, simulator.duration_s, track
         )
         self._true_signals: dict[str, Signal] = {}
         self._signals = {name: self._measure(name) for name in sorted(self._scenario.signals)}
@@ -84,11 +85,10 @@ class MissionRun:
         self._measured: dict[str, Measured] = {**self._signals}
         if self._battery is not None:
             self._measured[self._battery.key] = self._battery
-        measured_at_rows(*self._visibility.arrays, memory.visibility_m)
         self._detector = PipelineDetector(
             self.env,
             self._vehicle,
-            memory.visibility_m,
+            self._visibility.arrays,
             simulator.detection_points,
             simulator.view_tangent,
             self._recorder.log,
@@ -113,7 +113,7 @@ class MissionRun:
         self._further: FurtherMetrics | None = None
         if self._scenario.further_columns:
             self._further = further = FurtherMetrics(
-                self.env, self._scenario, self._vehicle, memory.visibility_m, self._measured, self._battery
+                self.env, self._scenario, self._vehicle, self._measured, self._battery
             )
             self.modes.listeners.append(further.mode_effect)
             self.modes.adaptation_listeners.append(further.adapted)

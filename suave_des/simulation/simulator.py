@@ -4,11 +4,12 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import simpy
 
+from suave_des.chance import Distributions
 from suave_des.clock import Process
 from suave_des.compiling import Array
 from suave_des.managed.follow import InspectionPath
@@ -28,13 +29,6 @@ if TYPE_CHECKING:
     from suave_des.simulation.mission import MissionRun
 
 OnTime = Callable[[float, float], None]
-
-
-class MissionMemory(NamedTuple):
-    """What a mission fills row by row, kept for the next one: to allocate it for each would fragment memory."""
-
-    track: Array
-    visibility_m: Array
 
 
 class Simulator:
@@ -61,6 +55,7 @@ class Simulator:
         self.loaded, self.training = loaded, training
         self.runs_per_draw = dict(runs_per_draw)
         scenario = loaded.scenario
+        self.distributions = Distributions(scenario)
         self.points = sample_points(scenario.pipeline.vertices_m, scenario.pipeline.points_per_piece)
         self.path = InspectionPath.along(there_and_back(self.points), scenario.revision.follow.altitude_m)
         self.detection_points = self.points + np.array([0.0, 0.0, scenario.revision.monitors.detected_point_height_m])
@@ -68,7 +63,7 @@ class Simulator:
         self.own_functions = own_functions(loaded)
         self.vehicle_model = vehicle_model(scenario.vehicle)
         self.view_tangent = scenario.vehicle.camera.tangent
-        self._spare_memory: list[MissionMemory] = []
+        self._spare_tracks: list[Array] = []  # to allocate one for each mission would fragment memory
         self._learned: dict[str, Mapping[str, Any]] = {}
         self._manager_files: dict[str, Mapping[str, Path]] = {}
 
@@ -120,19 +115,16 @@ class Simulator:
         """
         from suave_des.simulation.mission import MissionRun
 
-        rows = track_rows(self.duration_s)
-        memory = (
-            self._spare_memory.pop() if self._spare_memory else MissionMemory(np.empty((rows, ROW)), np.empty(rows))
-        )
+        track = self._spare_tracks.pop() if self._spare_tracks else np.empty((track_rows(self.duration_s), ROW))
         try:
-            return MissionRun(self, manager, run, seed, memory, record=record, kind=kind)
+            return MissionRun(self, manager, run, seed, track, record=record, kind=kind)
         except BaseException:
-            self._spare_memory.append(memory)
+            self._spare_tracks.append(track)
             raise
 
     def give_back(self, mission: "MissionRun") -> None:
         """Keep the memory of a mission that is no longer needed for the next one."""
-        self._spare_memory.append(mission.memory)
+        self._spare_tracks.append(mission.track)
 
     def run(
         self, manager: str, run: int, seed: int, *, record: bool = False, on_time: OnTime | None = None

@@ -64,6 +64,7 @@ def make_vehicle(
     """
     value, calibration = chance.value, scenario.calibration
     z_m, heading_rad = value("start.z_m"), value("start.heading_rad")
+    altitude_error_m = value("calibration.altitude_error_m")
     autopilot = Autopilot(
         calibration.position_gain_per_s,
         calibration.jerk_m_per_s3,
@@ -71,7 +72,6 @@ def make_vehicle(
         calibration.velocity_integral_gain_per_s2,
         calibration.heading_frequency_rad_per_s,
         calibration.heading_integral_gain_per_s3,
-        value("calibration.altitude_error_m"),
     )
     current_m_per_s, wave = _current(scenario, chance)
     return Vehicle(
@@ -79,6 +79,7 @@ def make_vehicle(
         autopilot,
         Pose(*start.position_m, z_m, 0.0, 0.0, heading_rad),
         duration_s,
+        altitude_error_m=altitude_error_m,
         current_m_per_s=current_m_per_s,
         current_wave=wave,
         time_scale=1.0 / (1.0 + value("calibration.real_time_factor_loss")),

@@ -1,7 +1,7 @@
 """The guided autopilot's settings, and the parameter vector of the compiled motion that follows from them."""
 
 import math
-from collections.abc import Iterable
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +25,6 @@ class Autopilot(NamedTuple):
         velocity_integral_gain_per_s2: the same for each metre that the error of the velocity sums up to.
         heading_frequency_rad_per_s: natural frequency of heading control, critically damped.
         heading_integral_gain_per_s3: angular acceleration demanded for each rad s that the heading error sums up to.
-        altitude_error_m: steady error: the autopilot holds its altitude set-point plus this.
         vertical_position_gain_per_s: as the horizontal one; ArduSub's default is 3.0.
         vertical_velocity_gain_per_s, vertical_velocity_integral_gain_per_s2: as the horizontal ones.
         roll_frequency_rad_per_s: natural frequency of roll control; missions are not sensitive to it.
@@ -37,17 +36,15 @@ class Autopilot(NamedTuple):
     velocity_integral_gain_per_s2: float = 1.2
     heading_frequency_rad_per_s: float = 4.5
     heading_integral_gain_per_s3: float = 0.0
-    altitude_error_m: float = 0.0
     vertical_position_gain_per_s: float = 3.0
     vertical_velocity_gain_per_s: float = 4.0
     vertical_velocity_integral_gain_per_s2: float = 1.0
     roll_frequency_rad_per_s: float = 3.0
 
 
-def kernel_parameters(
-    model: VehicleModel, autopilot: Autopilot, current_m_per_s: Iterable[float], z_limits_m: Iterable[float]
-) -> Array:
-    """Constants of vehicle, autopilot and water, in the order of the places that `kernel` names, shape (32,)."""
+@lru_cache(maxsize=64)
+def kernel_parameters(model: VehicleModel, autopilot: Autopilot, z_limits_m: tuple[float, float]) -> Array:
+    """Constants of vehicle and autopilot, in the order of the places that `kernel` names; in water at rest."""
     ap = autopilot
     # An integral may ask for as much as the four horizontal thrusters together give along one axis, and no more.
     integral_limit = 4.0 * model.thrust_limit_n * math.sqrt(0.5) / model.mass_kg
@@ -60,4 +57,6 @@ def kernel_parameters(
     turning = ap.heading_integral_gain_per_s3, 4.0 * heading * heading
     body = model.mass_kg, *model.inertia_kg_m2, *forces
     loops = *horizontal, *vertical, integral_limit, *attitude, *turning
-    return np.array((*body, *legs, *loops, *current_m_per_s, *z_limits_m))
+    parameters = np.array((*body, *legs, *loops, *[0.0] * 3, *z_limits_m, *[0.0] * 4))
+    parameters.flags.writeable = False
+    return parameters

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from suave_des.compiling import Array
+from suave_des.compiling import Array, Ticks
 from suave_des.vehicle import kernel
 from suave_des.vehicle.autopilot import Autopilot, kernel_parameters
 from suave_des.vehicle.frames import Pose, euler_angles, quaternion
@@ -100,6 +100,7 @@ class Vehicle:
         autopilot: the guided controller.
         start: pose at t = 0, at rest; the autopilot's first set-point is this place with heading 0.
         duration_s: length of the mission; nothing can be read beyond it.
+        altitude_error_m: steady error: the autopilot holds its altitude set-point plus this.
         current_m_per_s: velocity of the water, world frame.
         current_wave: its part that varies over time.
         time_scale: simulated seconds that pass in a second of mission time (the simulator's real-time factor).
@@ -119,6 +120,7 @@ class Vehicle:
     start: Pose
     duration_s: float
     _: KW_ONLY
+    altitude_error_m: float = 0.0
     current_m_per_s: Point = (0.0, 0.0, 0.0)
     current_wave: CurrentWave = STEADY
     time_scale: float = 1.0
@@ -138,15 +140,16 @@ class Vehicle:
         self._health = np.array([1.0] * len(model.thrusters))
         self._effectiveness = allocation_matrix(model).copy()
         self._set_point = np.array([*start[:3], 1.0, 0.0, 0.0])  # heading 0, number 0
-        constants = kernel_parameters(model, self.autopilot, self.current_m_per_s, self.z_limits_m)
-        parameters = np.array((*constants, *self.current_wave.parameters()))
+        parameters = kernel_parameters(model, self.autopilot, self.z_limits_m).copy()
+        parameters[kernel.CURRENT : kernel.FLOOR] = self.current_m_per_s
+        parameters[kernel.WAVE_X :] = self.current_wave.parameters()
         step_s, allocation = STEP_S * self.time_scale, autopilot_allocation(model)
         self._dynamics = step_s, self._set_point, parameters, allocation, self._effectiveness
 
     def command(self, t_s: float, x_m: float, y_m: float, z_m: float) -> None:
         """Give the autopilot a new position set-point; it replaces the one before."""
         self._cancel_after(t_s)
-        self._set_point[:3] = x_m, y_m, z_m + self.autopilot.altitude_error_m
+        self._set_point[:3] = x_m, y_m, z_m + self.altitude_error_m
         self._set_point[5] += 1.0
         self._notify(t_s)
 
@@ -184,7 +187,7 @@ class Vehicle:
             The ticks at which way-points will be found reached if control does not change; and the tick at which the
             caller has to act: the last way-point is reached then, or one is not reached in time.
         """
-        sent_as_m = *sent_as_m[:2], sent_as_m[2] + self.autopilot.altitude_error_m
+        sent_as_m = *sent_as_m[:2], sent_as_m[2] + self.altitude_error_m
         if send:
             self._cancel_after(t_s)
             self._take(waypoints, 0, sent_as_m, new=1)
@@ -244,9 +247,10 @@ class Vehicle:
         return row
 
     def _take(self, waypoints: Array, place: int, sent_as_m: Point, *, new: int) -> None:
-        x_m, y_m, z_m = sent_as_m
-        self._set_point[5] += new
-        self._set_point[:3] = waypoints.item(place, 0) + x_m, waypoints.item(place, 1) + y_m, z_m
+        set_point, (x_m, y_m, z_m) = self._set_point, sent_as_m
+        set_point[0], set_point[1] = waypoints.item(place, 0) + x_m, waypoints.item(place, 1) + y_m
+        set_point[2] = z_m
+        set_point[5] += new
 
     def _cancel_after(self, t_s: float) -> None:
         """Fill the track up to time t, and no further; from there on the set-point in force then is the only one."""
@@ -271,3 +275,8 @@ def track_rows(duration_s: float) -> int:
 def row_at(t_s: float) -> int:
     """Row of the track nearest to a mission time: the one rounding rule that reading and commanding share."""
     return round(t_s / STEP_S)
+
+
+def rows_at(times_s: Array) -> Ticks:
+    """Rows of the track nearest to many mission times, rounded alike, shape as that of the times."""
+    return np.rint(times_s / STEP_S).astype(np.int64)

@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -31,7 +32,7 @@ from suave_des.simulation import mission
 from suave_des.simulation.host import ManagerHost
 from suave_des.simulation.simulator import Simulator
 from suave_des.vehicle.guidance import SetPointSender, WaypointSource
-from suave_des.vehicle.vehicle import STEP_S, ArrivalCheck, Vehicle
+from suave_des.vehicle.vehicle import STEP_S, ArrivalCheck, Vehicle, row_at
 from suave_des.world.pipeline import first_point_in_view
 
 
@@ -119,7 +120,7 @@ class PollingDetector:
         self,
         env: simpy.Environment,
         vehicle: Vehicle,
-        visibility_m: NDArray[np.float64],
+        visibility: tuple[NDArray[np.float64], NDArray[np.float64]],
         points: NDArray[np.float64],
         view_tangent: float,
         log: Log,
@@ -129,21 +130,22 @@ class PollingDetector:
         self.first_point: int | None = None
         self.detected_s: float | None = None
         env.process(
-            self._look(
-                env, vehicle, visibility_m, partial(first_point_in_view, points=points, view_tangent=view_tangent)
-            )
+            self._look(env, vehicle, visibility, partial(first_point_in_view, points=points, view_tangent=view_tangent))
         )
 
     def _look(
         self,
         env: simpy.Environment,
         vehicle: Vehicle,
-        visibility_m: NDArray[np.float64],
+        visibility: tuple[NDArray[np.float64], NDArray[np.float64]],
         in_view: Callable[[float, float, float, float], int],
     ) -> Process:
+        measured = {row_at(t_s): value for t_s, value in zip(*visibility, strict=True)}
+        visibility_m = math.nan
         for row in range(vehicle.last_row + 1):
             yield until(env, row * STEP_S)
-            seen = in_view(*vehicle.position(env.now), visibility_m[row])
+            visibility_m = measured.get(row, visibility_m)
+            seen = in_view(*vehicle.position(env.now), visibility_m)
             if seen >= 0:
                 self.first_point, self.detected_s = seen, float(env.now)
                 self._log("detection", "pipeline_detected", f"point {seen}")

@@ -7,13 +7,12 @@ import pytest
 import simpy
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
-from suave_des.managed.detection import PipelineDetector, measured_at_rows
+from suave_des.managed.detection import PipelineDetector
 from suave_des.scenario.physical import Pipeline
 from suave_des.vehicle.autopilot import Autopilot
 from suave_des.vehicle.frames import Pose
-from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at
+from suave_des.vehicle.vehicle import STEP_S, Vehicle
 from suave_des.world.pipeline import first_point_in_view, sample_points
 from tests.helpers.stand_ins import silent
 from tests.helpers.vehicles import BLUEROV2, VIEW_TANGENT
@@ -29,12 +28,12 @@ class Sight:
         self.env = simpy.Environment()
         autopilot = Autopilot()
         self.vehicle = Vehicle(BLUEROV2, autopilot, Pose(-17.0, 4.0, -18.0, 0.0, 0.0, 0.0), DURATION_S)
-        self.visibility_m = np.full(self.vehicle.last_row + 1, visibility_m)
+        self.visibility_m = visibility_m
         self.logged: list[tuple[float, str]] = []
         self.detector = PipelineDetector(
             self.env,
             self.vehicle,
-            self.visibility_m,
+            (np.array([0.0]), np.array([visibility_m])),
             POINTS,
             VIEW_TANGENT,
             lambda source, event, detail: self.logged.append((self.env.now, event)),
@@ -60,7 +59,7 @@ def first_sight(sight: Sight) -> tuple[float, int]:
     """The same found by looking at every row of the finished track."""
     track = sight.vehicle.track
     for row in range(sight.vehicle.computed_row + 1):
-        point = first_point_in_view(*track[row, :3], sight.visibility_m[row], POINTS, VIEW_TANGENT)
+        point = first_point_in_view(*track[row, :3], sight.visibility_m, POINTS, VIEW_TANGENT)
         if point >= 0:
             return pytest.approx(row * STEP_S), point
     raise AssertionError("never in view")
@@ -80,7 +79,8 @@ def test_detection_is_recorded_at_its_own_time() -> None:
 def test_vehicle_that_starts_over_the_pipeline_sees_it_at_once() -> None:
     env = simpy.Environment()
     vehicle = Vehicle(BLUEROV2, Autopilot(), Pose(-17.0, 0.0, -18.0, 0, 0, 0), 10.0)
-    detector = PipelineDetector(env, vehicle, np.full(vehicle.last_row + 1, 3.0), POINTS, VIEW_TANGENT, silent)
+    always_3_m = np.array([0.0]), np.array([3.0])
+    detector = PipelineDetector(env, vehicle, always_3_m, POINTS, VIEW_TANGENT, silent)
     env.run(until=1.0)
     assert detector.detected_s == 0.0
 
@@ -123,23 +123,3 @@ def test_detection_under_many_commands_is_still_the_first_sight(commands: list) 
     else:
         with pytest.raises(AssertionError, match="never in view"):
             first_sight(sight)
-
-
-def at_rows(times_s: tuple[float, ...], values: tuple[float, ...], rows: int) -> NDArray[np.float64]:
-    found = np.zeros(rows)
-    measured_at_rows(np.array(times_s), np.array(values), found)
-    return found
-
-
-def test_visibility_counts_as_it_was_measured_last() -> None:
-    rows = at_rows((0.2, 1.2, 2.2), (3.0, 2.0, 1.0), row_at(3.0))
-    picked = [rows[row_at(t_s)] for t_s in (0.2, 1.15, 1.2, 2.9)]
-    assert picked == [3.0, 3.0, 2.0, 1.0]
-
-
-def test_before_the_first_measurement_there_is_none() -> None:
-    assert np.isnan(at_rows((0.2,), (3.0,), 10)[:4]).all()
-
-
-def test_measurements_after_the_end_are_left_out() -> None:
-    assert at_rows((0.0, 1.0, 99.0), (3.0, 2.0, 1.0), 40).tolist() == [3.0] * 20 + [2.0] * 20

@@ -264,8 +264,7 @@ class PlainSpiral:
 def real_search(happenings: list, *, plainly: bool) -> list:
     """Way of a vehicle whose search mode, health and set-point change meanwhile; by the node or tick by tick."""
     env = simpy.Environment()
-    autopilot = Autopilot(altitude_error_m=0.45)
-    vehicle = Vehicle(BLUEROV2, autopilot, Pose(*ORIGIN, -18.75, 0.0, 0.0, 0.0), 80.0)
+    vehicle = Vehicle(BLUEROV2, Autopilot(), Pose(*ORIGIN, -18.75, 0.0, 0.0, 0.0), 80.0, altitude_error_m=0.45)
     plain = PlainSpiral(env, vehicle) if plainly else None
     node = GenerateSearchPath(env, sender(env, vehicle), revision("2023").spiral, ORIGIN, VIEW_TANGENT, PHASE_S)
 

@@ -9,14 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.errors import InputError
-from suave_des.metrics.further import FurtherMetrics
+from suave_des.metrics.further import FurtherMetrics, measured_at_rows
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import FURTHER_METRICS, Requirement
 from suave_des.scenario.modes import Mode
 from suave_des.simulation.simulator import Simulator
 from suave_des.vehicle.autopilot import Autopilot
 from suave_des.vehicle.frames import Pose
-from suave_des.vehicle.vehicle import Vehicle
+from suave_des.vehicle.vehicle import Vehicle, row_at
 from suave_des.world.coverage import covered_area_m2
 from tests.helpers.vehicles import BLUEROV2
 
@@ -31,7 +31,7 @@ class Watched:
         scenario = load_scenario("extended").scenario
         scenario = scenario.model_copy(update={"metrics": FURTHER_METRICS, "requirements": {}, "battery": None})
         self.vehicle = Vehicle(BLUEROV2, Autopilot(), Pose(0.0, 0.0, -18.0, 0.0, 0.0, 0.0), 60.0)
-        self.noted = FurtherMetrics(self.env, scenario, self.vehicle, np.full(2000, 3.0), {}, None)
+        self.noted = FurtherMetrics(self.env, scenario, self.vehicle, {}, None)
 
     def at(self, t_s: float) -> FurtherMetrics:
         if t_s > self.env.now:
@@ -104,6 +104,24 @@ def test_what_is_seen_twice_counts_once() -> None:
 def test_in_murky_water_nothing_is_seen(visibility_m: float) -> None:
     track, _ = track_of((0.0, 0.0, -18.0))
     assert covered_area_m2(track, 3, np.full(4, visibility_m), -20.0, TANGENT) == 0.0
+
+
+def test_visibility_counts_as_it_was_measured_last() -> None:
+    rows = measured_at_rows((0.2, 1.2, 2.2), (3.0, 2.0, 1.0), row_at(3.0))
+    picked = [rows[row_at(t_s)] for t_s in (0.2, 1.15, 1.2, 2.9)]
+    assert picked == [3.0, 3.0, 2.0, 1.0]
+
+
+def test_before_the_first_measurement_there_is_none() -> None:
+    assert np.isnan(measured_at_rows((0.2,), (3.0,), 10)[:4]).all()
+
+
+def test_where_nothing_is_measured_there_is_none() -> None:
+    assert np.isnan(measured_at_rows((), (), 10)).all()
+
+
+def test_measurements_after_the_end_are_left_out() -> None:
+    assert measured_at_rows((0.0, 1.0, 99.0), (3.0, 2.0, 1.0), 40).tolist() == [3.0] * 20 + [2.0] * 20
 
 
 @given(st.sampled_from(["at_least", "at_most", "close_to"]), st.floats(-9, 9), st.floats(0, 9), st.floats(-99, 99))

@@ -20,11 +20,9 @@ def make_vehicle() -> MakeVehicle:
         duration_s: float = 150.0,
         *,
         lost: tuple[int, ...] = (),
-        altitude_error_m: float = 0.0,
         **options: object,
     ) -> Vehicle:
-        autopilot = Autopilot(altitude_error_m=altitude_error_m)
-        vehicle = Vehicle(BLUEROV2, autopilot, start, duration_s, **options)  # type: ignore[arg-type]
+        vehicle = Vehicle(BLUEROV2, Autopilot(), start, duration_s, **options)  # type: ignore[arg-type]
         for thruster in lost:
             vehicle.set_thruster_health(0.0, thruster, 0.0)
         return vehicle

@@ -87,7 +87,7 @@ def line_of_positions(y_m: float) -> np.ndarray:
 
 def test_first_detection_is_the_first_row_with_a_point_in_view() -> None:
     track = line_of_positions(0.5)
-    visibility = np.full(len(track), 3.0)
+    visibility = np.array([0]), np.array([3.0])
     expected = next(
         (row, point)
         for row, position in enumerate(track)
@@ -98,17 +98,18 @@ def test_first_detection_is_the_first_row_with_a_point_in_view() -> None:
 
 def test_first_detection_looks_only_at_the_rows_asked_for() -> None:
     track = line_of_positions(0.5)
-    visibility = np.full(len(track), 3.0)
+    visibility = np.array([0]), np.array([3.0])
     row, _ = first_detection(track, 0, len(track) - 1, visibility, POINTS, HALF_WIDTH_AT_1_M)
     assert first_detection(track, 0, row - 1, visibility, POINTS, HALF_WIDTH_AT_1_M) == (-1, -1)
 
 
 def test_first_detection_waits_for_the_visibility() -> None:
     track = line_of_positions(0.0)
-    visibility = np.where(np.arange(len(track)) < 250, 1.0, 2.5)
+    visibility = np.array([3, 250]), np.array([1.0, 2.5])
     assert first_detection(track, 0, len(track) - 1, visibility, POINTS, HALF_WIDTH_AT_1_M)[0] == 250
 
 
 def test_far_beside_the_pipeline_nothing_is_detected() -> None:
     track = line_of_positions(2.0)
-    assert first_detection(track, 0, len(track) - 1, np.full(len(track), 9.0), POINTS, HALF_WIDTH_AT_1_M) == (-1, -1)
+    visibility = np.array([0]), np.array([9.0])
+    assert first_detection(track, 0, len(track) - 1, visibility, POINTS, HALF_WIDTH_AT_1_M) == (-1, -1)
