@@ -236,8 +236,13 @@ class Decision:
     rejected: tuple[Rejection, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Plan:
     """Decisions for the objectives to adapt, by function name."""
 
     decisions: tuple[Decision, ...] = ()
+
+    @cached_property
+    def without_design(self) -> frozenset[str]:
+        """The functions that have no function design left."""
+        return frozenset([each.function for each in self.decisions if each.design is None])

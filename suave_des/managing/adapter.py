@@ -49,7 +49,7 @@ class Adapter:
         for decision in plan.decisions:
             if decision.design is not None and current_mode(decision.function) != decision.design:
                 return False
-        return _without_design(plan) == self._without_design
+        return plan.without_design == self._without_design
 
     def carry_out(self, plan: Plan, present: dict[str, str], functions: Collection[str]) -> dict[str, str]:
         """Request the modes of a plan.
@@ -75,14 +75,10 @@ class Adapter:
                 before = present.get(function, "ungrounded")
                 if before != design:
                     self._log("adaptation", f"{function}: {before} -> {design}", decision)
-        self._without_design = _without_design(plan)
+        self._without_design = plan.without_design
         return grounded
 
     def _log(self, event: str, what: str, decision: Decision) -> None:
         if self._system.recorded:
             left_out = "".join([f"; not {each.design}: {each.reason}" for each in decision.rejected])
             self._system.log(event, f"{what}: {decision.reason}{left_out}")
-
-
-def _without_design(plan: Plan) -> frozenset[str]:
-    return frozenset([each.function for each in plan.decisions if each.design is None])

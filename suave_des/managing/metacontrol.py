@@ -119,12 +119,13 @@ class Metacontrol(ManagingSubsystem):
         """Request the plan's modes after the reasoner's latency; objectives with a new design lose their status."""
         recovered = self._recovered()
         yield self.system.env.timeout(latency_s)
-        for line in sorted(conclusion.statuses - self._recorded_statuses):
-            self.system.log("inferred", line)
-        self._recorded_statuses = conclusion.statuses
+        if self.system.recorded:
+            for line in sorted(conclusion.statuses - self._recorded_statuses):
+                self.system.log("inferred", line)
+            self._recorded_statuses = conclusion.statuses
         needed = self.objectives.keys() - self._cancelled
         grounded = self._adapter.carry_out(conclusion.plan, self.groundings, needed)
-        if any(self.groundings.get(function) != design for function, design in grounded.items()):
+        if not grounded.items() <= self.groundings.items():
             self.system.record_reasoning_time(latency_s)
         self.groundings |= grounded
         self.objectives |= dict.fromkeys(grounded)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -50,7 +51,7 @@ class DiagnosticsBus:
     """Passes each diagnostic on at once to the subscribers to its kind, in the order of subscription."""
 
     def __init__(self) -> None:
-        self._subscribers: dict[Kind, list[Subscriber]] = {kind: [] for kind in Kind}
+        self._subscribers: defaultdict[Kind, list[Subscriber]] = defaultdict(list)
 
     def subscribe(self, subscriber: Subscriber, kinds: Iterable[Kind] = MEASURED_AND_COMPONENTS) -> None:
         """Pass every later diagnostic of some kinds to `subscriber`."""

@@ -8,7 +8,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import ClassVar
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -52,10 +52,11 @@ class Measurements:
 
     def crossings(self, thresholds: Thresholds) -> Crossings:
         """The measurements that are in another region than the one before; the first one counts."""
-        if thresholds not in self._crossings:
+        crossings = self._crossings.get(thresholds)
+        if crossings is None:
             places, regions = _crossing_places(self.arrays[1].tobytes(), thresholds)
-            self._crossings[thresholds] = [self.times_s[place] for place in places], regions
-        return self._crossings[thresholds]
+            crossings = self._crossings[thresholds] = [self.times_s[place] for place in places], regions
+        return crossings
 
     def region(self, t_s: float, thresholds: Thresholds) -> int:
         """Region of the value that was published last at mission time t."""
@@ -132,30 +133,42 @@ def measure(
     if (step_s := publishing.time_step_s) > 0.0:
         # A time within a millionth of a step below a multiple counts as it: timers add up rounding errors.
         read_at = np.floor(times / step_s + 1e-6) * step_s
-    values = _values_at(signal, read_at.tobytes())
+    values, changes = _read(signal, read_at.tobytes())
     if noise is not None:
         values = values + np.array([noise() for _ in range(len(times))])
     if is_lost is not None:
         kept = [not is_lost(t_s) for t_s in times.tolist()]
         times, values = times[kept], values[kept]
-    places = _changes(values.tobytes())
-    times, values = times[places], values[places]
-    return Measurements(key, tuple(times.tolist()), tuple(values.tolist()), phase_s, period_s, (times, values))
+    if noise is not None or is_lost is not None:
+        changes = _Changes.of(values)
+    times = times[changes.places]
+    return Measurements(key, tuple(times.tolist()), changes.numbers, phase_s, period_s, (times, changes.values))
+
+
+class _Changes(NamedTuple):
+    """Those of some values that differ from the one before, their places, and once more as numbers of Python."""
+
+    places: Ticks
+    values: Array
+    numbers: tuple[float, ...]
+
+    @classmethod
+    def of(cls, values: Array) -> Self:
+        """Find them; the first value is one."""
+        places = np.flatnonzero(np.diff(values, prepend=np.nan))
+        return cls(places, values[places], tuple(values[places].tolist()))
 
 
 # Cached by the arrays' bytes (float64): without noise, a signal that is read in time steps is the same in each run.
 
 
 @lru_cache(maxsize=16)
-def _values_at(signal: Signal, times_s: bytes) -> Array:
-    times, first = np.frombuffer(times_s), _changes(times_s)
-    return np.repeat([signal(t_s) for t_s in times[first].tolist()], np.diff(first, append=len(times)))
-
-
-@lru_cache(maxsize=64)
-def _changes(values: bytes) -> Ticks:
-    """Places of the values that differ from the one before; the first one does."""
-    return np.flatnonzero(np.diff(np.frombuffer(values), prepend=np.nan))
+def _read(signal: Signal, times_s: bytes) -> tuple[Array, _Changes]:
+    """Values of a signal at some times, and their changes."""
+    times = np.frombuffer(times_s)
+    first, _, different_s = _Changes.of(times)
+    values = np.repeat([signal(t_s) for t_s in different_s], np.diff(first, append=len(times)))
+    return values, _Changes.of(values)
 
 
 @lru_cache(maxsize=64)
