@@ -16,6 +16,7 @@ from suave_des.errors import InputError
 
 #: owlready2 0.50 and 0.51 ship a Jena class compiled for Java 25 (class-file version 69).
 NEEDED_VERSION: Final = 25
+_NOT_NEEDED: Final = ("log4j", "jena-arq")
 _OPTION_VARIABLES: Final = ("JAVA_TOOL_OPTIONS", "JDK_JAVA_OPTIONS", "_JAVA_OPTIONS")
 #: Options of a Java process that makes one inference and ends: 2.0 s of CPU time in place of 3.5 s.
 SHORT_LIVED: Final = ("-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC", "-Xlog:disable")
@@ -88,10 +89,14 @@ def java_library() -> Path:
 
 
 def jars() -> list[str]:
-    """owlready2's jars, without log4j, which takes 0.2 s to find out that there is nothing to log."""
+    """owlready2's jars, without those that cost time at the start and that reasoning does not need.
+
+    log4j takes 0.2 s to find out that there is nothing to log. Jena starts its SPARQL engine (ARQ) where it finds it.
+    """
     package = find_spec("owlready2")  # not imported: that takes time too
     assert package is not None and package.origin is not None
-    return sorted(str(jar) for jar in Path(package.origin).with_name("pellet").glob("*.jar") if "log4j" not in jar.name)
+    found = Path(package.origin).with_name("pellet").glob("*.jar")
+    return sorted(str(jar) for jar in found if not any(name in jar.name for name in _NOT_NEEDED))
 
 
 @lru_cache(maxsize=8)

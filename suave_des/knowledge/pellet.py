@@ -23,6 +23,8 @@ from suave_des.knowledge.state import ContradictionError
 from suave_des.knowledge.vocabulary import RDF_TYPE, XSD
 
 _LITERAL: Final = re.compile(r"literal\((.*),([^,]*),([^,]*)\)", re.DOTALL)
+#: An escape of N-Triples; of them all, Jena's reader does not know the one of eight digits.
+_ESCAPE: Final = re.compile(r"\\(?:U([0-9A-F]{8})|.)")
 _RULE: Final = re.compile(re.escape(RULE_IRI) + r"(\d+)")
 _PELLET: Final = "org.mindswap.pellet."
 #: One inference at a time in a process: Pellet's term factory is shared by all its knowledge bases.
@@ -32,6 +34,8 @@ one_at_a_time: Final = threading.RLock()
 def load_n_triples(text: str, *, explain: bool = False) -> Any:
     """Load a Pellet knowledge base; to be called with the lock held."""
     model = jvm.java_class("com.hp.hpl.jena.rdf.model.ModelFactory").createDefaultModel()
+    if "\\U" in text:
+        text = _ESCAPE.sub(lambda found: chr(int(found[1], 16)) if found[1] else found[0], text)
     model.read(jvm.java_class("java.io.StringReader")(text), None, "N-TRIPLES")
     knowledge_base = jvm.java_class(_PELLET + "KnowledgeBase")()
     knowledge_base.setDoExplanation(explain)

@@ -199,7 +199,8 @@ def test_every_kind_of_conclusion_of_an_own_rule_is_read(suave_copy: MakeOntolog
     rules: Mapping[str, str] = {
         "number": "QAvalue(?q) ^ hasValue(?q, ?v) ^ isQAtype(?q, :water_visibility) ^ multiply(?w, ?v, 2.0)"
         " -> tomasys:doubled(?q, ?w)",
-        "text": 'Component(?c) ^ c_status(?c, "FALSE") -> tomasys:note(?c, "it\'s 50% (no), été 🚨 C:\\new")',
+        "text": 'Component(?c) ^ c_status(?c, "FALSE") -> '
+        'tomasys:note(?c, "it\'s 50% (no), été 🚨 C:\\new\\U0001F6A8")',
         "thing": 'Component(?c) ^ c_status(?c, "FALSE") ^ Objective(?o) -> tomasys:hinders(?c, ?o)',
         "kind": 'Component(?c) ^ c_status(?c, "FALSE") -> tomasys:Broken(?c)',
     }
@@ -210,7 +211,7 @@ def test_every_kind_of_conclusion_of_an_own_rule_is_read(suave_copy: MakeOntolog
     inference = make_reasoner("pellet", base).infer(state)
     found = {str(fact) for fact in inference.facts}
     assert Fact("obs_water_visibility", "doubled", Decimal("3.4")) in inference.facts
-    assert "note(c_thruster_2, it's 50% (no), été 🚨 C:\\new)" in found
+    assert "note(c_thruster_2, it's 50% (no), été 🚨 C:\\new\\U0001F6A8)" in found
     assert "hinders(c_thruster_2, o_generate_search_path)" in found
     assert "Broken(c_thruster_2)" in found
     assert make_reasoner("owlready2", base).infer(state).facts ^ inference.facts == frozenset()

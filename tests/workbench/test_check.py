@@ -14,8 +14,9 @@ import pytest
 from suave_des.cli.main import main
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet import InProcessPellet
 from suave_des.resources import shipped_folder
-from suave_des.workbench.check import Subject, check, combined, simple_states
+from suave_des.workbench.check import MAX_STATES, Subject, check, combined, simple_states
 from suave_des.workbench.findings import Finding, Level, folded, has_level
 from tests.helpers.exemplar_files import write_as_owlready2_saves_it
 
@@ -24,11 +25,14 @@ TOMASYS = "http://metacontrol.org/tomasys#"
 SWRL = "http://www.w3.org/2003/11/swrl#"
 
 
-def found(tmp_path: Path, rules: str = "", extra: str = "", **options: object) -> tuple[Finding, ...]:
+def found(tmp_path: Path, rules: str = "", extra: str = "", states: int = 3, **options: object) -> tuple[Finding, ...]:
+    """What is found in the shipped suave.owl with a rule file; Pellet is asked about a few states only."""
     text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
     (tmp_path / "suave.owl").write_text(text.replace("</rdf:RDF>", extra + "</rdf:RDF>"), encoding="utf-8")
     (tmp_path / "mine.swrl").write_text(rules, encoding="utf-8")
-    return check(Subject([tmp_path / "suave.owl"], [tmp_path / "mine.swrl"], **options))  # type: ignore[arg-type]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("suave_des.workbench.check.MAX_STATES", states)
+        return check(Subject([tmp_path / "suave.owl"], [tmp_path / "mine.swrl"], **options))  # type: ignore[arg-type]
 
 
 def errors(findings: tuple[Finding, ...]) -> list[Finding]:
@@ -41,9 +45,18 @@ def only(findings: tuple[Finding, ...], words: str) -> Finding:
 
 
 def test_the_shipped_ontology_passes(tmp_path: Path) -> None:
-    findings = found(tmp_path)
+    findings = found(tmp_path, states=MAX_STATES)
     assert not has_level(findings, Level.WARN)
     assert only(findings, "battery_level").level is Level.INFO
+
+
+def test_pellet_is_not_asked_again_about_what_did_not_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rules = "A: hasValue(?q, ?v) ^ lessThan(?v, 1) -> Role(?q)\n"
+    findings = found(tmp_path, rules)
+    monkeypatch.setattr(InProcessPellet, "__init__", lambda *_: pytest.fail("Java was asked"))
+    assert found(tmp_path, rules) == findings
+    with pytest.raises(pytest.fail.Exception, match="Java was asked"):
+        found(tmp_path, rules.replace("1", "1.1"))
 
 
 def test_pellet_is_asked_for_fewer_states_that_contain_all_simple_ones() -> None:
@@ -350,7 +363,7 @@ def test_rules_that_clash_in_a_state_are_an_error_though_the_ontologies_are_cons
     rules = f"""
 one: typeFD(?fg, {high}) ^ hasQAvalue(?fg, ?q) ^ hasValue(?q, ?v) ^ lessThan(?v, 2.2) -> fg_status(?fg, "IN_ERROR_FR")
 """
-    (error,) = errors(found(tmp_path, rules))  # QAWaterVisibility says that it is IN_ERROR_NFR
+    (error,) = errors(found(tmp_path, rules, states=MAX_STATES))  # QAWaterVisibility says that it is IN_ERROR_NFR
     assert "contradiction" in error.message
     rules_in_it = r"by the rules QAWaterVisibility \(suave.owl, line \d+\), one \(mine.swrl, line \d+\)"
     assert re.search(rules_in_it, error.message)
@@ -367,7 +380,7 @@ def test_values_of_the_scenario_are_used(tmp_path: Path) -> None:
 
 
 def test_a_reasoner_that_takes_too_long_is_given_up_on(tmp_path: Path) -> None:
-    findings = found(tmp_path, time_limit_s=1e-6)
+    findings = found(tmp_path, "slow: Role(?r) -> Role(?r)\n", time_limit_s=1e-6)  # nobody has asked about it before
     assert "not done after" in errors(findings)[0].message
 
 
@@ -459,7 +472,7 @@ def test_a_rule_that_never_comes_to_an_end_is_named(tmp_path: Path) -> None:
     (tmp_path / "suave.owl").write_text(text.replace("</rdf:RDF>", start + "</rdf:RDF>"), encoding="utf-8")
     (tmp_path / "mine.swrl").write_text(rules, encoding="utf-8")
     command = [sys.executable, "-m", "suave_des", "kb", "infer", "--ontology", "suave.owl", "--rules", "mine.swrl"]
-    ended = subprocess.run([*command, "--time-limit", "5"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    ended = subprocess.run([*command, "--time-limit", "2"], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert ended.returncode == 2
     assert "mine.swrl: line 1: " in ended.stderr
     assert "rule ever computes ever new values from what it concludes itself" in ended.stderr

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
 from typing import Final
 
 from rdflib import BNode, Graph, Literal, URIRef
@@ -44,7 +46,11 @@ VARIABLE_IRIS: Final = ("urn:swrl:var#", "urn:swrl#")
 
 def rules_of(file: OntologyFile) -> tuple[Rule, ...]:
     """All rules of one file, enabled or not, sorted by name and text."""
-    graph = file.graph
+    return _read_rules(file.path, file.graph)
+
+
+@lru_cache(maxsize=4)  # as many as there are graphs in the cache of those: their rules are read again and again
+def _read_rules(path: Path, graph: Graph) -> tuple[Rule, ...]:
     found = sorted(
         ((line_of_rule(*_sides(graph, node)), node) for node in graph.subjects(RDF.type, IMP)),
         key=lambda rule: (rule[0].name, str(rule[1])),
@@ -61,7 +67,7 @@ def rules_of(file: OntologyFile) -> tuple[Rule, ...]:
             Rule(
                 name=name,
                 text=line.name,
-                file=file.path,
+                file=path,
                 enabled=str(graph.value(node, _ENABLED)).strip().lower() not in ("false", "0"),
                 node=node,
                 triples=tuple(_closure(graph, node)),
