@@ -67,7 +67,7 @@ def run_campaign(
     managers: ManagerLike | Iterable[ManagerLike] | None = None,
     runs: int | None = None,
     seed: int | None = None,
-    workers: int = 1,
+    workers: int | None = 1,
     out: str | Path | None = None,
     *,
     on_progress: OnProgress | None = None,
@@ -90,6 +90,7 @@ def run_campaign(
         seed: of everything that is random.
         workers: processes; with 1 the missions run in this one. With more, managers that the calling script defines
             itself (`__main__:Class`) need `if __name__ == "__main__":` around the call, as workers import the script.
+            None: 2, or 1 for few missions of built-in managers.
         out: folder for runs.csv, summary.csv and manifest.json; it is made if its parent exists. None: no files.
         on_progress: called when missions are done.
         options: see CampaignSpec.
@@ -119,7 +120,7 @@ def run_campaign(
                 remedy="leave --format suave out, or run a campaign for each point",
             )
         if not spec.confirmed:
-            check_size(campaign.job, campaign.tracker.total, spec.workers)
+            check_size(campaign.job, campaign.tracker.total, campaign.spec.processes)
         return campaign.run(on_progress, resumed=False)
 
 
@@ -137,7 +138,7 @@ class CampaignInterrupted(KeyboardInterrupt):
 
 def resume_campaign(
     folder: str | Path,
-    workers: int = 1,
+    workers: int | None = 1,
     *,
     runs: int | None = None,
     until_ci: str | None = None,
@@ -219,7 +220,7 @@ class _Campaign:
         self, spec: CampaignSpec, file: CampaignFile | None, stack: ExitStack, loaded: LoadedScenario | None = None
     ) -> None:
         self.spec = spec = spec.with_file(file)
-        end_worker_of_script(spec.managers, spec.workers)
+        end_worker_of_script(spec.managers, spec.processes)
         try:
             spec.check()
         except InputError as error:
@@ -237,11 +238,10 @@ class _Campaign:
 
     def _start_workers(self) -> Executor:
         """Start worker processes at once: they import what they need while this process reads and checks."""
-        spec = self.spec
-        workers = spec.workers if spec.sweep else min(spec.workers, len(spec.managers) * spec.runs)
-        if workers == 1:
+        workers = self.spec.processes
+        if workers == 1 or self.spec.scheduler is not None:
             return InProcess()
-        return self._stack.enter_context(LocalWorkers(spec.managers, workers))
+        return self._stack.enter_context(LocalWorkers(self.spec.managers, workers))
 
     def _executor(self) -> Executor:
         """Return what runs the missions; a cluster is contacted only when all else is checked."""

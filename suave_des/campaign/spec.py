@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from difflib import get_close_matches
@@ -15,7 +16,7 @@ from pydantic import Field
 
 from suave_des.errors import InputError, shown
 from suave_des.metrics.result import MissionMetrics
-from suave_des.registry import manager_class
+from suave_des.registry import is_built_in, manager_class
 from suave_des.resources import find
 from suave_des.scenario.layers import Files, find_named
 from suave_des.scenario.loader import Replacements
@@ -28,6 +29,9 @@ FORMAT = 1
 RUNS_LIMIT = 1_000_000
 SEED_LIMIT = 2**63 - 1
 """The greatest that tools which read the result files can hold."""
+_WORKERS = 2
+_FEW_MISSIONS = 300
+"""So many take one process no longer than two, which load the compiler first."""
 _WORKERS_PER_CORE = 4
 _LONGEST_TIME_OUT_S = 1e6
 
@@ -187,7 +191,7 @@ class CampaignSpec:
         parquet: whether runs.parquet is written, too; it needs pyarrow.
         record_knowledge: whether the states that managers reasoned about are kept, for `kb try`.
         out: folder for the result files; it is made if its parent exists. None: no files.
-        workers: processes; with 1 the missions run in this one.
+        workers: processes; with 1 the missions run in this one. None: 2, or 1 for few missions of built-in managers.
         scheduler: address of a Dask scheduler, such as tcp://127.0.0.1:8786, on whose workers missions run instead.
         overwrite: whether results in the folder may be replaced.
         confirmed: whether more than a million missions are meant.
@@ -220,7 +224,7 @@ class CampaignSpec:
     folder: str = ""
     command: tuple[str, ...] = ()
     out: Path | None = None
-    workers: int = 1
+    workers: int | None = None
     scheduler: str | None = None
     overwrite: bool = False
     confirmed: bool = False
@@ -254,6 +258,14 @@ class CampaignSpec:
     def replacements(self) -> Replacements:
         """What replaces the scenario's own files and settings."""
         return cast(Replacements, {name: getattr(self, name) for name in Replacements.__annotations__})
+
+    @property
+    def processes(self) -> int:
+        """How many processes run the missions."""
+        missions = sys.maxsize if self.sweep else len(self.managers) * self.runs
+        if self.workers is not None:
+            return min(self.workers, missions)
+        return 1 if missions <= _FEW_MISSIONS and all(map(is_built_in, self.managers)) else _WORKERS
 
     @property
     def until(self) -> UntilCi | None:
@@ -290,11 +302,12 @@ class CampaignSpec:
         if self.parquet and find_spec("pyarrow") is None:
             raise InputError("Parquet needs pyarrow, which is not installed", remedy="pip install 'suave-des[parquet]'")
         check_range("runs", self.runs, 1, RUNS_LIMIT)
-        check_workers(self.workers)
+        workers = 1 if self.workers is None else self.workers
+        check_workers(workers)
         if self.scheduler is not None:
             from suave_des.campaign.dask_cluster import check_scheduler
 
-            check_scheduler(self.scheduler, self.workers)
+            check_scheduler(self.scheduler, workers)
         check_seed(self.seed)
         if not 0.0 < self.time_out_s <= _LONGEST_TIME_OUT_S:
             remedy = f"give seconds above 0, at most {_LONGEST_TIME_OUT_S:g}"

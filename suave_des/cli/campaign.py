@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from suave_des.cli.options import (
+    CampaignWorkers,
     Files,
     ManagerOptions,
     OptionGroup,
@@ -19,7 +20,6 @@ from suave_des.cli.options import (
     Seed,
     SeedIfNew,
     TimeOut,
-    Workers,
     check_no_use,
     comma_separated,
     command_line,
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
 _FAILURES_SHOWN = 20
 _MANAGERS, _RUNS = "none,random,metacontrol", "20"
 """As in campaign.spec, which is not imported for --help."""
-_WORKERS = 2
 
 
 class ResultFormat(StrEnum):
@@ -101,10 +100,7 @@ def campaign(
     runs: Annotated[
         int | None, typer.Option(help="Missions for each manager, at each point.", show_default=_RUNS)
     ] = None,
-    workers: Annotated[
-        int | None,
-        typer.Option(help="Processes that run missions; any number gives the same bytes.", show_default=str(_WORKERS)),
-    ] = None,
+    workers: CampaignWorkers = None,
     scheduler: Annotated[
         str | None,
         typer.Option(
@@ -138,8 +134,6 @@ def campaign(
     A campaign file has all of it, with what is swept or drawn anew in each run; options take precedence over it.
     What is done is kept while the campaign runs; after an interruption, --resume DIR does the rest.
     """
-    if workers is None:
-        workers = _WORKERS if scheduler is None else 1
     names = None if managers is None else comma_separated(managers)
     if resume is not None:
         check_no_use(
@@ -234,7 +228,7 @@ _TEXT_WIDTH = 95
 @grouped_options
 def reproduce(
     runs: Annotated[int, typer.Option(help="Missions for each manager; the paper has 20.")] = 200,
-    workers: Workers = 2,
+    workers: CampaignWorkers = None,
     seed: Seed = 1,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder for result files; left out, none are written.")

@@ -53,6 +53,14 @@ SeedIfNew = Annotated[int | None, typer.Option("--seed", help="Seed of everythin
 Workers = Annotated[
     int, typer.Option("--workers", help="Processes that run missions; any number gives the same bytes.")
 ]
+CampaignWorkers = Annotated[
+    int | None,
+    typer.Option(
+        "--workers",
+        help="Processes that run missions; any number gives the same bytes.",
+        show_default="2, or 1 for few missions",
+    ),
+]
 TimeOut = Annotated[
     float | None,
     typer.Option(

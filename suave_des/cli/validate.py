@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from suave_des.cli.campaign import exit_telling_failures
-from suave_des.cli.options import Files, Overwrite, Quiet, Seed, Workers, check_no_use, command_line, grouped_options
+from suave_des.cli.options import (
+    CampaignWorkers,
+    Files,
+    Overwrite,
+    Quiet,
+    Seed,
+    check_no_use,
+    command_line,
+    grouped_options,
+)
 
 if TYPE_CHECKING:
     import pandas
@@ -65,7 +74,7 @@ def validate(
             show_default=f"{_RUNS}, among all conditions",
         ),
     ] = None,
-    workers: Workers = 2,
+    workers: CampaignWorkers = None,
     seed: Seed = 1,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder for tables, validation.json and figures.")

@@ -13,6 +13,7 @@ import pytest
 import suave_des
 from benchmarks import chaos
 from suave_des import run_campaign
+from suave_des.campaign.spec import CampaignSpec
 
 GUARD = 'if __name__ == "__main__":\n    '
 CALL = "print(run_campaign({scenario!r}, {managers}, runs=12, seed=1, workers=2).to_csv(index=False))\n"
@@ -143,3 +144,18 @@ def test_a_worker_that_dies_in_the_middle_of_a_result_costs_nothing(
     assert (tmp_path / "cut.txt").exists()
     assert shared.to_csv(index=False) == without_workers(scenario, ["none"]).replace(",none,", ",cut:Cut,")
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("processes", "options"),
+    [
+        (1, {"runs": 100}),
+        (2, {"runs": 101}),
+        (2, {"runs": 1, "managers": ["none", "own:Manager"]}),  # which may end or block its process
+        (2, {"runs": 1, "sweep": {"mission.time_limit_s": "300:400:50"}}),
+        (3, {"runs": 1, "workers": 4}),
+        (4, {"runs": 100, "workers": 4}),
+    ],
+)
+def test_few_missions_of_built_in_managers_start_no_workers_unless_asked_for(processes, options):
+    assert CampaignSpec.of("seams2023", **{"managers": ["none", "random", "bt"], **options}).processes == processes
