@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
+from tests.helpers.designs import each_pair
 from tests.helpers.polling import polled, unrecorded
 
 MANAGERS = ("none", "random", "bt", "bt_extended", "metacontrol")
@@ -72,13 +73,11 @@ def assert_same(simulator: Simulator, manager: str, run: int) -> None:
     assert recorded.trajectory == plain.trajectory
     assert recorded.knowledge == plain.knowledge
     effects = [(event.t_s, event.detail) for event in plain.events if event.event == "mode_set"]
-    for _ in range(2):  # at first metacontrol's memo may be empty
+    for _ in range(2 if manager == "metacontrol" else 1):  # at first its memo may be empty
         assert unrecorded(simulator, manager, run) == (plain.metrics, effects)
 
 
-@pytest.mark.parametrize("manager", MANAGERS)
-@pytest.mark.parametrize("condition", CONDITIONS)
-@pytest.mark.parametrize("name", sorted(LOADED))
+@pytest.mark.parametrize(("name", "condition", "manager"), each_pair(sorted(LOADED), CONDITIONS, MANAGERS))
 def test_looking_ahead_changes_nothing(name: str, condition: str, manager: str) -> None:
     """Each cell has a run of its own, so that there are as many different missions."""
     run = 1 + 10 * list(CONDITIONS).index(condition) + MANAGERS.index(manager)
