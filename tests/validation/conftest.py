@@ -1,5 +1,6 @@
 import csv
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import pandas
@@ -7,6 +8,22 @@ import pytest
 
 Write = Callable[..., Path]
 Missions = Callable[..., pandas.DataFrame]
+
+
+@pytest.fixture(scope="module")
+def few_resamples() -> Iterator[None]:
+    """Has validations permute and subsample a tenth as often as users have them, and draw small figures."""
+    from suave_des.report import style
+    from suave_des.validation import statistics, validation
+
+    with pytest.MonkeyPatch.context() as patch:
+        for function, times in (
+            (statistics.anderson_darling, {"permutations": statistics.PERMUTATIONS // 10}),
+            (statistics.agreement, {"subsamples": statistics.SUBSAMPLES // 10}),
+        ):
+            patch.setattr(validation, function.__name__, partial(function, **times))
+        patch.setattr(style, "png", partial(style.png, dpi=60))
+        yield
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ import pytest
 from suave_des.cli.main import main
 from suave_des.resources import shipped_folder
 
+pytestmark = pytest.mark.usefixtures("few_resamples")
 DATA = shipped_folder("scenarios/published") / "seams2023_runs.csv"
 HEADER = "manager,search_time_s,distance_inspected_m"
 

@@ -16,6 +16,7 @@ from suave_des.validation.files import JSON_FILE, TABLES, texts
 from suave_des.validation.shares import Share, read_targets, shares_beside
 from suave_des.validation.validation import Target, validate
 
+pytestmark = pytest.mark.usefixtures("few_resamples")
 MANAGERS = ("none", "random", "metacontrol")
 DATA = shipped_folder("scenarios/published") / "seams2023_runs.csv"
 
@@ -32,7 +33,7 @@ def like_published(published):
 
 
 @pytest.fixture(scope="module")
-def good(published, like_published):
+def good(published, like_published, few_resamples):
     return validate(published, like_published, MANAGERS, shares=read_targets(shares_beside(DATA)).shares)
 
 
