@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import ast
 import inspect
-import textwrap
+import sys
+from functools import cache
 from typing import Any
 
 from pydantic import BaseModel
@@ -104,8 +105,7 @@ def field_docs(model: type[BaseModel]) -> dict[str, str]:
     for part in reversed(model.__mro__):
         if part is BaseModel or not issubclass(part, BaseModel):
             continue
-        definition = ast.parse(textwrap.dedent(inspect.getsource(part))).body[0]
-        assert isinstance(definition, ast.ClassDef)
+        definition = _classes(part.__module__)[part.__name__]
         for field, text in zip(definition.body, definition.body[1:], strict=False):
             if (
                 isinstance(field, ast.AnnAssign)
@@ -115,3 +115,10 @@ def field_docs(model: type[BaseModel]) -> dict[str, str]:
             ):
                 texts[field.target.id] = inspect.cleandoc(str(text.value.value))
     return texts
+
+
+@cache
+def _classes(module: str) -> dict[str, ast.ClassDef]:
+    """The definitions of a module's classes, whose source is parsed once for all of them."""
+    tree = ast.parse(inspect.getsource(sys.modules[module]))
+    return {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}

@@ -175,7 +175,7 @@ class TestStreamCampaign:
             return most
 
         peak(100)
-        assert peak(1500) < 2 * peak(150)
+        assert peak(600) < 2 * peak(150)
 
     @pytest.mark.parametrize("chunk_rows", [0, -1])
     def test_pieces_without_rows_are_refused(self, chunk_rows: int) -> None:
