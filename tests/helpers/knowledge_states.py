@@ -32,3 +32,14 @@ def searching(
         components=components,
         measurements={} if visibility is None else {"water_visibility": visibility},
     )
+
+
+#: Values of a scenario: the designs' performance keeps its order, in numbers that the ontology has anyway, so that
+#: there are 8 ranges of measured values in place of 16, and half as many states of a policy.
+FEWER_NUMBERS = {
+    "knowledge.values": {
+        "qa_performance_low": 1.25,
+        **{f"qa_performance_{name}": 2.25 for name in ("medium", "recover_thrusters")},
+        **{f"qa_performance_{name}": 3.25 for name in ("high", "all_thrusters", "follow_pipeline")},
+    }
+}

@@ -7,11 +7,18 @@ import pytest
 from suave_des.cli.main import main
 from suave_des.resources import shipped_folder
 from suave_des.workbench import KnowledgeBase
+from tests.helpers.knowledge_states import FEWER_NUMBERS
 
 
 @pytest.fixture(scope="session")
 def bench():
     return KnowledgeBase.load()
+
+
+@pytest.fixture(scope="session")
+def small_bench():
+    """The shipped knowledge base with fewer ranges of measured values, for what goes through all of them."""
+    return KnowledgeBase.load(values=FEWER_NUMBERS)
 
 
 @pytest.fixture
