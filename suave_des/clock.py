@@ -1,13 +1,14 @@
 """Additions to SimPy's clock: ticks of a periodic timer, events at a mission time, alarms.
 
 Activities are SimPy processes. What looks ahead and is often overtaken by events is not: it sets an alarm, and sets it
-anew. Alarms and `advance` alone use callbacks and SimPy's private fields.
+anew. Alarms, `exactly_at` and `advance` alone use callbacks and SimPy's private fields.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator
+from heapq import heappush
 from typing import Any
 
 import simpy
@@ -25,6 +26,14 @@ def until(env: simpy.Environment, t_s: float) -> simpy.Timeout:
     """An event at mission time t, or now if t has passed."""
     delay_s = t_s - env.now
     return simpy.Timeout(env, delay_s if delay_s > 0.0 else 0.0)
+
+
+def exactly_at(env: simpy.Environment, t_s: float) -> simpy.Event:
+    """An event at mission time t itself; a delay that is added to the present time may miss it by rounding."""
+    event = simpy.Event(env)
+    event._ok, event._value = True, None
+    heappush(env._queue, (t_s, simpy.events.NORMAL, next(env._eid), event))
+    return event
 
 
 def advance(env: simpy.Environment, t_s: float) -> None:

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import simpy
 
-from suave_des.clock import Process, until
+from suave_des.clock import Process, exactly_at, until
 from suave_des.domain import Task
 from suave_des.errors import InputError, MissionError, SuaveDesError, did_you_mean, shown
 from suave_des.managing.base import AdaptationProcess, ManagedSystem, ManagingSubsystem
@@ -148,9 +148,7 @@ class ManagerHost:
                 tick_s = self._next_event_s(due_s, period_s)
                 if tick_s == inf:
                     yield env.event()  # until interrupted
-                if tick_s > 2.0 * env.now:
-                    yield until(env, 0.75 * tick_s)  # from there on the delay is exact
-                yield until(env, tick_s)
+                yield exactly_at(env, tick_s)
                 if self._regions(tick_s) not in self._idle_regions:
                     self._is_waiting = False
                     return tick_s
