@@ -59,7 +59,7 @@ class Chance(Streams):
         if not isinstance(distribution, float):
             shared_by = self._runs_per_draw.get(key, 1)
             first = (self._run - 1) // shared_by * shared_by + 1  # of the runs that share the value
-            distribution = draw(distribution, Streams(self._seed, first).stream(_stream_name(key, distribution)))
+            distribution = distribution.draw(Streams(self._seed, first).stream(_stream_name(key, distribution)))
         value = self.drawn[key] = max(least, distribution)
         return value
 

@@ -8,7 +8,7 @@ import simpy
 from suave_des.clock import Alarm
 from suave_des.compiling import Array
 from suave_des.managed.node import Log
-from suave_des.vehicle.vehicle import STEP_S, Vehicle, rows_at
+from suave_des.vehicle.vehicle import STEP_S, Vehicle
 from suave_des.world.pipeline import first_detection
 
 _FEWEST_ROWS = 22
@@ -46,8 +46,6 @@ class PipelineDetector:
 
     def __post_init__(self) -> None:
         self.detected: simpy.Event = self.env.event()
-        times_s, visibility_m = self.visibility
-        self._visibility = rows_at(times_s), visibility_m
         self._alarm = Alarm(self.env, self._arrive)
         self.vehicle.control_listeners.append(self._look_ahead)
         self._look_ahead(0)
@@ -60,7 +58,7 @@ class PipelineDetector:
             return
         self.vehicle.look_ahead(last)
         seen_row, self._seen = first_detection(
-            self.vehicle.track, row, last, self._visibility, self.points, self.view_tangent
+            self.vehicle.track, (row, last), STEP_S, self.visibility, self.points, self.view_tangent
         )
         if self._seen < 0:
             self._row = last

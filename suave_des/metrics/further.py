@@ -15,7 +15,7 @@ from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.measurements import BatteryLevel, Measured
 from suave_des.scenario.models import FURTHER_METRICS, Requirement, Scenario
 from suave_des.scenario.modes import Mode
-from suave_des.vehicle.vehicle import Vehicle, row_at, rows_at
+from suave_des.vehicle.vehicle import Vehicle, row_at
 from suave_des.world.coverage import covered_area_m2
 
 MetricValue = float | int | None
@@ -127,7 +127,8 @@ class FurtherMetrics:
 
 def measured_at_rows(times_s: Sequence[float], values: Sequence[float], rows: int) -> Array:
     """The value measured last at each row of a track, shape (rows,); nan before the first."""
-    places = np.searchsorted(rows_at(np.array(times_s)), np.arange(rows), side="right")
+    since_rows = [row_at(t_s) for t_s in times_s]
+    places = np.searchsorted(since_rows, np.arange(rows), side="right")
     return np.append(np.nan, values)[places]
 
 

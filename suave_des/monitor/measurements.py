@@ -8,7 +8,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import ClassVar, NamedTuple, Self
+from typing import ClassVar
 
 import numpy as np
 
@@ -140,35 +140,28 @@ def measure(
         kept = [not is_lost(t_s) for t_s in times.tolist()]
         times, values = times[kept], values[kept]
     if noise is not None or is_lost is not None:
-        changes = _Changes.of(values)
-    times = times[changes.places]
-    return Measurements(key, tuple(times.tolist()), changes.numbers, phase_s, period_s, (times, changes.values))
+        changes = _changes(values)
+    places, changed, numbers = changes
+    times = times[places]
+    return Measurements(key, tuple(times.tolist()), numbers, phase_s, period_s, (times, changed))
 
 
-class _Changes(NamedTuple):
-    """Those of some values that differ from the one before, their places, and once more as numbers of Python."""
-
-    places: Ticks
-    values: Array
-    numbers: tuple[float, ...]
-
-    @classmethod
-    def of(cls, values: Array) -> Self:
-        """Find them; the first value is one."""
-        places = np.flatnonzero(np.diff(values, prepend=np.nan))
-        return cls(places, values[places], tuple(values[places].tolist()))
+def _changes(values: Array) -> tuple[Ticks, Array, tuple[float, ...]]:
+    """Places of the values that differ from the one before, as the first one does, and these values, twice."""
+    places = np.flatnonzero(np.diff(values, prepend=np.nan))
+    return places, values[places], tuple(values[places].tolist())
 
 
 # Cached by the arrays' bytes (float64): without noise, a signal that is read in time steps is the same in each run.
 
 
 @lru_cache(maxsize=16)
-def _read(signal: Signal, times_s: bytes) -> tuple[Array, _Changes]:
+def _read(signal: Signal, times_s: bytes) -> tuple[Array, tuple[Ticks, Array, tuple[float, ...]]]:
     """Values of a signal at some times, and their changes."""
     times = np.frombuffer(times_s)
-    first, _, different_s = _Changes.of(times)
+    first, _, different_s = _changes(times)
     values = np.repeat([signal(t_s) for t_s in different_s], np.diff(first, append=len(times)))
-    return values, _Changes.of(values)
+    return values, _changes(values)
 
 
 @lru_cache(maxsize=64)

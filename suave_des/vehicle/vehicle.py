@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from suave_des.compiling import Array, Ticks
+from suave_des.compiling import Array
 from suave_des.vehicle import kernel
 from suave_des.vehicle.autopilot import Autopilot, kernel_parameters
 from suave_des.vehicle.frames import Pose, euler_angles, quaternion
@@ -275,8 +275,3 @@ def track_rows(duration_s: float) -> int:
 def row_at(t_s: float) -> int:
     """Row of the track nearest to a mission time: the one rounding rule that reading and commanding share."""
     return round(t_s / STEP_S)
-
-
-def rows_at(times_s: Array) -> Ticks:
-    """Rows of the track nearest to many mission times, rounded alike, shape as that of the times."""
-    return np.rint(times_s / STEP_S).astype(np.int64)

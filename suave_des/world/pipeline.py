@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from suave_des.compiling import Array, Ticks, compiled
+from suave_des.compiling import Array, compiled
 
 
 @cache
@@ -47,30 +47,34 @@ def first_point_in_view(
 
 @compiled
 def first_detection(
-    track: Array, first_row: int, last_row: int, visibility: tuple[Ticks, Array], points: Array, view_tangent: float
+    track: Array,
+    rows: tuple[int, int],
+    row_s: float,
+    visibility: tuple[Array, Array],
+    points: Array,
+    view_tangent: float,
 ) -> tuple[int, int]:
-    """First row of [first_row, last_row] from which a point is seen, and the point's index; (-1, -1) if none.
+    """First row from which a point is seen, and the point's index; (-1, -1) if none.
 
     Args:
         track: positions x, y, z in the first three columns, shape (rows, at least 3), m.
-        first_row: where to begin.
-        last_row: the last row that counts.
-        visibility: measured water visibility: the rows, ascending, from which on there is another value, and the
-            values, m; none before the first row.
+        rows: the first and the last row that count.
+        row_s: time between rows.
+        visibility: measured water visibility: the times, s, ascending, of the values, m; none before the first one.
         points: points as the detection places them, shape (n, 3), m.
         view_tangent: tangent of half the camera's field of view.
     """
     low_x, low_y, low_z = points[:, 0].min(), points[:, 1].min(), points[:, 2].min()
     high_x, high_y, high_z = points[:, 0].max(), points[:, 1].max(), points[:, 2].max()
-    since_row, visibility_m = visibility
+    times_s, visibility_m = visibility
     measured = 0
-    for row in range(first_row, last_row + 1):
+    for row in range(rows[0], rows[1] + 1):
         x, y, z = track[row, 0], track[row, 1], track[row, 2]
         # Far from the pipeline's bounding box no point can be in view: most rows of a search end here.
         widest = max(abs(z - low_z), abs(z - high_z)) * view_tangent
         if x < low_x - widest or x > high_x + widest or y < low_y - widest or y > high_y + widest:
             continue
-        while measured < since_row.shape[0] and since_row[measured] <= row:
+        while measured < times_s.shape[0] and np.rint(times_s[measured] / row_s) <= row:
             measured += 1
         if measured > 0:
             index = first_point_in_view(x, y, z, visibility_m[measured - 1], points, view_tangent)

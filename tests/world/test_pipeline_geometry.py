@@ -87,29 +87,29 @@ def line_of_positions(y_m: float) -> np.ndarray:
 
 def test_first_detection_is_the_first_row_with_a_point_in_view() -> None:
     track = line_of_positions(0.5)
-    visibility = np.array([0]), np.array([3.0])
+    visibility = np.array([0.0]), np.array([3.0])
     expected = next(
         (row, point)
         for row, position in enumerate(track)
         if (point := first_point_in_view(*position, 3.0, POINTS, HALF_WIDTH_AT_1_M)) >= 0
     )
-    assert first_detection(track, 0, len(track) - 1, visibility, POINTS, HALF_WIDTH_AT_1_M) == expected
+    assert first_detection(track, (0, len(track) - 1), 1.0, visibility, POINTS, HALF_WIDTH_AT_1_M) == expected
 
 
 def test_first_detection_looks_only_at_the_rows_asked_for() -> None:
     track = line_of_positions(0.5)
-    visibility = np.array([0]), np.array([3.0])
-    row, _ = first_detection(track, 0, len(track) - 1, visibility, POINTS, HALF_WIDTH_AT_1_M)
-    assert first_detection(track, 0, row - 1, visibility, POINTS, HALF_WIDTH_AT_1_M) == (-1, -1)
+    visibility = np.array([0.0]), np.array([3.0])
+    row, _ = first_detection(track, (0, len(track) - 1), 1.0, visibility, POINTS, HALF_WIDTH_AT_1_M)
+    assert first_detection(track, (0, row - 1), 1.0, visibility, POINTS, HALF_WIDTH_AT_1_M) == (-1, -1)
 
 
 def test_first_detection_waits_for_the_visibility() -> None:
     track = line_of_positions(0.0)
-    visibility = np.array([3, 250]), np.array([1.0, 2.5])
-    assert first_detection(track, 0, len(track) - 1, visibility, POINTS, HALF_WIDTH_AT_1_M)[0] == 250
+    visibility = np.array([3.0, 250.0]), np.array([1.0, 2.5])
+    assert first_detection(track, (0, len(track) - 1), 1.0, visibility, POINTS, HALF_WIDTH_AT_1_M)[0] == 250
 
 
 def test_far_beside_the_pipeline_nothing_is_detected() -> None:
     track = line_of_positions(2.0)
-    visibility = np.array([0]), np.array([9.0])
-    assert first_detection(track, 0, len(track) - 1, visibility, POINTS, HALF_WIDTH_AT_1_M) == (-1, -1)
+    visibility = np.array([0.0]), np.array([9.0])
+    assert first_detection(track, (0, len(track) - 1), 1.0, visibility, POINTS, HALF_WIDTH_AT_1_M) == (-1, -1)
