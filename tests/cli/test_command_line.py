@@ -340,14 +340,14 @@ class TestCampaign:
         assert "4 missions are in out/runs.csv" in ended.out
         assert len(rows_of(tmp_path / "out" / "runs.csv")) == 4
 
-    def test_lists_failures_keeps_the_others_and_ends_with_status_3(self, tmp_path: Path) -> None:
-        (tmp_path / "clumsy.py").write_text(MANAGER)
-        managers = "clumsy:Raises,none"
-        arguments = ("--managers", managers, "--runs", "2", "--workers", "2", "--quiet", *OUT)
-        ended = suave_des_command("campaign", "seams2023", *arguments, cwd=tmp_path)
-        assert ended.returncode == 3
-        lines = ended.stderr.splitlines()
-        assert lines[0].startswith("suave-des: failed: manager clumsy:Raises, run 1, mission time ")
+    def test_lists_failures_keeps_the_others_and_ends_with_status_3(self, command, tmp_path: Path) -> None:
+        (tmp_path / "clumsier.py").write_text(MANAGER)
+        managers = "clumsier:Raises,none"
+        arguments = ("--managers", managers, "--runs", "2", "--workers", "1", "--quiet", *OUT)
+        ended = command("campaign", "seams2023", *arguments)
+        assert ended.status == 3
+        lines = ended.err.splitlines()
+        assert lines[0].startswith("suave-des: failed: manager clumsier:Raises, run 1, mission time ")
         assert lines[0].endswith("(2 missions like this)")
         assert lines[-1] == "suave-des: 2 of 4 missions failed; the others are kept"
         rows = rows_of(tmp_path / "out" / "runs.csv")
@@ -375,17 +375,15 @@ class TestCampaign:
 
 
 class TestReproduce:
-    def test_prints_the_papers_table_beside_ours_and_writes_it(self, tmp_path: Path) -> None:
-        ended = suave_des_command(
-            "reproduce", "--runs", "2", "--seed", "1", "--workers", "1", "--quiet", *OUT, cwd=tmp_path
-        )
-        assert (ended.returncode, ended.stderr) == (0, "")
+    def test_prints_the_papers_table_beside_ours_and_writes_it(self, command, tmp_path: Path) -> None:
+        ended = command("reproduce", "--runs", "2", "--seed", "1", "--workers", "1", "--quiet", *OUT)
+        assert (ended.status, ended.err) == (0, "")
         for figure in ("187.85", "42.40", "31.40", "13.00", "180.15", "82.05", "3.88", "3.19"):
-            assert figure in ended.stdout
+            assert figure in ended.out
         for figure in ("106.95", "39.46", "51.15", "12.01"):
-            assert figure in ended.stdout
-        assert "Paper: 20 missions for each manager. Here: 2 missions for each manager." in ended.stdout
-        assert max(map(len, ended.stdout.splitlines())) <= 100
+            assert figure in ended.out
+        assert "Paper: 20 missions for each manager. Here: 2 missions for each manager." in ended.out
+        assert max(map(len, ended.out.splitlines())) <= 100
         rows = rows_of(tmp_path / "out" / "runs.csv")
         assert [row["manager"] for row in rows] == ["none"] * 2 + ["random"] * 2 + ["metacontrol"] * 2
         table = rows_of(tmp_path / "out" / "paper_table.csv")

@@ -20,6 +20,7 @@ from suave_des.knowledge.limit import TimeLimit
 COMMAND = [sys.executable, "-P", "-m", "suave_des"]
 CHECKOUT = Path(caches.__file__).parent.parent
 ONE_MISSION = ["run", "seams2023", "--manager", "none"]
+CAMPAIGN = ["campaign", "seams2023", "--managers", "none", "--runs", "2", "--workers", "1", "--out", "out"]
 
 
 def run(*arguments: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -156,24 +157,13 @@ class TestStopped:
 
 class TestOutput:
     def test_in_ascii_has_other_characters(self, tmp_path: Path) -> None:
-        done = run(
-            "campaign",
-            "seams2023",
-            "--managers",
-            "none",
-            "--runs",
-            "2",
-            "--out",
-            "out",
-            cwd=tmp_path,
-            PYTHONIOENCODING="ascii",
-        )
+        done = run(*CAMPAIGN, cwd=tmp_path, PYTHONIOENCODING="ascii")
         assert done.returncode == 0
         assert "+-" in done.stdout and done.stdout.isascii()
 
     def test_that_nobody_reads_is_no_error_and_results_are_kept(self, tmp_path: Path) -> None:
-        arguments = ["campaign", "seams2023", "--managers", "none", "--runs", "2", "--out", "out", "--quiet"]
-        process = subprocess.Popen([*COMMAND, *arguments], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        arguments = [*COMMAND, *CAMPAIGN, "--quiet"]
+        process = subprocess.Popen(arguments, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         process.stdout.close()
         told = process.stderr.read()
         assert process.wait(300) == 128 + signal.SIGPIPE
@@ -187,25 +177,28 @@ class TestOutput:
         assert plain("a\x1b[31m\u202eb ± é\n") == "a\\x1b[31m\\u202eb ± é\n"
 
 
-class TestJava:
-    def test_takes_no_options_from_the_environment(self, tmp_path: Path) -> None:
-        done = run(
-            "kb",
-            "infer",
-            "--reasoner",
-            "pellet",
-            "--set",
-            "water_visibility=1",
-            cwd=tmp_path,
-            JAVA_TOOL_OPTIONS="-Xmx1k -XX:+NoSuchOption",
-            _JAVA_OPTIONS="-XX:+NoSuchOption",
-        )
-        assert (done.returncode, done.stderr) == (0, "")
+@pytest.fixture(scope="module")
+def temporary(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("temporary")
 
-    def test_leaves_nothing_in_the_temporary_folder(self, tmp_path: Path) -> None:
-        done = run("kb", "infer", "--reasoner", "pellet", cwd=tmp_path, TMPDIR=str(tmp_path))
-        assert done.returncode == 0
-        assert not list(tmp_path.glob(".java_pid*"))
+
+@pytest.fixture(scope="module")
+def reasoned(temporary: Path) -> subprocess.CompletedProcess[str]:
+    """A command that asks Pellet, where variables have options for every Java that it must not get."""
+    options = {"JAVA_TOOL_OPTIONS": "-Xmx1k -XX:+NoSuchOption", "_JAVA_OPTIONS": "-XX:+NoSuchOption"}
+    arguments = ["kb", "infer", "--reasoner", "pellet", "--set", "water_visibility=1"]
+    return run(*arguments, cwd=temporary, TMPDIR=str(temporary), **options)
+
+
+class TestJava:
+    def test_takes_no_options_from_the_environment(self, reasoned: subprocess.CompletedProcess[str]) -> None:
+        assert (reasoned.returncode, reasoned.stderr) == (0, "")
+
+    def test_leaves_nothing_in_the_temporary_folder(
+        self, reasoned: subprocess.CompletedProcess[str], temporary: Path
+    ) -> None:
+        assert reasoned.returncode == 0
+        assert not list(temporary.glob(".java_pid*"))
 
 
 class TestLimits:
