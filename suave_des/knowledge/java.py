@@ -45,7 +45,8 @@ def without_options_of_others() -> Iterator[None]:
 def launcher_environment(*options: str) -> dict[str, str]:
     """The environment for a java command: with these options, and none that variables add to every Java."""
     others = {name: value for name, value in os.environ.items() if name not in _OPTION_VARIABLES}
-    return {**others, "JDK_JAVA_OPTIONS": " ".join(options)}
+    quoted = ('"{}"'.format(option.replace("\\", r"\\")) if " " in option else option for option in options)
+    return {**others, "JDK_JAVA_OPTIONS": " ".join(quoted)}
 
 
 def java_home() -> Path:

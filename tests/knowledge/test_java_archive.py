@@ -6,9 +6,16 @@ import sys
 import time
 from pathlib import Path
 
+import owlready2.reasoning
 import pytest
 
 from suave_des.knowledge import java_archive
+from suave_des.knowledge.java import SHORT_LIVED
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.reasoners import Reasoner, make_reasoner
+from tests.helpers.knowledge_states import searching
+
+STATE = searching("fd_spiral_high", "1.0")
 
 _FIRST = """
 from suave_des.knowledge import jvm
@@ -41,6 +48,41 @@ def test_an_archive_is_used_and_a_damaged_one_is_removed_without_a_word(tmp_path
     assert (damaged.returncode, damaged.stderr) == (0, "")
     assert "sharing" not in damaged.stdout
     assert not archive.exists()
+
+
+class TestOfStockOwlready2:
+    """Each of its inferences is a Java process, which is given an archive of its own."""
+
+    def test_one_that_java_rejects_changes_nothing(
+        self, kb: Ontology, pellet: Reasoner, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setenv("SUAVE_DES_JAVA_ARCHIVE", str(tmp_path / "with spaces"))
+        archive = java_archive.archive_path(owlready2.reasoning._PELLET_CLASSPATH.split(os.pathsep), SHORT_LIVED)
+        assert archive is not None
+        archive.parent.mkdir()
+        archive.write_bytes(b"damaged")
+        assert make_reasoner("owlready2", kb).infer(STATE) == pellet.infer(STATE)
+        assert f'"-XX:AOTCache={archive}"' in owlready2.reasoning._subprocess_kargs["env"]["JDK_JAVA_OPTIONS"]
+
+    @pytest.mark.slow
+    def test_it_takes_half_of_the_time(self, tmp_path: Path) -> None:
+        def cpu_s(switch: str) -> float:
+            program = (
+                "import resource\n"
+                "from suave_des.knowledge.ontology import Ontology\n"
+                "from suave_des.knowledge.stock import StockPellet\n"
+                "assert StockPellet(Ontology.load()).infer(())\n"
+                "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime)\n"
+            )
+            done = _python("-c", program, cache=tmp_path, switch=switch)
+            assert done.returncode == 0, done.stderr
+            return float(done.stdout)
+
+        cpu_s("on")
+        until_s = time.monotonic() + 120.0
+        while not list(tmp_path.rglob("*.aot")) and time.monotonic() < until_s:
+            time.sleep(0.5)
+        assert min(cpu_s("on") for _ in range(3)) < 0.8 * min(cpu_s("off") for _ in range(3))
 
 
 def test_of_several_processes_one_makes_the_archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
