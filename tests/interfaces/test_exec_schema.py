@@ -63,10 +63,11 @@ def assert_exchange_fits(command: str, scenario: str, schema: dict[str, Any]) ->
     lines = [json.loads(line) for line in Path("lines").read_text().splitlines()]
     messages, answers = lines[::2], lines[1::2]
     whole = jsonschema.Draft202012Validator(schema)
+    of = {name: validator(schema, name) for name in ("message", "first_answer", "answer")}
     for message, answer in zip(messages, answers, strict=True):
-        validator(schema, "message").validate(message)
+        of["message"].validate(message)
         is_first = message["type"] == "mission_started"
-        validator(schema, "first_answer" if is_first else "answer").validate(answer)
+        of["first_answer" if is_first else "answer"].validate(answer)
         whole.validate(message)
         whole.validate(answer)
     assert messages[0]["type"] == "mission_started" and messages[-1]["type"] == "mission_ended"

@@ -47,9 +47,12 @@ class Strategy:
 
     def __init__(self, port: int) -> None:
         self.port, self.seen = port, b""
-        self.schemas = {name: self.get(f"{name}_schema") for name in ("monitor", "execute", "adaptation_options")}
+        schemas = {name: self.get(f"{name}_schema") for name in ("monitor", "execute", "adaptation_options")}
+        for schema in schemas.values():
+            jsonschema.Draft202012Validator.check_schema(schema)
+        self.valid = {name: jsonschema.Draft202012Validator(schema) for name, schema in schemas.items()}
         self.options = self.get("adaptation_options")
-        jsonschema.validate(self.options, self.schemas["adaptation_options"])
+        self.valid["adaptation_options"].validate(self.options)
 
     def get(self, path: str) -> dict:
         status, body = request(self.port, "GET", f"/{path}")
@@ -59,12 +62,12 @@ class Strategy:
 
     def monitor(self) -> dict:
         found = self.get("monitor")
-        jsonschema.validate(found, self.schemas["monitor"])
+        self.valid["monitor"].validate(found)
         assert not any(isinstance(value, dict | list) for value in found.values())
         return found
 
     def execute(self, adaptation: dict) -> None:
-        jsonschema.validate(adaptation, self.schemas["execute"])
+        self.valid["execute"].validate(adaptation)
         status, body = request(self.port, "PUT", "/execute", adaptation)
         assert status == 200
         self.seen += body

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.helpers.command import suave_des_command
+from tests.helpers.command import command_here
 
 pytest.importorskip("py_trees")
 
@@ -48,8 +48,8 @@ class ItsOwnAncestor(PyTreesManager):
 def test_a_tick_that_does_not_end_ends_its_mission_only(tmp_path: Path) -> None:
     (tmp_path / "trees.py").write_text(TREES)
     names = "none,trees:Forever,trees:Stuck,trees:ItsOwnAncestor"
-    options = ("--runs", "1", "--workers", "2", "--time-out", "2", "--quiet", "--out", "out")
-    ended = suave_des_command("campaign", "seams2023", "--managers", names, *options, cwd=tmp_path)
+    options = ("--runs", "1", "--workers", "1", "--time-out", "2", "--quiet", "--out", "out")
+    ended = command_here("campaign", "seams2023", "--managers", names, *options, cwd=tmp_path)
     assert ended.returncode == 3
     said = " ".join(ended.stderr.split())
     for words in (
@@ -65,6 +65,6 @@ def test_a_tick_that_does_not_end_ends_its_mission_only(tmp_path: Path) -> None:
 
 def test_a_single_mission_ends_with_the_error(tmp_path: Path) -> None:
     (tmp_path / "trees.py").write_text(TREES)
-    ended = suave_des_command("run", "seams2023", "--manager", "trees:Forever", cwd=tmp_path)
+    ended = command_here("run", "seams2023", "--manager", "trees:Forever", cwd=tmp_path)
     assert ended.returncode == 3
     assert "a tick of the tree does not end" in " ".join(ended.stderr.split())
