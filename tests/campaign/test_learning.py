@@ -70,7 +70,7 @@ def test_a_manager_that_learns_nothing_cannot_be_trained(tmp_path: Path) -> None
 
 def test_the_command_prints_how_it_went(learner: str, tmp_path: Path) -> None:
     options = ("--missions", "12", "--out", "policy.json")
-    done = suave_des_command("train", learner, *options, cwd=tmp_path, PYTHONPATH=str(EXAMPLES))
+    done = command_here("train", learner, *options, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "11 to 12" in done.stdout and (tmp_path / "policy.json").exists()
 
@@ -118,11 +118,11 @@ def test_a_manager_that_serves_scenarios_without_a_battery_too_is_not_reported()
     assert "remarks" not in run_campaign("seams2023", [f"{AWKWARD}:SavesCharge"], 2).attrs
 
 
+@pytest.mark.usefixtures("quick_workers")
 def test_the_same_error_in_the_first_missions_stops_the_campaign_with_one_message(tmp_path: Path) -> None:
     manager = f"{AWKWARD}:RaisesAlways"
-    done = suave_des_command(
-        "campaign", "seams2023", "--managers", manager, "--runs", "500", "--out", "out", "--quiet", cwd=tmp_path
-    )
+    asked = ("--managers", manager, "--runs", "500", "--workers", "2", "--out", "out", "--quiet")
+    done = command_here("campaign", "seams2023", *asked, cwd=tmp_path)
     assert done.returncode == 3 and done.stdout == ""
     assert done.stderr.count("\n") == 1 and f"manager {manager} fails in each mission: " in done.stderr
 
@@ -186,8 +186,20 @@ def test_a_package_registers_its_manager_by_name(tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
     there = {"PYTHONPATH": str(installed(EXAMPLES / "suave-cautious", tmp_path / "there"))}
     margin = ("--manager-option", "margin_m=0.25")
-    command = ("campaign", "seams2023", "--managers", "cautious", "--runs", "2", "--out", "out", *margin)
-    done = suave_des_command(*command, cwd=tmp_path, **there)
+    command = (
+        "campaign",
+        "seams2023",
+        "--managers",
+        "cautious",
+        "--runs",
+        "2",
+        "--workers",
+        "1",
+        "--out",
+        "out",
+        *margin,
+    )
+    done = suave_des_command("campaign", "seams2023", *asked, cwd=tmp_path, **there)
     assert done.returncode == 0, done.stderr
     assert "cautious" in done.stdout
     inputs = json.loads((tmp_path / "out" / "manifest.json").read_text())["inputs_sha256"]

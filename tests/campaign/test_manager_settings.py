@@ -1,13 +1,16 @@
 """Settings and files of managers, on the command line and in sweeps; and whose code a resumed campaign runs."""
 
 import json
+import linecache
+import sys
 from pathlib import Path
 
 import pytest
 
 from suave_des import InputError, load_scenario, run_campaign, run_mission, with_values
-from tests.helpers.command import command_here, suave_des_command
+from tests.helpers.command import command_here
 
+RESUME = ("campaign", "--resume", "out", "--workers", "1")
 SETTABLE = """
 from suave_des.managing.simple import NoManager
 
@@ -75,7 +78,7 @@ def test_names_of_managers_may_have_points_in_key_paths() -> None:
 def test_options_of_the_command_line(folder: Path, settable: str) -> None:
     set_limit = ("--set", "mission.time_limit_s=150", "--set", "battery={discharge_time_s: 1e3}")
     chosen = ("--manager-option", "mode=fd_spiral_high", "--manager-option", f"{settable}.other=[1, x]")
-    done = suave_des_command("run", "seams2023", "--manager", settable, *set_limit, *chosen, "--out", "out", cwd=folder)
+    done = command_here("run", "seams2023", "--manager", settable, *set_limit, *chosen, "--out", "out", cwd=folder)
     assert done.returncode == 0, done.stderr
     scenario = json.loads((folder / "out" / "mission.json").read_text())["scenario"]
     assert scenario["mission"]["time_limit_s"] == 150.0 and scenario["battery"]["discharge_time_s"] == 1000.0
@@ -131,31 +134,34 @@ class TestDeclaredFiles:
         (folder / "table.txt").write_text("fd_spiral_high")
         run_campaign("seams2023", [settable], 1, out=folder / "out", manager_options={settable: {"table": "table.txt"}})
         (folder / "table.txt").write_text("fd_spiral_low")
-        done = suave_des_command("campaign", "--resume", "out", "--managers", settable, "--runs", "2", cwd=folder)
+        done = command_here(*RESUME, "--managers", settable, "--runs", "2", cwd=folder)
         assert done.returncode == 2 and "files_sha256.table.txt was" in done.stderr
 
 
 class TestReceivedFolder:
     @pytest.fixture
     def received(self, folder: Path, settable: str) -> Path:
-        """A campaign whose module notes that it is imported."""
+        """A campaign whose module, which nothing has imported yet, notes that it is imported."""
         run_campaign("seams2023", ["none", settable], 1, out=folder / "out")
-        module = folder / f"{settable.partition(':')[0]}.py"
+        name = settable.partition(":")[0]
+        del sys.modules[name]
+        linecache.clearcache()
+        module = folder / f"{name}.py"
         module.write_text("import pathlib\npathlib.Path('imported').touch()\n" + SETTABLE)
         return folder
 
     def test_its_managers_are_not_imported_unasked(self, received: Path, settable: str) -> None:
-        done = suave_des_command("campaign", "--resume", "out", cwd=received)
+        done = command_here(*RESUME, cwd=received)
         assert done.returncode == 2 and f"name it: --managers {settable}" in done.stderr
         assert not (received / "imported").exists()
 
     @pytest.mark.parametrize("how", ["named", "confirmed"])
     def test_they_are_when_the_user_says_so(self, received: Path, settable: str, how: str) -> None:
         options = ("--managers", settable) if how == "named" else ("--yes",)
-        done = suave_des_command("campaign", "--resume", "out", *options, cwd=received)
+        done = command_here(*RESUME, *options, cwd=received)
         assert (received / "imported").exists()
         assert "manager_code_sha256" in done.stderr  # the code is another one than the campaign began with
 
     def test_a_manager_that_it_does_not_have_cannot_be_added(self, received: Path) -> None:
-        done = command_here("campaign", "--resume", "out", "--managers", "bt", cwd=received)
+        done = command_here(*RESUME, "--managers", "bt", cwd=received)
         assert done.returncode == 2 and "the campaign has no manager 'bt'" in done.stderr

@@ -59,8 +59,10 @@ def test_what_is_done_is_kept(number: signal.Signals, workers: int, scenario: Pa
     assert not any(Path(f"/proc/{child}").exists() for child in children)
 
 
-@pytest.mark.parametrize("number", STATUS)
-@pytest.mark.parametrize("moment", ["lock", "store", "later"])
+@pytest.mark.parametrize(
+    ("number", "moment"),
+    [(signal.SIGINT, "lock"), (signal.SIGTERM, "store"), (signal.SIGINT, "later"), (signal.SIGTERM, "later")],
+)
 def test_no_empty_folder_is_left(number: signal.Signals, moment: str, scenario: Path, tmp_path: Path) -> None:
     process = chaos.start([str(scenario), "--managers", "none", "--runs", str(RUNS), "--out", "out"], tmp_path)
     wait_for(tmp_path / "out" / (".campaign.lock" if moment == "lock" else STORE_FILE))
