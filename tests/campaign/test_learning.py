@@ -186,19 +186,7 @@ def test_a_package_registers_its_manager_by_name(tmp_path: Path) -> None:
     (tmp_path / "there").mkdir()
     there = {"PYTHONPATH": str(installed(EXAMPLES / "suave-cautious", tmp_path / "there"))}
     margin = ("--manager-option", "margin_m=0.25")
-    command = (
-        "campaign",
-        "seams2023",
-        "--managers",
-        "cautious",
-        "--runs",
-        "2",
-        "--workers",
-        "1",
-        "--out",
-        "out",
-        *margin,
-    )
+    asked = ("--managers", "cautious", "--runs", "2", "--workers", "1", "--out", "out", *margin)
     done = suave_des_command("campaign", "seams2023", *asked, cwd=tmp_path, **there)
     assert done.returncode == 0, done.stderr
     assert "cautious" in done.stdout
