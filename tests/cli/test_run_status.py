@@ -14,7 +14,7 @@ from rich.console import Console
 import suave_des
 from suave_des.campaign.single import run_mission
 from suave_des.cli.console import mission_status
-from tests.helpers.command import suave_des_command
+from tests.helpers.command import command_here
 
 SLOW = """
 import os, time
@@ -56,10 +56,13 @@ def test_elsewhere_there_is_nothing_to_tell() -> None:
     assert file.getvalue() == ""
 
 
-def test_the_command_tells_it_on_its_error_stream_only_if_that_is_a_terminal(tmp_path: Path) -> None:
+def test_the_command_tells_it_on_its_error_stream_only_if_that_is_a_terminal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "slow.py").write_text(SLOW)
     arguments = ("run", "seams2023", "--manager", "slow:Slow")
-    plain = suave_des_command(*arguments, cwd=tmp_path, THINKS_S="0.4")
+    monkeypatch.setenv("THINKS_S", "0.4")
+    plain = command_here(*arguments, cwd=tmp_path)
     assert (plain.returncode, plain.stderr) == (0, "")
     ours, theirs = pty.openpty()
     environment = {

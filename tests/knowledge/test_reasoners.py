@@ -108,52 +108,53 @@ def test_spawned_workers_reason_each_with_a_java_of_its_own(pellet: Reasoner) ->
     assert os.getpid() not in {pid for pid, _ in done}
 
 
-QUIET = """
-from tests.helpers.knowledge_states import searching
+#: Reasons, is interrupted, and forks; a line of its own tells one from the next.
+PROGRAM = """
+import os, signal, time
+from suave_des.errors import InputError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoners import make_reasoner
+from tests.helpers.knowledge_states import searching
+
 reasoner = make_reasoner("pellet", Ontology.load())
 reasoner.infer(searching("fd_spiral_high", 2.0))
-{more}
+print("--", flush=True)
+try:
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(5)
+except KeyboardInterrupt:
+    print("interrupted")
+print("--", flush=True)
+if os.fork() == 0:
+    try:
+        reasoner.infer(searching("fd_spiral_high", 2.5))
+    except InputError as error:
+        os.write(1, str(error).encode())
+    os._exit(0)
+os.wait()
 """
 
 
-def run(more: str) -> subprocess.CompletedProcess[str]:
-    code = QUIET.format(more=more)
+@pytest.fixture(scope="module")
+def program() -> subprocess.CompletedProcess[str]:
+    """A process of its own with Java in it."""
     environment = {**os.environ, "PYTHONPATH": str(Path(suave_des.__file__).parents[1])}
     return subprocess.run(
-        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=120, check=False
+        [sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, timeout=120, check=False
     )
 
 
-def test_reasoning_prints_nothing() -> None:
-    done = run("")
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+def test_reasoning_prints_nothing(program: subprocess.CompletedProcess[str]) -> None:
+    assert (program.returncode, program.stderr) == (0, "")
+    assert program.stdout.startswith("--\n")
+
+
+def test_ctrl_c_reaches_python_while_java_runs(program: subprocess.CompletedProcess[str]) -> None:
+    assert program.stdout.split("--\n")[1] == "interrupted\n"
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
-def test_a_process_forked_after_java_has_started_is_told_instead_of_hanging() -> None:
-    done = run(
-        "import os\n"
-        "from suave_des.errors import InputError\n"
-        "if os.fork() == 0:\n"
-        "    try:\n"
-        "        reasoner.infer(searching('fd_spiral_high', 2.5))\n"
-        "    except InputError as error:\n"
-        "        os.write(1, str(error).encode())\n"
-        "    os._exit(0)\n"
-        "os.wait()\n"
-    )
-    assert "Java was started before this process was forked" in done.stdout
-
-
-def test_ctrl_c_reaches_python_while_java_runs() -> None:
-    done = run(
-        "import os, signal, time\n"
-        "try:\n"
-        "    os.kill(os.getpid(), signal.SIGINT)\n"
-        "    time.sleep(5)\n"
-        "except KeyboardInterrupt:\n"
-        "    print('interrupted')\n"
-    )
-    assert done.stdout == "interrupted\n"
+def test_a_process_forked_after_java_has_started_is_told_instead_of_hanging(
+    program: subprocess.CompletedProcess[str],
+) -> None:
+    assert "Java was started before this process was forked" in program.stdout.split("--\n")[2]

@@ -189,13 +189,6 @@ main(["run", "seams2023", "--reasoner", {reasoner!r}, "--rules", {str(rules)!r}]
         assert "not done after 1 s" in done.stderr
         assert done.stderr.count("\n") == 1
 
-    def test_a_process_that_started_java_within_the_limit_ends(self):
-        command = [sys.executable, "-m", "suave_des", "kb", "infer", "--reasoner", "pellet"]
-        path = str(Path(suave_des.__file__).parents[1])
-        environment = {**os.environ, "PYTHONPATH": path}
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
-        assert (done.returncode, done.stderr) == (0, "")
-
     def test_who_is_interrupted_while_it_lasts_has_given_it_up(self, monkeypatch):
         # Java may still run then, and crashes in a process that ends as usual.
         def interrupted(*_):
