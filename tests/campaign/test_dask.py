@@ -75,6 +75,26 @@ def cluster(tmp_path_factory: pytest.TempPathFactory, users_folder: Path) -> Ite
         cluster.stop()
 
 
+@pytest.fixture(scope="module")
+def _small_clusters() -> Iterator[list[Cluster]]:
+    clusters: list[Cluster] = []
+    yield clusters
+    for cluster in clusters:
+        cluster.stop()
+
+
+@pytest.fixture
+def small_cluster(_small_clusters: list[Cluster], tmp_path_factory: pytest.TempPathFactory) -> Cluster:
+    """A cluster of one worker, where missions are not given to another when it dies; another if a test ended it."""
+    if not _small_clusters or _small_clusters[-1].scheduler.poll() is not None:
+        folder = tmp_path_factory.mktemp("small")
+        settings = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0"}
+        _small_clusters.append(cluster := Cluster(folder / "cluster", folder / "nothing", **settings))
+        cluster.add_worker(replaced=True)
+        cluster.wait_for_workers(1)
+    return _small_clusters[-1]
+
+
 @pytest.fixture
 def short(tmp_path: Path) -> Path:
     path = tmp_path / "short.yaml"
@@ -118,20 +138,14 @@ def test_the_hook_that_watches_workers_would_tell(
     assert set(cluster.opened()) == {str(users_folder / "sea.csv")}
 
 
-def test_managers_that_end_or_block_their_worker_cost_their_own_missions_only(tmp_path: Path) -> None:
+def test_managers_that_end_or_block_their_worker_cost_their_own_missions_only(small_cluster: Cluster) -> None:
     causes = {
         "DiesInSome": "the cluster's worker died with it, 1 times (killed, out of memory, or stuck?)",
         "HangsInSome": "not done after 3 s (time-out)",
         "RaisesInHalf": "ValueError: I do not know what to do",
     }
     managers = [f"{AWKWARD}:{name}" for name in causes]
-    cluster = Cluster(tmp_path / "cluster", tmp_path / "nothing", DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="0")
-    try:
-        cluster.add_worker(replaced=True)
-        cluster.wait_for_workers(1)
-        result = run_campaign("seams2023", managers, 8, 1, scheduler=cluster.address, time_out_s=3.0)
-    finally:
-        cluster.stop()
+    result = run_campaign("seams2023", managers, 8, 1, scheduler=small_cluster.address, time_out_s=3.0)
     assert {failure.manager.partition(":")[2]: failure.cause for failure in result.failures} == causes
     assert len(result.rows) + len(result.failures) == 24
     idle = {row[2]: row[3:] for row in run_campaign("seams2023", ["none"], 8, 1).rows}
@@ -178,27 +192,22 @@ def test_another_version_on_a_worker_is_named_and_nothing_is_written(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_scheduler_that_is_lost_in_the_middle(short: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    cluster = Cluster(tmp_path / "cluster", tmp_path / "nothing")
+def test_a_scheduler_that_is_lost_in_the_middle(
+    small_cluster: Cluster, short: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     stopped_s = []
 
     def kill_scheduler(progress: Progress) -> None:
         if not stopped_s:
-            kill(cluster.scheduler)
+            kill(small_cluster.scheduler)
             stopped_s.append(time.monotonic())
 
-    try:
-        cluster.add_worker()
-        cluster.wait_for_workers(1)
-        asked = (short, ["none", "random"], 200, 1)
-        with pytest.raises(WorkerError) as lost:
-            run_campaign(*asked, out=tmp_path / "out", scheduler=cluster.address, on_progress=kill_scheduler)
-        assert time.monotonic() < stopped_s[0] + 20.0  # Dask itself would go on for longer
-    finally:
-        cluster.stop()
-    line = (
-        rf"the connection to the scheduler {cluster.address} is lost; \d+ of 400 missions are done, and kept in \S+; "
-    )
+    asked = (short, ["none", "random"], 200, 1)
+    with pytest.raises(WorkerError) as lost:
+        run_campaign(*asked, out=tmp_path / "out", scheduler=small_cluster.address, on_progress=kill_scheduler)
+    assert time.monotonic() < stopped_s[0] + 20.0  # Dask itself would go on for longer
+    lost_it = rf"the connection to the scheduler {small_cluster.address} is lost"
+    line = rf"{lost_it}; \d+ of 400 missions are done, and kept in \S+; "
     assert re.fullmatch(rf"{line}suave-des campaign --resume \S+ does the rest", str(lost.value))
     assert capfd.readouterr().err == ""
     resume_campaign(tmp_path / "out")
