@@ -95,19 +95,6 @@ class Publishing:
     time_step_s: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Disturbance:
-    """What is wrong with a monitor.
-
-    Attributes:
-        error: draws the error of one measurement.
-        is_lost: whether the message at a mission time is not published.
-    """
-
-    error: Callable[[], float] = lambda: 0.0
-    is_lost: Callable[[float], bool] = lambda t_s: False
-
-
 def measure(
     key: str,
     signal: Signal,
@@ -183,7 +170,8 @@ class BatteryLevel:
         is_at_station: whether the vehicle is at the station at a mission time.
         discharge_time_s: time from full to empty.
         publishing: when it is measured.
-        disturbance: what is wrong with its monitor.
+        noise: draws the error of one measurement; none if measurements are exact.
+        is_lost: whether the message at a mission time is not published; none: all are.
         times_s, values: of what was published so far.
         recharges: how often the vehicle came to the station so far.
     """
@@ -193,7 +181,8 @@ class BatteryLevel:
     is_at_station: Callable[[float], bool]
     discharge_time_s: float
     publishing: Publishing
-    disturbance: Disturbance = Disturbance()
+    noise: Callable[[], float] | None = None
+    is_lost: Callable[[float], bool] | None = None
     times_s: list[float] = field(default_factory=list, init=False)
     values: list[float] = field(default_factory=list, init=False)
     recharges: int = field(default=0, init=False)
@@ -210,8 +199,8 @@ class BatteryLevel:
                 self._full_at_s = self._next_s
                 self.recharges += not self._was_at_station
             self._was_at_station = at_station
-            error = self.disturbance.error()
-            if not self.disturbance.is_lost(self._next_s):
+            error = 0.0 if self.noise is None else self.noise()
+            if self.is_lost is None or not self.is_lost(self._next_s):
                 self.times_s.append(self._next_s)
                 self.values.append(self._level(self._next_s) + error)
             self._next_s += self.publishing.period_s
@@ -236,9 +225,17 @@ class BatteryLevel:
         return region_of(self.values[published - 1], thresholds) if published else -1
 
     def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
-        """Time of the first level after t, which is now: what it will be depends on where the vehicle goes."""
-        self.published(t_s)
-        return self._next_s
+        """Time from which on a level after t, which is now, can be in another region; it depends on the vehicle's way.
+
+        The level falls, or is back at 1 at once. In the region that 1 is in, only falling leads to another one; to wait
+        until then takes a fifth less CPU time in a mission of bt_extended.
+        """
+        region = self.region(t_s, thresholds)
+        if self.noise is not None or region != region_of(1.0, thresholds):
+            return self._next_s
+        least = max([each for each in thresholds if each <= 1.0], default=-math.inf)
+        falls_s = (1.0 - least) * self.discharge_time_s
+        return max(self._next_s, self._full_at_s + falls_s - self.publishing.period_s)
 
 
 Measured = Measurements | BatteryLevel

@@ -27,7 +27,7 @@ from suave_des.metrics.reactions import ReactionMeter
 from suave_des.metrics.recording import Recorder
 from suave_des.metrics.result import MissionMetrics, MissionResult
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
-from suave_des.monitor.measurements import BatteryLevel, Disturbance, Measured, Measurements, Publishing, measure
+from suave_des.monitor.measurements import BatteryLevel, Measured, Measurements, Publishing, measure
 from suave_des.monitor.monitors import (
     LossyPublisher,
     ThrusterFault,
@@ -253,9 +253,9 @@ class MissionRun:
 
         period_s = battery.publishing_period_s
         publishing = Publishing(period_s, self._monitor_phase_s("battery_monitor", period_s))
-        error = self._chance.sampler("battery.noise", battery.noise)
-        disturbance = Disturbance(error, self._chance.loss("battery", battery) or Disturbance().is_lost)
-        return BatteryLevel(is_at_station, battery.discharge_time_s, publishing, disturbance)
+        noise = self._chance.sampler("battery.noise", battery.noise) if battery.noise != 0.0 else None
+        lost = self._chance.loss("battery", battery)
+        return BatteryLevel(is_at_station, battery.discharge_time_s, publishing, noise, lost)
 
     def _start_monitors(self) -> None:
         if self._bus.has_subscribers(Kind.QA_STATUS):  # to look values up, the measurements are enough

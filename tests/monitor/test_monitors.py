@@ -284,6 +284,20 @@ def test_a_level_may_cross_a_threshold_at_each_message_to_come() -> None:
     assert level.region(160.5, (0.25, 1.0)) == 3
 
 
+@given(
+    st.lists(st.sampled_from((-1.0, 0.0, 0.2475, 0.25, 0.5, 0.9975, 1.0, 1.25)), unique=True).map(sorted),
+    st.lists(st.integers(0, 250).map(lambda message: message + 0.5), min_size=1, max_size=4),
+    st.sampled_from((0.2, 1.2, 2.0, 40.0, 149.9, 152.0)),
+)
+def test_no_level_is_in_another_region_before_the_next_crossing(
+    thresholds: list[float], docked: list[float], later_s: float
+) -> None:
+    edges, plain, t_s = tuple(thresholds), battery(set(docked)), docked[0] + later_s
+    region, crossing_s = plain.region(t_s, edges), battery(set(docked)).next_crossing_s(t_s, edges)
+    messages = [message + 0.5 for message in range(500) if t_s < message + 0.5 < crossing_s]
+    assert all(plain.region(message, edges) == region for message in messages)
+
+
 # The bus
 
 
