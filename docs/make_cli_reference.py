@@ -73,7 +73,8 @@ class Parameter:
             )  # within Annotated the first one is there
             option = next((each for each in names if each.startswith("--")), f"--{parameter.name.replace('_', '-')}")
             self.written = option if kind is bool else f"{option} {value}"
-        default = "needed" if self.needed else f"`{parameter.default}`" if parameter.default else ""
+        has_default = parameter.default not in (None, "") and parameter.default is not False
+        default = "needed" if self.needed else f"`{parameter.default}`" if has_default else ""
         if isinstance(declared.show_default, str):
             default = declared.show_default
         self.row = f"| `{self.written}` | {default} | {declared.help} |"

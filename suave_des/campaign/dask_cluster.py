@@ -58,7 +58,7 @@ def check_scheduler(scheduler: str, workers: int) -> None:
     """
     if workers != 1:
         raise InputError(
-            f"workers: {workers} has no use with a scheduler, whose own workers run the missions",
+            f"workers: {workers} cannot be used with a scheduler, whose own workers run the missions",
             remedy="leave it out; `dask worker --nworkers N` says how many missions run there at a time",
         )
     found = _ADDRESS.fullmatch(scheduler)

@@ -39,7 +39,7 @@ def check_size(job: JobSpec, total: int, workers: int) -> None:
     expected_s = (time.perf_counter() - began_s) / len(few) * total / workers
     by = f"{workers} worker{'s' if workers > 1 else ''}"
     problem = f"{total:,} missions take about {_duration_text(expected_s)} with {by} on this machine"
-    raise InputError(problem, remedy="give --yes if that is meant")
+    raise InputError(problem, remedy="confirm with --yes")
 
 
 def _duration_text(seconds: float) -> str:

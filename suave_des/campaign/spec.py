@@ -101,7 +101,7 @@ def parse_until_ci(text: str) -> UntilCi:
         first, _, second = (name.strip() for name in f"{parts.pop(0)} ".partition(" - "))
         if not second or first == second or len(parts) != 2:
             example = f"metacontrol - bt: {SEARCH_TIME}: 2"
-            raise _wrong(text, "it is no difference of two managers", f"give A - B: METRIC: HALF_WIDTH, as {example}")
+            raise _wrong(text, "expected a difference of two managers", f"give A - B: METRIC: HALF_WIDTH, as {example}")
         pair = first, second
         text = ":".join(parts)
     name, colon, number = (part.strip() for part in text.partition(":"))

@@ -34,7 +34,7 @@ _Parameters = Annotated[
     typer.Option(
         "--parameters",
         metavar="FILE",
-        help="What is free, and within which bounds.",
+        help="Free parameters and their bounds.",
         show_default="the shipped file of the scenario's name, or seams2023; of several scenarios: shared",
     ),
 ]
@@ -67,8 +67,10 @@ def calibrate(
             min=2, help="Missions for each manager and set of values; of a campaign file, among all conditions."
         ),
     ] = 150,
-    evaluations: Annotated[int, typer.Option(min=1, help="Sets of values to try, about.")] = 500,
-    profile: Annotated[bool, typer.Option(help="Determine how sharply each parameter is known, too.")] = True,
+    evaluations: Annotated[int, typer.Option(min=1, help="Approximate number of parameter sets to evaluate.")] = 500,
+    profile: Annotated[
+        bool, typer.Option(help="Profile each parameter, to see how well the data determine it.")
+    ] = True,
     workers: Workers = 2,
     seed: Seed = 1,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder for the fit.")] = None,

@@ -65,13 +65,13 @@ class NewCampaign(OptionGroup):
     time_out: TimeOut = None
     format: Annotated[
         list[ResultFormat] | None,
-        typer.Option(
-            help="Write the exemplar's own files into DIR/suave, or runs.parquet, besides; repeat it for both."
-        ),
+        typer.Option(help="Also write the exemplar's own files into DIR/suave, or runs.parquet; repeat it for both."),
     ] = None
     record_knowledge: Annotated[
         bool,
-        typer.Option("--record-knowledge", help="Keep what managers reasoned about, in knowledge_states.jsonl."),
+        typer.Option(
+            "--record-knowledge", help="Record the knowledge states that managers analysed, in knowledge_states.jsonl."
+        ),
     ] = False
     overwrite: Overwrite = False
     manager_option: ManagerOptions = None
@@ -91,7 +91,7 @@ def campaign(
         Path | None, typer.Option(metavar="DIR", help="Folder for runs.csv, summary.csv and manifest.json.")
     ] = None,
     resume: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Go on with the campaign in this folder; --runs may add runs.")
+        Path | None, typer.Option(metavar="DIR", help="Continue the campaign in this folder; --runs may add runs.")
     ] = None,
     managers: Annotated[
         str | None,
@@ -105,16 +105,16 @@ def campaign(
         str | None,
         typer.Option(
             metavar="tcp://HOST:PORT",
-            help="Run missions on the workers of this Dask scheduler instead; the same bytes again.",
+            help="Run missions on the workers of this Dask scheduler; results are the same.",
         ),
     ] = None,
     until_ci: Annotated[
         str | None,
         typer.Option(
             metavar="METRIC:HALF_WIDTH",
-            help="Stop a manager when half the 95% interval of the metric's mean is less, after 20 runs at least, and"
-            " after --runs (then 10000 if left out) at most; for instance search_time_s:5. Stop all when the difference"
-            " of two is known, after 100 runs at least: 'metacontrol - bt: search_time_s: 2'.",
+            help="Stop a manager when the half-width of the 95% interval of its mean is below HALF_WIDTH, after 20 to"
+            " --runs missions (10000 if left out), as in search_time_s:5; or stop all when the difference of two"
+            " managers is known that well, after at least 100 runs, as in 'metacontrol - bt: search_time_s: 2'.",
         ),
     ] = None,
     quiet: Quiet = False,
@@ -122,7 +122,7 @@ def campaign(
         bool,
         typer.Option(
             "--yes",
-            help="More than a million missions are meant; with --resume: managers that DIR names may run.",
+            help="Confirm more than a million missions; with --resume: trust the managers that DIR names.",
         ),
     ] = False,
     *,
@@ -131,8 +131,8 @@ def campaign(
 ) -> None:
     """Run many missions and write their results.
 
-    A campaign file has all of it, with what is swept or drawn anew in each run; options take precedence over it.
-    What is done is kept while the campaign runs; after an interruption, --resume DIR does the rest.
+    A campaign file may hold all settings, with sweeps and values drawn in each run; options override it. Finished
+    missions are kept; after an interruption, --resume DIR runs those that are missing.
     """
     names = None if managers is None else comma_separated(managers)
     if resume is not None:

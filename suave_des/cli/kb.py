@@ -188,7 +188,7 @@ def _policy_summary(found: Policy) -> Iterator[str]:
     from suave_des.workbench.policy import no_proof
 
     kinds, most = len(found.cases), found.max_failed
-    yield f"{found.states} states of {kinds} kinds, with at most {most} components reporting"
+    yield f"{found.states} states in {kinds} equivalence classes, with at most {most} components reporting"
     for group in found.alike:
         if len(group) > 1:
             yield f"interchangeable, only their number counts: {', '.join(group)}"

@@ -28,19 +28,22 @@ class Format(StrEnum):
     JSON = "json"
 
 
-AsFormat = Annotated[Format, typer.Option("--format", help="Text to read, or JSON.")]
+AsFormat = Annotated[Format, typer.Option("--format", help="Output format: text or JSON.")]
 TimeLimitS = Annotated[
     float, typer.Option("--time-limit", metavar="S", min=0.01, help="Seconds that the reasoner may take for a state.")
 ]
 MaxFailed = Annotated[
-    int, typer.Option("--max-failed", min=0, metavar="N", help="At most so many components have failed or recovered.")
+    int,
+    typer.Option(
+        "--max-failed", min=0, metavar="N", help="Include states with up to N components failed or recovered."
+    ),
 ]
 ScenarioOption = Annotated[
     str,
     typer.Option(
         "--scenario",
         metavar="SCENARIO",
-        help="Scenario whose ontologies, values, measured attributes and revision count.",
+        help="Scenario that provides ontologies, values, measured attributes and revision.",
     ),
 ]
 

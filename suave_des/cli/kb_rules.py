@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 FOUND = 1
 """Exit status of `check` when there are findings that --fail-on names."""
-OwlFile = Annotated[Path, typer.Argument(metavar="FILE", help="An OWL file; FILE.bak keeps what it was before.")]
+OwlFile = Annotated[Path, typer.Argument(metavar="FILE", help="An OWL file; the previous version is kept as FILE.bak.")]
 RuleName = Annotated[str, typer.Argument(metavar="NAME", help="Name of a rule of the file.")]
 
 
@@ -42,9 +42,9 @@ def check(
     modes: Modes = None,
     shapes: Annotated[
         list[Path] | None,
-        typer.Option("--shapes", metavar="FILE", help="SHACL shapes in Turtle, besides the shipped ones."),
+        typer.Option("--shapes", metavar="FILE", help="Additional SHACL shapes, in Turtle."),
     ] = None,
-    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="The least level that makes the exit status 1.")] = (
+    fail_on: Annotated[FailOn, typer.Option("--fail-on", help="Lowest level that makes the exit status 1.")] = (
         FailOn.ERROR
     ),
     time_limit: TimeLimitS = 60.0,
@@ -173,7 +173,9 @@ def try_(
         ),
     ],
     rule: Annotated[str | None, typer.Argument(metavar="RULE", help='As "name: body -> head".')] = None,
-    disable: Annotated[str | None, typer.Option("--disable", metavar="NAME", help="Try to do without a rule.")] = None,
+    disable: Annotated[
+        str | None, typer.Option("--disable", metavar="NAME", help="Evaluate without this rule.")
+    ] = None,
     form: AsFormat = Format.TEXT,
 ) -> None:
     """Show when a rule would have fired in recorded missions, and which decisions would have been different.

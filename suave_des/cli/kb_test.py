@@ -58,10 +58,12 @@ def test(
     ] = False,
     mutate: Annotated[
         bool,
-        typer.Option("--mutate", help="Change rules and data by small mistakes, and see which ones no test notices."),
+        typer.Option(
+            "--mutate", help="Mutation testing: seed small faults in rules and data; report those that no test detects."
+        ),
     ] = False,
     mutants: Annotated[
-        int | None, typer.Option("--mutants", min=1, metavar="N", help="So many mutants, instead of all.")
+        int | None, typer.Option("--mutants", min=1, metavar="N", help="Maximum number of mutants; all if left out.")
     ] = None,
     only: Annotated[
         list[str] | None,

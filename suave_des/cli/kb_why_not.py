@@ -44,7 +44,8 @@ def why_not(
         list[str] | None, typer.Argument(metavar="RULE", help="Names of rules; left out: all that do not fire.")
     ] = None,
     facts: Annotated[
-        list[str] | None, typer.Option("--fact", metavar="FACT", help='Assert besides, such as "Binding(b1)".')
+        list[str] | None,
+        typer.Option("--fact", metavar="FACT", help='Additional fact to assert, such as "Binding(b1)".'),
     ] = None,
     time_limit: TimeLimitS = 60.0,
     form: AsFormat = Format.TEXT,

@@ -41,6 +41,7 @@ def run(
     files: Files,
 ) -> None:
     """Run one mission and print its timeline."""
+    from suave_des.campaign.output import FAMILIES
     from suave_des.campaign.single import run_mission
     from suave_des.cli.console import errors, mission_status, output, print_timeline
 
@@ -61,18 +62,19 @@ def run(
     console = output()
     print_timeline(console, result)
     if out is not None:
-        console.print(f"\nmission.json, events.csv and trajectory.csv are in {out}", soft_wrap=True)
+        *others, last = (name for name in FAMILIES["mission"] if (out / name).exists())
+        console.print(f"\n{', '.join(others)} and {last} are in {out}", soft_wrap=True)
 
 
 @grouped_options
 def train(
     manager: Annotated[str, typer.Argument(metavar="MODULE:CLASS", help="The manager.")],
-    missions: Annotated[int, typer.Option(help="How many missions: runs 1 to that, in order.")],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="File for what is learned.")],
-    scenario: Annotated[str, typer.Option(metavar="SCENARIO", help="To be trained on.")] = "seams2023",
-    seed: Annotated[int, typer.Option(help="Seed; not that of the campaign that judges it.")] = 0,
+    missions: Annotated[int, typer.Option(help="Number of training missions: runs 1 to NUMBER, in order.")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="File for what the manager has learned.")],
+    scenario: Annotated[str, typer.Option(metavar="SCENARIO", help="Scenario to train on.")] = "seams2023",
+    seed: Annotated[int, typer.Option(help="Training seed; use another for the campaign that evaluates.")] = 0,
     start: Annotated[
-        Path | None, typer.Option("--from", metavar="FILE", help="File of an earlier training, to go on from.")
+        Path | None, typer.Option("--from", metavar="FILE", help="Continue from the file of an earlier training.")
     ] = None,
     overwrite: Overwrite = False,
     manager_option: ManagerOptions = None,
@@ -107,12 +109,12 @@ def train(
 @grouped_options
 def serve(
     scenario: Scenario,
-    host: Annotated[str, typer.Option(help="Address to listen at; the default is this machine alone.")] = ("127.0.0.1"),
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0 for any.")] = 3000,
+    host: Annotated[str, typer.Option(help="Address to listen on.")] = ("127.0.0.1"),
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 for any free one.")] = 3000,
     run_number: Annotated[int, typer.Option("--run", metavar="K", help="Run of the first mission.")] = 1,
     seed: Seed = 1,
     real_time_factor: Annotated[
-        float, typer.Option(metavar="X", help="Mission time per second; 0: it passes only when a client says so.")
+        float, typer.Option(metavar="X", help="Mission seconds per wall-clock second; 0: advance only on request.")
     ] = 0.0,
     *,
     files: Files,

@@ -35,29 +35,27 @@ Reasoner = Annotated[
 ]
 RuleFiles = Annotated[
     list[Path] | None,
-    typer.Option("--rules", metavar="FILE", help="Rules as text besides the ontologies; repeat it for several files."),
+    typer.Option("--rules", metavar="FILE", help="Rule file to add to the ontologies; repeat it for several files."),
 ]
 DisabledRules = Annotated[
     list[str] | None,
-    typer.Option("--disable-rule", metavar="NAME", help="Switch a rule off for this time; repeat it for several."),
+    typer.Option("--disable-rule", metavar="NAME", help="Disable a rule; repeat it for several."),
 ]
 SetValues = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", metavar="KEY=VALUE", help="Value of the scenario, such as mission.time_limit_s=400; repeat it."
+        "--set", metavar="KEY=VALUE", help="Override a scenario value, such as mission.time_limit_s=400; repeat it."
     ),
 ]
-Seed = Annotated[int, typer.Option("--seed", help="Seed of everything that is random.")]
-SeedIfNew = Annotated[int | None, typer.Option("--seed", help="Seed of everything that is random.", show_default="1")]
+Seed = Annotated[int, typer.Option("--seed", help="Random seed.")]
+SeedIfNew = Annotated[int | None, typer.Option("--seed", help="Random seed.", show_default="1")]
 """For commands that may go on from results, which have a seed already."""
-Workers = Annotated[
-    int, typer.Option("--workers", help="Processes that run missions; any number gives the same bytes.")
-]
+Workers = Annotated[int, typer.Option("--workers", help="Worker processes; results do not depend on the number.")]
 CampaignWorkers = Annotated[
     int | None,
     typer.Option(
         "--workers",
-        help="Processes that run missions; any number gives the same bytes.",
+        help="Worker processes; results do not depend on the number.",
         show_default="2, or 1 for few missions",
     ),
 ]
@@ -66,14 +64,12 @@ TimeOut = Annotated[
     typer.Option(
         "--time-out",
         metavar="SECONDS",
-        help="Real time that a mission may take.",
+        help="Wall-clock limit for a mission.",
         show_default="120; with the reasoner owlready2 1800",
     ),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress.")]
-Overwrite = Annotated[
-    bool, typer.Option("--overwrite", help="Replace results of the same kind that are in the output folder already.")
-]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace results of the same kind in the output folder.")]
 
 
 @dataclass(frozen=True)
@@ -136,11 +132,11 @@ def _is_given(value: object) -> bool:
 
 
 def check_no_use(options: Mapping[str, object], where: str, remedy: str = "leave it out") -> None:
-    """See that no option is given that a command cannot heed as it is called.
+    """Check that no option is given that has no effect in this use of the command.
 
     Args:
         options: values by name, such as those of `Files.given`.
-        where: in which use of the command they cannot be heeded, such as "with --resume".
+        where: the use of the command, such as "with --resume".
         remedy: what to do instead.
 
     Raises:
@@ -150,7 +146,7 @@ def check_no_use(options: Mapping[str, object], where: str, remedy: str = "leave
 
     for option, value in options.items():
         if _is_given(value):
-            raise InputError(f"{option} has no use {where}", remedy=remedy)
+            raise InputError(f"{option} cannot be used {where}", remedy=remedy)
 
 
 def comma_separated(names: str | None) -> tuple[str, ...]:

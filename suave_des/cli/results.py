@@ -56,7 +56,7 @@ def compare(
         ),
     ] = None,
     unpaired: Annotated[
-        bool, typer.Option("--unpaired", help="Take runs as independent though they share random numbers.")
+        bool, typer.Option("--unpaired", help="Treat runs as independent although they share random numbers.")
     ] = False,
     as_format: Annotated[CompareFormat, typer.Option("--format", help="What to print.")] = CompareFormat.TABLE,
     out: Annotated[

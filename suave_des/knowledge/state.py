@@ -103,10 +103,10 @@ class KnowledgeState:
     def __str__(self) -> str:
         """As messages show it, on one line."""
         parts = [
-            *(f"{each.function} asked for" + (f" ({each.status})" if each.status else "") for each in self.objectives),
+            *(f"objective {each.function}" + (f" ({each.status})" if each.status else "") for each in self.objectives),
             *(f"{name} = {value}" for name, value in (*self.groundings, *self.components, *self.measurements)),
         ]
-        return ", ".join(parts) or "with nothing in it"
+        return ", ".join(parts) or "the empty state"
 
     def grounded(self, function: str) -> str | None:
         """The function design now in use for a function."""

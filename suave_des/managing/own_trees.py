@@ -66,7 +66,9 @@ class PyTreesManager(FunctionsManager):
                 raise RuntimeError(f"{problem}, the last one {behaviour.name!r}")
         if not self.system.recorded:
             return
-        ticked = "; ".join(f"{each.name} {each.status.name.lower()}" for each in self.root.iterate() if _tells(each))
+        ticked = "; ".join(
+            f"{each.name} {each.status.name.lower()}" for each in self.root.iterate() if _is_ticked_leaf(each)
+        )
         if ticked != self._noted:
             self._noted = ticked
             self.system.log("tick", ticked)
@@ -77,7 +79,7 @@ class PyTreesManager(FunctionsManager):
         return text.rstrip("\n")
 
 
-def _tells(behaviour: Behaviour) -> bool:
+def _is_ticked_leaf(behaviour: Behaviour) -> bool:
     """Whether a behaviour was ticked, and is not made of others."""
     return not behaviour.children and behaviour.status != Status.INVALID
 

@@ -122,7 +122,7 @@ def chosen_metrics(wanted: Sequence[str], groups: Sequence[Group]) -> tuple[Comp
     for name in wanted:
         if name not in KNOWN:
             remedy = did_you_mean(name, KNOWN, "there are")
-            raise InputError(f"{shown(name)} is no metric", place="metrics", remedy=remedy)
+            raise InputError(f"there is no metric {shown(name)}", place="metrics", remedy=remedy)
         if not _is_there(name, groups):
             raise InputError(f"no mission has a value of {name}", place="metrics", remedy="leave it out")
     names = wanted or [name for name in _DEFAULTS if _is_there(name, groups)]

@@ -119,7 +119,7 @@ def _parsed(text: str) -> Atom:
     except RuleError as error:
         if text.count("(") > text.count(")"):
             remedy = "in a YAML list in brackets a fact needs quotes, because of its comma"
-            raise InputError(f"{shown(text)} is half a fact", remedy=remedy) from None
+            raise InputError(f"{shown(text)} is an incomplete fact", remedy=remedy) from None
         remedy = error.remedy or "write it as an atom of a rule: fg_status(fg_spiral_high, IN_ERROR_NFR)"
         raise InputError(f"{shown(text)} is not a fact: {error.problem}", remedy=remedy) from None
     if len(rule.head) != 1:

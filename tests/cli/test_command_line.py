@@ -109,8 +109,8 @@ class TestResume:
     @pytest.mark.parametrize(
         ("arguments", "words"),
         [
-            (("--resume", "out", "--seed", "0"), "--seed has no use with --resume"),
-            (("seams2023", "--resume", "out"), "SCENARIO has no use with --resume"),
+            (("--resume", "out", "--seed", "0"), "--seed cannot be used with --resume"),
+            (("seams2023", "--resume", "out"), "SCENARIO cannot be used with --resume"),
             (("--resume", "nowhere"), "nowhere: there is no campaign to resume"),
             (("seams2023",), "--out DIR is missing"),
             (("--out", "out"), "SCENARIO is missing"),

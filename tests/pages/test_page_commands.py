@@ -85,7 +85,7 @@ def test_two_missions_are_written_side_by_side(mission, tmp_path, capsys):
     [
         ((), "nothing to play is given"),
         (("gone",), "no such folder"),
-        (("{mission}", "--seed", "3"), "--seed has no use with DIR"),
+        (("{mission}", "--seed", "3"), "--seed cannot be used with DIR"),
         (("{mission}", "--scenario", "seams2023"), "both DIR and --scenario"),
         (("{campaign}", "--run", "9"), "it has runs 1 to 2"),
         (("{campaign}", "--managers", "bd"), "its managers: none, bt"),

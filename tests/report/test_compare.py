@@ -264,7 +264,7 @@ def test_a_significant_difference_of_ranks_against_that_of_means_is_told() -> No
     ("choices", "words"),
     [
         (Choices(managers=["nonne"]), "no mission of 'nonne' .*did you mean 'none'"),
-        (Choices(metrics=["search_time"]), "'search_time' is no metric .*did you mean 'search_time_s'"),
+        (Choices(metrics=["search_time"]), "there is no metric 'search_time' .*did you mean 'search_time_s'"),
         (Choices(against="bt"), "nothing is called 'bt'"),
         (Choices(by=["visibility"]), "'visibility' is not what a sweep varies"),
         (Choices(half_widths=["search_time_s"]), "has no half-width .*search_time_s:2"),

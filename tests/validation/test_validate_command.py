@@ -131,7 +131,7 @@ def test_other_data_without_a_file_of_shares_has_no_cluster_targets(validate, tm
         (["--runs-file", "missing.csv"], "missing.csv: no such file"),
         (["--runs-file", "other.csv"], "other.csv: has no mission of manager 'none'"),
         (["release15", "--runs-file", "scenario.csv"], "scenario.csv: line 2: has missions of scenario seams2023"),
-        (["--runs-file", "scenario.csv", "--reasoner", "pellet"], "--reasoner has no use with --runs-file"),
+        (["--runs-file", "scenario.csv", "--reasoner", "pellet"], "--reasoner cannot be used with --runs-file"),
         (["no_such_scenario"], "no_such_scenario"),
         (["--runs-file", str(DATA), "--out", "full"], "full: the output folder is not empty"),
         (["--runs", "1", "--out", "full"], "full: the output folder is not empty"),

@@ -166,7 +166,7 @@ class TestReader:
             place = ("changes", function)
             sides = words.split("->") if isinstance(words, str) else ()
             if len(sides) != 2:
-                raise self.error(f"{shown(words)} says of no change", place, example)
+                raise self.error(f"expected a change, BEFORE -> AFTER, got {shown(words)}", place, example)
             before, after = (self._choice(function, side, place) for side in sides)
             yield function, before, after
 
