@@ -15,7 +15,7 @@ from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.measurements import BatteryLevel, Measured
 from suave_des.scenario.models import FURTHER_METRICS, Requirement, Scenario
 from suave_des.scenario.modes import Mode
-from suave_des.vehicle.vehicle import Vehicle, row_at
+from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at
 from suave_des.world.coverage import covered_area_m2
 
 MetricValue = float | int | None
@@ -127,9 +127,8 @@ class FurtherMetrics:
 
 def measured_at_rows(times_s: Sequence[float], values: Sequence[float], rows: int) -> Array:
     """The value measured last at each row of a track, shape (rows,); nan before the first."""
-    since_rows = [row_at(t_s) for t_s in times_s]
-    places = np.searchsorted(since_rows, np.arange(rows), side="right")
-    return np.append(np.nan, values)[places]
+    since_rows = np.minimum(np.rint(np.array(times_s) / STEP_S), rows).astype(np.int64)  # rounded as Vehicle does
+    return np.repeat(np.append(np.nan, values), np.diff(since_rows, prepend=0, append=rows))
 
 
 def fulfilments(
