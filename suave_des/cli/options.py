@@ -31,7 +31,7 @@ Modes = Annotated[
     Path | None, typer.Option("--modes", metavar="FILE", help="System Modes file in place of the scenario's.")
 ]
 Reasoner = Annotated[
-    str | None, typer.Option("--reasoner", metavar="NAME", help="remembered, pellet, or owlready2 (slow).")
+    str | None, typer.Option("--reasoner", metavar="NAME", help="cached, pellet, or owlready2 (slow).")
 ]
 RuleFiles = Annotated[
     list[Path] | None,

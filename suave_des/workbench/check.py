@@ -218,7 +218,7 @@ def _ask_pellet(subject: Subject, before: Sequence[Finding]) -> Iterator[Finding
         yield Finding(Level.INFO, f"inferences are cached for equal measured values only, which is slower: {reason}")
     try:
         # What is in its cache has been asked with this very knowledge base, without a contradiction or a dropped rule.
-        pellet = make_reasoner("remembered", base, TimeLimit(subject.time_limit_s, "--time-limit"))
+        pellet = make_reasoner("cached", base, TimeLimit(subject.time_limit_s, "--time-limit"))
         states = tuple(islice(simple_states(base), MAX_STATES)) or (KnowledgeState(),)
         abandoned = times_abandoned()
         try:

@@ -20,7 +20,7 @@ from tests.helpers.knowledge_states import SEARCH, searching
 
 
 def test_an_unknown_reasoner_is_told_with_those_known(kb: Ontology) -> None:
-    with pytest.raises(InputError, match=r"there is no reasoner 'hermit' \(one of owlready2, pellet, remembered\)"):
+    with pytest.raises(InputError, match=r"there is no reasoner 'hermit' \(one of cached, owlready2, pellet\)"):
         make_reasoner("hermit", kb)
     assert all(make_reasoner(name, kb).name == name for name in BACKENDS)
 

@@ -248,7 +248,7 @@ def refused(write, content: str, **options: object) -> InputError:
             HEAD + "knowledge:\n  reasoner: pelet\n",
             "line 3, knowledge.reasoner",
             "'pelet' is not allowed",
-            "did you mean 'pellet'? allowed: remembered, pellet, owlready2",
+            "did you mean 'pellet'? allowed: cached, pellet, owlready2",
         ),
         (HEAD + "knowledge: {ontologies: []}\n", "line 2, knowledge.ontologies", "has 0 entries", "at least 1"),
         # revisions
@@ -513,7 +513,7 @@ def test_a_missing_ontology_or_modes_file_of_the_command_line_is_named(write):
 def test_an_unknown_reasoner_of_the_command_line_is_refused_before_anything_is_opened(write):
     error = refused(write, HEAD, reasoner="pelet")
     assert str(error) == (
-        "--reasoner: there is no reasoner 'pelet' (did you mean 'pellet'? known: remembered, pellet, owlready2)"
+        "--reasoner: there is no reasoner 'pelet' (did you mean 'pellet'? known: cached, pellet, owlready2)"
     )
 
 

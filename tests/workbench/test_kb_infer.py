@@ -160,7 +160,7 @@ class TestTimeLimit:
             reasoner.infer(bench.state())
         released.set()
 
-    @pytest.mark.parametrize("reasoner", ["remembered", "owlready2"])
+    @pytest.mark.parametrize("reasoner", ["cached", "owlready2"])
     def test_holds_for_a_mission_too(self, tmp_path, reasoner):
         rules = tmp_path / "explosion.swrl"
         rules.write_text(EXPLOSION)

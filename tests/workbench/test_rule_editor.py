@@ -125,7 +125,7 @@ def test_an_added_rule_infers_what_it_does_as_text(owl: Path, tmp_path: Path) ->
     assert make_reasoner("pellet", Ontology.load([owl])).infer(state).facts == as_text.facts
     assert as_text.values("fd_spiral_low", "fd_error_log") == ("o_generate_search_path",)
     set_enabled(owl, "Battery", enabled=False)
-    for backend in ("pellet", "remembered"):
+    for backend in ("pellet", "cached"):
         assert not make_reasoner(backend, Ontology.load([owl])).infer(state).facts
 
 

@@ -130,7 +130,7 @@ class _Original:
 
     @cached_property
     def _reasoner(self) -> Reasoner:
-        return make_reasoner("remembered", self.bench.base, self.bench.limit)
+        return make_reasoner("cached", self.bench.base, self.bench.limit)
 
     def outcome(self, base: Ontology, known: frozenset[Fact], situation: Situation) -> Outcome:
         """The outcome in a knowledge base with perhaps other data, from which the same is inferred.

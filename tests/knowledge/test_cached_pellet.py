@@ -126,14 +126,14 @@ def moved(draw: random.Random, kb: Ontology, state: KnowledgeState) -> Knowledge
 @pytest.mark.parametrize("name", ONTOLOGIES)
 @settings(max_examples=25)
 @given(data=st.data(), seed=st.integers(0, 2**32))
-def test_remembered_and_pellet_agree_around_thresholds(name: str, data: st.DataObject, seed: int) -> None:
-    kb, pellet, remembered = loaded(name)
+def test_cached_pellet_and_pellet_agree_around_thresholds(name: str, data: st.DataObject, seed: int) -> None:
+    kb, pellet, cached = loaded(name)
     state = data.draw(states(kb))
-    assert outcome(remembered, state) == outcome(pellet, state)
+    assert outcome(cached, state) == outcome(pellet, state)
     twin = moved(random.Random(seed), kb, state)
-    if remembered.regions.is_sound:
-        assert remembered.regions.key(twin) == remembered.regions.key(state)
-    found, wanted = outcome(remembered, twin), outcome(pellet, twin)
+    if cached.regions.is_sound:
+        assert cached.regions.key(twin) == cached.regions.key(state)
+    found, wanted = outcome(cached, twin), outcome(pellet, twin)
     assert found == wanted
     if isinstance(found, Inference) and isinstance(wanted, Inference):
         assert (found.state, found.asserted) == (twin, wanted.asserted)
@@ -144,7 +144,7 @@ def test_remembered_and_pellet_agree_around_thresholds(name: str, data: st.DataO
 )
 @pytest.mark.parametrize("name", [name for name in ONTOLOGIES if name != "shipped"])
 def test_stock_owlready2_agrees(name: str, visibility: str, battery: str) -> None:
-    kb, pellet, remembered = loaded(name)
+    kb, pellet, cached = loaded(name)
     draw = random.Random(name)
     stock = make_reasoner("owlready2", kb)
     state = searching(draw.choice(kb.designs(SEARCH)), visibility)
@@ -153,7 +153,7 @@ def test_stock_owlready2_agrees(name: str, visibility: str, battery: str) -> Non
         groundings=dict(state.groundings),
         measurements={"water_visibility": visibility, "battery_level": battery},
     )
-    assert outcome(stock, state) == outcome(pellet, state) == outcome(remembered, state)
+    assert outcome(stock, state) == outcome(pellet, state) == outcome(cached, state)
 
 
 @given(
@@ -214,19 +214,19 @@ STATES = [searching(f"fd_spiral_{name}", value) for name in ("low", "high") for 
 
 @pytest.fixture
 def filled(kb: Ontology, tmp_path: Path) -> Path:
-    remembered = CachedPellet(kb, tmp_path)
+    cached = CachedPellet(kb, tmp_path)
     for state in STATES:
-        remembered.infer(state)
-    (file,) = (tmp_path / "memory").iterdir()
+        cached.infer(state)
+    (file,) = (tmp_path / "inferences").iterdir()
     return file
 
 
 def test_a_filled_memory_asks_nobody(kb: Ontology, pellet: Reasoner, filled: Path, no_pellet: None) -> None:
-    remembered = CachedPellet(kb, filled.parent.parent)
+    cached = CachedPellet(kb, filled.parent.parent)
     for state in [*STATES, searching("fd_spiral_high", "2.1234")]:
-        assert remembered.infer(state) == pellet.infer(state)
+        assert cached.infer(state) == pellet.infer(state)
     with pytest.raises(AssertionError, match="asked"):
-        remembered.infer(searching("fd_spiral_medium", "1.0"))
+        cached.infer(searching("fd_spiral_medium", "1.0"))
 
 
 def test_another_knowledge_base_does_not_use_it(filled: Path, tmp_path: Path, kb: Ontology) -> None:
@@ -253,12 +253,12 @@ def test_damaged_entries_are_left_out_and_the_file_is_mended(kb: Ontology, fille
 
 
 @pytest.mark.parametrize(
-    "content", [b"", b"\x80\x04pickled", b"suave-des memory 1 other\n" + b"x" * 24 + b" [[],[]]\n"]
+    "content", [b"", b"\x80\x04pickled", b"suave-des inferences 1 other\n" + b"x" * 24 + b" [[],[]]\n"]
 )
 def test_a_foreign_file_is_rebuilt(kb: Ontology, filled: Path, content: bytes) -> None:
     filled.write_bytes(content)
-    remembered = CachedPellet(kb, filled.parent.parent)
-    remembered.infer(STATES[0])
+    cached = CachedPellet(kb, filled.parent.parent)
+    cached.infer(STATES[0])
     assert len(InferenceCache(cache_digest(kb), filled.parent.parent).load()) == 1
 
 
@@ -276,8 +276,8 @@ def test_random_bytes_never_break_the_memory(kb: Ontology, filled: Path) -> None
 
 def test_a_folder_that_cannot_be_written_is_no_obstacle(kb: Ontology, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("not a folder", encoding="utf-8")
-    remembered = CachedPellet(kb, tmp_path / "file")
-    assert remembered.infer(STATES[0]).grounding_status(SEARCH) == "IN_ERROR_NFR"
+    cached = CachedPellet(kb, tmp_path / "file")
+    assert cached.infer(STATES[0]).grounding_status(SEARCH) == "IN_ERROR_NFR"
 
 
 def _add_many(folder: str, digest: str, number: int) -> None:
@@ -294,22 +294,22 @@ def test_several_processes_share_a_file(tmp_path: Path) -> None:
 
 
 def test_a_contradiction_is_told_for_each_state_with_its_own_values(kb: Ontology, tmp_path: Path) -> None:
-    remembered = CachedPellet(kb, tmp_path)
+    cached = CachedPellet(kb, tmp_path)
     for _ in range(2):
         with pytest.raises(KnowledgeError, match="o_status"):
-            remembered.infer(searching("fd_spiral_high", "1.0", status="UNGROUNDED"))
-    assert not (tmp_path / "memory").exists()
+            cached.infer(searching("fd_spiral_high", "1.0", status="UNGROUNDED"))
+    assert not (tmp_path / "inferences").exists()
 
 
 @pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 0, 2)])
 def test_a_value_on_a_threshold_is_not_one_beside_it(order: tuple[int, int, int], tmp_path: Path) -> None:
     # fd_spiral_high expects 3.25 m; the rule QAWaterVisibility says less than that is an error, so 3.25 itself is none.
     kb = Ontology.load()
-    remembered = CachedPellet(kb, tmp_path)
+    cached = CachedPellet(kb, tmp_path)
     cases = [("3.2499", "IN_ERROR_NFR"), ("3.25", None), ("3.2501", None)]
     for place in order:
         value, status = cases[place]
-        inference = remembered.infer(searching("fd_spiral_high", value))
+        inference = cached.infer(searching("fd_spiral_high", value))
         assert inference.grounding_status(SEARCH) == status, value
 
 
@@ -319,10 +319,10 @@ def test_a_rule_for_a_threshold_alone_holds_on_it_alone(order: tuple[int, int, i
         "Level: isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ equal(?v, 3.25) -> Binding(?q)\n"
     )
     kb = Ontology.load(rules=[tmp_path / "equal.swrl"])
-    remembered = CachedPellet(kb, tmp_path)
+    cached = CachedPellet(kb, tmp_path)
     for place in order:
         value = ("3.2499", "3.25", "3.2501")[place]
-        facts = remembered.infer(searching("fd_spiral_high", value)).facts
+        facts = cached.infer(searching("fd_spiral_high", value)).facts
         assert ("Binding(obs_water_visibility)" in map(str, facts)) == (value == "3.25"), value
 
 
