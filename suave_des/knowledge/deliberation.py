@@ -27,7 +27,6 @@ class Conclusion:
     Attributes:
         inference: what the reasoner added to the state.
         plan: decisions for the objectives to adapt.
-        statuses: inferred statuses of objectives and groundings, as text for events.
     """
 
     inference: Inference

@@ -33,7 +33,6 @@ class MissionCoordinator:
     Attributes:
         ended: the event of the mission's end: the time limit, or the end of the path.
         search_time_s: whole seconds until the pipeline was found, as the revision counts them; none while it is not.
-        distance_inspected_m: distance inspected, as it was published last before the mission's end.
         task: the task that is carried out, if there is one.
         lasting_functions: functions that are needed from launch to the end, and belong to no task.
     """
@@ -46,7 +45,7 @@ class MissionCoordinator:
     follow: FollowPipeline
     log: Log
     search_time_s: float | None = None
-    distance_inspected_m: float = 0.0
+    _inspected_m: float | None = None  # at the mission's end
     task: Task | None = None
 
     def __post_init__(self) -> None:
@@ -55,6 +54,11 @@ class MissionCoordinator:
         self.lasting_functions = (*(() if per_task else (MAINTAIN_MOTION,)), *self.functions.lasting)
         self._search = Task("search_pipeline", (*per_task, GENERATE_SEARCH_PATH, *self.functions.search_pipeline))
         self._inspect = Task("inspect_pipeline", (*per_task, FOLLOW_PIPELINE, *self.functions.inspect_pipeline))
+
+    @property
+    def distance_inspected_m(self) -> float:
+        """Distance inspected, as it was published last: until now, or before the mission's end."""
+        return self.follow.distance_m if self._inspected_m is None else self._inspected_m
 
     def start(self, request: Callable[[Task], None], cancel: Callable[[Task], None]) -> None:
         """Start the mission, which calls these to request and to cancel its tasks."""
@@ -139,7 +143,7 @@ class MissionCoordinator:
     def _finish(self, why: str) -> None:
         if not self.ended.triggered:
             # What the cancellation of the present task brings about comes too late for the metric.
-            self.distance_inspected_m = self.follow.distance_m
+            self._inspected_m = self.follow.distance_m
             self._end("task_cancelled")
             self.log("coordinator", "mission_ended", why)
             self.ended.succeed()

@@ -12,9 +12,9 @@ from suave_des.vehicle.vehicle import STEP_S, Vehicle
 from suave_des.world.pipeline import first_detection
 
 _FEWEST_ROWS = 22
-"""How far to look at least; else as far as guidance has looked. Where that ends, the set-point mostly changes."""
+"""Minimum look-ahead; beyond it, as far as guidance has computed. There the set-point usually changes."""
 _AFTER_CONTROL_S = 0.6 * STEP_S
-"""From there to looking on, which is not needed if control changes: after what is rounded to the same row."""
+"""Delay past the last checked row before looking on: a control change that rounds to that row comes first."""
 
 
 @dataclass(eq=False)

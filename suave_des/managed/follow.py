@@ -51,7 +51,7 @@ class FollowPipeline(FunctionNode, WaypointSource):
 
     Attributes:
         path: gives the path to inspect; NO_PATH while the pipeline is not detected.
-        finished: the event that the last point of the path is reached.
+        finished: triggered when the last point of the path is reached.
     """
 
     sender: SetPointSender
@@ -99,7 +99,8 @@ class FollowPipeline(FunctionNode, WaypointSource):
 
     def _arrival_check(self, began_s: float) -> ArrivalCheck:
         period_s, width_m = self.revision.poll_period_s, self.revision.acceptance_m
-        # Without it the counter of polls starts anew by sending again; with it, it is above the limit from then on.
+        # Otherwise the poll counter restarts with each resend; here it stays above the limit, so every later poll
+        # resends.
         polls = self.revision.polls_before_resending
         waits = (polls + 1, 1) if self.revision.resends_at_each_poll else (polls, polls)
         return ArrivalCheck(began_s, period_s, width_m, math.inf, 0, *waits)

@@ -52,7 +52,7 @@ class ModeManager:
         return self._requested.get(function)
 
     def task_over(self, functions: Iterable[str]) -> None:
-        """Take the end of the functions' task: changes do not count as adaptations until they are active again."""
+        """The functions' task has ended: mode changes do not count as adaptations until they are active again."""
         self._in_use.difference_update(functions)
 
     def change_mode(self, function: str, mode: str, latency_s: float | None = None) -> bool:

@@ -18,14 +18,14 @@ class MaintainMotion(FunctionNode):
 
     Attributes:
         delay_s: draws the time from the activation to the recovery of the first thruster.
-        lost_for_good: thrusters that cannot be restored; they are left out, and nothing is reported of them.
+        unrecoverable: thrusters that cannot be restored; they are left out, and nothing is reported of them.
     """
 
     bus: DiagnosticsBus
     revision: RecoveryRevision
     set_health: Callable[[float, int, float], None]
     delay_s: Callable[[], float]
-    lost_for_good: Collection[int] = ()
+    unrecoverable: Collection[int] = ()
     _recovery: simpy.Process | None = field(default=None, init=False)
 
     def activated(self) -> None:
@@ -43,7 +43,7 @@ class MaintainMotion(FunctionNode):
         try:
             yield self.env.timeout(self.delay_s())
             for thruster in range(1, THRUSTERS + 1):
-                if thruster not in self.lost_for_good:
+                if thruster not in self.unrecoverable:
                     self.set_health(self.env.now, thruster, 1.0)
                     name = thruster_name(thruster)
                     self.bus.publish(Diagnostic(self.env.now, Kind.COMPONENT_STATUS, name, RECOVERED))

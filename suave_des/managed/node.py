@@ -28,10 +28,13 @@ class FunctionNode:
             self.configure(mode)
         if mode.active != self.active:
             self.active = mode.active
-            (self.activated if mode.active else self.deactivated)()
+            if mode.active:
+                self.activated()
+            else:
+                self.deactivated()
 
     def configure(self, mode: Mode) -> None:
-        """Take the mode's parameters; called before the activation that the mode brings, too."""
+        """Apply the mode's parameters; also called before an activation."""
 
     def activated(self) -> None:
         """Start the function's activity."""

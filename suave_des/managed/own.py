@@ -81,7 +81,7 @@ class OwnFunction(FunctionNode):
             raise FunctionError(f"function {self.context.name}: {type(error).__name__}: {error}") from error
 
     def configure(self, mode: Mode) -> None:
-        """Take the mode's parameters, `mode.parameters`; called before the activation that the mode brings, too."""
+        """Apply the mode's parameters, `mode.parameters`; also called before an activation."""
 
     def activated(self) -> None:
         """Start the function's activity."""

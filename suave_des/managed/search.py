@@ -79,7 +79,7 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         self._present: Array | None = None  # way-point, none before the first
 
     def configure(self, mode: Mode) -> None:
-        """Take the mode's spiral_altitude; the spiral itself goes on."""
+        """Apply the mode's spiral_altitude; the spiral itself goes on."""
         altitude = mode.parameters.get("spiral_altitude")
         if altitude is not None and altitude != self.altitude_m:
             self._guidance.catch_up()
@@ -140,8 +140,8 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         return waypoints
 
     def _arrival_check(self, began_s: float) -> ArrivalCheck:
-        # The exemplar sends again when its counter of waits is above 10. It sets the counter to 0 by sending; by
-        # sending again, it counts in the same tick.
+        # The exemplar resends when its wait counter exceeds 10. Sending resets the counter; a resend also counts in
+        # the same tick, hence one tick less.
         node = self.revision
         first, again = node.ticks_before_resending + 2, node.ticks_before_resending + 1
         return ArrivalCheck(began_s, node.tick_period_s, node.acceptance_m, node.acceptance_m, 1, first, again)

@@ -21,7 +21,7 @@ class Surface(FunctionNode):
     """The surface function: while active, the set-point is above the place of activation, sent again every 10 s.
 
     Attributes:
-        surfaced: the event that the vehicle is at the surface; it is looked at twice a second.
+        surfaced: triggered when the vehicle is at the surface, which is checked twice a second.
     """
 
     sender: SetPointSender

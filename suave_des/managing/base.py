@@ -40,7 +40,7 @@ def _unknown(*_: object) -> Any:
 
 @dataclass(frozen=True)
 class ManagedSystem:
-    """A manager's view of the managed subsystem: what it can read, and the only thing it can do: request modes.
+    """A manager's view of the managed subsystem: what it can read, and its only action, requesting modes.
 
     Attributes:
         env: the mission's clock; `env.timeout(s)` is an event to wait for.
@@ -52,7 +52,7 @@ class ManagedSystem:
         log: adds an event and its detail to the mission's record.
         knowledge: gives the knowledge base with its reasoner, opened on the first call.
         record_state: adds a state of knowledge that is reasoned about to the mission's record.
-        state_changed: to be called when something that `adapt` depends on has changed of itself, not in a hook.
+        state_changed: call this when something that `adapt` depends on has changed outside a hook.
         record_reasoning_time: adds the mission time, s, that reasoning took before an adaptation; a further metric.
         measurements: what monitors have measured, by quality attribute; see `measured`.
         recorded: whether the mission is recorded.
@@ -101,6 +101,12 @@ class ManagedSystem:
             return None
         return measurements.values[published - 1] if measurements.times_s[published - 1] >= since_s else None
 
+    def first_cycle_s(self) -> float:
+        """When metacontrol's first cycle is due: in step with the other timers, or with a phase drawn for the run."""
+        period_s = self.scenario.managers.metacontrol.reasoning_period_s
+        in_step = "metacontrol" in self.scenario.revision.timers_in_step
+        return period_s if in_step else self.stream("metacontrol/phase").uniform(0.0, period_s)
+
     def change_mode(self, function: str, mode: str, latency_s: float | None = None) -> bool:
         """Request a mode of a function; the effect comes later. False if there is no such mode.
 
@@ -108,8 +114,6 @@ class ManagedSystem:
             function, mode: names, as in the modes file.
             latency_s: time to the effect, for references such as `oracle`; None: as the scenario says.
         """
-        if latency_s is None:
-            return self.modes.change_mode(function, mode)
         return self.modes.change_mode(function, mode, latency_s)
 
     def file(self, name: str) -> Path:
@@ -174,7 +178,7 @@ class ManagingSubsystem:
 
     @classmethod
     def check(cls, loaded: LoadedScenario) -> None:
-        """See that the manager can work with a scenario; called before the first mission.
+        """Check that the manager can work with a scenario; called before the first mission.
 
         Raises:
             InputError: it cannot.
@@ -194,21 +198,21 @@ class ManagingSubsystem:
         return None
 
     def mission_started(self) -> None:
-        """Take the beginning of the mission, at t = 0, before anything else happens."""
+        """Called at t = 0, before anything else."""
 
     def mission_ended(self, metrics: MissionMetrics) -> None:
-        """Take the end of the mission and its metrics, after everything else; no request has an effect any more."""
+        """Called after everything else, with the metrics; requests have no effect."""
 
     def task_requested(self, task: Task) -> None:
-        """Take a task that begins, and needs its functions."""
+        """Called when a task begins that needs its functions."""
 
     def task_cancelled(self, task: Task) -> None:
-        """Take the end of a task: by default its functions are set to fd_unground at once."""
+        """Called when a task ends; by default sets its functions to fd_unground."""
         for function in task.functions:
             self.system.change_mode(function, UNGROUND_MODE)
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
-        """Take what a monitor publishes: a component's status, or a measured value that differs from the one before."""
+        """Called for each diagnostic of a subscribed kind: a component's status, or a changed measured value."""
 
     def adapt(self) -> AdaptationProcess | None:
         """Adapt, once every `period_s`; a call that would come while an earlier one still runs is left out."""

@@ -106,7 +106,7 @@ def _lines(part: Behaviour, first: str, further: str) -> Iterator[str]:
 
 
 def last_tick(root: Behaviour) -> str:
-    """Say what the last tick came to: each mode that was requested, with the conditions that held on the way to it."""
+    """Summarise the last tick: each mode that was requested, with the conditions that held on the way to it."""
     return "; ".join(_requests(root, ()))
 
 

@@ -1,7 +1,8 @@
 """Metacontrol: a MAPE-K loop over an OWL knowledge base (paper, section on Metacontrol; kas-lab/suave).
 
-Monitor: diagnostics update the state of the knowledge. Analyze: a reasoner infers what the rules say about that state.
-Plan: the best function design for each objective that needs one. Execute: request the mode of the design's name.
+Monitor: read the measured values; component statuses arrive as diagnostics. Analyze: a reasoner infers what the rules
+say about that state. Plan: the best function design for each objective that needs one. Execute: request the mode of the
+design's name.
 """
 
 from collections.abc import Collection, Hashable
@@ -57,8 +58,7 @@ class Metacontrol(ManagingSubsystem):
         self._latency = scenario.latencies.inference_s
         self._latency_stream = None if isinstance(self._latency, float) else system.stream("metacontrol/inference")
         self.period_s: float = scenario.managers.metacontrol.reasoning_period_s
-        in_step = "metacontrol" in scenario.revision.timers_in_step
-        self.starts_s = self.period_s if in_step else system.stream("metacontrol/phase").uniform(0.0, self.period_s)
+        self.starts_s = system.first_cycle_s()
         self._adapter = Adapter(system)
         bridge_s = revision.task_bridge_period_s
         phase_s = system.stream("metacontrol/bridge").uniform(0.0, bridge_s) if bridge_s > 0.0 else 0.0
@@ -87,8 +87,10 @@ class Metacontrol(ManagingSubsystem):
         if self._latency_stream is not None:
             return self.execute(conclusion, draw(self._latency, self._latency_stream))
         assert isinstance(self._latency, float)
-        is_over_in_time = self._latency < self.period_s
-        return None if is_over_in_time and self._is_in_force(conclusion) else self.execute(conclusion, self._latency)
+        if self._latency < self.period_s and self._changes_nothing(conclusion):
+            self._recorded_statuses = conclusion.statuses
+            return None
+        return self.execute(conclusion, self._latency)
 
     def monitor(self) -> None:
         """Read the measured values; components report by themselves, see `diagnostic`."""
@@ -116,7 +118,7 @@ class Metacontrol(ManagingSubsystem):
         return self._knowledge.plan(inference, improve_exceeded=self._revision.search_improves_when_exceeded)
 
     def execute(self, conclusion: Conclusion, latency_s: float) -> AdaptationProcess:
-        """Request the plan's modes after the reasoner's latency; objectives with a new design lose their status."""
+        """Request the plan's modes after the reasoner's latency; their objectives lose their status."""
         recovered = self._recovered()
         yield self.system.env.timeout(latency_s)
         if self.system.recorded:
@@ -138,7 +140,7 @@ class Metacontrol(ManagingSubsystem):
     # What changes the state.
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
-        """Take a component's status."""
+        """Update a component's status."""
         if self._is_listening() and diagnostic.kind == Kind.COMPONENT_STATUS:
             self.components[diagnostic.key] = str(diagnostic.value)
 
@@ -174,6 +176,8 @@ class Metacontrol(ManagingSubsystem):
         regions = self._knowledge.regions
         if regions is None or not regions.is_sound:
             return None
+        if self._revision.ignores_diagnostics_without_objective and not self.system.lasting_functions:
+            return None  # then it also depends on when a value was published
         return dict.fromkeys(self.system.measurements, regions.thresholds_as_floats)
 
     def _symbolic_state(self) -> Hashable:
@@ -187,7 +191,7 @@ class Metacontrol(ManagingSubsystem):
         known = tuple(self.objectives.items()), tuple(self.groundings.items()), tuple(self.components.items())
         return known, tuple(self.measurements), values
 
-    def _is_in_force(self, conclusion: Conclusion) -> bool:
+    def _changes_nothing(self, conclusion: Conclusion) -> bool:
         """Whether executing a plan would change nothing."""
         adds_statuses = self.system.recorded and conclusion.statuses - self._recorded_statuses
         if adds_statuses or RECOVERED in self.components.values():
@@ -196,7 +200,6 @@ class Metacontrol(ManagingSubsystem):
             function, design = decision.function, decision.design
             if design is not None and (self.groundings.get(function), self.objectives[function]) != (design, None):
                 return False
-        self._recorded_statuses = conclusion.statuses
         return self._adapter.is_in_force(conclusion.plan)
 
     def _recovered(self) -> list[str]:

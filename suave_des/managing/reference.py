@@ -28,7 +28,7 @@ class FixedMode(NoManager):
 
     @classmethod
     def check(cls, loaded: LoadedScenario) -> None:
-        """See that some function has the mode."""
+        """Check that some function has the mode."""
         known = sorted({mode for function in loaded.modes.functions for mode in loaded.modes.modes(function)})
         if cls.mode not in known:
             known = [mode for mode in known if mode not in (DEFAULT_MODE, UNGROUND_MODE)]
@@ -53,10 +53,10 @@ def fixed_mode(mode: str) -> type[ManagingSubsystem]:
 
 
 class Threshold(FunctionsManager):
-    """threshold: metacontrol's decisions as plain if-then: what differs from metacontrol is the ontology's price.
+    """threshold: metacontrol's decisions as plain conditions; the difference is what the ontology costs.
 
-    It adapts at metacontrol's times (`managers.metacontrol.reasoning_period_s`, with the same phase in each run), takes
-    no time to reason, and searches by the thresholds of `managers.bt`.
+    It adapts at metacontrol's times (`managers.metacontrol.reasoning_period_s`, from the same first cycle on in each
+    run), takes no time to reason, and searches by the thresholds of `managers.bt`.
     """
 
     subscribes_to: ClassVar[Collection[Kind]] = (Kind.COMPONENT_STATUS,)
@@ -64,7 +64,7 @@ class Threshold(FunctionsManager):
     def __init__(self, system: ManagedSystem) -> None:
         super().__init__(system)
         self.period_s: float | None = system.scenario.managers.metacontrol.reasoning_period_s
-        self.starts_s = system.stream("metacontrol/phase").uniform(0.0, self.period_s or 0.0)
+        self.starts_s = system.first_cycle_s()
         self.thresholds_m = system.scenario.managers.bt.visibility_thresholds_m
         self.search_modes = system.scenario.managers.bt.search_modes
         self.failed: set[str] = set()
@@ -76,7 +76,10 @@ class Threshold(FunctionsManager):
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
         """Remember failed thrusters."""
-        (self.failed.add if diagnostic.value == FAILED else self.failed.discard)(diagnostic.key)
+        if diagnostic.value == FAILED:
+            self.failed.add(diagnostic.key)
+        else:
+            self.failed.discard(diagnostic.key)
 
     def adapt(self) -> None:
         """Request the modes that fit."""
@@ -117,7 +120,7 @@ class Oracle(Threshold):
         self.adapt()
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
-        """Take a thruster's status, and adapt at once."""
+        """Update a thruster's status, and adapt at once."""
         super().diagnostic(diagnostic)
         self.adapt()
 

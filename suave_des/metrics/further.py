@@ -51,7 +51,7 @@ class FurtherMetrics:
     _working: list[tuple[float, int]] = field(default_factory=list)
 
     def adapted(self, function: str, before: str, after: str) -> None:
-        """Take a change of mode of a function in use."""
+        """Count a mode change of a function in use."""
         undone_within_s = self.scenario.reaction_metric.undone_within_s
         changed_s, from_mode = self._changes.get(function, (-undone_within_s, ""))
         is_undone = after == from_mode and self.env.now - changed_s <= undone_within_s
@@ -60,7 +60,7 @@ class FurtherMetrics:
         self._changes[function] = (self.env.now, "" if is_undone else before)
 
     def mode_effect(self, function: str, mode: Mode) -> None:
-        """Take a mode that takes effect."""
+        """Note a mode that takes effect."""
         self._count_configuration()
         self._in_force[function] = mode.name
 
@@ -71,15 +71,15 @@ class FurtherMetrics:
         self._in_force_since_s = self.env.now
 
     def reasoning_took(self, duration_s: float) -> None:
-        """Take the time that the reasoner took in a cycle that changed something."""
+        """Note the time that the reasoner took in a cycle that changed something."""
         self.reasoning_time_s += duration_s
 
     def surfaced(self, leak_s: float) -> None:
-        """Take the moment at which the vehicle has surfaced after a leak."""
+        """Note the moment at which the vehicle has surfaced after a leak."""
         self.surfacing_time_s = float(self.env.now) - leak_s
 
     def thrusters_changed(self) -> None:
-        """Take a change of the thrusters that work."""
+        """Note a change of the thrusters that work."""
         self._working.append((self.env.now, self.vehicle.working_thrusters))
 
     def columns(self, metrics: MissionMetrics) -> dict[str, MetricValue]:

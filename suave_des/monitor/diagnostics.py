@@ -18,7 +18,7 @@ class Kind(StrEnum):
     QA_STATUS = "QA status"
     COMPONENT_STATUS = "Component status"
     POSE = "Pose"
-    """Key pose, a `Pose`; not a diagnostic of the exemplar's, so nobody gets it without asking. Likewise the next."""
+    """Key pose, a `Pose`. Not published by the exemplar's monitors, like the next two: subscribers have to name it."""
     DISTANCE = "Distance inspected"
     """Key distance_inspected_m."""
     DETECTION = "Pipeline detected"
@@ -36,7 +36,7 @@ HULL, LEAK = "hull", "LEAK"
 
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
-    """One message: the measured value of a quality attribute, the status of a component, a pose, or a distance in m."""
+    """One message: a measured value of a quality attribute, a component's status, or what the other kinds say."""
 
     time_s: float
     kind: Kind

@@ -54,8 +54,8 @@ class Measurements:
         """The measurements that are in another region than the one before; the first one counts."""
         crossings = self._crossings.get(thresholds)
         if crossings is None:
-            places, regions = _crossing_places(self.arrays[1].tobytes(), thresholds)
-            crossings = self._crossings[thresholds] = [self.times_s[place] for place in places], regions
+            indices, regions = _crossing_indices(self.arrays[1].tobytes(), thresholds)
+            crossings = self._crossings[thresholds] = [self.times_s[index] for index in indices], regions
         return crossings
 
     def region(self, t_s: float, thresholds: Thresholds) -> int:
@@ -120,7 +120,7 @@ def measure(
     if (step_s := publishing.time_step_s) > 0.0:
         # A time within a millionth of a step below a multiple counts as it: timers add up rounding errors.
         read_at = np.floor(times / step_s + 1e-6) * step_s
-    values, changes = _read(signal, read_at.tobytes())
+    values, changes = _sampled(signal, read_at.tobytes())
     if noise is not None:
         values = values + np.array([noise() for _ in range(len(times))])
     if is_lost is not None:
@@ -128,22 +128,22 @@ def measure(
         times, values = times[kept], values[kept]
     if noise is not None or is_lost is not None:
         changes = _changes(values)
-    places, changed, numbers = changes
-    times = times[places]
+    indices, changed, numbers = changes
+    times = times[indices]
     return Measurements(key, tuple(times.tolist()), numbers, phase_s, period_s, (times, changed))
 
 
 def _changes(values: Array) -> tuple[Ticks, Array, tuple[float, ...]]:
-    """Places of the values that differ from the one before, as the first one does, and these values, twice."""
-    places = np.flatnonzero(np.diff(values, prepend=np.nan))
-    return places, values[places], tuple(values[places].tolist())
+    """Indices of the values that differ from the one before, as the first one does, and these values, twice."""
+    indices = np.flatnonzero(np.diff(values, prepend=np.nan))
+    return indices, values[indices], tuple(values[indices].tolist())
 
 
 # Cached by the arrays' bytes (float64): without noise, a signal that is read in time steps is the same in each run.
 
 
 @lru_cache(maxsize=16)
-def _read(signal: Signal, times_s: bytes) -> tuple[Array, tuple[Ticks, Array, tuple[float, ...]]]:
+def _sampled(signal: Signal, times_s: bytes) -> tuple[Array, tuple[Ticks, Array, tuple[float, ...]]]:
     """Values of a signal at some times, and their changes."""
     times = np.frombuffer(times_s)
     first, _, different_s = _changes(times)
@@ -152,12 +152,12 @@ def _read(signal: Signal, times_s: bytes) -> tuple[Array, tuple[Ticks, Array, tu
 
 
 @lru_cache(maxsize=64)
-def _crossing_places(values: bytes, thresholds: Thresholds) -> tuple[list[int], list[int]]:
-    """Places of the values that are in another region than the one before, and the regions' numbers."""
+def _crossing_indices(values: bytes, thresholds: Thresholds) -> tuple[list[int], list[int]]:
+    """Indices of the values that are in another region than the one before, and the regions' numbers."""
     measured = np.frombuffer(values)
     regions = np.searchsorted(thresholds, measured) + np.searchsorted(thresholds, measured, side="right")
-    places = np.flatnonzero(np.diff(regions, prepend=-1))
-    return places.tolist(), regions[places].tolist()
+    indices = np.flatnonzero(np.diff(regions, prepend=-1))
+    return indices.tolist(), regions[indices].tolist()
 
 
 @dataclass(eq=False)

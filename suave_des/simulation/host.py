@@ -22,7 +22,7 @@ _T = TypeVar("_T")
 _MEASURED_SOMEWHERE = ("water_visibility", "battery_level")
 """What shipped scenarios measure, though not each of them: a manager may serve all."""
 _STEPS_AT_ONE_TIME = 10_000
-"""So often `adapt` may yield without mission time passing."""
+"""How often `adapt` may yield while mission time stands still."""
 
 
 @dataclass(eq=False)
@@ -65,6 +65,8 @@ class ManagerHost:
             own = "depends_on" in vars(kind)  # a derived class may depend on more
             is_users = not is_built_in(self.name)
             declared = self.manager.depends_on if own and (self.skips_idle_calls or is_users) else None
+            if declared is not None:
+                declared = {name: tuple(sorted(map(float, each))) for name, each in declared.items()}
         except InputError:
             raise  # such as an ontology that cannot be used: it concerns every mission
         except RAISED as error:
@@ -103,7 +105,7 @@ class ManagerHost:
         self.state_changed()
 
     def state_changed(self) -> None:
-        """Have a manager that waits for an event called at the next of its times."""
+        """Wake a manager that waits for an event: it is called at the next of its times."""
         self._idle_regions.clear()
         if self._is_waiting:
             self._is_waiting = False
@@ -159,7 +161,7 @@ class ManagerHost:
             return tick_s
 
     def _next_event_s(self, due_s: float, period_s: float) -> float:
-        """First of the times of `adapt` at which measured values will, or can, be where a call was not idle before."""
+        """First time of `adapt` at which measured values lie, or may lie, outside all idle regions."""
         tick_s = self.system.env.now
         while True:
             event_s = min([each.next_crossing_s(tick_s, edges) for each, edges in self._depends_on], default=inf)
@@ -174,20 +176,24 @@ class ManagerHost:
         return tuple([measured.region(t_s, edges) for measured, edges in self._depends_on])
 
     def _guarded_steps(self, adaptation: AdaptationProcess) -> Process:
-        value, steps, since_s = None, 0, self.system.env.now
+        resume: Callable[[Any], object] = adaptation.send
+        outcome, steps, since_s = None, 0, self.system.env.now
         while True:
             steps, since_s = (steps + 1, since_s) if self.system.env.now == since_s else (0, self.system.env.now)
             try:
                 if steps > _STEPS_AT_ONE_TIME:
                     raise RuntimeError(f"adapt yielded {_STEPS_AT_ONE_TIME} events, and no mission time passed")
-                event = adaptation.send(value)
+                event = resume(outcome)
                 if not isinstance(event, simpy.Event):
                     raise TypeError(f"adapt yielded {event!r}; it may yield events, such as system.env.timeout(1.0)")
-                value = yield event
             except StopIteration:
                 return
             except RAISED as error:
                 raise self.mission_error(error) from error
+            try:
+                outcome, resume = (yield event), adaptation.send
+            except Exception as error:  # the event has failed, which `adapt` may handle
+                outcome, resume = error, adaptation.throw
 
     def _guarded(self, hook: Callable[..., _T], *arguments: Any) -> _T:
         try:
@@ -197,14 +203,14 @@ class ManagerHost:
 
 
 def _tick_at_or_after(t_s: float, due_s: float, period_s: float) -> float:
-    """First of the times that go on from `due_s` by additions, rounding errors included, that is not before t."""
+    """First of due_s, due_s + period_s, ... (summed, rounding included) that is not before t."""
     while due_s < t_s:
         due_s += period_s
     return due_s
 
 
 def _unmeasured(names: Iterable[str], measured: Iterable[str]) -> Iterator[str]:
-    """Yield a remark for each name that a manager waits for in vain, misspelt as it seems."""
+    """Yield a remark for each name in depends_on that nothing measures."""
     known = sorted({*measured, *_MEASURED_SOMEWHERE})
     for name in sorted(set(names).difference(known), key=str):
         yield f"depends_on has {shown(name)}, which nothing measures ({did_you_mean(name, known)})"

@@ -45,7 +45,7 @@ from suave_des.vehicle.guidance import SetPointSender
 from suave_des.world.signals import Signal
 
 _DELIVERY_S = 0.01
-"""From a timer's tick to the arrival of what it publishes: too late for a tick of another timer at the same time."""
+"""Delay from a timer's tick to the arrival of its message; a simultaneous tick of another timer misses it."""
 
 
 class MissionRun:
@@ -71,7 +71,7 @@ class MissionRun:
         self.env = simpy.Environment()
         self._recorder = Recorder(self.env, enabled=record)
         self._bus = DiagnosticsBus()
-        self._lost_for_good: set[int] = set()
+        self._unrecoverable: set[int] = set()
         self._faults_happened = 0
 
         self._start = draw_start(self._chance)
@@ -155,7 +155,7 @@ class MissionRun:
         return self._coordinator.ended.triggered
 
     def advance(self, until_s: float) -> None:
-        """Let mission time pass until `until_s`, what happens then excluded, or until the mission's end.
+        """Advance to `until_s`, excluding events at that time, or to the mission's end.
 
         Raises:
             MissionError: the manager raised.
@@ -208,18 +208,21 @@ class MissionRun:
         )
 
     def _make_fault(self, t_s: float, thruster: int, health: float) -> None:
-        """Let the next of the scenario's thruster events happen."""
+        """Apply the next of the scenario's thruster events."""
         n = self._faults_happened
         event = self._scenario.thruster_events[n]
         self._faults_happened += 1
         if not health and self._is_without_effect(n, t_s):
             self._recorder.log("thruster_monitor", "failure_without_effect", f"c_thruster_{thruster}")
             return
-        (self._lost_for_good.discard if health or event.recoverable else self._lost_for_good.add)(thruster)
+        if health or event.recoverable:
+            self._unrecoverable.discard(thruster)
+        else:
+            self._unrecoverable.add(thruster)
         self._set_thruster_health(t_s, thruster, health)
 
     def _is_without_effect(self, n: int, t_s: float) -> bool:
-        """Tell whether a failure, the scenario's thruster event n, does not reach the vehicle."""
+        """Whether a failure, the scenario's thruster event n, does not reach the vehicle."""
         failures = self._revision.thruster_failures
         if t_s < failures.effective_from_s:
             return True
@@ -300,7 +303,7 @@ class MissionRun:
         self._follow = FollowPipeline(env, make_sender(follow), revision.follow, self._path)
         nodes: dict[str, FunctionNode] = {
             domain.MAINTAIN_MOTION: MaintainMotion(
-                env, self._bus, revision.recovery, self._set_thruster_health, recovery_s, self._lost_for_good
+                env, self._bus, revision.recovery, self._set_thruster_health, recovery_s, self._unrecoverable
             ),
             search: GenerateSearchPath(
                 env, make_sender(search), revision.spiral, self._start.origin_m, view_tangent, phase_s, ready_s

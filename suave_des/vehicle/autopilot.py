@@ -19,12 +19,12 @@ class Autopilot(NamedTuple):
 
     Attributes:
         position_gain_per_s: horizontal velocity demanded for each metre of position error; ArduSub's default is 1.0.
-        jerk_m_per_s3: of a leg. ArduSub's default is 1.0, but its legs change the jerk gradually and take longer; 0.5
-            at once is about as slow on legs of some 0.3 m.
+        jerk_m_per_s3: of a leg. ArduSub's default is 1.0 with gradual changes of jerk; a constant 0.5 takes about as
+            long on legs of 0.3 m.
         velocity_gain_per_s: horizontal acceleration demanded for each m/s of velocity error.
-        velocity_integral_gain_per_s2: the same for each metre that the error of the velocity sums up to.
+        velocity_integral_gain_per_s2: horizontal acceleration demanded for each metre of integrated velocity error.
         heading_frequency_rad_per_s: natural frequency of heading control, critically damped.
-        heading_integral_gain_per_s3: angular acceleration demanded for each rad s that the heading error sums up to.
+        heading_integral_gain_per_s3: angular acceleration demanded for each rad s of integrated heading error.
         vertical_position_gain_per_s: as the horizontal one; ArduSub's default is 3.0.
         vertical_velocity_gain_per_s, vertical_velocity_integral_gain_per_s2: as the horizontal ones.
         roll_frequency_rad_per_s: natural frequency of roll control; missions are not sensitive to it.

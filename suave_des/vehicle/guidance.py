@@ -33,7 +33,7 @@ class WaypointSource(Protocol):
     """What guidance asks of a function that generates way-points."""
 
     def tick(self) -> None:
-        """Take note of a tick of the timer; called before anything else when guidance acts. By default: nothing."""
+        """Called at a timer tick, before guidance acts; does nothing by default."""
         return
 
     def waypoints(self, count: int) -> Array:
@@ -93,7 +93,7 @@ class SetPointSender:
         return self.vehicle.queue_waypoints(now_s, waypoints, sent_as_m, check, first=first, last=last, send=send)
 
     def queued_were_sent(self, count: int) -> None:
-        """Take note that so many queued set-points have been sent."""
+        """Count set-points that were sent from the queue."""
         self._before_loss -= count
 
     def _is_lost(self) -> bool:

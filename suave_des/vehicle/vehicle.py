@@ -273,5 +273,5 @@ def track_rows(duration_s: float) -> int:
 
 
 def row_at(t_s: float) -> int:
-    """Row of the track nearest to a mission time: the one rounding rule that reading and commanding share."""
+    """Row of the track nearest to a mission time, halves to even, as everywhere that times become rows."""
     return round(t_s / STEP_S)

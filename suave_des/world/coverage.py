@@ -13,10 +13,10 @@ _MOST_CELLS = 4_000_000
 
 
 def covered_area_m2(track: Array, last_row: int, visibility_m: Array, sea_bed_z_m: float, view_tangent: float) -> float:
-    """Area of the sea bed of which the camera, looking straight down, has seen every place at least once.
+    """Area of the sea bed that the camera, looking straight down, has seen at least once.
 
     A place is seen when it is in view, and the height above it is at most the water visibility. Areas are counted in
-    squares of 0.1 m, larger ones where the way is very long.
+    squares of 0.1 m, larger ones for very long tracks.
 
     Args:
         track: positions x, y, z in the first three columns, shape (rows, at least 3), m.

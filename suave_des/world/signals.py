@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from functools import lru_cache
 
 Signal = Callable[[float], float]
-"""Value at a mission time in s. Equal descriptions give the same function, so that its values can be cached."""
+"""Value at a mission time in s. Equal descriptions, except of a table, give the same function: values can be cached."""
 
 
 @lru_cache(maxsize=64)

@@ -27,7 +27,7 @@ class AskedModes:
     def available_modes(self, function: str) -> tuple[str, ...]:
         return MODES.modes(function)
 
-    def change_mode(self, function: str, mode: str) -> bool:
+    def change_mode(self, function: str, mode: str, latency_s: float | None = None) -> bool:
         self.asked.append((function, mode))
         return mode in MODES.modes(function)
 

@@ -32,6 +32,21 @@ class Deliberate(ManagingSubsystem):
             self.system.change_mode("f_generate_search_path", "fd_spiral_high")
 
 
+class HandlesFailures(Deliberate):
+    """Waits for an event that fails, and goes on."""
+
+    def adapt(self):
+        try:
+            yield self.system.env.event().fail(LookupError("lost"))
+        except LookupError as error:
+            self.system.log("handles", str(error))
+
+
+class IgnoresFailures(Deliberate):
+    def adapt(self):
+        yield self.system.env.event().fail(LookupError("lost"))
+
+
 class Observer(ManagingSubsystem):
     """Records the diagnostics that it gets."""
 
@@ -147,6 +162,16 @@ class EventTriggeredByProperty(EventTriggered):
     @property
     def depends_on(self):
         return {"water_visibility": tuple(self.system.settings.get("thresholds_m", (2.0, 3.0)))}
+
+
+class DependsOnAList(EventTriggered):
+    """In no order, and as numbers of another type."""
+
+    depends_on: ClassVar = {"water_visibility": [3, 2]}
+
+
+class DependsOnAWord(EventTriggered):
+    depends_on: ClassVar = {"water_visibility": ("low",)}
 
 
 class DependsOnTheBattery(EventTriggered):

@@ -69,6 +69,13 @@ def test_reading_the_metrics_on_the_way_changes_nothing(simulator: Simulator) ->
     assert mission.metrics().distance_inspected_m == simulator.run("none", 5, 1).metrics.distance_inspected_m
 
 
+def test_the_metrics_on_the_way_have_the_distance_until_now(simulator: Simulator) -> None:
+    mission = Mission(simulator, run=5)
+    while not mission.metrics().distance_inspected_m:
+        mission.advance(mission.now_s + 5.0)
+    assert not mission.is_over and mission.metrics().distance_inspected_m == mission.distance_inspected_m
+
+
 def test_many_missions_of_one_simulator_may_go_on_at_once(simulator: Simulator) -> None:
     missions = [Mission(simulator, run=run) for run in range(1, 4)]
     while not all(mission.is_over for mission in missions):

@@ -5,6 +5,8 @@ import pytest
 from suave_des import InputError, load_scenario, run_campaign, run_mission
 from suave_des.registry import is_built_in, manager_class
 
+SEARCH = "f_generate_search_path"
+
 
 def requests(manager: str, scenario: str = "seams2023", run: int = 1) -> list[tuple[float, str]]:
     events = run_mission(scenario, manager, run, 1).events
@@ -38,11 +40,14 @@ def test_they_need_no_trust_as_they_are_the_projects_own() -> None:
     assert all(map(is_built_in, ("fixed:fd_spiral_low", "threshold", "oracle"))) and not is_built_in("mine:Manager")
 
 
-def test_threshold_adapts_at_metacontrols_times() -> None:
-    threshold = [t_s for t_s, _ in requests("threshold")]
-    metacontrol = [t_s for t_s, detail in requests("metacontrol")]
-    reasoning_s = load_scenario("seams2023").scenario.latencies.inference_s
-    assert metacontrol[0] - threshold[0] == pytest.approx(reasoning_s)
+@pytest.mark.parametrize("scenario", ["seams2023", "release15", "planta_exp1"])
+def test_threshold_adapts_at_metacontrols_times(scenario: str) -> None:
+    threshold_s, metacontrol_s = (
+        next(t_s for t_s, detail in requests(manager, scenario) if detail.startswith(f"{SEARCH} -> fd_spiral"))
+        for manager in ("threshold", "metacontrol")
+    )
+    reasoning_s = load_scenario(scenario).scenario.latencies.inference_s
+    assert metacontrol_s - threshold_s == pytest.approx(reasoning_s)
 
 
 def test_oracle_changes_modes_at_the_moment_of_the_true_crossing() -> None:

@@ -97,6 +97,13 @@ def test_a_region_in_which_it_was_idle_since_the_last_change_of_state_needs_no_c
     assert len(calls) == 2 and all(41.0 <= t_s < 51.0 for t_s in calls)  # one in each region
 
 
+def test_thresholds_may_be_in_any_order_and_of_any_type_of_number() -> None:
+    for value in (3.5, 1.0):
+        assert called_s(steps(2.5, value, 31.5), "DependsOnAList") == [33.0]
+    with pytest.raises(MissionError, match="could not convert string to float: 'low'"):
+        called_s({}, "DependsOnAWord")
+
+
 def test_thresholds_may_come_from_its_settings() -> None:
     given = with_settings("EventTriggeredByProperty", thresholds_m=[2.55])
     assert called_s({**steps(2.5, 3.5, 31.5), **given}, "EventTriggeredByProperty") == [33.0]

@@ -38,6 +38,10 @@ def test_a_call_that_would_come_during_an_earlier_one_is_left_out(simulator) -> 
     assert times_of(mission(simulator, "Deliberate", **settings), "thinks")[:4] == pytest.approx([1.0, 7.0, 13.0, 19.0])
 
 
+def test_adapt_may_handle_the_failure_of_an_event_that_it_waits_for(simulator) -> None:
+    assert times_of(mission(simulator, "HandlesFailures"), "handles", "lost")[:2] == pytest.approx([1.0, 3.0])
+
+
 def test_an_outside_manager_can_complete_the_mission(simulator) -> None:
     assert mission(simulator, "Deliberate", **QUIET).metrics.distance_inspected_m > 0.0
 
@@ -64,6 +68,7 @@ def test_its_random_stream_depends_on_the_run_alone(simulator) -> None:
         ("FailsOnDiagnostic", "ValueError: a thruster, too", 35.0, 36.0),
         ("FailsInAdapt", "ZeroDivisionError: division by zero", 12.0, 12.0),
         ("FailsAfterAWhile", "ValueError: changed its mind", 14.5, 14.5),
+        ("IgnoresFailures", "LookupError: lost", 1.0, 1.0),
         ("YieldsANumber", "TypeError: adapt yielded 1.0", 12.0, 12.0),
         ("FailsInItsOwnProcess", "ValueError: by itself", 7.0, 7.0),
         ("NeverAdvances", "ValueError: period_s is 0.0", 0.0, 0.0),
