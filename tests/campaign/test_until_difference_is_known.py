@@ -105,9 +105,9 @@ def test_the_order_in_which_runs_finish_makes_no_difference() -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("metacontrol - : search_time_s: 2", "no difference of two managers"),
-        ("bt - bt: search_time_s: 2", "no difference of two managers"),
-        ("metacontrol - bt: 2", "no difference of two managers"),
+        ("metacontrol - : search_time_s: 2", "expected a difference of two managers"),
+        ("bt - bt: search_time_s: 2", "expected a difference of two managers"),
+        ("metacontrol - bt: 2", "expected a difference of two managers"),
         ("metacontrol - bt: search_time: 2", "no metric 'search_time'"),
         ("metacontrol - bt: search_time_s: 0", "is not a half-width"),
         ("metacontrol - random: search_time_s: 2", "needs 'random', which is not among the managers"),
