@@ -219,7 +219,7 @@ class TestFiles:
         )
         assert row[f"{SEARCH}_then"] == "fd_spiral_medium"
         assert picture.read_bytes().startswith(b"\x89PNG")
-        assert f"{policy.states} states of {len(policy.cases)} kinds" in text
+        assert f"{policy.states} states in {len(policy.cases)} equivalence classes" in text
         assert not list(tmp_path.glob(".*"))
 
     def test_a_picture_over_two_attributes(self, tmp_path):
