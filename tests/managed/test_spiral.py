@@ -288,7 +288,7 @@ def real_search(happenings: list, *, plainly: bool) -> list:
     return vehicle.track[: row_at(75.0), :3].tolist()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.lists(st.tuples(st.integers(1, 70), st.integers(0, 7)), max_size=6, unique_by=lambda each: each[0]))
 def test_queueing_waypoints_is_the_same_as_checking_at_each_tick(happenings: list) -> None:
     ahead, plainly = real_search(happenings, plainly=False), real_search(happenings, plainly=True)
