@@ -1,22 +1,67 @@
-"""Output of commands: styled on a terminal; elsewhere plain, and wide enough for the tables."""
+"""Output of commands: styled on a terminal; elsewhere plain, and wide enough for the tables.
+
+Only characters that the terminal has reach it, and no control characters from files of others."""
 
 from __future__ import annotations
 
+import codecs
 import os
+import sys
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
-
-from suave_des.cli.terminal import PlainConsole
 
 if TYPE_CHECKING:
     from suave_des.campaign.progress import OnProgress
     from suave_des.metrics.result import Event, MissionMetrics, MissionResult
+
+_IN_ASCII = {"±": "+-", "–": "-", "—": "-", "…": "...", "×": "x", "≥": ">=", "≤": "<=", "−": "-", "→": "->", "█": "#"}
+_ERRORS = "suave-des-in-ascii"
+
+
+def _replaced(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    return "".join(_IN_ASCII.get(char, "?") for char in error.object[error.start : error.end]), error.end
+
+
+def write_what_the_terminal_has() -> None:
+    """Have characters that the terminal's encoding lacks written in others, instead of failing."""
+    codecs.register_error(_ERRORS, _replaced)
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure") and (stream.encoding or "").lower().replace("-", "") != "utf8":
+            stream.reconfigure(errors=_ERRORS)
+
+
+def plain(text: str) -> str:
+    r"""Return a text with \x1b and the like in place of control characters, which a terminal would obey."""
+    if text.isprintable():
+        return text
+    return "".join(char if char.isprintable() or char in "\n\t" else _escaped(char) for char in text)
+
+
+def _escaped(char: str) -> str:
+    return char.encode("unicode_escape").decode() if char < "\xa0" or 0x202A <= ord(char) <= 0x2069 else char
+
+
+class PlainConsole(Console):
+    """A console that writes control characters in what it is given as text."""
+
+    def on_broken_pipe(self) -> None:
+        """Leave the end to the command, whatever version of rich."""
+        raise BrokenPipeError
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Render to segments of text and style."""
+        for segment in super().render(renderable, options):
+            yield segment if segment.control else segment._replace(text=plain(segment.text))
+
 
 _PLAIN_WIDTH = 120
 _LEAST_WIDTH = 72

@@ -15,7 +15,6 @@ import typer
 
 from suave_des.cli import kb_diff, kb_rules, kb_test, kb_why_not
 from suave_des.cli.console import counted, errors, output, plain_table, print_table, print_trimmed
-from suave_des.cli.headings import CommandsUnderHeadings, Headings, add_commands
 from suave_des.cli.kb_options import (
     AsFormat,
     Asked,
@@ -26,7 +25,7 @@ from suave_des.cli.kb_options import (
     print_json,
     state_lines,
 )
-from suave_des.cli.options import grouped_options
+from suave_des.cli.options import CommandsUnderHeadings, Headings, add_commands, grouped_options
 from suave_des.errors import InputError
 from suave_des.interrupts import ends_at_once
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.text import Text
 
-from suave_des.cli.console import output
+from suave_des.cli.console import output, plain_table, print_table
 from suave_des.cli.kb_options import MaxFailed, TimeLimitS
 from suave_des.cli.options import KnowledgeFiles, grouped_options
 from suave_des.errors import InputError, did_you_mean, shown
@@ -22,7 +22,9 @@ from suave_des.errors import InputError, did_you_mean, shown
 if TYPE_CHECKING:
     from suave_des.knowledge.ontology import Ontology
     from suave_des.workbench import KnowledgeBase
+    from suave_des.workbench.testing.coverage import Coverage, RuleCoverage
     from suave_des.workbench.testing.mutants import Mutant
+    from suave_des.workbench.testing.mutation import MutationReport
     from suave_des.workbench.testing.reader import RuleTest
     from suave_des.workbench.testing.run import TestResult
     from suave_des.workbench.testing.suite import TestedKnowledge, TestFile
@@ -138,7 +140,6 @@ def _write_mission(folder: Path, file: Path | None, knowledge: Tested, time_limi
 def _cover(console: Console, suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
     """Show what the tests of each knowledge base cover, and write tests of what they do not."""
     from suave_des.campaign.output import write_files
-    from suave_des.cli.kb_test_reports import print_coverage
     from suave_des.workbench.prover import Prover
     from suave_des.workbench.testing.coverage import measure_coverage
     from suave_des.workbench.testing.writing import NamedState, tests_text
@@ -175,7 +176,6 @@ def _mutants(base: Ontology, only: Sequence[str], most: int | None) -> tuple[Mut
 
 def _mutate(console: Console, suites: Sequence[Suite], only: Sequence[str], most: int | None, max_failed: int) -> None:
     """Show which mutants of each knowledge base the tests kill."""
-    from suave_des.cli.kb_test_reports import print_mutation
     from suave_des.workbench.testing.mutation import mutate
 
     for suite, tests in _together(suites):
@@ -302,3 +302,76 @@ def _print_summary(console: Console, results: Sequence[TestResult], duration_s: 
     line = f" {', '.join(counts)}, {states} states, in {duration_s:.2f} s "
     width = min(console.width, _WIDTH)
     console.print(Text(line.center(width, "="), "bold red" if failed else "bold green"), soft_wrap=True)
+
+
+_LINES_SHOWN = 8
+"""Lines of a list on a terminal; all of it is in the JSON form."""
+
+
+def print_coverage(console: Console, coverage: Coverage) -> None:
+    """Print a table of the rules, what is missing, and the states that would cover it."""
+    table = plain_table(
+        ("rule", "fired", "not fired", "covered", "missing", "no state"), right=("fired", "not fired", "covered")
+    )
+    for each in coverage.rules:
+        reachable = len(each.covered) + len(each.missing)
+        cells = (len(each.missing) or "", len(each.unreachable) or "")
+        table.add_row(
+            each.rule, str(each.fired), str(each.not_fired), f"{len(each.covered)}/{reachable}", *map(str, cells)
+        )
+    console.print()
+    share = coverage.covered / coverage.reachable if coverage.reachable else 1.0
+    title = f"coverage: {coverage.covered} of {coverage.reachable}, {share:.0%}"
+    print_table(console, title, table)
+    for line in _coverage_lines(coverage):
+        console.print(Text(line), soft_wrap=True)
+
+
+def _coverage_lines(coverage: Coverage) -> Iterator[str]:
+    missing = [goal for each in coverage.rules for goal in each.missing]
+    if missing:
+        yield "not covered"
+        yield from (f"  {goal}" for goal in missing)
+    unreachable = [each for each in coverage.rules if each.unreachable]
+    if unreachable:
+        words = f"of {coverage.states} kinds of states of this model, with at most {coverage.max_failed} components"
+        yield f"never, whatever the state ({words} reporting); facts in a test may"
+        yield from (f"  {line}" for line in _unreachable(unreachable))
+    if coverage.proposed:
+        count = len(coverage.proposed)
+        yield f"the least set of states that would cover the rest: {count} (write them as tests with --write FILE)"
+        for state, goals in coverage.proposed:
+            yield f"  {state}"
+            yield f"    {goals[0]}" + (f" and {len(goals) - 1} more" if len(goals) > 1 else "")
+
+
+def print_mutation(console: Console, report: MutationReport) -> None:
+    """Print a table of the operators, and each survivor with a state that tells it apart."""
+    from suave_des.workbench.testing.mutation import EQUIVALENT, KILLED, SURVIVED
+
+    results = (KILLED, SURVIVED, EQUIVALENT)
+    table = plain_table(("operator", *results), right=results)
+    for operator in dict.fromkeys(verdict.mutant.operator for verdict in report.verdicts):
+        own = [verdict.result for verdict in report.verdicts if verdict.mutant.operator == operator]
+        table.add_row(operator, *(str(own.count(result)) for result in results))
+    killed, survived, equivalent = (len(report.of(result)) for result in results)
+    console.print()
+    title = f"mutation: {killed} of {killed + survived} mutants killed, {report.score:.0%}; {equivalent} equivalent"
+    print_table(console, title, table)
+    if survived:
+        console.print("survivors: no test notices", soft_wrap=True)
+    for verdict in report.of(SURVIVED):
+        console.print(Text(f"  {verdict.mutant}\n    {verdict.reason}\n    at {verdict.state}"), soft_wrap=True)
+    count = len(report.verdicts)
+    each_ms = 1000 * report.duration_s / count if count else 0.0
+    console.print(Text(f"{count} mutants in {report.duration_s:.1f} s, {each_ms:.0f} ms each"), soft_wrap=True)
+    if report.states:
+        words = f"equivalent: {report.states} kinds of states, with at most {report.max_failed} components reporting"
+        console.print(Text(f"{words}, or the schema says so"), soft_wrap=True)
+
+
+def _unreachable(rules: list[RuleCoverage]) -> Iterator[str]:
+    goals = [goal for each in rules for goal in each.unreachable]
+    yield from map(str, goals[:_LINES_SHOWN])
+    if len(goals) > _LINES_SHOWN:
+        yield f"and {len(goals) - _LINES_SHOWN} more"

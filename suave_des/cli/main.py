@@ -15,10 +15,9 @@ from typing import Annotated, Any, ClassVar
 import typer
 
 from suave_des import __version__
-from suave_des.cli import bench, calibrate, campaign, files, kb, missions, results, validate
-from suave_des.cli.headings import CommandsUnderHeadings, Headings, add_commands
-from suave_des.cli.options import remember_command_line
-from suave_des.cli.terminal import plain, write_what_the_terminal_has
+from suave_des.cli import calibrate, campaign, files, kb, missions, results, validate
+from suave_des.cli.console import plain, write_what_the_terminal_has
+from suave_des.cli.options import CommandsUnderHeadings, Headings, add_commands, remember_command_line
 from suave_des.errors import InputError, SuaveDesError
 from suave_des.interrupts import exit_status, signals_raised, was_interrupted
 
@@ -34,7 +33,7 @@ class _Commands(CommandsUnderHeadings):
         "Look at results": (results.compare, results.figure, results.report, results.replay, validate.validate),
         "Knowledge, rules and trees": (kb.app, files.tree),
         "Files": (files.import_config, files.scenarios, files.schema),
-        "Other": (calibrate.calibrate, bench.bench),
+        "Other": (calibrate.calibrate, missions.bench),
     }
 
     def invoke(self, ctx: Any) -> Any:

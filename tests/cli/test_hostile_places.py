@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from suave_des import caches
+from suave_des.cli.console import plain
 from suave_des.cli.main import main
-from suave_des.cli.terminal import plain
 from suave_des.errors import InputError
 from suave_des.knowledge.limit import TimeLimit
 
