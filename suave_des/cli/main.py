@@ -15,8 +15,9 @@ from typing import Annotated, Any, ClassVar
 import typer
 
 from suave_des import __version__
-from suave_des.cli import calibrate, campaign, files, kb, missions, results, validate
+from suave_des.cli import calibrate, campaign, files, missions, results, validate
 from suave_des.cli.console import plain, write_what_the_terminal_has
+from suave_des.cli.kb import commands as kb
 from suave_des.cli.options import CommandsUnderHeadings, Headings, add_commands, remember_command_line
 from suave_des.errors import InputError, SuaveDesError
 from suave_des.interrupts import exit_status, signals_raised, was_interrupted

@@ -15,7 +15,7 @@ from rich.progress import Progress
 from rich.text import Text
 
 from suave_des.cli.console import output, plain_table, print_table
-from suave_des.cli.kb_options import MaxFailed, TimeLimitS
+from suave_des.cli.kb.options import MaxFailed, TimeLimitS
 from suave_des.cli.options import KnowledgeFiles, grouped_options
 from suave_des.errors import InputError, did_you_mean, shown
 

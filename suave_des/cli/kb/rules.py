@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli.kb_options import AsFormat, Format, Replayed, Sources, TimeLimitS, print_json
+from suave_des.cli.kb.options import AsFormat, Format, Replayed, Sources, TimeLimitS, print_json
 from suave_des.cli.options import Modes, grouped_options
 
 if TYPE_CHECKING:

@@ -1,31 +1,31 @@
-"""suave-des kb: look at the knowledge base, edit its rules, and ask what they do.
-
-What reads ontologies or starts Java is imported when a command runs, so that help appears at once.
-"""
+"""suave-des kb infer, explain, why-not, policy, query: what follows in a state, why, and what is decided."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli import kb_diff, kb_rules, kb_test, kb_why_not
 from suave_des.cli.console import counted, errors, output, plain_table, print_table, print_trimmed
-from suave_des.cli.kb_options import (
+from suave_des.cli.kb.options import (
     AsFormat,
     Asked,
     AskedInState,
     Format,
     MaxFailed,
+    SourcesInState,
     StateParts,
+    TimeLimitS,
     print_json,
     state_lines,
 )
-from suave_des.cli.options import CommandsUnderHeadings, Headings, add_commands, grouped_options
+from suave_des.cli.options import grouped_options
 from suave_des.errors import InputError
 from suave_des.interrupts import ends_at_once
 
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
     from suave_des.workbench.policy import Policy
     from suave_des.workbench.policy_table import FunctionTable
+    from suave_des.workbench.state_input import StateBuilder
 
 _EXAMPLES = 5
 _WIDE = 300
@@ -246,28 +247,71 @@ def query(
             print("no rows")
 
 
-class _Commands(CommandsUnderHeadings):
-    headings: ClassVar[Headings] = {
-        "Ask": (infer, explain, kb_why_not.why_not, policy, query),
-        "Check, test and compare": (kb_rules.check, kb_test.test, kb_rules.try_, kb_diff.diff),
-        "Rules and OWL files": (
-            *(kb_rules.rules, kb_rules.add_rule, kb_rules.remove_rule),
-            *(kb_rules.enable_rule, kb_rules.disable_rule),
+@dataclass(frozen=True)
+class StateAnywhere(StateParts):
+    """Options that describe a state, or say where it is recorded."""
+
+    at: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--at",
+            metavar="WHAT",
+            help="Part of the state: NAME=VALUE of a quality attribute, component or function; a YAML file; "
+            "or FOLDER@SECONDS of a recorded mission.",
         ),
-    }
+    ] = None
+
+    def add_to(self, builder: StateBuilder, measured: Sequence[str]) -> None:
+        """Add all parts; those of --at come first, and the other options replace what they say."""
+        builder.add_at(self.at or ())
+        super().add_to(builder, measured)
 
 
-app = typer.Typer(
-    name="kb",
-    cls=_Commands,
-    add_completion=False,
-    rich_markup_mode=None,
-    help="Look at the knowledge base, edit its rules, and ask what they do.",
-)
-add_commands(app, _Commands.headings)
+@grouped_options
+def why_not(
+    sources: SourcesInState,
+    parts: StateAnywhere,
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="RULE", help="Names of rules; left out: all that do not fire.")
+    ] = None,
+    facts: Annotated[
+        list[str] | None,
+        typer.Option("--fact", metavar="FACT", help='Additional fact to assert, such as "Binding(b1)".'),
+    ] = None,
+    time_limit: TimeLimitS = 60.0,
+    form: AsFormat = Format.TEXT,
+) -> None:
+    """Say why a rule does not fire: the first atom that fails, what was found and what is needed.
 
+    Exit status: 0 also if a rule fires.
+    """
+    from suave_des.knowledge.limit import TimeLimit
+    from suave_des.knowledge.rules.syntax import RuleError
+    from suave_des.scenario_knowledge import open_base
+    from suave_des.workbench.fact_reader import FactReader
+    from suave_des.workbench.state_input import ManagingSettings, StateBuilder
+    from suave_des.workbench.why_not import RuleQuestions, UnusableRule, open_without_unusable
 
-@app.callback(invoke_without_command=True)
-def _help(context: typer.Context) -> None:
-    if context.invoked_subcommand is None:
-        print(context.get_help())
+    loaded = sources.loaded()
+    try:
+        base, unusable = open_base(loaded), list[UnusableRule]()
+    except RuleError:
+        base, unusable = open_without_unusable(loaded)
+    reader = FactReader(base)
+    reader.declare(facts or ())
+    base = base.with_facts(reader.triple(fact) for fact in facts or ())
+    builder = StateBuilder(base, ManagingSettings.of(loaded.scenario))
+    parts.add_to(builder, sources.measured)
+    state = builder.state()
+    questions = RuleQuestions(base, tuple(unusable))
+    named = names or sorted({*(rule.name for rule in base.rules), *(each.name for each in unusable)})
+    limit = TimeLimit(time_limit, "--time-limit")
+    answers = [limit.run(partial(questions.why_not, name, state), f"looking for what {name} lacks") for name in named]
+    shown = [answer for answer in answers if names or not answer.fires]
+    if form is Format.JSON:
+        print_json(shown)
+        return
+    for answer in shown:
+        print(answer)
+    if not shown:
+        print("all rules fire")

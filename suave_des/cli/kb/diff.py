@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from suave_des.cli.console import counted, errors, output, plain_table, print_trimmed, progress
-from suave_des.cli.kb_options import AsFormat, Asked, Format, MaxFailed, print_json
+from suave_des.cli.kb.options import AsFormat, Asked, Format, MaxFailed, print_json
 from suave_des.cli.options import Quiet, Seed, Workers, grouped_options
 
 if TYPE_CHECKING:
