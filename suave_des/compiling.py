@@ -25,7 +25,7 @@ with hidden("scipy.linalg"):
 arraymath._HAVE_BLAS = True
 
 Array = NDArray[np.float64]
-Ticks = NDArray[np.int64]
+IntArray = NDArray[np.int64]
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 

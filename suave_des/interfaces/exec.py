@@ -24,7 +24,7 @@ from suave_des.domain import Task
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.managing.base import Dependencies, ManagedSystem, ManagingSubsystem
 from suave_des.metrics.result import MissionMetrics
-from suave_des.monitor.diagnostics import MEASURED_AND_COMPONENTS, Diagnostic, Kind
+from suave_des.monitor.diagnostics import EXEMPLAR_KINDS, Diagnostic, Kind
 
 PROTOCOL: Final = 1
 """Version of the messages; a program of another version is refused."""
@@ -177,7 +177,7 @@ class ExecManager(ManagingSubsystem):
         period_s = answer.pop("period_s", None)
         self.period_s = None if period_s is None else float(period_s)
         self.starts_s = float(answer.pop("starts_s", 0.0))
-        names = answer.pop("subscribes_to", [_NAMES[kind] for kind in MEASURED_AND_COMPONENTS])
+        names = answer.pop("subscribes_to", [_NAMES[kind] for kind in EXEMPLAR_KINDS])
         if unknown := [name for name in names if name not in KINDS]:
             raise ValueError(f"subscribes_to: {did_you_mean(unknown[0], KINDS)}")
         self._subscribes_to = tuple(KINDS[name] for name in names)

@@ -127,7 +127,7 @@ class _Episode:
 
     def __init__(self, of: _Episodes, seed: int) -> None:
         self._of = of
-        self._run = run = of.simulator.start(CALLER, 1, seed, kind=_Observing)
+        self._run = run = of.simulator.start(CALLER, 1, seed, manager_type=_Observing)
         self._system, self._modes = run.system, run.modes
         assert isinstance(run.manager, _Observing)
         self._works = run.manager.works

@@ -78,7 +78,7 @@ class Mission:
                 raise InputError(f"{name}: {shown(number)} is not a number of a {name}", remedy="give a whole number")
         self._is_managed = manager is not None
         self._run = self._simulator.start(
-            manager or CALLER, run, seed, record=record, kind=None if manager else CallerManages
+            manager or CALLER, run, seed, record=record, manager_type=None if manager else CallerManages
         )
         self._result: MissionResult | None = None
         self._components: dict[str, str] = {}

@@ -66,7 +66,7 @@ class MissionCoordinator:
         self.env.process(self._watch_time_limit())
         self._tasks = self.env.process(self._carry_out_tasks())
 
-    def surface_at(self, surfaced: simpy.Event) -> Callable[[], None]:
+    def leak_handler(self, surfaced: simpy.Event) -> Callable[[], None]:
         """What is to be called at a leak: everything else is given up, and the mission ends at an event, `surfaced`."""
         self._surfaced = surfaced
 
@@ -120,9 +120,9 @@ class MissionCoordinator:
         self._finish("time limit")
 
     def _watch_battery(self, battery: BatteryLevel, least_level: float) -> Process:
-        yield until(self.env, battery.publishing.phase_s)
+        yield until(self.env, battery.timing.phase_s)
         while battery.level(self.env.now) > least_level:
-            yield self.env.timeout(battery.publishing.period_s)
+            yield self.env.timeout(battery.timing.period_s)
         self._finish(f"the battery is down to {battery.level(self.env.now):.2f}")
 
     def _next_poll(self) -> simpy.Event:

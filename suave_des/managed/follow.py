@@ -97,13 +97,13 @@ class FollowPipeline(FunctionNode, WaypointSource):
             self._travelled_m += math.dist(self._way.points_m[self._next - 1, :2].tolist(), (x_m, y_m))
             self._published_m = self._travelled_m
 
-    def _arrival_check(self, began_s: float) -> ArrivalCheck:
+    def _arrival_check(self, start_s: float) -> ArrivalCheck:
         period_s, width_m = self.revision.poll_period_s, self.revision.acceptance_m
         # Otherwise the poll counter restarts with each resend; here it stays above the limit, so every later poll
         # resends.
         polls = self.revision.polls_before_resending
         waits = (polls + 1, 1) if self.revision.resends_at_each_poll else (polls, polls)
-        return ArrivalCheck(began_s, period_s, width_m, math.inf, 0, *waits)
+        return ArrivalCheck(start_s, period_s, width_m, math.inf, 0, *waits)
 
     def waypoints(self, count: int) -> Array:
         """The present point and those after it; none when the end is reached."""

@@ -51,7 +51,7 @@ class ModeManager:
         """The mode that was requested last; none before the first request."""
         return self._requested.get(function)
 
-    def task_over(self, functions: Iterable[str]) -> None:
+    def end_task(self, functions: Iterable[str]) -> None:
         """The functions' task has ended: mode changes do not count as adaptations until they are active again."""
         self._in_use.difference_update(functions)
 

@@ -20,16 +20,16 @@ class GenerateRechargePath(FunctionNode):
     sender: SetPointSender
     station_m: tuple[float, float, float]
     resend_period_s: float
-    _going: simpy.Process | None = field(default=None, init=False)
+    _process: simpy.Process | None = field(default=None, init=False)
 
     def activated(self) -> None:
         """Set off for the station."""
-        self._going = self.env.process(self._go())
+        self._process = self.env.process(self._go())
 
     def deactivated(self) -> None:
         """Leave the autopilot to other functions."""
-        if self._going is not None:
-            self._going.interrupt()
+        if self._process is not None:
+            self._process.interrupt()
 
     def _go(self) -> Process:
         try:

@@ -139,9 +139,9 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         spiral(self._step, self._radius_m, self.altitude_m, form, self.centre_m, waypoints)
         return waypoints
 
-    def _arrival_check(self, began_s: float) -> ArrivalCheck:
+    def _arrival_check(self, start_s: float) -> ArrivalCheck:
         # The exemplar resends when its wait counter exceeds 10. Sending resets the counter; a resend also counts in
         # the same tick, hence one tick less.
         node = self.revision
         first, again = node.ticks_before_resending + 2, node.ticks_before_resending + 1
-        return ArrivalCheck(began_s, node.tick_period_s, node.acceptance_m, node.acceptance_m, 1, first, again)
+        return ArrivalCheck(start_s, node.tick_period_s, node.acceptance_m, node.acceptance_m, 1, first, again)

@@ -25,19 +25,19 @@ class Surface(FunctionNode):
     """
 
     sender: SetPointSender
-    _going: simpy.Process | None = field(default=None, init=False)
+    _process: simpy.Process | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         self.surfaced: simpy.Event = self.env.event()
 
     def activated(self) -> None:
         """Set off for the surface."""
-        self._going = self.env.process(self._go())
+        self._process = self.env.process(self._go())
 
     def deactivated(self) -> None:
         """Leave the autopilot to other functions."""
-        if self._going is not None and self._going.is_alive:
-            self._going.interrupt()
+        if self._process is not None and self._process.is_alive:
+            self._process.interrupt()
 
     def _go(self) -> Process:
         x_m, y_m, _ = self.sender.vehicle.position(self.env.now)

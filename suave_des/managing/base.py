@@ -16,7 +16,7 @@ import simpy
 
 from suave_des.domain import Task
 from suave_des.errors import InputError
-from suave_des.monitor.diagnostics import MEASURED_AND_COMPONENTS, Diagnostic, Kind
+from suave_des.monitor.diagnostics import EXEMPLAR_KINDS, Diagnostic, Kind
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.modes import UNGROUND_MODE
 
@@ -97,7 +97,7 @@ class ManagedSystem:
         None if there is none; a repetition of the value before is not a publication.
         """
         measurements = self.measurements.get(attribute)
-        if measurements is None or not (published := measurements.published(self.env.now)):
+        if measurements is None or not (published := measurements.count_until(self.env.now)):
             return None
         return measurements.values[published - 1] if measurements.times_s[published - 1] >= since_s else None
 
@@ -166,7 +166,7 @@ class ManagingSubsystem:
     """
 
     needs_knowledge: ClassVar[bool] = False
-    subscribes_to: ClassVar[Collection[Kind]] = MEASURED_AND_COMPONENTS
+    subscribes_to: ClassVar[Collection[Kind]] = EXEMPLAR_KINDS
 
     @classmethod
     def input_files(cls, settings: Mapping[str, Any]) -> Collection[str]:

@@ -34,7 +34,7 @@ class BehaviourTree(FunctionsManager):
         self.period_s = self._settings.tick_period_s
         self.starts_s = system.stream("bt/phase").uniform(0.0, self.period_s)
         self._failed: set[str] = set()
-        self._noted = ""
+        self._logged = ""
         self.root = self.make_tree()
 
     def make_tree(self) -> Behaviour:
@@ -54,9 +54,9 @@ class BehaviourTree(FunctionsManager):
             self.root.tick()
             return
         behaviours.tick(self.root)
-        if (noted := behaviours.last_tick(self.root)) != self._noted:
-            self._noted = noted
-            self.system.log("tick", noted)
+        if (requested := behaviours.last_tick(self.root)) != self._logged:
+            self._logged = requested
+            self.system.log("tick", requested)
 
     def drawing(self) -> str:
         """The tree as text."""

@@ -40,7 +40,7 @@ class PyTreesManager(FunctionsManager):
         self.period_s = float(system.settings.get("tick_period_s", 0.1))
         self.starts_s = system.stream("py_trees/phase").uniform(0.0, self.period_s)
         self.root = self.make_tree()
-        self._noted = ""
+        self._logged = ""
 
     def make_tree(self) -> Behaviour:
         """Make the tree; called once, before the mission."""
@@ -69,8 +69,8 @@ class PyTreesManager(FunctionsManager):
         ticked = "; ".join(
             f"{each.name} {each.status.name.lower()}" for each in self.root.iterate() if _is_ticked_leaf(each)
         )
-        if ticked != self._noted:
-            self._noted = ticked
+        if ticked != self._logged:
+            self._logged = ticked
             self.system.log("tick", ticked)
 
     def drawing(self) -> str:

@@ -158,7 +158,7 @@ def fulfilments(
 
 
 def _over_time(requirement: Requirement, measured: Measured, now_s: float) -> float | None:
-    count = measured.published(now_s)
+    count = measured.count_until(now_s)
     times_s, values = measured.times_s[:count], measured.values[:count]
     if not count or now_s <= times_s[0]:
         return None

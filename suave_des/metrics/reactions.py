@@ -73,7 +73,7 @@ class ReactionMeter:
 
     def _low_battery(self) -> Iterator[_Entry]:
         if self.battery is not None:
-            for message in range(self.battery.published(self.env.now)):
+            for message in range(self.battery.count_until(self.env.now)):
                 low = self.battery.values[message] < self.settings.battery_limit
                 yield self.battery.times_s[message], _OpenEvents.battery, low
 

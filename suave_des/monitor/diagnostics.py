@@ -25,7 +25,7 @@ class Kind(StrEnum):
     """Key pipeline, the index of the point seen first; at the moment of the first sight."""
 
 
-MEASURED_AND_COMPONENTS = (Kind.QA_STATUS, Kind.COMPONENT_STATUS)
+EXEMPLAR_KINDS = (Kind.QA_STATUS, Kind.COMPONENT_STATUS)
 """The kinds that the exemplar's monitors publish."""
 
 
@@ -53,7 +53,7 @@ class DiagnosticsBus:
     def __init__(self) -> None:
         self._subscribers: defaultdict[Kind, list[Subscriber]] = defaultdict(list)
 
-    def subscribe(self, subscriber: Subscriber, kinds: Iterable[Kind] = MEASURED_AND_COMPONENTS) -> None:
+    def subscribe(self, subscriber: Subscriber, kinds: Iterable[Kind] = EXEMPLAR_KINDS) -> None:
         """Pass every later diagnostic of some kinds to `subscriber`."""
         for kind in kinds:
             self._subscribers[kind].append(subscriber)

@@ -1,19 +1,19 @@
-"""What monitors measure, as tables: a whole mission's messages at once, ahead of time.
+"""What monitors measure: a signal's messages as a table for the whole mission, the battery's level as it comes.
 
 To look a value up is to read the table; a monitor publishes it only when somebody subscribes (see `monitors`).
 """
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import ClassVar
+from typing import ClassVar, Protocol
 
 import numpy as np
 
 from suave_des.clock import tick_at_or_after
-from suave_des.compiling import Array, Ticks
+from suave_des.compiling import Array, IntArray
 from suave_des.world.signals import Signal
 
 Thresholds = tuple[float, ...]
@@ -27,6 +27,34 @@ Crossings = tuple[list[float], list[int]]
 def region_of(value: float, thresholds: Thresholds) -> int:
     """Number of a value's region."""
     return bisect_left(thresholds, value) + bisect_right(thresholds, value)
+
+
+class Measured(Protocol):
+    """What a monitor measures of a quality attribute."""
+
+    @property
+    def is_tabulated(self) -> bool:
+        """Whether it is known for the whole mission: then the times that are asked about may lie in the future."""
+
+    @property
+    def times_s(self) -> Sequence[float]:
+        """When the values were published."""
+
+    @property
+    def values(self) -> Sequence[float]:
+        """The values that were published, and those that will be if it is tabulated."""
+
+    def count_until(self, t_s: float) -> int:
+        """How many values are published until mission time t."""
+
+    def value(self, t_s: float) -> float | None:
+        """The value that was published last at mission time t; none before the first."""
+
+    def region(self, t_s: float, thresholds: Thresholds) -> int:
+        """Region of the value that was published last at mission time t."""
+
+    def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
+        """First time after mission time t at which the region changes, or, if that is not known, may change."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +74,7 @@ class Measurements:
     """Times and values once more, for computing with all of them at once."""
     _crossings: dict[Thresholds, Crossings] = field(default_factory=dict, repr=False, compare=False)
 
-    def published(self, t_s: float) -> int:
+    def count_until(self, t_s: float) -> int:
         """How many values are published until mission time t."""
         return bisect_right(self.times_s, t_s)
 
@@ -72,7 +100,7 @@ class Measurements:
 
     def value(self, t_s: float) -> float | None:
         """The value that was published last at mission time t; none before the first."""
-        published = self.published(t_s)
+        published = self.count_until(t_s)
         return self.values[published - 1] if published else None
 
     def next_message_s(self, t_s: float) -> float:
@@ -81,7 +109,7 @@ class Measurements:
 
 
 @dataclass(frozen=True, slots=True)
-class Publishing:
+class MonitorTiming:
     """When a monitor measures.
 
     Attributes:
@@ -99,7 +127,7 @@ def measure(
     key: str,
     signal: Signal,
     duration_s: float,
-    publishing: Publishing,
+    timing: MonitorTiming,
     noise: Callable[[], float] | None = None,
     is_lost: Callable[[float], bool] | None = None,
 ) -> Measurements:
@@ -109,15 +137,15 @@ def measure(
         key: name of the quality attribute.
         signal: what is measured.
         duration_s: of the mission.
-        publishing: when it is measured.
+        timing: when it is measured.
         noise: draws the error of one measurement.
         is_lost: whether the message at a mission time is not published.
     """
-    period_s, phase_s = publishing.period_s, publishing.phase_s
+    period_s, phase_s = timing.period_s, timing.phase_s
     messages = max(0, math.floor((duration_s - phase_s) / period_s)) + 1
     times: Array = phase_s + period_s * np.arange(messages, dtype=np.float64)
     read_at = times
-    if (step_s := publishing.time_step_s) > 0.0:
+    if (step_s := timing.time_step_s) > 0.0:
         # A time within a millionth of a step below a multiple counts as it: timers add up rounding errors.
         read_at = np.floor(times / step_s + 1e-6) * step_s
     values, changes = _sampled(signal, read_at.tobytes())
@@ -133,7 +161,7 @@ def measure(
     return Measurements(key, tuple(times.tolist()), numbers, phase_s, period_s, (times, changed))
 
 
-def _changes(values: Array) -> tuple[Ticks, Array, tuple[float, ...]]:
+def _changes(values: Array) -> tuple[IntArray, Array, tuple[float, ...]]:
     """Indices of the values that differ from the one before, as the first one does, and these values, twice."""
     indices = np.flatnonzero(np.diff(values, prepend=np.nan))
     return indices, values[indices], tuple(values[indices].tolist())
@@ -143,7 +171,7 @@ def _changes(values: Array) -> tuple[Ticks, Array, tuple[float, ...]]:
 
 
 @lru_cache(maxsize=16)
-def _sampled(signal: Signal, times_s: bytes) -> tuple[Array, tuple[Ticks, Array, tuple[float, ...]]]:
+def _sampled(signal: Signal, times_s: bytes) -> tuple[Array, tuple[IntArray, Array, tuple[float, ...]]]:
     """Values of a signal at some times, and their changes."""
     times = np.frombuffer(times_s)
     first, _, different_s = _changes(times)
@@ -169,7 +197,7 @@ class BatteryLevel:
     Attributes:
         is_at_station: whether the vehicle is at the station at a mission time.
         discharge_time_s: time from full to empty.
-        publishing: when it is measured.
+        timing: when it is measured.
         noise: draws the error of one measurement; none if measurements are exact.
         is_lost: whether the message at a mission time is not published; none: all are.
         times_s, values: of what was published so far.
@@ -180,7 +208,7 @@ class BatteryLevel:
     is_tabulated: ClassVar[bool] = False
     is_at_station: Callable[[float], bool]
     discharge_time_s: float
-    publishing: Publishing
+    timing: MonitorTiming
     noise: Callable[[], float] | None = None
     is_lost: Callable[[float], bool] | None = None
     times_s: list[float] = field(default_factory=list, init=False)
@@ -190,9 +218,9 @@ class BatteryLevel:
     _was_at_station: bool = field(default=False, init=False)
 
     def __post_init__(self) -> None:
-        self._next_s = self.publishing.phase_s
+        self._next_s = self.timing.phase_s
 
-    def published(self, t_s: float) -> int:
+    def count_until(self, t_s: float) -> int:
         """How many values are published until mission time t, which must not lie in the future."""
         while self._next_s <= t_s:
             if at_station := self.is_at_station(self._next_s):
@@ -203,17 +231,17 @@ class BatteryLevel:
             if self.is_lost is None or not self.is_lost(self._next_s):
                 self.times_s.append(self._next_s)
                 self.values.append(self._level(self._next_s) + error)
-            self._next_s += self.publishing.period_s
+            self._next_s += self.timing.period_s
         return bisect_right(self.times_s, t_s)
 
     def value(self, t_s: float) -> float | None:
         """The level that was published last at mission time t; none before the first."""
-        published = self.published(t_s)
+        published = self.count_until(t_s)
         return self.values[published - 1] if published else None
 
     def level(self, t_s: float) -> float:
         """The true level at mission time t, which is now."""
-        self.published(t_s)
+        self.count_until(t_s)
         return self._level(t_s)
 
     def _level(self, t_s: float) -> float:
@@ -221,7 +249,7 @@ class BatteryLevel:
 
     def region(self, t_s: float, thresholds: Thresholds) -> int:
         """Region of the level that was published last at mission time t."""
-        published = self.published(t_s)
+        published = self.count_until(t_s)
         return region_of(self.values[published - 1], thresholds) if published else -1
 
     def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
@@ -235,8 +263,4 @@ class BatteryLevel:
             return self._next_s
         least = max([each for each in thresholds if each <= 1.0], default=-math.inf)
         falls_s = (1.0 - least) * self.discharge_time_s
-        return max(self._next_s, self._full_at_s + falls_s - self.publishing.period_s)
-
-
-Measured = Measurements | BatteryLevel
-"""What a monitor measures of a quality attribute; times asked about may lie in the future if it is tabulated."""
+        return max(self._next_s, self._full_at_s + falls_s - self.timing.period_s)

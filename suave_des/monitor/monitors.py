@@ -8,7 +8,7 @@ import simpy
 from suave_des.clock import Process, tick_at_or_after, until
 from suave_des.domain import thruster_name
 from suave_des.monitor.diagnostics import FAILED, HULL, LEAK, RECOVERED, Diagnostic, DiagnosticsBus, Kind
-from suave_des.monitor.measurements import BatteryLevel, Measurements, Publishing
+from suave_des.monitor.measurements import BatteryLevel, Measurements, MonitorTiming
 from suave_des.vehicle.frames import Pose
 
 
@@ -22,13 +22,13 @@ def signal_monitor(env: simpy.Environment, bus: DiagnosticsBus, measurements: Me
 def battery_monitor(env: simpy.Environment, bus: DiagnosticsBus, level: BatteryLevel) -> Process:
     """Publish the battery's level, once a period."""
     known = 0
-    yield until(env, level.publishing.phase_s)
+    yield until(env, level.timing.phase_s)
     while True:
-        published = level.published(env.now)
+        published = level.count_until(env.now)
         if published > known:  # or the message was lost
             bus.publish(Diagnostic(env.now, Kind.QA_STATUS, level.key, level.values[published - 1]))
         known = published
-        yield env.timeout(level.publishing.period_s)
+        yield env.timeout(level.timing.period_s)
 
 
 def leak_monitor(env: simpy.Environment, bus: DiagnosticsBus, time_s: float, detected: Callable[[], None]) -> Process:
@@ -57,45 +57,55 @@ class LossyPublisher(NamedTuple):
             self.bus.publish(diagnostic)
 
 
-class ThrusterFault(NamedTuple):
-    """A thruster that fails or recovers, time in s as the revision counts it."""
+class ScheduledEvent(NamedTuple):
+    """A thruster that fails or recovers in a run.
+
+    Attributes:
+        thruster: its number, from 1.
+        fails: whether it fails; else it recovers.
+        time_s: when, as the revision counts it.
+        recoverable: whether f_maintain_motion can bring it back after this failure.
+        number: of its entry in the scenario, from 0.
+    """
 
     thruster: int
     fails: bool
     time_s: float
+    recoverable: bool = True
+    number: int = 0
 
 
 def thruster_monitor(
     env: simpy.Environment,
     bus: Publisher,
-    faults: Sequence[ThrusterFault],
-    set_health: Callable[[float, int, float], None],
-    checking: Publishing,
+    events: Sequence[ScheduledEvent],
+    happens: Callable[[float, ScheduledEvent], None],
+    timing: MonitorTiming,
     after_previous: bool,
 ) -> Process:
-    """Inject the scheduled faults, and publish them.
+    """Inject the scheduled faults and recoveries, and publish them.
 
-    Once a period the monitor checks the first fault of the list that has not happened yet: so several that are due
+    Once a period the monitor checks the first event of the list that has not happened yet: so several that are due
     come one period apart, in list order, and a later one waits for the one before it.
 
     Args:
         env, bus: the mission's clock, and where to publish.
-        faults: the schedule.
-        set_health: called with the time, a thruster's number and 0 (lost) or 1 (works).
-        checking: when the monitor checks.
-        after_previous: whether each time counts from the fault before it (rev 2023) or from the start (rev 1.5).
+        events: the schedule.
+        happens: called with mission time and event.
+        timing: when the monitor checks.
+        after_previous: whether each time counts from the event before it (rev 2023) or from the start (rev 1.5).
     """
-    counted_from, earliest = 0.0, 0.0
-    for fault in faults:
-        due = counted_from + fault.time_s
-        tick = tick_at_or_after(max(due, earliest), checking.phase_s, checking.period_s)
-        yield until(env, tick)
-        set_health(env.now, fault.thruster, 0.0 if fault.fails else 1.0)
-        status = FAILED if fault.fails else RECOVERED
-        bus.publish(Diagnostic(env.now, Kind.COMPONENT_STATUS, thruster_name(fault.thruster), status))
-        earliest = tick + checking.period_s
+    counted_from_s, earliest_s = 0.0, 0.0
+    for event in events:
+        due_s = max(counted_from_s + event.time_s, earliest_s)
+        tick_s = tick_at_or_after(due_s, timing.phase_s, timing.period_s)
+        yield until(env, tick_s)
+        happens(env.now, event)
+        status = FAILED if event.fails else RECOVERED
+        bus.publish(Diagnostic(env.now, Kind.COMPONENT_STATUS, thruster_name(event.thruster), status))
+        earliest_s = tick_s + timing.period_s
         if after_previous:
-            counted_from = tick
+            counted_from_s = tick_s
 
 
 def state_monitor(

@@ -21,7 +21,7 @@ RAISED = (Exception, SystemExit)
 _T = TypeVar("_T")
 _MEASURED_SOMEWHERE = ("water_visibility", "battery_level")
 """What shipped scenarios measure, though not each of them: a manager may serve all."""
-_STEPS_AT_ONE_TIME = 10_000
+_MAX_YIELDS_AT_ONE_TIME = 10_000
 """How often `adapt` may yield while mission time stands still."""
 
 
@@ -38,7 +38,7 @@ class ManagerHost:
         system: the manager's view of the managed subsystem.
         bus: where the diagnostics come from that the manager subscribes to.
         skips_idle_calls: whether calls are left out at all.
-        kind: the manager's class; None: the one that its name leads to.
+        manager_type: the manager's class; None: the one that its name leads to.
 
     Raises:
         MissionError: the manager raised; here, or in any hook later.
@@ -50,34 +50,35 @@ class ManagerHost:
     system: ManagedSystem
     bus: DiagnosticsBus
     skips_idle_calls: bool
-    kind: type[ManagingSubsystem] | None = None
+    manager_type: type[ManagingSubsystem] | None = None
     manager: ManagingSubsystem = field(init=False)
     remarks: tuple[str, ...] = ()  # what its author should know
     _is_waiting: bool = False  # for an event
     _idle_regions: set[tuple[int, ...]] = field(default_factory=set)  # of measured values: there, calls change nothing
 
     def __post_init__(self) -> None:
-        kind = self.kind or manager_class(self.name)
+        manager_type = self.manager_type or manager_class(self.name)
         try:
-            self.manager = kind(self.system)
+            self.manager = manager_type(self.system)
             if not hasattr(self.manager, "system"):
-                raise TypeError(f"{kind.__name__}.__init__ does not begin with super().__init__(system)")
-            own = "depends_on" in vars(kind)  # a derived class may depend on more
-            is_users = not is_built_in(self.name)
-            declared = self.manager.depends_on if own and (self.skips_idle_calls or is_users) else None
+                raise TypeError(f"{manager_type.__name__}.__init__ does not begin with super().__init__(system)")
+            declares = "depends_on" in vars(manager_type)  # a derived class may depend on more
+            is_user_defined = not is_built_in(self.name)
+            declared = self.manager.depends_on if declares and (self.skips_idle_calls or is_user_defined) else None
             if declared is not None:
                 declared = {name: tuple(sorted(map(float, each))) for name, each in declared.items()}
         except InputError:
             raise  # such as an ontology that cannot be used: it concerns every mission
         except RAISED as error:
             raise self.mission_error(error) from error
-        if is_users:
+        if is_user_defined:
             self.remarks = tuple(_unmeasured(declared or (), self.system.measurements))
         self._is_event_triggered = declared is not None and self.skips_idle_calls
-        edges = (declared or {}) if self._is_event_triggered else {}
-        self._depends_on = [(each, edges[name]) for name, each in self.system.measurements.items() if name in edges]
+        thresholds = (declared or {}) if self._is_event_triggered else {}
+        measured = self.system.measurements
+        self._depends_on = [(measured[name], thresholds[name]) for name in measured if name in thresholds]
         self._is_tabulated = all(each.is_tabulated for each, _ in self._depends_on)
-        if kind.diagnostic is not ManagingSubsystem.diagnostic:
+        if manager_type.diagnostic is not ManagingSubsystem.diagnostic:
             self.bus.subscribe(self._diagnostic, self.manager.subscribes_to)
         period_s = self.manager.period_s
         if period_s is not None:
@@ -100,7 +101,7 @@ class ManagerHost:
 
     def cancel(self, task: Task) -> None:
         """Pass on to the manager a task that is over."""
-        self.system.modes.task_over(task.functions)
+        self.system.modes.end_task(task.functions)
         self._guarded(self.manager.task_cancelled, task)
         self.state_changed()
 
@@ -164,7 +165,9 @@ class ManagerHost:
         """First time of `adapt` at which measured values lie, or may lie, outside all idle regions."""
         tick_s = self.system.env.now
         while True:
-            event_s = min([each.next_crossing_s(tick_s, edges) for each, edges in self._depends_on], default=inf)
+            event_s = min(
+                [each.next_crossing_s(tick_s, thresholds) for each, thresholds in self._depends_on], default=inf
+            )
             if event_s == inf:
                 return inf
             tick_s = _tick_at_or_after(event_s, due_s, period_s)
@@ -173,7 +176,7 @@ class ManagerHost:
             due_s = tick_s + period_s
 
     def _regions(self, t_s: float) -> tuple[int, ...]:
-        return tuple([measured.region(t_s, edges) for measured, edges in self._depends_on])
+        return tuple([each.region(t_s, thresholds) for each, thresholds in self._depends_on])
 
     def _guarded_steps(self, adaptation: AdaptationProcess) -> Process:
         resume: Callable[[Any], object] = adaptation.send
@@ -181,8 +184,8 @@ class ManagerHost:
         while True:
             steps, since_s = (steps + 1, since_s) if self.system.env.now == since_s else (0, self.system.env.now)
             try:
-                if steps > _STEPS_AT_ONE_TIME:
-                    raise RuntimeError(f"adapt yielded {_STEPS_AT_ONE_TIME} events, and no mission time passed")
+                if steps > _MAX_YIELDS_AT_ONE_TIME:
+                    raise RuntimeError(f"adapt yielded {_MAX_YIELDS_AT_ONE_TIME} events, and no mission time passed")
                 event = resume(outcome)
                 if not isinstance(event, simpy.Event):
                     raise TypeError(f"adapt yielded {event!r}; it may yield events, such as system.env.timeout(1.0)")

@@ -1,6 +1,6 @@
 """One mission: scenario, manager, run and seed, wired into a SimPy environment."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import simpy
@@ -27,25 +27,21 @@ from suave_des.metrics.reactions import ReactionMeter
 from suave_des.metrics.recording import Recorder
 from suave_des.metrics.result import MissionMetrics, MissionResult
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
-from suave_des.monitor.measurements import BatteryLevel, Measured, Measurements, Publishing, measure
+from suave_des.monitor.measurements import Measured
 from suave_des.monitor.monitors import (
     LossyPublisher,
-    ThrusterFault,
     battery_monitor,
     leak_monitor,
     signal_monitor,
     state_monitor,
     thruster_monitor,
 )
-from suave_des.scenario.physical import Battery
+from suave_des.simulation.faults import ThrusterFaults, schedule
 from suave_des.simulation.host import RAISED, ManagerHost
-from suave_des.simulation.simulator import Simulator
+from suave_des.simulation.measuring import measure_battery, measure_signal, monitor_timing
+from suave_des.simulation.prepared import PreparedScenario
 from suave_des.simulation.vehicles import draw_start, make_vehicle
 from suave_des.vehicle.guidance import SetPointSender
-from suave_des.world.signals import Signal
-
-_DELIVERY_S = 0.01
-"""Delay from a timer's tick to the arrival of its message; a simultaneous tick of another timer misses it."""
 
 
 class MissionRun:
@@ -53,86 +49,58 @@ class MissionRun:
 
     def __init__(
         self,
-        simulator: Simulator,
+        prepared: PreparedScenario,
         manager: str,
         run: int,
         seed: int,
         track: Array,
         *,
         record: bool,
-        kind: type[ManagingSubsystem] | None = None,
+        manager_type: type[ManagingSubsystem] | None = None,
     ) -> None:
-        self._simulator = simulator
-        self._scenario = simulator.loaded.scenario
-        self._revision = self._scenario.revision
+        self._prepared = prepared
+        self._scenario = scenario = prepared.loaded.scenario
+        self._revision = scenario.revision
         self._manager, self._run_number, self._seed = manager, run, seed
         self.track = track
-        self._chance = Chance(simulator.distributions, seed, run, simulator.runs_per_draw)
+        self._chance = chance = Chance(prepared.distributions, seed, run, prepared.runs_per_draw)
         self.env = simpy.Environment()
+        self.bus = DiagnosticsBus()
         self._recorder = Recorder(self.env, enabled=record)
-        self._bus = DiagnosticsBus()
-        self._unrecoverable: set[int] = set()
-        self._faults_happened = 0
 
-        self._start = draw_start(self._chance)
-        self._vehicle = make_vehicle(
-            self._scenario, simulator.vehicle_model, self._chance, self._start, simulator.duration_s, track
-        )
-        self._true_signals: dict[str, Signal] = {}
-        self._signals = {name: self._measure(name) for name in sorted(self._scenario.signals)}
-        self._visibility = self._signals["water_visibility"]
-        self._battery = None if self._scenario.battery is None else self._make_battery(self._scenario.battery)
+        # The vehicle.
+        self._start = draw_start(chance)
+        self._vehicle = make_vehicle(scenario, prepared.vehicle_model, chance, self._start, prepared.duration_s, track)
+        self._faults = ThrusterFaults(scenario, chance, self._vehicle, self._recorder.log)
+
+        # What monitors measure.
+        names, tables, duration_s = sorted(scenario.signals), prepared.loaded.tables, prepared.duration_s
+        self._true = {name: chance.signal(name, scenario.signals[name], tables) for name in names}
+        self._signals = {name: measure_signal(scenario, chance, name, self._true[name], duration_s) for name in names}
+        self._battery = measure_battery(scenario, chance, self._vehicle)
         self._measured: dict[str, Measured] = {**self._signals}
         if self._battery is not None:
             self._measured[self._battery.key] = self._battery
-        self._detector = PipelineDetector(
-            self.env,
-            self._vehicle,
-            self._visibility.arrays,
-            simulator.detection_points,
-            simulator.view_tangent,
-            self._recorder.log,
-        )
-        nodes = self._make_functions()
-        latency_s = self._chance.sampler("latencies.mode_change_s", self._scenario.latencies.mode_change_s)
-        self.modes = ModeManager(self.env, simulator.loaded.modes, nodes, latency_s, self._recorder.log)
-        self._reactions = ReactionMeter(
-            self.env,
-            self._scenario.reaction_metric,
-            self._visibility,
-            self._revision.spiral.initial_altitude_m,
-            self._battery,
-        )
-        self._bus.subscribe(self._reactions.diagnostic, (Kind.COMPONENT_STATUS,))
-        if record:
-            thresholds_m = self._scenario.reaction_metric.visibility_thresholds_m
-            battery_limit = self._scenario.reaction_metric.battery_limit
-            self._bus.subscribe(self._recorder.diagnostic_of(thresholds_m, battery_limit))
-            self.modes.listeners.append(self._recorder.mode_effect)
-        self.modes.listeners.append(self._reactions.mode_effect)
-        self._further: FurtherMetrics | None = None
-        if self._scenario.further_columns:
-            self._further = further = FurtherMetrics(
-                self.env, self._scenario, self._vehicle, self._measured, self._battery
-            )
-            self.modes.listeners.append(further.mode_effect)
-            self.modes.adaptation_listeners.append(further.adapted)
+
+        # The managed subsystem.
+        self._detector = self._make_detector()
+        self.modes = self._make_mode_manager(self._make_functions())
         self._coordinator = self._make_coordinator()
-        self._host = self._make_host(kind)
-        self._coordinator.start(self._host.request, self._host.cancel)
-        self._start_monitors()
-        self._coordinator.ended.callbacks.append(StopSimulation.callback)  # or `advance` would run past it
-        self._host.start()
+
+        # Metrics and record.
+        self._reactions = self._make_reaction_meter()
+        self._further = self._make_further_metrics()
+        if record:
+            self._record_changes()
+
+        # The managing subsystem.
+        self._host = self._make_host(manager_type)
+        self._begin()
 
     @property
     def manager(self) -> ManagingSubsystem:
         """The managing subsystem."""
         return self._host.manager
-
-    @property
-    def bus(self) -> DiagnosticsBus:
-        """Where diagnostics are published."""
-        return self._bus
 
     @property
     def system(self) -> ManagedSystem:
@@ -170,7 +138,7 @@ class MissionRun:
         recorder, drawn, metrics = self._recorder, self._chance.drawn, self.metrics()
         self._host.end(metrics)
         measured = {} if self._battery is None else {self._battery.key: self._battery}
-        trajectory = recorder.trajectory(self._vehicle, self._visibility, measured)
+        trajectory = recorder.trajectory(self._vehicle, self._signals["water_visibility"], measured)
         events, knowledge = tuple(recorder.events), tuple(recorder.knowledge)
         further = {} if self._further is None else self._further.columns(metrics)
         remarks = self._host.remarks
@@ -188,7 +156,7 @@ class MissionRun:
         """The metrics, as of now if the mission is not over."""
         coordinator, detector = self._coordinator, self._detector
         found = coordinator.search_time_s is not None
-        x_m, y_m = self._simulator.points[detector.first_point, :2].tolist() if found else (None, None)
+        x_m, y_m = self._prepared.points[detector.first_point, :2].tolist() if found else (None, None)
         return MissionMetrics(
             scenario=self._scenario.name,
             manager=self._manager,
@@ -207,90 +175,16 @@ class MissionRun:
             detection_y_m=y_m,
         )
 
-    def _make_fault(self, t_s: float, thruster: int, health: float) -> None:
-        """Apply the next of the scenario's thruster events."""
-        n = self._faults_happened
-        event = self._scenario.thruster_events[n]
-        self._faults_happened += 1
-        if not health and self._is_without_effect(n, t_s):
-            self._recorder.log("thruster_monitor", "failure_without_effect", f"c_thruster_{thruster}")
-            return
-        if health or event.recoverable:
-            self._unrecoverable.discard(thruster)
-        else:
-            self._unrecoverable.add(thruster)
-        self._set_thruster_health(t_s, thruster, health)
+    # The parts.
 
-    def _is_without_effect(self, n: int, t_s: float) -> bool:
-        """Whether a failure, the scenario's thruster event n, does not reach the vehicle."""
-        failures = self._revision.thruster_failures
-        if t_s < failures.effective_from_s:
-            return True
-        chance = failures.loss_probability  # one stream an event: an earlier loss does not move the next draw
-        return chance > 0.0 and self._chance.stream(f"thruster_failures/{n}").random() < chance
+    def _make_detector(self) -> PipelineDetector:
+        prepared, visibility = self._prepared, self._signals["water_visibility"].arrays
+        points, view_tangent, log = prepared.detection_points, prepared.view_tangent, self._recorder.log
+        return PipelineDetector(self.env, self._vehicle, visibility, points, view_tangent, log)
 
-    def _set_thruster_health(self, t_s: float, thruster: int, health: float) -> None:
-        self._vehicle.set_thruster_health(t_s, thruster, health)
-        if self._further is not None:
-            self._further.thrusters_changed()
-
-    def _measure(self, name: str) -> Measurements:
-        signal, chance = self._scenario.signals[name], self._chance
-        period_s = signal.publishing_period_s or self._revision.monitors.visibility_publishing_period_s
-        publishing = Publishing(period_s, self._monitor_phase_s(f"signals.{name}", period_s), signal.time_step_s)
-        noise = chance.sampler(f"signals.{name}.noise", signal.noise) if signal.noise != 0.0 else None
-        described = self._true_signals[name] = chance.signal(name, signal, self._simulator.loaded.tables)
-        lost = chance.loss(f"signals.{name}", signal)
-        return measure(name, described, self._simulator.duration_s, publishing, noise, lost)
-
-    def _monitor_phase_s(self, monitor: str, period_s: float) -> float:
-        """Mission time of a monitor's first message."""
-        if "monitors" in self._revision.timers_in_step:
-            return period_s + _DELIVERY_S
-        return self._chance.phase(monitor, period_s)
-
-    def _make_battery(self, battery: Battery) -> BatteryLevel:
-        def is_at_station(t_s: float) -> bool:
-            x_m, y_m, _ = self._vehicle.position(t_s)
-            return max(abs(x_m - battery.station_x_m), abs(y_m - battery.station_y_m)) <= battery.station_radius_m
-
-        period_s = battery.publishing_period_s
-        publishing = Publishing(period_s, self._monitor_phase_s("battery_monitor", period_s))
-        noise = self._chance.sampler("battery.noise", battery.noise) if battery.noise != 0.0 else None
-        lost = self._chance.loss("battery", battery)
-        return BatteryLevel(is_at_station, battery.discharge_time_s, publishing, noise, lost)
-
-    def _start_monitors(self) -> None:
-        if self._bus.has_subscribers(Kind.QA_STATUS):  # to look values up, the measurements are enough
-            for measurements in self._signals.values():
-                self.env.process(signal_monitor(self.env, self._bus, measurements))
-            if self._battery is not None:
-                self.env.process(battery_monitor(self.env, self._bus, self._battery))
-        for kind, key, state in (
-            (Kind.POSE, "pose", lambda: self._vehicle.pose(self.env.now)),
-            (Kind.DISTANCE, "distance_inspected_m", lambda: self._follow.distance_m),
-        ):
-            if self._bus.has_subscribers(kind):
-                self.env.process(state_monitor(self.env, self._bus, kind, key, state))
-        if self._bus.has_subscribers(Kind.DETECTION):
-            self._detector.detected.callbacks.append(self._publish_detection)
-        self._start_thruster_monitor()
-
-    def _start_thruster_monitor(self) -> None:
-        faults = []
-        for n, event in enumerate(self._scenario.thruster_events):
-            time_s = self._chance.draw(f"thruster_events.{n}.time_s", event.time_s, least=0.0)
-            faults.append(ThrusterFault(event.thruster, event.event == "failure", time_s))
-        monitors = self._revision.monitors
-        period_s, after_previous = monitors.thruster_check_period_s, monitors.thruster_event_times == "after_previous"
-        checking = Publishing(period_s, self._monitor_phase_s("thruster_monitor", period_s))
-        lost = self._chance.loss("thruster_monitor", self._scenario.thruster_monitor)
-        bus = self._bus if lost is None else LossyPublisher(self._bus, lost)
-        self.env.process(thruster_monitor(self.env, bus, faults, self._make_fault, checking, after_previous))
-
-    def _publish_detection(self, _: simpy.Event) -> None:
-        point = float(self._detector.first_point or 0)
-        self._bus.publish(Diagnostic(self.env.now, Kind.DETECTION, "pipeline", point))
+    def _make_mode_manager(self, nodes: Mapping[str, FunctionNode]) -> ModeManager:
+        latency_s = self._chance.sampler("latencies.mode_change_s", self._scenario.latencies.mode_change_s)
+        return ModeManager(self.env, self._prepared.loaded.modes, nodes, latency_s, self._recorder.log)
 
     def _make_functions(self) -> dict[str, FunctionNode]:
         env, revision, chance = self.env, self._revision, self._chance
@@ -298,12 +192,12 @@ class MissionRun:
         follow, search, recharge = domain.FOLLOW_PIPELINE, domain.GENERATE_SEARCH_PATH, domain.GENERATE_RECHARGE_PATH
         make_sender = partial(self._make_sender, loss_probability)
         phase_s = chance.phase(search, revision.spiral.tick_period_s)
-        ready_s, view_tangent = chance.value("latencies.guided_start_s"), self._simulator.view_tangent
+        ready_s, view_tangent = chance.value("latencies.guided_start_s"), self._prepared.view_tangent
         recovery_s = chance.sampler("revision.recovery.delay_s", revision.recovery.delay_s)
         self._follow = FollowPipeline(env, make_sender(follow), revision.follow, self._path)
         nodes: dict[str, FunctionNode] = {
             domain.MAINTAIN_MOTION: MaintainMotion(
-                env, self._bus, revision.recovery, self._set_thruster_health, recovery_s, self._unrecoverable
+                env, self.bus, revision.recovery, self._faults.set_health, recovery_s, self._faults.unrecoverable
             ),
             search: GenerateSearchPath(
                 env, make_sender(search), revision.spiral, self._start.origin_m, view_tangent, phase_s, ready_s
@@ -316,7 +210,7 @@ class MissionRun:
         if self._scenario.leak is not None:
             self._surface = Surface(env, make_sender(domain.SURFACE))
             nodes[domain.SURFACE] = self._surface
-        for name, kind in self._simulator.own_functions.items():
+        for name, kind in self._prepared.own_functions.items():
             nodes[name] = self._make_own_function(name, kind, make_sender(name))
         return nodes
 
@@ -327,7 +221,7 @@ class MissionRun:
             env=self.env,
             settings=(settings.model_extra or {}) if settings is not None else {},
             sender=sender,
-            bus=self._bus,
+            bus=self.bus,
             stream=lambda stream: self._chance.stream(f"functions/{name}/{stream}"),
             log=partial(self._recorder.log, name),
         )
@@ -341,7 +235,7 @@ class MissionRun:
 
     def _path(self) -> InspectionPath:
         first = self._detector.first_point
-        return NO_PATH if first is None else self._simulator.path.from_point(first)
+        return NO_PATH if first is None else self._prepared.path.from_point(first)
 
     def _make_coordinator(self) -> MissionCoordinator:
         settings, phase = self._revision.coordinator, self._chance.phase
@@ -359,24 +253,45 @@ class MissionRun:
         if self._battery is not None and battery is not None and battery.mission_ends_at_level is not None:
             coordinator.end_with(self._battery, battery.mission_ends_at_level)
         if self._scenario.leak is not None:
-            leak_s = self._chance.value("leak.time_s")
-            leak = coordinator.surface_at(self._surface.surfaced)
-            self.env.process(leak_monitor(self.env, self._bus, leak_s, leak))
-            if (further := self._further) is not None:
-                self._surface.surfaced.callbacks.append(lambda event: further.surfaced(leak_s))
+            detected = coordinator.leak_handler(self._surface.surfaced)
+            self.env.process(leak_monitor(self.env, self.bus, self._chance.value("leak.time_s"), detected))
         return coordinator
 
-    def _make_host(self, kind: type[ManagingSubsystem] | None) -> ManagerHost:
+    def _make_reaction_meter(self) -> ReactionMeter:
+        settings, altitude_m = self._scenario.reaction_metric, self._revision.spiral.initial_altitude_m
+        meter = ReactionMeter(self.env, settings, self._signals["water_visibility"], altitude_m, self._battery)
+        self.bus.subscribe(meter.diagnostic, (Kind.COMPONENT_STATUS,))
+        self.modes.listeners.append(meter.mode_effect)
+        return meter
+
+    def _make_further_metrics(self) -> FurtherMetrics | None:
+        if not self._scenario.further_columns:
+            return None
+        further = FurtherMetrics(self.env, self._scenario, self._vehicle, self._measured, self._battery)
+        self._faults.listeners.append(further.thrusters_changed)
+        self.modes.listeners.append(further.mode_effect)
+        self.modes.adaptation_listeners.append(further.adapted)
+        if self._scenario.leak is not None:
+            leak_s = self._chance.value("leak.time_s")
+            self._surface.surfaced.callbacks.append(lambda event: further.surfaced(leak_s))
+        return further
+
+    def _record_changes(self) -> None:
+        metric = self._scenario.reaction_metric
+        self.bus.subscribe(self._recorder.diagnostic_of(metric.visibility_thresholds_m, metric.battery_limit))
+        self.modes.listeners.append(self._recorder.mode_effect)
+
+    def _make_host(self, manager_type: type[ManagingSubsystem] | None) -> ManagerHost:
         name = self._manager
         system = ManagedSystem(
             env=self.env,
             scenario=self._scenario,
-            settings=self._simulator.loaded.manager_settings(name),
+            settings=self._prepared.loaded.manager_settings(name),
             modes=self.modes,
             lasting_functions=self._coordinator.lasting_functions,
             stream=lambda stream: self._chance.stream(f"manager/{stream}"),
             log=partial(self._recorder.log, name),
-            knowledge=lambda: self._simulator.knowledge,
+            knowledge=lambda: self._prepared.knowledge,
             record_state=self._recorder.record_state,
             state_changed=lambda: self._host.state_changed(),
             measurements=self._measured,
@@ -384,11 +299,49 @@ class MissionRun:
             recorded=self._recorder.enabled,
             pose=lambda: self._vehicle.pose(self.env.now),
             distance_inspected_m=lambda: self._follow.distance_m,
-            true_signal=self._true_signals.__getitem__,
-            files={} if kind else self._simulator.manager_files(name),
-            learned=self._simulator.learned(name),
-            training=self._simulator.training is not None,
+            true_signal=self._true.__getitem__,
+            files={} if manager_type else self._prepared.manager_files(name),
+            learned=self._prepared.learned(name),
+            training=self._prepared.training is not None,
         )
-        return ManagerHost(
-            name, self._run_number, system, self._bus, skips_idle_calls=not self._recorder.enabled, kind=kind
+        skips_idle_calls = not self._recorder.enabled
+        return ManagerHost(name, self._run_number, system, self.bus, skips_idle_calls, manager_type)
+
+    # The beginning.
+
+    def _begin(self) -> None:
+        """Start what goes on by itself."""
+        self._coordinator.start(self._host.request, self._host.cancel)
+        self._start_monitors()
+        self._coordinator.ended.callbacks.append(StopSimulation.callback)  # or `advance` would run past it
+        self._host.start()
+
+    def _start_monitors(self) -> None:
+        if self.bus.has_subscribers(Kind.QA_STATUS):  # to look values up, the measurements are enough
+            for measurements in self._signals.values():
+                self.env.process(signal_monitor(self.env, self.bus, measurements))
+            if self._battery is not None:
+                self.env.process(battery_monitor(self.env, self.bus, self._battery))
+        for kind, key, state in (
+            (Kind.POSE, "pose", lambda: self._vehicle.pose(self.env.now)),
+            (Kind.DISTANCE, "distance_inspected_m", lambda: self._follow.distance_m),
+        ):
+            if self.bus.has_subscribers(kind):
+                self.env.process(state_monitor(self.env, self.bus, kind, key, state))
+        if self.bus.has_subscribers(Kind.DETECTION):
+            self._detector.detected.callbacks.append(self._publish_detection)
+        self._start_thruster_monitor()
+
+    def _start_thruster_monitor(self) -> None:
+        monitors, lost = self._revision.monitors, self._chance.loss("thruster_monitor", self._scenario.thruster_monitor)
+        timing = monitor_timing(self._scenario, self._chance, "thruster_monitor", monitors.thruster_check_period_s)
+        bus = self.bus if lost is None else LossyPublisher(self.bus, lost)
+        events, after_previous = (
+            schedule(self._scenario, self._chance),
+            monitors.thruster_event_times == "after_previous",
         )
+        self.env.process(thruster_monitor(self.env, bus, events, self._faults.happens, timing, after_previous))
+
+    def _publish_detection(self, _: simpy.Event) -> None:
+        point = float(self._detector.first_point or 0)
+        self.bus.publish(Diagnostic(self.env.now, Kind.DETECTION, "pipeline", point))

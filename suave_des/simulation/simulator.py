@@ -1,38 +1,27 @@
 """Runs missions of one scenario."""
 
 from collections.abc import Callable, Mapping
-from functools import cached_property
-from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import simpy
 
-from suave_des.chance import Distributions
 from suave_des.clock import Process
 from suave_des.compiling import Array
-from suave_des.managed.follow import InspectionPath
-from suave_des.managing.learned import read_learned
+from suave_des.managing.base import ManagingSubsystem
 from suave_des.metrics.result import MissionResult
-from suave_des.registry import manager_class
 from suave_des.scenario.loader import LoadedScenario
-from suave_des.simulation.functions import own_functions
-from suave_des.simulation.vehicles import vehicle_model
+from suave_des.simulation.mission import MissionRun
+from suave_des.simulation.prepared import PreparedScenario
 from suave_des.vehicle.kernel import ROW
 from suave_des.vehicle.vehicle import track_rows
-from suave_des.world.pipeline import sample_points, there_and_back
-
-if TYPE_CHECKING:
-    from suave_des.knowledge.deliberation import Deliberation
-    from suave_des.managing.base import ManagingSubsystem
-    from suave_des.simulation.mission import MissionRun
 
 OnTime = Callable[[float, float], None]
 
 
-class Simulator:
-    """Runs missions of one scenario in this process; what does not change between missions is made once.
+class Simulator(PreparedScenario):
+    """Runs missions of one scenario in this process.
 
     Args:
         loaded: the scenario with its files.
@@ -52,55 +41,18 @@ class Simulator:
         runs_per_draw: Mapping[str, int] = MappingProxyType({}),
         training: dict[str, dict[str, Any]] | None = None,
     ) -> None:
-        self.loaded, self.training = loaded, training
-        self.runs_per_draw = dict(runs_per_draw)
-        scenario = loaded.scenario
-        self.distributions = Distributions(scenario)
-        self.points = sample_points(scenario.pipeline.vertices_m, scenario.pipeline.points_per_piece)
-        self.path = InspectionPath.along(there_and_back(self.points), scenario.revision.follow.altitude_m)
-        self.detection_points = self.points + np.array([0.0, 0.0, scenario.revision.monitors.detected_point_height_m])
-        self.duration_s = scenario.mission.time_limit_s + scenario.revision.coordinator.limit_check_period_s
-        self.own_functions = own_functions(loaded)
-        self.vehicle_model = vehicle_model(scenario.vehicle)
-        self.view_tangent = scenario.vehicle.camera.tangent
+        super().__init__(loaded, runs_per_draw, training)
         self._spare_tracks: list[Array] = []  # to allocate one for each mission would fragment memory
-        self._learned: dict[str, Mapping[str, Any]] = {}
-        self._manager_files: dict[str, Mapping[str, Path]] = {}
-
-    @cached_property
-    def knowledge(self) -> "Deliberation":
-        """The scenario's knowledge base with its reasoner, opened and checked on first use."""
-        from suave_des.scenario_knowledge import open_knowledge  # owlready2 is loaded only when it is needed
-
-        return open_knowledge(self.loaded)
-
-    def learned(self, manager: str) -> Mapping[str, Any]:
-        """What a manager has learned: in training what it may change, else the content of its file, if it has one.
-
-        Raises:
-            InputError: the file cannot be read, or has something else in it.
-        """
-        if self.training is not None:
-            return self.training.setdefault(manager, {})
-        if manager not in self._learned:
-            name = self.loaded.manager_settings(manager).get("learned")
-            path = None if name is None else self.loaded.manager_file(manager, str(name))
-            self._learned[manager] = {} if path is None else read_learned(path)
-        return self._learned[manager]
-
-    def manager_files(self, manager: str) -> Mapping[str, Path]:
-        """Where the files are that a manager declares, by their names as given.
-
-        Raises:
-            InputError: one is not there.
-        """
-        if manager not in self._manager_files:
-            self._manager_files[manager] = dict(self.loaded.declared_files(manager, manager_class(manager)))
-        return self._manager_files[manager]
 
     def start(
-        self, manager: str, run: int, seed: int, *, record: bool = False, kind: "type[ManagingSubsystem] | None" = None
-    ) -> "MissionRun":
+        self,
+        manager: str,
+        run: int,
+        seed: int,
+        *,
+        record: bool = False,
+        manager_type: type[ManagingSubsystem] | None = None,
+    ) -> MissionRun:
         """Make a mission, at t = 0; `give_back` is to be called when it is no longer needed.
 
         Args:
@@ -108,21 +60,19 @@ class Simulator:
             run: number of the run in its campaign.
             seed: seed of the campaign.
             record: whether to keep events and trajectory.
-            kind: the manager's class; None: the one that its name leads to.
+            manager_type: the manager's class; None: the one that its name leads to.
 
         Raises:
             MissionError, InputError: as `run`.
         """
-        from suave_des.simulation.mission import MissionRun
-
         track = self._spare_tracks.pop() if self._spare_tracks else np.empty((track_rows(self.duration_s), ROW))
         try:
-            return MissionRun(self, manager, run, seed, track, record=record, kind=kind)
+            return MissionRun(self, manager, run, seed, track, record=record, manager_type=manager_type)
         except BaseException:
             self._spare_tracks.append(track)
             raise
 
-    def give_back(self, mission: "MissionRun") -> None:
+    def give_back(self, mission: MissionRun) -> None:
         """Keep the memory of a mission that is no longer needed for the next one."""
         self._spare_tracks.append(mission.track)
 

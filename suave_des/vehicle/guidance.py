@@ -180,7 +180,7 @@ class Guidance:
                 self._is_due = self._is_repeated = True
             if self._is_due:
                 self._sent = tick
-            self._plan(check, tick, first=tick + check.fewest_ticks if self._is_due else tick)
+            self._plan(check, tick, first=tick + check.first_check_ticks if self._is_due else tick)
 
     def _plan(self, check: ArrivalCheck, tick: int, first: int) -> None:
         """Send the present way-point, if that is due, and look ahead from a tick on."""
@@ -188,7 +188,7 @@ class Guidance:
         if len(waypoints) == 0:
             self._check = None
             return
-        last = self._sent + (check.ticks_again if self._is_repeated else check.most_ticks)
+        last = self._sent + (check.resend_again_ticks if self._is_repeated else check.resend_ticks)
         z_m = self.source.set_point_z_m()
         self._is_acting = True
         self._arrivals, act_at = self.sender.queue(waypoints, z_m, check, first=first, last=last, send=self._is_due)

@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from suave_des.compiling import Array, Ticks, compiled
+from suave_des.compiling import Array, IntArray, compiled
 
 ROW = 25
 POSITION, ATTITUDE, VELOCITY, INTEGRAL = slice(0, 3), slice(3, 7), slice(7, 13), slice(13, 17)
@@ -260,7 +260,7 @@ def fly_waypoints(
     box: tuple[float, float],
     timer: tuple[float, float, float],
     window: tuple[int, int, int, int],
-    arrivals: Ticks,
+    arrivals: IntArray,
 ) -> tuple[int, int]:
     """Fly through way-points: at each tick of a timer that finds one reached, the next becomes the set-point.
 
@@ -277,14 +277,14 @@ def fly_waypoints(
         arrivals: shape (n,); the ticks that find way-points reached are written into it.
 
     Returns:
-        How many way-points were reached, and the last row that is filled now. Ticks beyond the track do not count.
+        How many way-points were reached, and the last row that is filled now. IntArray beyond the track do not count.
     """
     half_width, half_height = box
-    began_s, period_s, grid_s = timer
+    start_s, period_s, grid_s = timer
     tick, last, fewest, most = window
     set_point, reached = dynamics[1], 0
     while tick <= last:
-        row = int(np.rint((began_s + tick * period_s) / grid_s))
+        row = int(np.rint((start_s + tick * period_s) / grid_s))
         if row >= track.shape[0]:
             break
         if row > computed:

@@ -23,30 +23,30 @@ class ArrivalCheck:
     """When it is checked whether the vehicle has reached a way-point, and what counts as reached.
 
     Attributes:
-        began_s: time of tick 0.
+        start_s: time of tick 0.
         period_s: time between ticks.
         half_width_m: greatest difference in x and in y.
         half_height_m: greatest difference in z.
-        fewest_ticks: from the tick that finds a way-point reached to the first check of the next one.
-        most_ticks: from the tick that sends a way-point's set-point to the one that sends it again.
-        ticks_again: the same, once it has been sent again.
+        first_check_ticks: from the tick that finds a way-point reached to the first check of the next one.
+        resend_ticks: from the tick that sends a way-point's set-point to the one that sends it again.
+        resend_again_ticks: the same, once it has been sent again.
     """
 
-    began_s: float
+    start_s: float
     period_s: float
     half_width_m: float
     half_height_m: float
-    fewest_ticks: int
-    most_ticks: int
-    ticks_again: int
+    first_check_ticks: int
+    resend_ticks: int
+    resend_again_ticks: int
 
     def time_s(self, tick: int) -> float:
         """Time of a tick."""
-        return self.began_s + tick * self.period_s
+        return self.start_s + tick * self.period_s
 
     def last_tick_until(self, t_s: float) -> int:
         """Number of the last tick until time t; one at t counts, as it comes before whatever else happens then."""
-        tick = math.floor((t_s - self.began_s) / self.period_s + 1e-9)
+        tick = math.floor((t_s - self.start_s) / self.period_s + 1e-9)
         return tick if self.time_s(tick) <= t_s else tick - 1
 
 
@@ -194,8 +194,8 @@ class Vehicle:
         elif self._queue is not None and self._queue.sent_until(t_s) < len(self._queue.ticks):
             waypoints = waypoints[:1]
         count, before = len(waypoints), self._set_point.copy()
-        box, timer = (check.half_width_m, check.half_height_m), (check.began_s, check.period_s, STEP_S)
-        window, ticks = (first, last, check.fewest_ticks, check.most_ticks), np.empty(count, dtype=np.int64)
+        box, timer = (check.half_width_m, check.half_height_m), (check.start_s, check.period_s, STEP_S)
+        window, ticks = (first, last, check.first_check_ticks, check.resend_ticks), np.empty(count, dtype=np.int64)
         reached, self.computed_row = kernel.fly_waypoints(
             self.track, self.computed_row, self._dynamics, waypoints, sent_as_m, box, timer, window, ticks
         )
@@ -207,7 +207,7 @@ class Vehicle:
             self._notify(t_s)
         if reached == count:
             return arrivals, arrivals[-1]
-        return arrivals, arrivals[-1] + check.most_ticks if arrivals else last
+        return arrivals, arrivals[-1] + check.resend_ticks if arrivals else last
 
     def cancel_waypoints(self, t_s: float, check: ArrivalCheck) -> None:
         """Cancel the set-points after time t that were queued with a check, if there are any left."""

@@ -39,7 +39,7 @@ class Published:
         self.times_s: list[float] = []
         self.values: list[float] = []
 
-    def published(self, t_s: float) -> int:
+    def count_until(self, t_s: float) -> int:
         return len(self.values)
 
 

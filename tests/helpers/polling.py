@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from suave_des.clock import Alarm, Process, until
 from suave_des.managed.mode_manager import ModeManager
 from suave_des.managed.node import Log
-from suave_des.managing.base import ManagingSubsystem
+from suave_des.managing.base import ManagedSystem, ManagingSubsystem
 from suave_des.metrics.result import MissionMetrics
-from suave_des.monitor.diagnostics import Diagnostic, Kind
+from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.measurements import Thresholds
 from suave_des.scenario.modes import Mode
 from suave_des.simulation import mission
@@ -92,12 +92,12 @@ class PollingGuidance:
             if self._is_due:
                 self._sender.send(*source.waypoints(1)[0, :2].tolist(), source.set_point_z_m())
                 self._sent, self._is_due = tick, False
-            if tick < self._sent + check.fewest_ticks:
+            if tick < self._sent + check.first_check_ticks:
                 break
             if self._is_near(check, tick):
                 source.reached(1)
                 self._is_repeated = False
-            elif tick >= self._sent + (check.ticks_again if self._is_repeated else check.most_ticks):
+            elif tick >= self._sent + (check.resend_again_ticks if self._is_repeated else check.resend_ticks):
                 source.not_reached()
                 self._is_repeated = True
             else:
@@ -156,6 +156,8 @@ class PollingDetector:
 class Published:
     """What was published of a quality attribute: see `suave_des.monitor.measurements.Measured`."""
 
+    is_tabulated = False
+
     def __init__(self, key: str) -> None:
         self.key = key
         self.times_s: list[float] = []
@@ -166,8 +168,12 @@ class Published:
             self.times_s.append(diagnostic.time_s)
             self.values.append(float(diagnostic.value))
 
-    def published(self, t_s: float) -> int:
+    def count_until(self, t_s: float) -> int:
         return bisect_right(self.times_s, t_s)
+
+    def value(self, t_s: float) -> float | None:
+        count = self.count_until(t_s)
+        return self.values[count - 1] if count else None
 
     def region(self, t_s: float, thresholds: Thresholds) -> int:
         raise AssertionError("managers that are called at each of their times need no regions")
@@ -179,24 +185,30 @@ class Published:
 class PlainMission(mission.MissionRun):
     """A mission whose managers read what monitors have published."""
 
-    def _make_host(self, kind: type[ManagingSubsystem] | None) -> ManagerHost:
-        tables = self._signals, self._battery
-        self._signals = {name: self._published(name) for name in self._signals}  # type: ignore[assignment]
-        self._battery = None if self._battery is None else self._published(self._battery.key)  # type: ignore[assignment]
+    def _make_host(self, manager_type: type[ManagingSubsystem] | None) -> ManagerHost:
+        measured = self._measured
+        self._measured = {name: self._published(name) for name in measured}
         try:
-            return super()._make_host(kind)
+            return super()._make_host(manager_type)
         finally:
-            self._signals, self._battery = tables
+            self._measured = measured
 
     def _published(self, key: str) -> Published:
         published = Published(key)
-        self._bus.subscribe(published.diagnostic, (Kind.QA_STATUS,))
+        self.bus.subscribe(published.diagnostic, (Kind.QA_STATUS,))
         return published
 
 
-def time_triggered(*arguments: object, skips_idle_calls: bool, kind: object = None) -> ManagerHost:
+def time_triggered(
+    name: str,
+    run: int,
+    system: ManagedSystem,
+    bus: DiagnosticsBus,
+    skips_idle_calls: bool,
+    manager_type: type[ManagingSubsystem] | None = None,
+) -> ManagerHost:
     """A host that calls its manager at each of its times."""
-    return ManagerHost(*arguments, skips_idle_calls=False)  # type: ignore[arg-type]
+    return ManagerHost(name, run, system, bus, skips_idle_calls=False, manager_type=manager_type)
 
 
 PARTS: Final = {
@@ -206,7 +218,7 @@ PARTS: Final = {
     },
     "detector": {"suave_des.simulation.mission.PipelineDetector": PollingDetector},
     "calls": {"suave_des.simulation.mission.ManagerHost": time_triggered},
-    "monitors": {"suave_des.simulation.mission.MissionRun": PlainMission},  # needs "calls"
+    "monitors": {"suave_des.simulation.simulator.MissionRun": PlainMission},  # needs "calls"
 }
 
 

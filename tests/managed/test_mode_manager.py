@@ -141,7 +141,7 @@ def test_adaptations_are_changes_of_functions_in_use(managed: Managed, requests:
 
 def test_the_end_of_a_task_is_no_adaptation(managed: Managed) -> None:
     managed.modes.change_mode(SEARCH, "fd_spiral_low")
-    managed.modes.task_over([SEARCH])
+    managed.modes.end_task([SEARCH])
     managed.modes.change_mode(SEARCH, "fd_unground")
     managed.modes.change_mode(SEARCH, "fd_spiral_high")
     assert managed.modes.adaptations == 0

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
-from suave_des.monitor.measurements import BatteryLevel, Measurements, Publishing, measure, region_of
-from suave_des.monitor.monitors import ThrusterFault, battery_monitor, signal_monitor, thruster_monitor
+from suave_des.monitor.measurements import BatteryLevel, Measurements, MonitorTiming, measure, region_of
+from suave_des.monitor.monitors import ScheduledEvent, battery_monitor, signal_monitor, thruster_monitor
 from suave_des.world.signals import constant, sinusoid, step
 
 VISIBILITY = sinusoid(80.0, 1.25, 3.75)
@@ -39,23 +39,23 @@ def subscriber() -> Subscriber:
 
 
 def test_messages_lie_on_the_monitors_grid() -> None:
-    measured = measure("v", lambda t: t, 3.0, Publishing(0.8, 0.3))
+    measured = measure("v", lambda t: t, 3.0, MonitorTiming(0.8, 0.3))
     assert measured.times_s == pytest.approx((0.3, 1.1, 1.9, 2.7))
 
 
 def test_only_changed_values_are_published() -> None:
-    measured = measure("v", VISIBILITY, 3.0, Publishing(0.2, 0.1, 1.0))
+    measured = measure("v", VISIBILITY, 3.0, MonitorTiming(0.2, 0.1, 1.0))
     assert measured.times_s == pytest.approx((0.1, 1.1, 2.1))
 
 
 def test_a_message_has_the_value_of_its_whole_second() -> None:
-    measured = measure("v", VISIBILITY, 30.0, Publishing(1.0, 0.7, 1.0))
+    measured = measure("v", VISIBILITY, 30.0, MonitorTiming(1.0, 0.7, 1.0))
     assert measured.values == tuple(sinusoid(80.0, 1.25, 3.75)(float(t)) for t in range(30))
 
 
 def test_rounding_errors_of_a_timer_do_not_shift_a_step() -> None:
     assert 0.1 + 3 * 0.3 < 1.0  # by a rounding error
-    measured = measure("v", lambda t_s: t_s, 1.9, Publishing(0.3, 0.1, 1.0))
+    measured = measure("v", lambda t_s: t_s, 1.9, MonitorTiming(0.3, 0.1, 1.0))
     assert (measured.times_s, measured.values) == ((0.1, pytest.approx(1.0)), (0.0, 1.0))
 
 
@@ -119,29 +119,29 @@ def test_crossings_are_those_found_by_going_through_all_values(
 
 
 def test_a_constant_is_published_once() -> None:
-    measured = measure("v", constant(2.0), 100.0, Publishing(0.2, 0.05))
+    measured = measure("v", constant(2.0), 100.0, MonitorTiming(0.2, 0.05))
     assert (measured.times_s, measured.values) == ((0.05,), (2.0,))
 
 
 def test_a_step_is_published_at_the_first_message_after_it() -> None:
-    measured = measure("v", step(10.05, 3.0, 1.0), 20.0, Publishing(0.2, 0.0))
+    measured = measure("v", step(10.05, 3.0, 1.0), 20.0, MonitorTiming(0.2, 0.0))
     assert measured.times_s == pytest.approx((0.0, 10.2))
 
 
 def test_noise_makes_every_measurement_another_one() -> None:
     errors = itertools.count(1)
-    measured = measure("v", constant(2.0), 1.0, Publishing(0.25, 0.0, 1.0), noise=lambda: next(errors))
+    measured = measure("v", constant(2.0), 1.0, MonitorTiming(0.25, 0.0, 1.0), noise=lambda: next(errors))
     assert measured.values == (3.0, 4.0, 5.0, 6.0, 7.0)
 
 
 @pytest.mark.parametrize(("t_s", "expected_s"), [(0.0, 0.3), (0.3, 0.3), (0.31, 1.3), (7.0, 7.3)])
 def test_next_message_comes_changed_or_not(t_s: float, expected_s: float) -> None:
-    measured = measure("v", constant(2.0), 10.0, Publishing(1.0, 0.3))
+    measured = measure("v", constant(2.0), 10.0, MonitorTiming(1.0, 0.3))
     assert measured.next_message_s(t_s) == pytest.approx(expected_s)
 
 
 def test_signal_monitor_publishes_measurements_at_their_times(subscriber: Subscriber) -> None:
-    measured = measure("current", step(1.0, 0.1, 0.4), 5.0, Publishing(0.5, 0.2))
+    measured = measure("current", step(1.0, 0.1, 0.4), 5.0, MonitorTiming(0.5, 0.2))
     subscriber.env.process(signal_monitor(subscriber.env, subscriber.bus, measured))
     subscriber.env.run()
     assert subscriber.received == [
@@ -153,21 +153,23 @@ def test_signal_monitor_publishes_measurements_at_their_times(subscriber: Subscr
 # Thrusters
 
 
-def publish_faults(subscriber: Subscriber, *faults: ThrusterFault, after_previous: bool, phase_s: float = 0.25) -> list:
-    """Run a schedule to its end; the health set, with its times."""
-    healths: list[tuple[float, int, float]] = []
+def publish_events(
+    subscriber: Subscriber, *faults: ScheduledEvent, after_previous: bool, phase_s: float = 0.25
+) -> list:
+    """Run a schedule to its end; the events, with the times at which they happened."""
+    happened: list[tuple[float, ScheduledEvent]] = []
     subscriber.env.process(
         thruster_monitor(
             subscriber.env,
             subscriber.bus,
             faults,
-            lambda t_s, thruster, health: healths.append((t_s, thruster, health)),
-            Publishing(1.0, phase_s),
+            lambda t_s, event: happened.append((t_s, event)),
+            MonitorTiming(1.0, phase_s),
             after_previous=after_previous,
         )
     )
     subscriber.env.run()
-    return healths
+    return happened
 
 
 BOTH = pytest.mark.parametrize("after_previous", [True, False], ids=["2023", "1.5"])
@@ -175,25 +177,20 @@ BOTH = pytest.mark.parametrize("after_previous", [True, False], ids=["2023", "1.
 
 @BOTH
 def test_failure_is_seen_at_the_first_look_after_its_time(subscriber: Subscriber, after_previous: bool) -> None:
-    publish_faults(subscriber, ThrusterFault(1, True, 35.0), after_previous=after_previous)
+    publish_events(subscriber, ScheduledEvent(1, True, 35.0), after_previous=after_previous)
     assert subscriber.received == [Diagnostic(35.25, Kind.COMPONENT_STATUS, "c_thruster_1", "FALSE")]
 
 
 @BOTH
-def test_failure_and_recovery_change_the_health_when_they_are_published(
-    subscriber: Subscriber, after_previous: bool
-) -> None:
-    faults = ThrusterFault(3, True, 5.0), ThrusterFault(3, False, 60.0)
-    healths = publish_faults(subscriber, *faults, after_previous=after_previous)
-    assert [(time_s, thruster, health) for time_s, thruster, health in healths] == [
-        (subscriber.received[0].time_s, 3, 0.0),
-        (subscriber.received[1].time_s, 3, 1.0),
-    ]
+def test_failure_and_recovery_happen_when_they_are_published(subscriber: Subscriber, after_previous: bool) -> None:
+    failure, recovery = ScheduledEvent(3, True, 5.0), ScheduledEvent(3, False, 60.0)
+    happened = publish_events(subscriber, failure, recovery, after_previous=after_previous)
+    assert happened == [(subscriber.received[0].time_s, failure), (subscriber.received[1].time_s, recovery)]
 
 
 @BOTH
 def test_recovery_is_published_as_recovered(subscriber: Subscriber, after_previous: bool) -> None:
-    publish_faults(subscriber, ThrusterFault(6, False, 2.0), after_previous=after_previous)
+    publish_events(subscriber, ScheduledEvent(6, False, 2.0), after_previous=after_previous)
     assert subscriber.values() == [(2.25, "c_thruster_6", "RECOVERED")]
 
 
@@ -203,21 +200,21 @@ def test_recovery_is_published_as_recovered(subscriber: Subscriber, after_previo
 def test_what_the_time_of_a_second_event_counts_from(
     subscriber: Subscriber, after_previous: bool, times_s: list[float]
 ) -> None:
-    publish_faults(
-        subscriber, ThrusterFault(1, True, 10.0), ThrusterFault(2, True, 30.0), after_previous=after_previous
+    publish_events(
+        subscriber, ScheduledEvent(1, True, 10.0), ScheduledEvent(2, True, 30.0), after_previous=after_previous
     )
     assert [each.time_s for each in subscriber.received] == times_s
 
 
 def test_in_2023_time_counts_from_when_the_event_before_happened(subscriber: Subscriber) -> None:
     # Due at 10 s, it happened at 10.25 s: 30.1 s later is past the look at 40.25 s.
-    publish_faults(subscriber, ThrusterFault(1, True, 10.0), ThrusterFault(2, True, 30.1), after_previous=True)
+    publish_events(subscriber, ScheduledEvent(1, True, 10.0), ScheduledEvent(2, True, 30.1), after_previous=True)
     assert subscriber.received[1].time_s == 41.25
 
 
 def test_several_due_come_one_a_second_in_list_order(subscriber: Subscriber) -> None:
-    faults = [ThrusterFault(thruster, True, 5.0) for thruster in (4, 2, 6)]
-    publish_faults(subscriber, *faults, after_previous=False)
+    events = [ScheduledEvent(thruster, True, 5.0) for thruster in (4, 2, 6)]
+    publish_events(subscriber, *events, after_previous=False)
     assert subscriber.values() == [
         (5.25, "c_thruster_4", "FALSE"),
         (6.25, "c_thruster_2", "FALSE"),
@@ -226,18 +223,18 @@ def test_several_due_come_one_a_second_in_list_order(subscriber: Subscriber) -> 
 
 
 def test_an_earlier_event_waits_for_the_one_before_it_in_the_list(subscriber: Subscriber) -> None:
-    publish_faults(subscriber, ThrusterFault(1, True, 20.0), ThrusterFault(2, True, 5.0), after_previous=False)
+    publish_events(subscriber, ScheduledEvent(1, True, 20.0), ScheduledEvent(2, True, 5.0), after_previous=False)
     assert subscriber.values() == [(20.25, "c_thruster_1", "FALSE"), (21.25, "c_thruster_2", "FALSE")]
 
 
 @BOTH
 def test_a_time_before_the_start_fires_at_the_first_look(subscriber: Subscriber, after_previous: bool) -> None:
-    publish_faults(subscriber, ThrusterFault(1, True, -50.0), after_previous=after_previous, phase_s=0.6)
+    publish_events(subscriber, ScheduledEvent(1, True, -50.0), after_previous=after_previous, phase_s=0.6)
     assert subscriber.values() == [(0.6, "c_thruster_1", "FALSE")]
 
 
 def test_a_negative_time_after_another_event_fires_at_the_next_look(subscriber: Subscriber) -> None:
-    publish_faults(subscriber, ThrusterFault(1, True, 10.0), ThrusterFault(2, True, -5.0), after_previous=True)
+    publish_events(subscriber, ScheduledEvent(1, True, 10.0), ScheduledEvent(2, True, -5.0), after_previous=True)
     assert [each.time_s for each in subscriber.received] == [10.25, 11.25]
 
 
@@ -245,7 +242,7 @@ def test_a_negative_time_after_another_event_fires_at_the_next_look(subscriber: 
 
 
 def battery(docked: set[float]) -> BatteryLevel:
-    return BatteryLevel(lambda t_s: t_s in docked, 200.0, Publishing(1.0, 0.5))
+    return BatteryLevel(lambda t_s: t_s in docked, 200.0, MonitorTiming(1.0, 0.5))
 
 
 def battery_levels(subscriber: Subscriber, until_s: float, docked: set[float]) -> list[tuple[float, float]]:
@@ -271,10 +268,10 @@ def test_battery_is_full_at_once_at_the_station(subscriber: Subscriber) -> None:
 def test_a_level_looked_up_is_the_one_published_last(subscriber: Subscriber) -> None:
     received = battery_levels(subscriber, 200.0, docked={160.5})
     level = battery({160.5})
-    assert level.published(0.4) == 0
-    assert level.published(160.7) == 161 and level.values[160] == 1.0
-    assert level.published(199.9) == len(received) and list(zip(level.times_s, level.values, strict=True)) == received
-    assert level.published(30.5) == 31  # of those known by now
+    assert level.count_until(0.4) == 0
+    assert level.count_until(160.7) == 161 and level.values[160] == 1.0
+    assert level.count_until(199.9) == len(received) and list(zip(level.times_s, level.values, strict=True)) == received
+    assert level.count_until(30.5) == 31  # of those known by now
 
 
 def test_a_level_may_cross_a_threshold_at_each_message_to_come() -> None:

@@ -1,0 +1,83 @@
+"""What the missions of one scenario have in common."""
+
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from suave_des.chance import Distributions
+from suave_des.managed.follow import InspectionPath
+from suave_des.managing.learned import read_learned
+from suave_des.registry import manager_class
+from suave_des.scenario.loader import LoadedScenario
+from suave_des.simulation.functions import own_functions
+from suave_des.simulation.vehicles import vehicle_model
+from suave_des.world.pipeline import sample_points, there_and_back
+
+if TYPE_CHECKING:  # owlready2 is loaded only when it is needed
+    from suave_des.knowledge.deliberation import Deliberation
+
+
+class PreparedScenario:
+    """A scenario, with what does not change between its missions made once.
+
+    Args:
+        loaded: the scenario with its files.
+        runs_per_draw: how many runs in a row share the value drawn for a key path; one, if the path is not in it.
+        training: what each manager has learned, by its name, kept from mission to mission; None: missions are no
+            training.
+    """
+
+    def __init__(
+        self,
+        loaded: LoadedScenario,
+        runs_per_draw: Mapping[str, int] = MappingProxyType({}),
+        training: dict[str, dict[str, Any]] | None = None,
+    ) -> None:
+        self.loaded, self.training = loaded, training
+        self.runs_per_draw = dict(runs_per_draw)
+        scenario = loaded.scenario
+        self.distributions = Distributions(scenario)
+        self.points = sample_points(scenario.pipeline.vertices_m, scenario.pipeline.points_per_piece)
+        self.path = InspectionPath.along(there_and_back(self.points), scenario.revision.follow.altitude_m)
+        self.detection_points = self.points + np.array([0.0, 0.0, scenario.revision.monitors.detected_point_height_m])
+        self.duration_s = scenario.mission.time_limit_s + scenario.revision.coordinator.limit_check_period_s
+        self.own_functions = own_functions(loaded)
+        self.vehicle_model = vehicle_model(scenario.vehicle)
+        self.view_tangent = scenario.vehicle.camera.tangent
+        self._learned: dict[str, Mapping[str, Any]] = {}
+        self._manager_files: dict[str, Mapping[str, Path]] = {}
+
+    @cached_property
+    def knowledge(self) -> "Deliberation":
+        """The scenario's knowledge base with its reasoner, opened and checked on first use."""
+        from suave_des.scenario_knowledge import open_knowledge
+
+        return open_knowledge(self.loaded)
+
+    def learned(self, manager: str) -> Mapping[str, Any]:
+        """What a manager has learned: in training what it may change, else the content of its file, if it has one.
+
+        Raises:
+            InputError: the file cannot be read, or has something else in it.
+        """
+        if self.training is not None:
+            return self.training.setdefault(manager, {})
+        if manager not in self._learned:
+            name = self.loaded.manager_settings(manager).get("learned")
+            path = None if name is None else self.loaded.manager_file(manager, str(name))
+            self._learned[manager] = {} if path is None else read_learned(path)
+        return self._learned[manager]
+
+    def manager_files(self, manager: str) -> Mapping[str, Path]:
+        """Where the files are that a manager declares, by their names as given.
+
+        Raises:
+            InputError: one is not there.
+        """
+        if manager not in self._manager_files:
+            self._manager_files[manager] = dict(self.loaded.declared_files(manager, manager_class(manager)))
+        return self._manager_files[manager]
