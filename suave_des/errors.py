@@ -101,3 +101,9 @@ def did_you_mean(word: object, known: Iterable[str], what: str = "known") -> str
     near = difflib.get_close_matches(str(word), names, n=1, cutoff=0.6)
     listing = f"{what}: {', '.join(names)}" if names else f"{what}: none"
     return f"did you mean {near[0]!r}? {listing}" if near else listing
+
+
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """Suggest the known name most similar to a word, as a question; None when none is similar."""
+    found = difflib.get_close_matches(word, sorted(known), n=1, cutoff=0.6)
+    return f"did you mean {found[0]}?" if found else None

@@ -15,12 +15,9 @@ from rdflib.namespace import OWL as OWL_TERMS
 from rdflib.namespace import RDF
 from rdflib.term import Node
 
-from suave_des.errors import KnowledgeError
+from suave_des.errors import KnowledgeError, nearest
 from suave_des.knowledge.ontology_file import OntologyFile, supplies
-from suave_des.knowledge.rdf import Lit, RdfTriple, Triple, is_fact, n_triple, n_triple_with_nodes, term_of
-from suave_des.knowledge.rules.rdf import rules_of
-from suave_des.knowledge.rules.syntax import Rule
-from suave_des.knowledge.vocabulary import (
+from suave_des.knowledge.rdf import (
     DECISION_PROPERTIES,
     HAS_VALUE,
     LANGUAGE_NAMESPACES,
@@ -32,9 +29,17 @@ from suave_des.knowledge.vocabulary import (
     SWRLA,
     SWRLB,
     XSD,
+    Lit,
+    RdfTriple,
+    Triple,
+    is_fact,
     local_name,
-    nearest,
+    n_triple,
+    n_triple_with_nodes,
+    term_of,
 )
+from suave_des.knowledge.rules.rdf import rules_of
+from suave_des.knowledge.rules.syntax import Rule
 from suave_des.resources import shipped_folder
 
 _DECLARED: Final = frozenset(OWL + kind for kind in ("ObjectProperty", "DatatypeProperty", "Class"))

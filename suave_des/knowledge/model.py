@@ -11,9 +11,8 @@ from typing import Final
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.ontology_file import OntologyFile, place_of
-from suave_des.knowledge.rdf import EXACT, Lit, Names, Triple, is_fact, value_of
-from suave_des.knowledge.state import KnowledgeState, Value
-from suave_des.knowledge.vocabulary import (
+from suave_des.knowledge.rdf import (
+    EXACT,
     HAS_VALUE,
     MROS,
     OWL,
@@ -21,12 +20,15 @@ from suave_des.knowledge.vocabulary import (
     RDFS,
     TOMASYS,
     XSD,
-    grounding_name,
+    Lit,
+    Names,
+    Triple,
+    is_fact,
     local_name,
-    measurement_name,
     namespace,
-    objective_name,
+    value_of,
 )
+from suave_des.knowledge.state import KnowledgeState, Value, grounding_name, measurement_name, objective_name
 
 #: Comparison operators that a quality attribute type may have.
 OPERATORS: Final = ("<", "<=", ">", ">=")

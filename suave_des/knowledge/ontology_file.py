@@ -34,7 +34,7 @@ from rdflib.plugins.parsers.notation3 import BadSyntax
 
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.files import read_bytes
-from suave_des.knowledge.vocabulary import MROS, OWL, RDF, XSD, local_name
+from suave_des.knowledge.rdf import MROS, OWL, RDF, XSD, local_name
 from suave_des.resources import shipped_folder
 
 MAX_BYTES: Final = 64 * 2**20

@@ -17,10 +17,9 @@ from suave_des.errors import KnowledgeError
 from suave_des.knowledge import jvm
 from suave_des.knowledge.content import RULE_IRI, Terms
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import Lit, Triple, canonical, facts_of, for_pellet, n_triple
+from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, canonical, facts_of, for_pellet, n_triple
 from suave_des.knowledge.rules.syntax import Rule
 from suave_des.knowledge.state import ContradictionError
-from suave_des.knowledge.vocabulary import RDF_TYPE, XSD
 
 _LITERAL: Final = re.compile(r"literal\((.*),([^,]*),([^,]*)\)", re.DOTALL)
 #: An escape of N-Triples; of them all, Jena's reader does not know the one of eight digits.

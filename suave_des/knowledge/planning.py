@@ -14,8 +14,17 @@ from typing import Final
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.state import UNGROUNDED, Decision, Inference, KnowledgeState, ObjectiveState, Plan, Rejection
-from suave_des.knowledge.vocabulary import PERFORMANCE, objective_name
+from suave_des.knowledge.rdf import PERFORMANCE
+from suave_des.knowledge.state import (
+    UNGROUNDED,
+    Decision,
+    Inference,
+    KnowledgeState,
+    ObjectiveState,
+    Plan,
+    Rejection,
+    objective_name,
+)
 
 #: Performance of a design for which none is given.
 DEFAULT_PERFORMANCE: Final = Decimal("0.001")

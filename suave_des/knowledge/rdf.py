@@ -1,4 +1,9 @@
-"""RDF terms and triples as reasoners are given them, their N-Triples, and the facts that they state."""
+"""RDF: IRIs of the vocabularies, terms and triples as reasoners are given them, and the facts that they state.
+
+The vocabularies are TOMASys, its terms for robots (mros), SUAVE's model, OWL and SWRL. Source: the exemplar's three
+ontologies (repository kas-lab/suave), whose names and namespaces are kept so that either side's files work with the
+other's.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +18,66 @@ from rdflib import BNode, Literal
 from rdflib.term import Node
 
 from suave_des.knowledge.state import Fact, Value
-from suave_des.knowledge.vocabulary import LANGUAGE_NAMESPACES, MROS, RDF_TYPE, SWRL, TOMASYS, XSD, local_name
+
+TOMASYS: Final = "http://metacontrol.org/tomasys#"
+MROS: Final = "http://ros/mros#"
+SUAVE: Final = "http://www.metacontrol.org/suave#"
+
+RDF: Final = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
+RDFS: Final = "http://www.w3.org/2000/01/rdf-schema#"
+OWL: Final = "http://www.w3.org/2002/07/owl#"
+XSD: Final = "http://www.w3.org/2001/XMLSchema#"
+SWRL: Final = "http://www.w3.org/2003/11/swrl#"
+SWRLB: Final = "http://www.w3.org/2003/11/swrlb#"
+SWRLA: Final = "http://swrl.stanford.edu/ontologies/3.3/swrla.owl#"
+
+#: Namespaces of OWL, RDF and SWRL: their terms describe no fact of the system.
+LANGUAGE_NAMESPACES: Final = (RDF, RDFS, OWL, XSD, SWRL, SWRLB, SWRLA)
+
+RDF_TYPE: Final = RDF + "type"
+HAS_VALUE: Final = TOMASYS + "hasValue"
+
+#: What the planner and the loop read, whether or not a rule can conclude it.
+DECISION_PROPERTIES: Final = tuple(
+    TOMASYS + name
+    for name in (
+        "fd_error_log",
+        "fd_realisability",
+        "fg_status",
+        "hasNFR",
+        "hasQAestimation",
+        "hasQAvalue",
+        "hasValue",
+        "isQAtype",
+        "o_always_improve",
+        "o_status",
+        "o_updatable",
+        "qa_comparison_operator",
+        "solvesF",
+        "solvesO",
+        "typeF",
+        "typeFD",
+    )
+)
+
+#: The quality attribute that the planner maximises.
+PERFORMANCE: Final = MROS + "performance"
+
+
+def local_name(iri: str) -> str:
+    """Last part of an IRI: after '#', or after the last '/' or ':' where there is none."""
+    for separator in ("#", "/", ":"):
+        head, found, tail = iri.rpartition(separator)
+        if found and tail:
+            return tail
+        if found:
+            iri = head
+    return iri
+
+
+def namespace(iri: str) -> str:
+    """The part of an IRI before the local name, with the separator."""
+    return iri[: len(iri) - len(local_name(iri))]
 
 
 class Lit(NamedTuple):

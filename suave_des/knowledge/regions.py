@@ -17,11 +17,9 @@ from math import inf
 from typing import Any, Final
 
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import Lit
-from suave_des.knowledge.rules.builtins import COMPARISONS
-from suave_des.knowledge.rules.syntax import EXPRESSION, Rule, Variable
+from suave_des.knowledge.rdf import HAS_VALUE, OWL, RDF_TYPE, RDFS, XSD, Lit, local_name
+from suave_des.knowledge.rules.syntax import COMPARISONS, EXPRESSION, Rule, Variable
 from suave_des.knowledge.state import MAX_EXPONENT, KnowledgeState
-from suave_des.knowledge.vocabulary import HAS_VALUE, OWL, RDF_TYPE, RDFS, XSD, local_name
 
 #: Objectives, groundings, components and measurements of a state, the last as regions or as exact values.
 Key = tuple[Any, ...]

@@ -13,7 +13,6 @@ from functools import cached_property
 from typing import Final, NamedTuple
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.vocabulary import grounding_name, objective_name
 
 Value = str | bool | Decimal
 Number = Decimal | float | int | str
@@ -246,3 +245,22 @@ class Plan:
     def without_design(self) -> frozenset[str]:
         """The functions that have no function design left."""
         return frozenset([each.function for each in self.decisions if each.design is None])
+
+
+def _swap_prefix(name: str, old: str, new: str) -> str:
+    return new + (name.removeprefix(old) if name.startswith(old) else name)
+
+
+def objective_name(function: str) -> str:
+    """Name of the objective of a function: o_generate_search_path for f_generate_search_path."""
+    return _swap_prefix(function, "f_", "o_")
+
+
+def grounding_name(design: str) -> str:
+    """Name of the grounding of a function design: fg_spiral_high for fd_spiral_high."""
+    return _swap_prefix(design, "fd_", "fg_")
+
+
+def measurement_name(attribute: str) -> str:
+    """Name of the measured value of a quality attribute type: obs_water_visibility for water_visibility."""
+    return f"obs_{attribute}"

@@ -26,9 +26,8 @@ from suave_des.knowledge.content import Terms
 from suave_des.knowledge.java import SHORT_LIVED, java_executable, launcher_environment
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import unescape
-from suave_des.knowledge.rdf import Lit, Triple, n_triple, term_of
-from suave_des.knowledge.vocabulary import RDF as RDF_IRI
-from suave_des.knowledge.vocabulary import RDF_TYPE, XSD
+from suave_des.knowledge.rdf import RDF as RDF_IRI
+from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, n_triple, term_of
 
 _PLAIN: Final = RDF_IRI + "PlainLiteral"
 _STATE_IRI: Final = "urn:suave-des:state"

@@ -12,9 +12,9 @@ from suave_des.knowledge.deliberation import Conclusion
 from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.planning import performance
+from suave_des.knowledge.rdf import local_name
 from suave_des.knowledge.rules.writer import write_rule
 from suave_des.knowledge.state import KnowledgeState
-from suave_des.knowledge.vocabulary import local_name
 from suave_des.pages.recorded import Recorded, read_recorded
 from suave_des.report.mission_record import MissionRecord, adaptations
 from suave_des.resources import find

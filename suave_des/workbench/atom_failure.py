@@ -6,12 +6,11 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Final
 
+from suave_des.errors import nearest
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import NUMERIC, Lit, value_of
-from suave_des.knowledge.rules.builtins import COMPARISONS
-from suave_des.knowledge.rules.syntax import Atom, Variable
+from suave_des.knowledge.rdf import NUMERIC, OWL, TOMASYS, Lit, local_name, value_of
+from suave_des.knowledge.rules.syntax import COMPARISONS, Atom, Variable
 from suave_des.knowledge.rules.writer import literal_text
-from suave_des.knowledge.vocabulary import OWL, TOMASYS, local_name, nearest
 from suave_des.workbench.matching import FACT_KINDS, Binding, Facts, bound
 
 _WORDS: Final = {

@@ -10,9 +10,8 @@ from typing import Final
 
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.model import Model
-from suave_des.knowledge.rdf import Lit, canonical
+from suave_des.knowledge.rdf import LANGUAGE_NAMESPACES, OWL, RDF_TYPE, RDFS, TOMASYS, XSD, Lit, canonical
 from suave_des.knowledge.rules.syntax import EXPRESSION, Atom, Named, Rule
-from suave_des.knowledge.vocabulary import LANGUAGE_NAMESPACES, OWL, RDF_TYPE, RDFS, TOMASYS, XSD
 
 _ANY: Final = "any value"
 _ANY_TEXT: Final = "any text"

@@ -9,9 +9,8 @@ import rdflib
 from rdflib.term import Node
 
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import Lit, Triple, facts_of, is_fact, term_of
+from suave_des.knowledge.rdf import RDF_TYPE, Lit, Triple, facts_of, is_fact, local_name, term_of
 from suave_des.knowledge.rules.writer import literal_text
-from suave_des.knowledge.vocabulary import RDF_TYPE, local_name
 from suave_des.workbench.policy import Policy, PolicyCase, no_proof
 from suave_des.workbench.ranges import ValueRange
 

@@ -13,8 +13,7 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.planning import performance
 from suave_des.knowledge.rdf import Triple, facts_of
 from suave_des.knowledge.reasoners import make_reasoner
-from suave_des.knowledge.state import ContradictionError, Decision, Fact, KnowledgeState, value_text
-from suave_des.knowledge.vocabulary import objective_name
+from suave_des.knowledge.state import ContradictionError, Decision, Fact, KnowledgeState, objective_name, value_text
 from suave_des.workbench.tracing import Clash, Derivation, Tracer
 from suave_des.workbench.why_not import RuleQuestions, WhyNot
 

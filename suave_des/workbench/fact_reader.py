@@ -6,13 +6,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final
 
-from suave_des.errors import InputError, shown
+from suave_des.errors import InputError, nearest, shown
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import Lit, Triple, facts_of
+from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, facts_of, local_name
 from suave_des.knowledge.rules.parser import parse_rule
 from suave_des.knowledge.rules.syntax import Atom, Named, RuleError, Term, Variable
 from suave_des.knowledge.state import Fact
-from suave_des.knowledge.vocabulary import RDF_TYPE, XSD, local_name, nearest
 
 #: Begins the IRIs of individuals that exist in a test or a question only.
 NEW_INDIVIDUAL: Final = "urn:suave-des:test#"

@@ -16,11 +16,9 @@ from rdflib import BNode
 from suave_des.knowledge import jvm
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.pellet import load_n_triples, one_at_a_time, read_term
-from suave_des.knowledge.rdf import Lit, Triple, canonical
-from suave_des.knowledge.rules.builtins import TESTERS
+from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, canonical
 from suave_des.knowledge.rules.rdf import with_triples
-from suave_des.knowledge.rules.syntax import Atom, Named, Rule, Term, Variable
-from suave_des.knowledge.vocabulary import RDF_TYPE, XSD
+from suave_des.knowledge.rules.syntax import TESTERS, Atom, Named, Rule, Term, Variable
 
 #: What the variables of a rule stand for: IRIs and literals by name.
 Binding = Mapping[str, str | Lit]

@@ -11,22 +11,14 @@ from rdflib import RDF, Graph, Literal, Namespace, URIRef
 from rdflib.plugins.parsers.notation3 import BadSyntax
 from rdflib.term import Node
 
-from suave_des.errors import InputError
+from suave_des.errors import InputError, nearest
 from suave_des.files import decode, read_bytes
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.model import Model, expectations
 from suave_des.knowledge.ontology_file import OntologyFile, without_log
+from suave_des.knowledge.rdf import LANGUAGE_NAMESPACES, PERFORMANCE, RDF_TYPE, TOMASYS, local_name, namespace
 from suave_des.knowledge.rules.names import Vocabulary
 from suave_des.knowledge.rules.syntax import Named
-from suave_des.knowledge.vocabulary import (
-    LANGUAGE_NAMESPACES,
-    PERFORMANCE,
-    RDF_TYPE,
-    TOMASYS,
-    local_name,
-    namespace,
-    nearest,
-)
 from suave_des.resources import shipped_folder
 from suave_des.workbench.findings import Finding, Level, finding_about
 

@@ -13,10 +13,8 @@ from math import comb
 from typing import Final
 
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import Lit, Triple
-from suave_des.knowledge.rules.builtins import COMPARISONS
-from suave_des.knowledge.rules.syntax import Atom, Named, Rule, Variable
-from suave_des.knowledge.vocabulary import OWL, RDFS, TOMASYS, XSD
+from suave_des.knowledge.rdf import OWL, RDFS, TOMASYS, XSD, Lit, Triple
+from suave_des.knowledge.rules.syntax import COMPARISONS, Atom, Named, Rule, Variable
 from suave_des.workbench.ranges import numbers_in
 from suave_des.workbench.state_input import ManagingSettings
 

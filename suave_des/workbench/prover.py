@@ -15,11 +15,10 @@ from suave_des.knowledge.limit import LOADING, TimeLimit, reasoning_on
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import InProcessPellet
 from suave_des.knowledge.planning import plan
-from suave_des.knowledge.rdf import Lit, Triple, facts_of
+from suave_des.knowledge.rdf import XSD, Lit, Triple, facts_of
 from suave_des.knowledge.rules.rdf import with_triples
 from suave_des.knowledge.rules.syntax import Atom, Named, Rule
 from suave_des.knowledge.state import ContradictionError, Fact, Inference, KnowledgeState
-from suave_des.knowledge.vocabulary import XSD
 from suave_des.workbench.policy import PolicyCase
 
 if TYPE_CHECKING:

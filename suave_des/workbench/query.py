@@ -14,9 +14,8 @@ from rdflib.namespace import RDFS
 from suave_des.errors import InputError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import InProcessPellet
-from suave_des.knowledge.rdf import Triple, n_triple
+from suave_des.knowledge.rdf import MROS, OWL, RDF, SUAVE, SWRL, TOMASYS, XSD, Triple, n_triple
 from suave_des.knowledge.state import KnowledgeState
-from suave_des.knowledge.vocabulary import MROS, OWL, RDF, SUAVE, SWRL, TOMASYS, XSD
 
 _UNNAMED: Final = re.compile(r"(?<![^\s])_:([A-Za-z0-9]+)(?=\s)")
 _PREFIXES: Final = {

@@ -23,15 +23,14 @@ from rdflib import BNode, Literal, URIRef
 from rdflib.namespace import OWL, RDF
 from rdflib.term import Node
 
-from suave_des.errors import InputError, KnowledgeError
+from suave_des.errors import InputError, KnowledgeError, nearest
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, read_ontology
-from suave_des.knowledge.rdf import RdfTriple
+from suave_des.knowledge.rdf import RDF as RDF_NS
+from suave_des.knowledge.rdf import RDFS, SWRL, SWRLA, XSD, RdfTriple, local_name
 from suave_des.knowledge.rules.files import read_rule
 from suave_des.knowledge.rules.rdf import rules_of
 from suave_des.knowledge.rules.syntax import Rule
-from suave_des.knowledge.vocabulary import RDF as RDF_NS
-from suave_des.knowledge.vocabulary import RDFS, SWRL, SWRLA, XSD, local_name, nearest
 
 #: Stands for the file of a rule that was given on the command line.
 _GIVEN: Final = Path("the rule")

@@ -10,12 +10,11 @@ from typing import Any, Final
 
 from suave_des.campaign.knowledge_records import CAMPAIGN_KNOWLEDGE_FILE, KNOWLEDGE_FILE, read_knowledge, read_missions
 from suave_des.domain import GENERATE_SEARCH_PATH, MAINTAIN_MOTION
-from suave_des.errors import InputError, KeyPath, KnowledgeError, did_you_mean, shown
+from suave_des.errors import InputError, KeyPath, KnowledgeError, did_you_mean, nearest, shown
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.planning import calls
-from suave_des.knowledge.rdf import Lit
+from suave_des.knowledge.rdf import TOMASYS, XSD, Lit
 from suave_des.knowledge.state import UNGROUNDED, KnowledgeState, ObjectiveState
-from suave_des.knowledge.vocabulary import TOMASYS, XSD, nearest
 from suave_des.metrics.result import KnowledgeRecord
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.yamlfile import read_yaml

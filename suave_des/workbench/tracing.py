@@ -25,10 +25,9 @@ from suave_des.knowledge.pellet import (
     read_term,
     trace_contradiction,
 )
-from suave_des.knowledge.rdf import Lit, Triple, canonical, facts_of, is_fact, n_triple, value_of
+from suave_des.knowledge.rdf import OWL, RDF_TYPE, Lit, Triple, canonical, facts_of, is_fact, n_triple, value_of
 from suave_des.knowledge.rules.syntax import Atom, AtomKind, Rule
 from suave_des.knowledge.state import Fact, KnowledgeState, Value
-from suave_des.knowledge.vocabulary import OWL, RDF_TYPE
 from suave_des.workbench.matching import Binding, Facts, matched
 
 _FACT: Final = re.compile(r"^(prop|type)\(([^,()]+),([^,()]+)")

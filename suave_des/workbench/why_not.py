@@ -14,13 +14,12 @@ from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.knowledge.content import with_rules
 from suave_des.knowledge.limit import TimeLimit
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import Lit, Triple, facts_of, value_of
+from suave_des.knowledge.rdf import RDF_TYPE, Lit, Triple, facts_of, value_of
 from suave_des.knowledge.rules.checks import RuleProblem, check_rule
 from suave_des.knowledge.rules.files import RulesFile
 from suave_des.knowledge.rules.syntax import Atom, Rule, RuleError
 from suave_des.knowledge.rules.writer import write_atom
 from suave_des.knowledge.state import ContradictionError, Fact, KnowledgeState, Value, value_text
-from suave_des.knowledge.vocabulary import RDF_TYPE
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario_knowledge import open_base
 from suave_des.workbench.atom_failure import describe_failure

@@ -11,14 +11,13 @@ from hypothesis import strategies as st
 
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import Lit
+from suave_des.knowledge.rdf import MROS, SWRLB, TOMASYS, XSD, Lit
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.rules.checks import check_rule
 from suave_des.knowledge.rules.names import rule_from_text
 from suave_des.knowledge.rules.parser import RuleError, parse_rule, parse_rules
 from suave_des.knowledge.rules.syntax import Atom, Named, Place, Rule, Variable
 from suave_des.knowledge.rules.writer import full_name, naming, write_rule
-from suave_des.knowledge.vocabulary import MROS, SWRLB, TOMASYS, XSD
 
 RULE = "LowBattery: QAvalue(?q) ^ isQAtype(?q, battery_level) ^ hasValue(?q, ?v) ^ lessThan(?v, 0.25) -> Role(?q)\n"
 EVERYTHING = r"""# rules for a test

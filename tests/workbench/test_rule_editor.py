@@ -12,9 +12,9 @@ from rdflib.compare import isomorphic
 
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rdf import SWRLB
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
-from suave_des.knowledge.vocabulary import SWRLB
 from suave_des.resources import shipped_folder
 from suave_des.workbench.rule_editor import add_rule, remove_rule, set_enabled
 

@@ -12,13 +12,25 @@ from decimal import Decimal
 from operator import gt, lt
 from typing import Final
 
-from suave_des.errors import KnowledgeError
-from suave_des.knowledge.rdf import NUMERIC, Lit, Triple
-from suave_des.knowledge.rules.builtins import BUILTINS, COMPARISON_OF, COMPARISONS, TESTERS, mirrored
+from suave_des.errors import KnowledgeError, nearest
+from suave_des.knowledge.rdf import NUMERIC, OWL, RDF_TYPE, XSD, Lit, Triple, local_name
 from suave_des.knowledge.rules.names import Vocabulary
-from suave_des.knowledge.rules.syntax import EXPRESSION, Atom, Named, Place, Rule, RuleError, Term, Variable
+from suave_des.knowledge.rules.syntax import (
+    BUILTINS,
+    COMPARISON_OF,
+    COMPARISONS,
+    EXPRESSION,
+    TESTERS,
+    Atom,
+    Named,
+    Place,
+    Rule,
+    RuleError,
+    Term,
+    Variable,
+    mirrored,
+)
 from suave_des.knowledge.rules.writer import literal_text
-from suave_des.knowledge.vocabulary import OWL, RDF_TYPE, XSD, local_name, nearest
 
 _DECLARED_AS: Final = {"class": "class", "object": "object property", "data": "data property"}
 _ARGUMENTS: Final = {"class": 1, "range": 1, "object": 2, "data": 2, "same": 2, "different": 2}

@@ -10,10 +10,23 @@ from typing import Final
 
 from rdflib import BNode
 
-from suave_des.knowledge.rdf import Lit, Triple
-from suave_des.knowledge.rules.builtins import BUILTINS
+from suave_des.errors import nearest
+from suave_des.knowledge.rdf import (
+    LANGUAGE_NAMESPACES,
+    MROS,
+    OWL,
+    RDF_TYPE,
+    RDFS,
+    SWRLB,
+    TOMASYS,
+    XSD,
+    Lit,
+    Triple,
+    local_name,
+)
 from suave_des.knowledge.rules.rdf import with_triples
 from suave_des.knowledge.rules.syntax import (
+    BUILTINS,
     DIFFERENT,
     SAME,
     Atom,
@@ -26,18 +39,6 @@ from suave_des.knowledge.rules.syntax import (
     Term,
 )
 from suave_des.knowledge.rules.writer import line_of_rule
-from suave_des.knowledge.vocabulary import (
-    LANGUAGE_NAMESPACES,
-    MROS,
-    OWL,
-    RDF_TYPE,
-    RDFS,
-    SWRLB,
-    TOMASYS,
-    XSD,
-    local_name,
-    nearest,
-)
 
 _DECLARED: Final = {
     OWL + "Class": "class",

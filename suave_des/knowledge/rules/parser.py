@@ -23,9 +23,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
-from suave_des.knowledge.rdf import Lit
+from suave_des.errors import nearest
+from suave_des.knowledge.rdf import MROS, OWL, RDF, RDFS, SUAVE, SWRL, SWRLA, SWRLB, TOMASYS, XSD, Lit
 from suave_des.knowledge.rules.syntax import Atom, Named, ParsedRule, Place, RuleError, Term, Variable
-from suave_des.knowledge.vocabulary import MROS, OWL, RDF, RDFS, SUAVE, SWRL, SWRLA, SWRLB, TOMASYS, XSD, nearest
 
 if TYPE_CHECKING:
     from lark import Lark, Token

@@ -13,7 +13,7 @@ from rdflib.namespace import RDF, RDFS
 from rdflib.term import Node
 
 from suave_des.knowledge.ontology_file import OntologyFile
-from suave_des.knowledge.rdf import RdfTriple, literal
+from suave_des.knowledge.rdf import SWRL, SWRLA, RdfTriple, literal, local_name
 from suave_des.knowledge.rules.syntax import (
     DIFFERENT,
     EXPRESSION,
@@ -27,7 +27,6 @@ from suave_des.knowledge.rules.syntax import (
     Variable,
 )
 from suave_des.knowledge.rules.writer import distinct_variables, line_of_rule
-from suave_des.knowledge.vocabulary import SWRL, SWRLA, local_name
 
 IMP: Final = URIRef(SWRL + "Imp")
 _VARIABLE: Final = URIRef(SWRL + "Variable")

@@ -7,10 +7,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Final
 
-from suave_des.knowledge.rdf import Lit
+from suave_des.knowledge.rdf import SWRLB, XSD, Lit, local_name, namespace
 from suave_des.knowledge.rules.parser import PREFIXES
 from suave_des.knowledge.rules.syntax import Atom, Named, ParsedRule, Place, Term, Variable
-from suave_des.knowledge.vocabulary import SWRLB, XSD, local_name, namespace
 
 _WORD: Final = re.compile(r"[^\W\d](?:[\w.-]*\w)?")
 #: Literals without quotes, by the datatype that the parser gives them.

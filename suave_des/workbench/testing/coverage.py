@@ -10,8 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
-from suave_des.knowledge.rules.builtins import COMPARISON_OF, COMPARISONS
-from suave_des.knowledge.rules.syntax import Rule
+from suave_des.knowledge.rules.syntax import COMPARISON_OF, COMPARISONS, Rule
 from suave_des.knowledge.rules.writer import write_atom
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.workbench.knowledge_base import KnowledgeBase

@@ -13,14 +13,24 @@ from types import MappingProxyType
 from typing import Final
 
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import EXACT, Lit, Triple
-from suave_des.knowledge.rules.builtins import COMPARISON_OF, COMPARISONS, mirrored
+from suave_des.knowledge.rdf import (
+    EXACT,
+    HAS_VALUE,
+    LANGUAGE_NAMESPACES,
+    OWL,
+    RDF_TYPE,
+    RDFS,
+    TOMASYS,
+    XSD,
+    Lit,
+    Triple,
+    local_name,
+)
 from suave_des.knowledge.rules.checks import check_rule
 from suave_des.knowledge.rules.rdf import with_triples
-from suave_des.knowledge.rules.syntax import Atom, Named, Rule, Term, Variable
+from suave_des.knowledge.rules.syntax import COMPARISON_OF, COMPARISONS, Atom, Named, Rule, Term, Variable, mirrored
 from suave_des.knowledge.rules.writer import literal_text, write_atom
 from suave_des.knowledge.state import KnowledgeState
-from suave_des.knowledge.vocabulary import HAS_VALUE, LANGUAGE_NAMESPACES, OWL, RDF_TYPE, RDFS, TOMASYS, XSD, local_name
 from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.matching import FACT_KINDS, instance, matched
 from suave_des.workbench.prover import Body, Prover, Situation

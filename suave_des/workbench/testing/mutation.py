@@ -22,10 +22,9 @@ from suave_des.errors import KnowledgeError
 from suave_des.knowledge.deliberation import Conclusion
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.planning import plan
-from suave_des.knowledge.rdf import facts_of
+from suave_des.knowledge.rdf import DECISION_PROPERTIES, HAS_VALUE, TOMASYS, facts_of, local_name
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.knowledge.state import ContradictionError, Fact, Inference, KnowledgeState
-from suave_des.knowledge.vocabulary import DECISION_PROPERTIES, HAS_VALUE, TOMASYS, local_name
 from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.policy import PolicyCase, kinds_of_states
 from suave_des.workbench.policy_space import PolicySpace
