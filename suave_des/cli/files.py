@@ -106,8 +106,8 @@ def import_config(
     from suave_des.cli.console import plain
     from suave_des.errors import InputError
     from suave_des.registry import manager_names
-    from suave_des.scenario.exemplar import import_config as imported_from
-    from suave_des.scenario.exemplar_files import ImportOptions
+    from suave_des.scenario.exemplar.files import ImportOptions
+    from suave_des.scenario.exemplar.importing import import_config as imported_from
 
     targets = [out] if campaign is None else [out, campaign]
     if campaign is not None and campaign.resolve() == out.resolve():

@@ -21,9 +21,9 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rules.files import RulesFile
 from suave_des.report.figures import draw_folder
 from suave_des.resources import shipped_folder
-from suave_des.scenario.exemplar import import_config
-from suave_des.scenario.exemplar_files import ImportOptions
-from suave_des.scenario.exemplar_settings import RELEASES
+from suave_des.scenario.exemplar.files import ImportOptions
+from suave_des.scenario.exemplar.importing import import_config
+from suave_des.scenario.exemplar.settings import RELEASES
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
 from tests.helpers.mutation import damaged

@@ -11,8 +11,8 @@ import yaml
 from suave_des.campaign.campaign import run_campaign
 from suave_des.cli.main import main
 from suave_des.errors import InputError
-from suave_des.scenario.exemplar import import_config
-from suave_des.scenario.exemplar_files import ImportOptions
+from suave_des.scenario.exemplar.files import ImportOptions
+from suave_des.scenario.exemplar.importing import import_config
 from suave_des.scenario.loader import load_scenario
 
 MISSION_2023 = """\

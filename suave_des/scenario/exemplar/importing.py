@@ -10,8 +10,8 @@ from typing import Any
 
 from suave_des.errors import InputError, KeyPath
 from suave_des.resources import find, shipped_folder
-from suave_des.scenario.exemplar_campaign import campaign_text, commented, flow, heading, one_line
-from suave_des.scenario.exemplar_files import (
+from suave_des.scenario.exemplar.campaign import campaign_text, commented, flow, heading, one_line
+from suave_des.scenario.exemplar.files import (
     NODES,
     NOT_NEEDED,
     RUNNER,
@@ -19,7 +19,7 @@ from suave_des.scenario.exemplar_files import (
     ImportOptions,
     read_configuration,
 )
-from suave_des.scenario.exemplar_settings import RELEASES, Release, Setting, Settings, release_of, settings_of
+from suave_des.scenario.exemplar.settings import RELEASES, Release, Setting, Settings, release_of, settings_of
 from suave_des.scenario.layers import Files, merge, scenario_layer
 from suave_des.scenario.loader import LoadedScenario, load_layer
 from suave_des.scenario.models import Scenario

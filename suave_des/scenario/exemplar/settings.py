@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH
 from suave_des.errors import InputError, did_you_mean, shown
-from suave_des.scenario.exemplar_files import (
+from suave_des.scenario.exemplar.files import (
     NODES,
     NOT_NEEDED,
     REASONER,

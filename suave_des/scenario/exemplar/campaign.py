@@ -12,7 +12,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, BeforeValidator, Field, TypeAdapter, ValidationError
 
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown
-from suave_des.scenario.exemplar_files import (
+from suave_des.scenario.exemplar.files import (
     NODES,
     NOT_NEEDED,
     RUNNER,
