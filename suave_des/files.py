@@ -1,11 +1,50 @@
-"""Read files that the user named."""
+"""Files that the user named: read within limits; checked before the work, and written whole or not at all."""
 
 from __future__ import annotations
 
+import csv
+import io
+import json
+import os
 import stat
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from suave_des.errors import InputError
+
+_PIECE_ROWS = 1000
+_PART = ".part"
+
+DERIVED = (
+    *("paper_table.md", "paper_table.csv"),
+    *("validation.csv", "validation_pairs.csv", "validation_shares.csv", "validation_positions.csv"),
+    *("validation_targets.csv", "validation.json", "distributions.png", "detections.png"),
+    *("replay.html", "report.html"),
+)
+"""Files that reproduce, validate, report and replay make of a campaign's, beside them."""
+FAMILIES: Mapping[str, tuple[str, ...]] = {
+    "mission": ("mission.json", "events.csv", "trajectory.csv", "knowledge.jsonl"),
+    "campaign": (
+        "campaign.sqlite",
+        "runs.csv",
+        "summary.csv",
+        "manifest.json",
+        "ensemble.csv",
+        "validation_conditions.csv",
+        "suave_results.csv",
+        "runs.parquet",
+        *DERIVED,
+        "knowledge_states.jsonl",
+    ),
+    "fit": ("fitted.yaml", "parameters.csv", "calibration.json", "profiles.png"),
+}
+"""Names of result files by kind; a folder has those of one family, so that nothing in it is misread."""
+
+DECIMALS = 6
+"""Digits after the point in result files."""
 
 
 def read_bytes(path: Path, limit: int) -> bytes:
@@ -42,3 +81,160 @@ def decode(path: Path, content: bytes) -> str:
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise InputError("is not UTF-8 text", file=path, place=f"line {line}", remedy="save it as UTF-8") from None
+
+
+def rounded(value: float) -> float:
+    """Round a number as in result files."""
+    return round(value, DECIMALS) + 0.0  # + 0.0: no minus before a zero
+
+
+def cell(value: object) -> object:
+    """Return a value as in a CSV file: numbers rounded and in their shortest form, True or False, empty for None."""
+    return repr(rounded(value)) if isinstance(value, float) else value
+
+
+def csv_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    r"""Return a CSV file with a header: RFC 4180, except that lines end with \n."""
+    return "".join(csv_pieces(columns, rows))
+
+
+def csv_pieces(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:
+    """Yield a CSV file as csv_text returns it, piece by piece, so that few of its rows are in memory."""
+    rest = iter(rows)
+    part: list[Sequence[object]] = [columns]
+    while part:
+        buffer = io.StringIO()
+        csv.writer(buffer, lineterminator="\n").writerows([cell(value) for value in row] for row in part)
+        yield buffer.getvalue()
+        part = list(islice(rest, _PIECE_ROWS))
+
+
+def json_text(content: Mapping[str, Any]) -> str:
+    """Return a JSON file that people can read, too."""
+    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+
+
+def check_output_folder(
+    folder: Path, family: str, *, overwrite: bool, left_over: Callable[[str], bool] = lambda name: False
+) -> None:
+    """See that results can go into a folder, without changing anything.
+
+    Args:
+        folder: where they are to go.
+        family: their kind, a key of FAMILIES.
+        overwrite: whether it need not be empty.
+        left_over: returns whether a file of that name does not count.
+
+    Raises:
+        InputError: it is not empty and `overwrite` is false, has results of another family, is a file, or cannot be
+            written.
+    """
+    with _user_errors(folder):
+        entries = [entry.name for entry in folder.iterdir()] if folder.is_dir() else []
+        found = min((name for name in entries if not left_over(name)), default=None)
+        is_there, has_parent = folder.exists() or folder.is_symlink(), folder.parent.is_dir()
+    for other, names in FAMILIES.items():
+        known = min((name for name in names if name in entries), default=None)
+        if other != family and known is not None:
+            problem = f"the output folder has a {other}'s results in it ({known}), which this command does not replace"
+            raise InputError(problem, file=folder, remedy="give another folder, or remove them first")
+    may_be_written = os.access(folder if is_there else folder.parent, os.W_OK | os.X_OK)
+    not_empty = f"the output folder is not empty: it has {found}"
+    _check(
+        folder,
+        (found and not overwrite, not_empty, "give another folder, or --overwrite to replace the results in it"),
+        (is_there and not folder.is_dir(), "the output folder is not a folder", "give another path"),
+        (not (is_there or has_parent), f"there is no folder {folder.parent} to make it in", "make that folder first"),
+        (not may_be_written, "the output folder cannot be written", "give a folder that is yours"),
+    )
+
+
+def check_output_file(file: Path, *, overwrite: bool) -> None:
+    """See that a file can be written, without changing anything.
+
+    Raises:
+        InputError: it is a folder, its folder does not exist or cannot be written, or it exists and `overwrite` is
+            false.
+    """
+    _check(
+        file,
+        (not file.name or file.is_dir(), "is a folder", "name a file in it"),
+        (not file.parent.is_dir(), f"there is no folder {file.parent} to write it in", "make it first"),
+        (not os.access(file.parent, os.W_OK | os.X_OK), "its folder cannot be written", "give one that is yours"),
+        (file.exists() and not overwrite, "exists already", "give another name, or --overwrite to replace it"),
+    )
+
+
+def _check(path: Path, *cases: tuple[object, str, str]) -> None:
+    """Raise an error for the first case, of condition, problem and remedy, whose condition holds."""
+    for is_wrong, problem, remedy in cases:
+        if is_wrong:
+            raise InputError(problem, file=path, remedy=remedy)
+
+
+def make_output_folder(folder: Path) -> None:
+    """Make the folder if it is not there yet.
+
+    Raises:
+        InputError: it cannot be made.
+    """
+    with _user_errors(folder):
+        folder.mkdir(exist_ok=True)
+
+
+def remove_results(folder: Path, names: Collection[str]) -> None:
+    """Remove files that were made from a campaign that is replaced, those of these names among them.
+
+    Raises:
+        InputError: it cannot be removed.
+    """
+    with _user_errors(folder):
+        for name in (*names, *DERIVED):
+            (folder / name).unlink(missing_ok=True)
+
+
+def write_files(folder: Path, files: Mapping[str, str | bytes | Iterable[str]], *, stale: Collection[str] = ()) -> None:
+    """Write files under temporary names, and rename them when all are complete.
+
+    Args:
+        folder: an existing folder.
+        files: content by name; text is written as UTF-8, pieces of text one after the other.
+        stale: names of files of an earlier use of the folder, removed unless they are written anew.
+
+    Raises:
+        InputError: the disk is full, or the folder cannot be written; nothing half-written stays.
+    """
+    written = {folder / name: folder / f".{name}.{os.getpid()}{_PART}" for name in files}
+    try:
+        with _user_errors(folder):
+            for content, temporary in zip(files.values(), written.values(), strict=True):
+                temporary.unlink(missing_ok=True)
+                with temporary.open("xb") as file:  # x: a link of that name is not followed
+                    if isinstance(content, str | bytes):
+                        file.write(content if isinstance(content, bytes) else content.encode())
+                    else:
+                        file.writelines(piece.encode() for piece in content)
+            for final, temporary in written.items():
+                temporary.replace(final)
+            for name in set(stale) - set(files):
+                (folder / name).unlink(missing_ok=True)
+    finally:
+        for temporary in written.values():
+            temporary.unlink(missing_ok=True)
+
+
+def remove_parts(folder: Path, names: Iterable[str]) -> None:
+    """Remove unfinished files of these names, left by a process that was killed."""
+    for name in names:
+        for part in folder.glob(f".{name}.*{_PART}"):
+            part.unlink(missing_ok=True)
+
+
+@contextmanager
+def _user_errors(folder: Path) -> Iterator[None]:
+    """Turn errors of the system into errors for the user."""
+    try:
+        yield
+    except OSError as error:
+        problem = f"the output folder cannot be written: {error.strerror}"
+        raise InputError(problem, file=folder, remedy="give a folder that is yours") from None

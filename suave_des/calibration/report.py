@@ -13,7 +13,7 @@ import yaml
 from suave_des.calibration.cases import Case
 from suave_des.calibration.fit import Profile
 from suave_des.calibration.loss import Evaluation, FreeParameter, Judgement, Problem, judge
-from suave_des.campaign.output import csv_text, json_text
+from suave_des.files import csv_text, json_text
 from suave_des.report import style
 from suave_des.resources import find, shipped_folder
 from suave_des.scenario.loader import LoadedScenario, value_at, with_values

@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Unpack
 
-from suave_des.campaign.early_checks import FirstFailures, check_size
 from suave_des.campaign.executors import InProcess, LocalWorkers, end_worker_of_script
 from suave_des.campaign.inputs import (
     check_same,
@@ -20,11 +19,11 @@ from suave_des.campaign.inputs import (
     trained_on,
 )
 from suave_des.campaign.missions import Executor, Finished, JobSpec, Remark, WorkerError, plan
-from suave_des.campaign.output import check_output_folder, make_output_folder, remove_parts, remove_results
 from suave_des.campaign.progress import OnProgress, Progress, ProgressTracker
 from suave_des.campaign.result_files import FILES, SUAVE_FOLDER, write_results
 from suave_des.campaign.results import CampaignResult, gather
 from suave_des.campaign.spec import CampaignFile, CampaignSpec, read_campaign_file
+from suave_des.campaign.stopping import FirstFailures, check_size
 from suave_des.campaign.store import (
     LOCK_FILE,
     NEW_STORE_FILE,
@@ -38,6 +37,7 @@ from suave_des.campaign.store import (
 )
 from suave_des.campaign.variation import plain
 from suave_des.errors import InputError, SuaveDesError, did_you_mean
+from suave_des.files import check_output_folder, make_output_folder, remove_parts, remove_results
 from suave_des.registry import ManagerLike, name_of
 from suave_des.scenario.loader import LoadedScenario, Replacements
 

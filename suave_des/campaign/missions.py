@@ -8,9 +8,9 @@ from itertools import product
 from operator import attrgetter
 from typing import NamedTuple, Protocol
 
-from suave_des.campaign.output import rounded
 from suave_des.campaign.variation import Variation
 from suave_des.errors import MissionError, SuaveDesError
+from suave_des.files import rounded
 from suave_des.metrics.result import MissionMetrics, MissionResult
 from suave_des.scenario.loader import LoadedScenario
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from suave_des.campaign.missions import COLUMNS, Finished, MissionFailure, MissionGroup, MissionOutcome
-from suave_des.campaign.spec import FEWEST_PAIRS, FEWEST_RUNS, SEARCH_TIME, UntilCi
+from suave_des.campaign.stopping import FEWEST_PAIRS, FEWEST_RUNS, SEARCH_TIME, UntilCi
 from suave_des.estimates import RunningMean
 
 PAIR_STEP = 10

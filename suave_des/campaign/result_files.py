@@ -14,8 +14,8 @@ from suave_des.campaign.ensemble import ENSEMBLE_COLUMNS, ENSEMBLE_FILE
 from suave_des.campaign.inputs import provenance
 from suave_des.campaign.knowledge_records import CAMPAIGN_KNOWLEDGE_FILE
 from suave_des.campaign.missions import COLUMNS, MissionFailure, Row
-from suave_des.campaign.output import csv_pieces, csv_text, json_text, make_output_folder, write_files
 from suave_des.campaign.results import CampaignResult
+from suave_des.files import csv_pieces, csv_text, json_text, make_output_folder, write_files
 
 RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE, PARQUET_FILE = "runs.csv", "summary.csv", "manifest.json", "runs.parquet"
 FILES = (RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE, ENSEMBLE_FILE, PARQUET_FILE, CAMPAIGN_KNOWLEDGE_FILE)

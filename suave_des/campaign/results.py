@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 from suave_des.campaign.ensemble import MemberDifferences, differences
 from suave_des.campaign.knowledge_records import scenario_line
 from suave_des.campaign.missions import COLUMNS, Finished, MissionFailure, MissionGroup, Row
-from suave_des.campaign.output import rounded
 from suave_des.campaign.progress import GroupProgress, PairProgress, ProgressTracker
-from suave_des.campaign.spec import FEWEST_PAIRS, FEWEST_RUNS, CampaignSpec, UntilCi
+from suave_des.campaign.spec import CampaignSpec
+from suave_des.campaign.stopping import FEWEST_PAIRS, FEWEST_RUNS, UntilCi
 from suave_des.campaign.variation import Variation, cell_of
 from suave_des.estimates import estimate
+from suave_des.files import rounded
 from suave_des.metrics.result import MissionMetrics
 from suave_des.scenario.loader import LoadedScenario
 

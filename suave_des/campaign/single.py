@@ -1,27 +1,23 @@
-"""Missions outside campaigns: one with its whole record and result files, and those that managers learn from."""
+"""Missions one by one: outside campaigns, of a campaign again, and those that managers learn from."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import astuple, fields
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import chdir, closing, contextmanager
+from dataclasses import astuple, dataclass, fields
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, Unpack
 
-from suave_des.campaign.inputs import check_inputs, provenance
+from suave_des.campaign.inputs import check_inputs, check_trusted, provenance, read_inputs
 from suave_des.campaign.knowledge_records import KNOWLEDGE_FILE, knowledge_text
 from suave_des.campaign.missions import COLUMNS, further_of, row_of
-from suave_des.campaign.output import (
-    check_output_file,
-    check_output_folder,
-    csv_text,
-    json_text,
-    make_output_folder,
-    write_files,
-)
-from suave_des.campaign.spec import RUNS_LIMIT, check_range, check_seed
-from suave_des.errors import InputError
+from suave_des.campaign.spec import RUNS_LIMIT, CampaignSpec, check_range, check_seed, read_campaign_file
+from suave_des.campaign.store import STORE_FILE, Store
+from suave_des.campaign.variation import Variation
+from suave_des.errors import InputError, did_you_mean
+from suave_des.files import check_output_file, check_output_folder, csv_text, json_text, make_output_folder, write_files
 from suave_des.managing.learned import Learned, read_file
 from suave_des.metrics.result import Event, MissionMetrics, MissionResult, TrajectoryPoint
 from suave_des.registry import ManagerLike, name_of
@@ -171,3 +167,77 @@ def blocks(values: Sequence[float], count: int = 10) -> list[tuple[int, int, flo
     size = max(1, -(-len(values) // count))
     parts = [values[first : first + size] for first in range(0, len(values), size)]
     return [(n * size + 1, n * size + len(part), sum(part) / len(part)) for n, part in enumerate(parts)]
+
+
+@dataclass(frozen=True)
+class OpenedCampaign:
+    """A campaign whose missions can be run again.
+
+    Attributes:
+        spec: what it was asked to do.
+        loaded: its scenario.
+        variation: what differs between its missions besides manager and run.
+    """
+
+    spec: CampaignSpec
+    loaded: LoadedScenario
+    variation: Variation
+
+    def at_point(self, point: int, run: int | None = None) -> LoadedScenario:
+        """Return the scenario at a point of the sweep, 0 without one; with a run, as its member of the ensemble has it.
+
+        Raises:
+            InputError: there is no such point.
+        """
+        if not 0 <= point < self.variation.sweep.points:
+            remedy = f"its sweep has the points 0 to {self.variation.sweep.points - 1}"
+            raise InputError(f"the campaign has no point {point}", remedy=remedy)
+        return self.variation.scenario(self.loaded, point, None if run is None else self.variation.member(run))
+
+    def simulator(self, point: int = 0, run: int | None = None) -> Simulator:
+        """Make what runs the missions of a point; with an ensemble, those of a run."""
+        return Simulator(self.at_point(point, run), dict.fromkeys(self.variation.drawn, self.spec.runs_per_draw))
+
+    def run(self, manager: str, run: int, point: int = 0, *, simulator: Simulator | None = None) -> MissionResult:
+        """Run a mission of the campaign again, with its record.
+
+        Raises:
+            InputError: the campaign has no such manager, run or point.
+            MissionError: the manager raised.
+        """
+        if manager not in self.spec.managers:
+            remedy = did_you_mean(manager, self.spec.managers, "its managers")
+            raise InputError(f"the campaign has no manager {manager!r}", remedy=remedy)
+        if not 1 <= run <= self.spec.runs:
+            raise InputError(f"the campaign has no run {run}", remedy=f"it has runs 1 to {self.spec.runs}")
+        if simulator is None or self.variation.ensemble is not None:
+            simulator = self.simulator(point, run)
+        return simulator.run(manager, run, self.spec.seed, record=True)
+
+
+@contextmanager
+def opened_campaign(folder: Path, named: Collection[str] = ()) -> Iterator[OpenedCampaign]:
+    """Open a campaign, to run missions of it again; what it names is looked up where it was started.
+
+    Args:
+        folder: the campaign's.
+        named: managers that the user has named: their code may run, see `check_trusted`.
+
+    Raises:
+        InputError: there is no campaign in the folder, what it was made of is not there any more, or it names managers
+            that are neither installed nor named.
+    """
+    path = (folder / STORE_FILE).absolute()
+    if not path.is_file():
+        remedy = "give the --out folder of suave-des run or campaign"
+        raise InputError("has no campaign whose missions could be run again", file=folder, remedy=remedy)
+    with closing(Store(path)) as store:
+        spec = CampaignSpec.of_stored(store.about("request"))
+    started_in = Path(spec.folder)
+    with chdir(started_in if started_in.is_dir() else Path.cwd()):
+        file = read_campaign_file(spec.scenario)
+        spec = spec.with_file(file)
+        check_trusted(spec.managers, named, folder, confirmed=False)
+        spec.check()
+        loaded, variation, _ = read_inputs(spec, file)
+        yield OpenedCampaign(spec, loaded, variation)

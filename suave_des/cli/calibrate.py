@@ -87,9 +87,9 @@ def calibrate(
     from suave_des.calibration.fit import FINAL_FACTOR, fit, larger, profiles, select
     from suave_des.calibration.loss import evaluate, resampling_spread
     from suave_des.calibration.parameters import read_problem
-    from suave_des.campaign.output import check_output_folder, make_output_folder, write_files
     from suave_des.campaign.spec import RUNS_LIMIT, check_range, check_seed, check_workers
     from suave_des.cli.console import output
+    from suave_des.files import check_output_folder, make_output_folder, write_files
 
     check_workers(workers)
     check_seed(seed)

@@ -244,8 +244,8 @@ def reproduce(
     Prints the table of the paper (SEAMS 2023, arXiv:2303.09220) beside the simulated results.
     """
     from suave_des.campaign.campaign import run_campaign
-    from suave_des.campaign.output import write_files
     from suave_des.cli.console import output, progress
+    from suave_des.files import write_files
     from suave_des.report.paper import FILES, compare, published_estimates
 
     published = published_estimates()

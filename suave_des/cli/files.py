@@ -102,9 +102,9 @@ def import_config(
 
     What has no counterpart is reported, a line each. Files of any revision are read, with or without leading slashes.
     """
-    from suave_des.campaign.output import check_output_file, write_files
     from suave_des.cli.console import plain
     from suave_des.errors import InputError
+    from suave_des.files import check_output_file, write_files
     from suave_des.registry import manager_names
     from suave_des.scenario.exemplar.files import ImportOptions
     from suave_des.scenario.exemplar.importing import import_config as imported_from

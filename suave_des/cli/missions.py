@@ -36,9 +36,9 @@ def run(
     files: Files,
 ) -> None:
     """Run one mission and print its timeline."""
-    from suave_des.campaign.output import FAMILIES
     from suave_des.campaign.single import run_mission
     from suave_des.cli.console import errors, mission_status, output, print_timeline
+    from suave_des.files import FAMILIES
 
     with mission_status(scenario, errors()) as show:
         result = run_mission(
@@ -143,8 +143,8 @@ def bench(
     from dataclasses import asdict
 
     from suave_des.bench.bench import goal_rows, measure, programs
-    from suave_des.campaign.output import check_output_file, json_text, write_files
     from suave_des.cli.console import errors, output
+    from suave_des.files import check_output_file, json_text, write_files
 
     if json_file is not None:
         check_output_file(json_file, overwrite=overwrite)

@@ -83,7 +83,7 @@ def compare(
     )
     comparison = compare_folders(results, choices)
     if out is not None:
-        from suave_des.campaign.output import write_files
+        from suave_des.files import write_files
 
         write_files(out.parent, {out.name: WRITERS[ENDINGS[out.suffix.lower()]](comparison)})
         print(f"compared in {out}")
@@ -94,8 +94,8 @@ def compare(
 
 
 def _check_out(out: Path, endings: Iterable[str]) -> None:
-    from suave_des.campaign.output import check_output_file
     from suave_des.errors import InputError
+    from suave_des.files import check_output_file
 
     if out.suffix.lower() not in endings:
         problem = f"expected a table, got {out.suffix or 'a file without an ending'}"

@@ -12,7 +12,7 @@ from rich.table import Table
 from suave_des.campaign.display import estimated
 from suave_des.campaign.progress import GroupProgress
 from suave_des.campaign.results import METRIC_TITLES, METRICS, SUMMARY_COLUMNS
-from suave_des.campaign.spec import UntilCi
+from suave_des.campaign.stopping import UntilCi
 from suave_des.campaign.variation import cell_of
 from suave_des.cli.console import number, plain_table, print_table
 

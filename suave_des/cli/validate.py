@@ -180,8 +180,8 @@ def _recorded(
     overwrite: bool,
 ) -> Runs:
     """Read the missions of an earlier campaign, and make the output folder."""
-    from suave_des.campaign.output import check_output_folder, make_output_folder
     from suave_des.campaign.spec import read_campaign_file
+    from suave_des.files import check_output_folder, make_output_folder
     from suave_des.report.runs import read_runs
     from suave_des.scenario.loader import load_scenario
 
@@ -207,7 +207,7 @@ def _write(
     real: str,
 ) -> None:
     from suave_des import __version__
-    from suave_des.campaign.output import write_files
+    from suave_des.files import write_files
     from suave_des.validation import files
     from suave_des.validation.figures import detections_png, distributions_png
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-from suave_des.campaign.output import check_output_file, write_files
+from suave_des.files import check_output_file, write_files
 
 _COMPRESSION = 6
 

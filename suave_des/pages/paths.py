@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas
 
-from suave_des.campaign.again import OpenedCampaign, opened_campaign
+from suave_des.campaign.single import OpenedCampaign, opened_campaign
 from suave_des.domain import SEA_BED_Z_M
 from suave_des.errors import SuaveDesError
 from suave_des.metrics.result import MissionResult

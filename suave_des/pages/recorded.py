@@ -10,10 +10,10 @@ from pathlib import Path
 import pandas
 from pydantic import ValidationError
 
-from suave_des.campaign.again import OpenedCampaign, opened_campaign
 from suave_des.campaign.inputs import check_inputs
 from suave_des.campaign.knowledge_records import KNOWLEDGE_FILE, read_knowledge
 from suave_des.campaign.missions import COLUMNS, row_of
+from suave_des.campaign.single import OpenedCampaign, opened_campaign
 from suave_des.campaign.spec import RUNS_LIMIT, check_range, check_seed
 from suave_des.campaign.store import STORE_FILE
 from suave_des.errors import InputError

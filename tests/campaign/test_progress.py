@@ -16,7 +16,7 @@ from suave_des.campaign import display
 from suave_des.campaign.campaign import CampaignInterrupted, resume_campaign, run_campaign
 from suave_des.campaign.missions import COLUMNS, Finished, MissionFailure, MissionKey
 from suave_des.campaign.progress import GROUPS_SHOWN, OnProgress, Progress, ProgressTracker
-from suave_des.campaign.spec import UntilCi
+from suave_des.campaign.stopping import UntilCi
 from suave_des.estimates import estimate
 from tests.helpers import AWKWARD
 

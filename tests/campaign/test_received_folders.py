@@ -14,9 +14,9 @@ import pytest
 
 from suave_des.campaign import campaign
 from suave_des.campaign.campaign import resume_campaign, run_campaign
-from suave_des.campaign.output import write_files
 from suave_des.cli.main import main
 from suave_des.errors import InputError, SuaveDesError
+from suave_des.files import write_files
 
 
 @pytest.fixture(scope="module")

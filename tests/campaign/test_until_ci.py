@@ -16,7 +16,7 @@ from benchmarks import chaos
 from suave_des.campaign.campaign import CampaignInterrupted, Progress, resume_campaign, run_campaign
 from suave_des.campaign.missions import COLUMNS, MissionFailure, MissionOutcome
 from suave_des.campaign.progress import GroupTracker, OnProgress
-from suave_des.campaign.spec import FEWEST_RUNS, METRICS
+from suave_des.campaign.stopping import FEWEST_RUNS, METRICS
 from suave_des.errors import InputError
 from suave_des.estimates import RunningMean, estimate
 from tests.helpers import AWKWARD

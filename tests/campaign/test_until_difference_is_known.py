@@ -12,7 +12,7 @@ import pytest
 
 from suave_des.campaign.campaign import CampaignInterrupted, Progress, resume_campaign, run_campaign
 from suave_des.campaign.progress import PAIR_STEP, PairTracker
-from suave_des.campaign.spec import FEWEST_PAIRS, parse_until_ci
+from suave_des.campaign.stopping import FEWEST_PAIRS, parse_until_ci
 from suave_des.errors import InputError
 from suave_des.estimates import estimate
 

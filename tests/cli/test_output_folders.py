@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from suave_des.campaign.output import FAMILIES
 from suave_des.cli.main import main
+from suave_des.files import FAMILIES
 
 RUN = ("run", "seams2023", "--manager", "none", "--out", "out")
 CAMPAIGN = ("campaign", "seams2023", "--managers", "none", "--runs", "1", "--workers", "1", "--out", "out")

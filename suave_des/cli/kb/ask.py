@@ -108,7 +108,7 @@ def policy(
 
     Measured values count by range: between any two numbers of the knowledge base, and on each of them.
     """
-    from suave_des.campaign.output import csv_text, write_files
+    from suave_des.files import csv_text, write_files
     from suave_des.workbench.policy_table import columns_of, function_table, rows_of
 
     if csv is not None and csv.is_dir():
@@ -227,7 +227,7 @@ def query(
 
     Without any option that gives a state, the query is answered from the ontologies alone.
     """
-    from suave_des.campaign.output import csv_text
+    from suave_des.files import csv_text
 
     bench = knowledge.bench()
     state = parts.build(bench, knowledge.measured) if parts.is_given or knowledge.measured else None

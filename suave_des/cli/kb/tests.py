@@ -86,7 +86,7 @@ def test(
 
     Exit status: 0 all tests pass; 1 one fails; 2 something cannot be read.
     """
-    from suave_des.campaign.output import check_output_file, write_files
+    from suave_des.files import check_output_file, write_files
 
     for file in filter(None, (junit_xml, write)):
         check_output_file(file, overwrite=file == junit_xml)
@@ -121,7 +121,7 @@ def test(
 
 def _write_mission(folder: Path, file: Path | None, knowledge: Tested, time_limit_s: float) -> None:
     """Write a recorded mission's decisions as tests, or print them."""
-    from suave_des.campaign.output import write_files
+    from suave_des.files import write_files
     from suave_des.workbench.prover import Prover
     from suave_des.workbench.testing.writing import mission_knowledge, mission_states, tests_text
 
@@ -139,7 +139,7 @@ def _write_mission(folder: Path, file: Path | None, knowledge: Tested, time_limi
 
 def _cover(console: Console, suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
     """Show what the tests of each knowledge base cover, and write tests of what they do not."""
-    from suave_des.campaign.output import write_files
+    from suave_des.files import write_files
     from suave_des.workbench.prover import Prover
     from suave_des.workbench.testing.coverage import measure_coverage
     from suave_des.workbench.testing.writing import NamedState, tests_text
