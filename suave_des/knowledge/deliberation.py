@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Hashable, Iterator
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
+from math import isfinite
 from typing import Final
 
 from suave_des.knowledge.ontology import Ontology
@@ -16,8 +17,6 @@ from suave_des.knowledge.state import Inference, KnowledgeState, Plan
 #: What happens to a function's grounding that gets no other design.
 STAYS: Final = "stays"
 NONE_LEFT: Final = "none left"
-#: Conclusions kept by a Deliberation; the least recently used are dropped.
-CACHED_CONCLUSIONS: Final = 16384
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,8 @@ class Conclusion:
 class Deliberation:
     """A knowledge base with a reasoner; analyzes states and plans on them.
 
-    Both are pure functions of the state, so conclusions are cached.
+    Both are pure functions of the state. Reasoners cache inferences, by state or by what the rules can tell of it;
+    metacontrol caches conclusions, by what they can tell of its own data. Nothing else needs a conclusion twice.
 
         base = Ontology.load()
         deliberation = Deliberation(base, make_reasoner("pellet", base))
@@ -67,7 +67,6 @@ class Deliberation:
         self.base = base
         self.reasoner = reasoner
         self.regions: Regions | None = getattr(reasoner, "regions", None)
-        self._cached = lru_cache(maxsize=CACHED_CONCLUSIONS)(self._analyze_and_plan)
 
     def analyze_and_plan(self, state: KnowledgeState, *, improve_exceeded: bool = False) -> Conclusion:
         """Analyze a state and plan on it.
@@ -80,7 +79,8 @@ class Deliberation:
         Raises:
             KnowledgeError: the state and the ontologies contradict one another.
         """
-        return self._cached(state, improve_exceeded)
+        inference = self.analyze(state)
+        return Conclusion(inference, self.plan(inference, improve_exceeded=improve_exceeded))
 
     def analyze(self, state: KnowledgeState) -> Inference:
         """Infer what the rules say about a state; see `analyze_and_plan`."""
@@ -90,9 +90,24 @@ class Deliberation:
         """Choose function designs for the objectives to adapt; see `analyze_and_plan`."""
         return plan(self.base, inference, improve_exceeded=improve_exceeded)
 
-    def _analyze_and_plan(self, state: KnowledgeState, improve_exceeded: bool) -> Conclusion:
-        inference = self.analyze(state)
-        return Conclusion(inference, self.plan(inference, improve_exceeded=improve_exceeded))
+    @property
+    def thresholds(self) -> tuple[float, ...] | None:
+        """The numbers that rules compare measured values with; None if they may do more than compare."""
+        return self.regions.thresholds_as_floats if self.regions is not None and self.regions.is_sound else None
+
+    def distinguished(self, measured: Collection[float]) -> Hashable:
+        """What the rules can tell of measured values: the bounds of their regions, or the values themselves."""
+        if self.regions is None or not all(map(isfinite, measured)):
+            return tuple(measured)
+        bounds = tuple(map(self.regions.around, measured))
+        # Of two values in one gap between thresholds rules can tell which is the greater.
+        return bounds if len(bounds) == 1 or len(set(bounds)) == len(bounds) else tuple(measured)
+
+    @cached_property
+    def expected_attributes(self) -> frozenset[str]:
+        """The quality attributes of which some function design expects a value."""
+        designs = [design for function in self.base.functions for design in self.base.designs(function)]
+        return frozenset(attribute for design in designs for attribute in self.base.expected(design))
 
 
 def _statuses(inference: Inference) -> Iterator[str]:

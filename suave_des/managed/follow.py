@@ -107,9 +107,11 @@ class FollowPipeline(FunctionNode, WaypointSource):
 
     def waypoints(self, count: int) -> Array:
         """The present point and those after it; none when the end is reached."""
-        if self._next == len(self._way.lengths_m):
-            self.finished.succeed()
         return self._way.points_m[self._next : self._next + count]
+
+    def completed(self) -> None:
+        """Report that the end of the path is reached."""
+        self.finished.succeed()
 
     def set_point_z_m(self) -> float:
         """The altitude of following above the sea bed."""

@@ -45,7 +45,7 @@ class ModeManager:
 
     def available_modes(self, function: str) -> tuple[str, ...]:
         """All modes of a function, in the order of the modes file; none for one that is unknown or has no node."""
-        return self.table.modes(function) if function in self.table.table and function in self.nodes else ()
+        return self.table.modes(function) if function in self.table and function in self.nodes else ()
 
     def current_mode(self, function: str) -> str | None:
         """The mode that was requested last; none before the first request."""
@@ -62,7 +62,7 @@ class ModeManager:
         """
         if self._requested.get(function) == mode:
             return True
-        chosen = self.table.table.get(function, {}).get(mode)
+        chosen = self.table.get(function, mode)
         if chosen is None or function not in self.nodes:
             self.refused[function, mode] = self.refused.get((function, mode), 0) + 1
             self.log("mode_manager", "refused", self._missing(function, mode))
@@ -84,7 +84,7 @@ class ModeManager:
 
     def _missing(self, function: str, mode: str) -> str:
         """What a request lacks that is refused."""
-        if function not in self.table.table:
+        if function not in self.table:
             return f"{function}: the modes file has no such function"
         if function not in self.nodes:
             return f"{function}: has no node here; name its class under functions: in the scenario"

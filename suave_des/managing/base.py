@@ -7,10 +7,10 @@ or register it by name as an entry point of the group `suave_des.managers`.
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Collection, Generator, Mapping
+from collections.abc import Callable, Collection, Generator, Hashable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import simpy
 
@@ -20,9 +20,8 @@ from suave_des.monitor.diagnostics import EXEMPLAR_KINDS, Diagnostic, Kind
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.modes import UNGROUND_MODE
 
-if TYPE_CHECKING:  # or looking a manager up would load the vehicle, the compiler and the reasoner
-    from suave_des.knowledge.deliberation import Deliberation
-    from suave_des.knowledge.state import KnowledgeState
+if TYPE_CHECKING:  # or looking a manager up would load the vehicle and the compiler
+    from suave_des.knowledge.state import Inference, KnowledgeState, Plan
     from suave_des.managed.mode_manager import ModeManager
     from suave_des.metrics.result import MissionMetrics
     from suave_des.monitor.measurements import Measured
@@ -36,6 +35,27 @@ Dependencies = Mapping[str, tuple[float, ...]]
 
 def _unknown(*_: object) -> Any:
     raise NotImplementedError("this system was made without a vehicle")
+
+
+class Knowledge(Protocol):
+    """What managers use of the knowledge base and its reasoner: the K of MAPE-K."""
+
+    @property
+    def thresholds(self) -> tuple[float, ...] | None:
+        """The numbers that rules compare measured values with; None if they may do more than compare."""
+
+    @property
+    def expected_attributes(self) -> frozenset[str]:
+        """The quality attributes of which some function design expects a value."""
+
+    def distinguished(self, measured: Collection[float]) -> Hashable:
+        """What the rules can tell of measured values: states in which it is equal lead to equal conclusions."""
+
+    def analyze(self, state: KnowledgeState) -> Inference:
+        """Infer what the rules say about a state."""
+
+    def plan(self, inference: Inference, *, improve_exceeded: bool = False) -> Plan:
+        """Choose function designs for the objectives to adapt."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +93,7 @@ class ManagedSystem:
     lasting_functions: tuple[str, ...]
     stream: Callable[[str], random.Random]
     log: Callable[[str, str], None]
-    knowledge: Callable[[], Deliberation]
+    knowledge: Callable[[], Knowledge]
     record_state: Callable[[KnowledgeState], None] = lambda state: None
     state_changed: Callable[[], None] = lambda: None
     record_reasoning_time: Callable[[float], None] = lambda duration_s: None

@@ -5,24 +5,24 @@ say about that state. Plan: the best function design for each objective that nee
 design's name.
 """
 
-from collections.abc import Collection, Hashable
-from math import isfinite
+from collections.abc import Callable, Collection, Hashable
+from functools import partial
 from typing import ClassVar, Final
 from weakref import WeakKeyDictionary
 
 from suave_des.domain import GENERATE_SEARCH_PATH, Task
-from suave_des.knowledge.deliberation import Conclusion, Deliberation
+from suave_des.knowledge.deliberation import Conclusion
 from suave_des.knowledge.state import UNGROUNDED, Inference, KnowledgeState, ObjectiveState, Plan
 from suave_des.managing.adapter import Adapter, TaskBridge
-from suave_des.managing.base import AdaptationProcess, Dependencies, ManagedSystem, ManagingSubsystem
+from suave_des.managing.base import AdaptationProcess, Dependencies, Knowledge, ManagedSystem, ManagingSubsystem
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, Kind
 from suave_des.scenario.modes import UNGROUND_MODE
 from suave_des.scenario.quantities import draw
 from suave_des.scenario.revision import MetacontrolRevision
 
-_memos: WeakKeyDictionary[Deliberation, dict[MetacontrolRevision, dict[Hashable, Conclusion]]] = WeakKeyDictionary()
-"""Results of analyze and plan by symbolic state: missions of one scenario go through the same few states."""
-_MEMO_SIZE: Final = 16384
+_cached: WeakKeyDictionary[Knowledge, dict[MetacontrolRevision, dict[Hashable, Conclusion]]] = WeakKeyDictionary()
+"""Conclusions by symbolic state: missions of one scenario go through the same few states."""
+_MAX_CACHED: Final = 16384
 
 
 class Metacontrol(ManagingSubsystem):
@@ -46,7 +46,10 @@ class Metacontrol(ManagingSubsystem):
         scenario, revision = system.scenario, system.scenario.revision.metacontrol
         self._revision = revision
         self._knowledge = system.knowledge()
-        self._memo = _memos.setdefault(self._knowledge, {}).setdefault(revision, {})
+        # What a derived class makes of analyze and plan may depend on more than the state.
+        methods = type(self).analyze, type(self).plan
+        self._is_cacheable = methods == (Metacontrol.analyze, Metacontrol.plan)
+        self._conclusions = _cached.setdefault(self._knowledge, {}).setdefault(revision, {})
         self.objectives: dict[str, str | None] = {}
         self.groundings: dict[str, str] = {}
         self.components: dict[str, str] = {}
@@ -55,8 +58,10 @@ class Metacontrol(ManagingSubsystem):
         self._cancelled: set[str] = set()  # functions, since the last cycle began
         self._recorded_statuses: frozenset[str] = frozenset()
         self._awaited = self._attributes_to_await()
-        self._latency = scenario.latencies.inference_s
-        self._latency_stream = None if isinstance(self._latency, float) else system.stream("metacontrol/inference")
+        latency, stream = scenario.latencies.inference_s, "metacontrol/inference"
+        self._latency_s: float | Callable[[], float] = (  # a number, or what draws one
+            latency if isinstance(latency, float) else partial(draw, latency, system.stream(stream))
+        )
         self.period_s: float = scenario.managers.metacontrol.reasoning_period_s
         self.starts_s = system.first_cycle_s()
         self._adapter = Adapter(system)
@@ -70,27 +75,20 @@ class Metacontrol(ManagingSubsystem):
     # The loop.
 
     def adapt(self) -> AdaptationProcess | None:
-        """Go through the loop once; what analyze and plan give for a state is cached."""
+        """Go through the loop once."""
         self.monitor()
         if not self.objectives or not self._awaited <= self.measurements.keys():
             return None
         self._cancelled.clear()
-        state = self._symbolic_state()
-        conclusion = self._memo.get(state)
-        if conclusion is None:
-            inference = self.analyze()
-            conclusion = Conclusion(inference, self.plan(inference))
-            if len(self._memo) >= _MEMO_SIZE:
-                self._memo.clear()
-            self._memo[state] = conclusion
+        conclusion = self._analyze_and_plan()
         self.system.record_state(conclusion.inference.state)
-        if self._latency_stream is not None:
-            return self.execute(conclusion, draw(self._latency, self._latency_stream))
-        assert isinstance(self._latency, float)
-        if self._latency < self.period_s and self._changes_nothing(conclusion):
+        latency_s = self._latency_s
+        if callable(latency_s):
+            return self.execute(conclusion, latency_s())
+        if latency_s < self.period_s and self._changes_nothing(conclusion):
             self._recorded_statuses = conclusion.statuses
             return None
-        return self.execute(conclusion, self._latency)
+        return self.execute(conclusion, latency_s)
 
     def monitor(self) -> None:
         """Read the measured values; components report by themselves, see `diagnostic`."""
@@ -173,21 +171,32 @@ class Metacontrol(ManagingSubsystem):
     @property
     def depends_on(self) -> Dependencies | None:
         """The numbers in the knowledge base, if the rules only compare measured values with them."""
-        regions = self._knowledge.regions
-        if regions is None or not regions.is_sound:
+        thresholds = self._knowledge.thresholds
+        if thresholds is None:
             return None
         if self._revision.ignores_diagnostics_without_objective and not self.system.lasting_functions:
             return None  # then it also depends on when a value was published
-        return dict.fromkeys(self.system.measurements, regions.thresholds_as_floats)
+        return dict.fromkeys(self.system.measurements, thresholds)
+
+    def _analyze_and_plan(self) -> Conclusion:
+        """Analyze and plan, or look up what both gave for an equal state."""
+        if not self._is_cacheable:
+            inference = self.analyze()
+            return Conclusion(inference, self.plan(inference))
+        state = self._symbolic_state()
+        conclusion = self._conclusions.get(state)
+        if conclusion is None:
+            inference = self.analyze()
+            conclusion = Conclusion(inference, self.plan(inference))
+            if len(self._conclusions) >= _MAX_CACHED:
+                self._conclusions.clear()
+            self._conclusions[state] = conclusion
+        return conclusion
 
     def _symbolic_state(self) -> Hashable:
         """The state, with regions in place of measured values, unless the mission is recorded: then with the values."""
-        values: tuple[Hashable, ...] = tuple(self.measurements.values())
-        regions = None if self.system.recorded else self._knowledge.regions
-        if regions is not None and all(map(isfinite, self.measurements.values())):
-            around = tuple(map(regions.around, self.measurements.values()))
-            # Of two values in one gap between thresholds rules can tell which is the greater.
-            values = around if len(around) == 1 or len(set(around)) == len(around) else values
+        measured = self.measurements.values()
+        values = tuple(measured) if self.system.recorded else self._knowledge.distinguished(measured)
         known = tuple(self.objectives.items()), tuple(self.groundings.items()), tuple(self.components.items())
         return known, tuple(self.measurements), values
 
@@ -208,11 +217,8 @@ class Metacontrol(ManagingSubsystem):
     def _is_listening(self) -> bool:
         return bool(self.objectives) or not self._revision.ignores_diagnostics_without_objective
 
-    def _attributes_to_await(self) -> set[str]:
-        """The measured attributes that some function design expects a value of."""
+    def _attributes_to_await(self) -> frozenset[str]:
+        """The signals of which some function design expects a value, if cycles wait for the first ones."""
         if not self._revision.waits_for_first_measurement:
-            return set()
-        base = self._knowledge.base
-        designs = [design for function in base.functions for design in base.designs(function)]
-        expected = {attribute for design in designs for attribute in base.expected(design)}
-        return expected & self.system.measurements.keys() & self.system.scenario.signals.keys()
+            return frozenset()
+        return self._knowledge.expected_attributes.intersection(self.system.measurements, self.system.scenario.signals)

@@ -49,6 +49,14 @@ class ModeTable:
         """Names of the functions."""
         return tuple(self.table)
 
+    def __contains__(self, function: str) -> bool:
+        """Whether there is a function of this name."""
+        return function in self.table
+
+    def get(self, function: str, mode: str) -> Mode | None:
+        """Give one mode of a function; None if there is no such function, or it has no such mode."""
+        return self.table.get(function, {}).get(mode)
+
     def modes(self, function: str) -> tuple[str, ...]:
         """Give the names of a function's modes, __DEFAULT__ among them.
 

@@ -2,7 +2,7 @@
 
 The exemplar's functions check at every tick of a timer whether their way-point is reached; then they send the next one.
 Nothing else changes at most ticks, so guidance looks ahead: it queues the next way-points, knows the tick at which each
-will be reached, and sets an alarm for the tick at which the function has to act. When the vehicle's control changes
+will be reached, and sets a timer for the tick at which the function has to act. When the vehicle's control changes
 earlier, it counts the ticks until then, and plans again from there.
 """
 
@@ -13,16 +13,30 @@ import random
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import Final, Protocol
 
 from suave_des.compiling import Array
 from suave_des.vehicle.vehicle import ArrivalCheck, Vehicle
 
-if TYPE_CHECKING:  # the vehicle itself needs no events
-    from suave_des.clock import Alarm
-
 QUEUED_WAYPOINTS: Final = 20
 """At most so many way-points are queued at a time, besides the present one: with 10 missions take 7% more CPU time."""
+
+
+class OneShotTimer(Protocol):
+    """What guidance needs of the mission's clock: a call at a mission time; setting it anew replaces a pending one."""
+
+    @property
+    def now_s(self) -> float:
+        """Mission time."""
+
+    def set(self, t_s: float) -> None:
+        """Make the call at mission time t."""
+
+    def set_now(self) -> None:
+        """Make the call when the present event is over, before any other."""
+
+    def cancel(self) -> None:
+        """Drop the pending call."""
 
 
 class WaypointSource(Protocol):
@@ -37,6 +51,10 @@ class WaypointSource(Protocol):
 
         None is left when the last one has been reached.
         """
+
+    def completed(self) -> None:
+        """React to having no way-point left. By default: nothing."""
+        return
 
     def set_point_z_m(self) -> float:
         """The z to send, which need not be the way-point's."""
@@ -111,45 +129,45 @@ class Guidance:
     Attributes:
         sender: the connection to the autopilot.
         source: the function.
-        make_alarm: makes an alarm that calls a function.
+        make_timer: makes a timer that calls a function.
         make_check: makes the arrival check whose tick 0 is at a mission time.
     """
 
     sender: SetPointSender
     source: WaypointSource
-    make_alarm: Callable[[Callable[[], None]], Alarm]
+    make_timer: Callable[[Callable[[], None]], OneShotTimer]
     make_check: Callable[[float], ArrivalCheck]
     _check: ArrivalCheck | None = None  # none before the first tick and after the last
     _sent: int = -1  # tick at which the present way-point was sent last
     _arrivals: list[int] = field(default_factory=list)  # ticks that will find the planned way-points reached
-    _act_at: int = 0  # tick of the alarm
+    _act_at: int = 0  # tick that the timer is set to
     _is_planned: bool = False  # until that tick
     _is_due: bool = False  # whether a way-point is to be sent then
     _is_acting: bool = False
     _is_repeated: bool = False  # whether the present way-point was sent again
 
     def __post_init__(self) -> None:
-        self._alarm = self.make_alarm(self._act)
-        self._replanning = self.make_alarm(self._replan)
+        self._timer = self.make_timer(self._act)
+        self._replanning = self.make_timer(self._replan)
         self.sender.vehicle.control_listeners.append(self._control_changed)
 
     def start_at(self, t_s: float, *, resumes: bool = False) -> None:
         """Tick from mission time t on, and send the present way-point, unless the one sent last before is resumed."""
         self._is_due, self._is_repeated = not resumes, self._is_repeated and resumes
         self._arrivals, self._act_at, self._is_planned = [], 0, False
-        if t_s > self._alarm.now_s:
-            self._alarm.set(t_s)
+        if t_s > self._timer.now_s:
+            self._timer.set(t_s)
         else:
             self._act()
 
     def stop(self) -> None:
         """Stop ticking, and cancel what is queued."""
-        self._alarm.cancel()
+        self._timer.cancel()
         self._replanning.cancel()
         self.catch_up()
         check, self._check = self._check, None
         if check is not None:
-            self.sender.vehicle.cancel_waypoints(self._alarm.now_s, check)
+            self.sender.vehicle.cancel_waypoints(self._timer.now_s, check)
             self._sent -= self._last_tick(check) + 1  # on resumption the first tick is 0 again
 
     def catch_up(self) -> None:
@@ -162,15 +180,15 @@ class Guidance:
         check = self._check
         if check is not None and self._act_at > (tick := self._last_tick(check)):
             self._is_acting = True
-            self.sender.vehicle.cancel_waypoints(self._alarm.now_s, check)
+            self.sender.vehicle.cancel_waypoints(self._timer.now_s, check)
             self._is_acting = False
             self._replanning.cancel()
             self._arrivals, self._is_planned, self._is_due = [], False, False
-            self._set_alarm(check, tick + 1)
+            self._set_timer(check, tick + 1)
 
     def _act(self) -> None:
         """Do what is due at this tick; plan until the next one at which there is something to do."""
-        check = self._check = self._check or self.make_check(self._alarm.now_s)
+        check = self._check = self._check or self.make_check(self._timer.now_s)
         tick = self._act_at
         self._count_arrivals(tick)
         self.source.tick()
@@ -187,6 +205,7 @@ class Guidance:
         waypoints = self.source.waypoints(1 + QUEUED_WAYPOINTS)
         if len(waypoints) == 0:
             self._check = None
+            self.source.completed()
             return
         last = self._sent + (check.resend_again_ticks if self._is_repeated else check.resend_ticks)
         z_m = self.source.set_point_z_m()
@@ -196,7 +215,7 @@ class Guidance:
         self._is_planned = True
         self._is_due = self._arrivals[-1:] == [act_at]
         if act_at > tick:
-            self._set_alarm(check, act_at)
+            self._set_timer(check, act_at)
         else:
             self._act_at = tick
             self._count_arrivals(tick)
@@ -223,8 +242,8 @@ class Guidance:
             self.source.reached(reached)
 
     def _last_tick(self, check: ArrivalCheck) -> int:
-        return check.last_tick_until(self._alarm.now_s)
+        return check.last_tick_until(self._timer.now_s)
 
-    def _set_alarm(self, check: ArrivalCheck, tick: int) -> None:
+    def _set_timer(self, check: ArrivalCheck, tick: int) -> None:
         self._act_at = tick
-        self._alarm.set(check.time_s(tick))
+        self._timer.set(check.time_s(tick))

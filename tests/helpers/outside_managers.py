@@ -1,9 +1,11 @@
 """Managers as a user would write them, some of them with mistakes."""
 
+from dataclasses import replace
 from typing import ClassVar
 from weakref import WeakSet
 
 from suave_des.domain import Task
+from suave_des.knowledge.state import Plan
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
 from suave_des.managing.metacontrol import Metacontrol
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
@@ -332,6 +334,17 @@ class Meddling(Metacontrol):
     def diagnostic(self, diagnostic):
         super().diagnostic(diagnostic)
         self.system.change_mode("f_generate_search_path", "fd_spiral_high")
+
+
+class PlansLow(Metacontrol):
+    """Searches at the lowest altitude, whatever the visibility is."""
+
+    depends_on = Metacontrol.depends_on
+
+    def plan(self, inference):
+        low = {"f_generate_search_path": "fd_spiral_low"}
+        decisions = super().plan(inference).decisions
+        return Plan(tuple(replace(each, design=low.get(each.function, each.design)) for each in decisions))
 
 
 class CountsIdleCycles(Metacontrol):

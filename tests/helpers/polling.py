@@ -43,12 +43,12 @@ class PollingGuidance:
         self,
         sender: SetPointSender,
         source: WaypointSource,
-        make_alarm: Callable[[Callable[[], None]], Alarm],
+        make_timer: Callable[[Callable[[], None]], Alarm],
         check: Callable[[float], ArrivalCheck],
     ) -> None:
         self._sender = sender
         self._source = source
-        self._alarm = make_alarm(self._tick)
+        self._timer = make_timer(self._tick)
         self._make_check = check
         self._check: ArrivalCheck | None = None
         self._next_tick = 0
@@ -60,21 +60,21 @@ class PollingGuidance:
         self._is_due = not resumes
         self._is_repeated = self._is_repeated and resumes
         self._next_tick = 0
-        if t_s <= self._alarm.now_s:
+        if t_s <= self._timer.now_s:
             self._tick()
         else:
-            self._alarm.set(t_s)
+            self._timer.set(t_s)
 
     def stop(self) -> None:
         self.catch_up()
-        self._alarm.cancel()
+        self._timer.cancel()
         if self._check is not None:
             self._check = None
             self._sent -= self._next_tick
 
     def catch_up(self) -> None:
         """A tick that is due at this very time comes first."""
-        while self._check is not None and self._next_tick <= self._check.last_tick_until(self._alarm.now_s):
+        while self._check is not None and self._next_tick <= self._check.last_tick_until(self._timer.now_s):
             self._tick()
 
     def way_changed(self) -> None:
@@ -82,12 +82,13 @@ class PollingGuidance:
 
     def _tick(self) -> None:
         if self._check is None:
-            self._check = self._make_check(self._alarm.now_s)
+            self._check = self._make_check(self._timer.now_s)
         check, source, tick = self._check, self._source, self._next_tick
         source.tick()
         while True:
             if not len(source.waypoints(1)):
                 self._check = None
+                source.completed()
                 return
             if self._is_due:
                 self._sender.send(*source.waypoints(1)[0, :2].tolist(), source.set_point_z_m())
@@ -104,7 +105,7 @@ class PollingGuidance:
                 break
             self._is_due = True
         self._next_tick = tick + 1
-        self._alarm.set(check.time_s(self._next_tick))
+        self._timer.set(check.time_s(self._next_tick))
 
     def _is_near(self, check: ArrivalCheck, tick: int) -> bool:
         position = self._sender.vehicle.position(check.time_s(tick))

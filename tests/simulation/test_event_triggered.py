@@ -193,10 +193,10 @@ def test_metacontrol_skips_no_cycle_with(values: dict, calls) -> None:
 
 def assert_same_missions(simulator: Simulator, manager: str, runs: range) -> None:
     """Metrics and effects are the same whether the manager is event-triggered or called at each of its times."""
-    has_memo = not manager.startswith(OUTSIDE) or issubclass(manager_class(manager), Metacontrol)
+    has_cache = not manager.startswith(OUTSIDE) or issubclass(manager_class(manager), Metacontrol)
     for run in runs:
         found = []
-        for called_at_each_time in (True, False, *([False] if has_memo else [])):  # at first the memo is empty
+        for called_at_each_time in (True, False, *([False] if has_cache else [])):  # at first the cache is empty
             with polled("calls", "monitors") if called_at_each_time else nullcontext():
                 found.append(unrecorded(simulator, manager, run))
         assert all(each == found[0] for each in found)
@@ -222,6 +222,29 @@ CHANGES = {
 @pytest.mark.parametrize(("name", "change", "manager"), each_pair(sorted(LOADED), CHANGES, DERIVED))
 def test_metacontrol_and_what_is_derived_from_it(name: str, change: str, manager: str) -> None:
     assert_same_missions(simulator_of(CHANGES[change], name), manager, range(1, 4))
+
+
+def test_metacontrol_skips_no_cycle_while_it_may_have_missed_a_value() -> None:
+    # 1.5 m is published before there is an objective, and ignored; 1.6 m, in the same region, is not.
+    values = {
+        **steps(1.5, 1.6, 40.0),
+        **NO_FAULTS,
+        "revision.coordinator.maintain_motion_per_task": True,
+        "revision.metacontrol.objectives_at_launch": False,
+    }
+    simulator = simulator_of(values)
+    _, effects = unrecorded(simulator, "metacontrol", 1)
+    assert [t_s > 40.0 for t_s, effect in effects if effect.endswith("fd_spiral_low")] == [True]
+    assert_same_missions(simulator, "metacontrol", range(1, 3))
+
+
+def test_what_a_derived_class_plans_is_its_own() -> None:
+    simulator = simulator_of(NO_FAULTS)
+    before = unrecorded(simulator, "metacontrol", 1)
+    _, effects = unrecorded(simulator, f"{OUTSIDE}:PlansLow", 1)
+    searches = [effect for _, effect in effects if "= fd_spiral" in effect]
+    assert searches == ["f_generate_search_path = fd_spiral_low"] != [effect for _, effect in before[1]]
+    assert unrecorded(simulator, "metacontrol", 1) == before
 
 
 NOISE = {"signals.water_visibility.noise": {"distribution": "normal", "mean": 0.0, "std": 0.3}}
