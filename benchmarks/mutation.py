@@ -14,7 +14,7 @@ import time
 from suave_des.workbench import KnowledgeBase
 from suave_des.workbench.testing.mutants import mutants_of, sample
 from suave_des.workbench.testing.mutation import EQUIVALENT, KILLED, SURVIVED, mutate
-from suave_des.workbench.testing.suite import TestFile, shipped_tests
+from suave_des.workbench.testing.reading import TestFile, shipped_tests
 
 LONGEST_S = 30.0
 

@@ -7,8 +7,8 @@ import pytest
 
 from suave_des.errors import InputError
 from suave_des.workbench.ranges import measurements_in, parse_region, ranges_between
+from suave_des.workbench.testing.reading import TestFile, shipped_tests
 from suave_des.workbench.testing.run import Runner
-from suave_des.workbench.testing.suite import TestFile, shipped_tests
 
 SPARE = """\
 spare: hasQAvalue(?fg, ?q) ^ isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ lessThan(?v, 3.5)

@@ -10,8 +10,8 @@ from suave_des.workbench.prover import Prover, Situation
 from suave_des.workbench.testing.coverage import FIRES, Goal, least_cover, measure_coverage
 from suave_des.workbench.testing.mutants import OPERATORS, mutants_of, sample
 from suave_des.workbench.testing.mutation import EQUIVALENT, KILLED, SURVIVED, mutate
+from suave_des.workbench.testing.reading import TestFile
 from suave_des.workbench.testing.run import Runner
-from suave_des.workbench.testing.suite import TestFile
 from tests.helpers.knowledge_states import FEWER_NUMBERS
 
 TESTS = """\
@@ -105,7 +105,7 @@ def test_decisions_of_a_recorded_mission_become_tests_that_pass(tmp_path, comman
 
 @pytest.mark.slow
 def test_the_shipped_tests_kill_the_mutants_of_the_shipped_rules(bench):
-    from suave_des.workbench.testing.suite import shipped_tests
+    from suave_des.workbench.testing.reading import shipped_tests
 
     tests = [test for file in shipped_tests() for test in TestFile.read(file).tests(bench)]
     assert all(Runner.of(bench).run(test).passed for test in tests)

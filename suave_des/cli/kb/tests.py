@@ -25,9 +25,8 @@ if TYPE_CHECKING:
     from suave_des.workbench.testing.coverage import Coverage, RuleCoverage
     from suave_des.workbench.testing.mutants import Mutant
     from suave_des.workbench.testing.mutation import MutationReport
-    from suave_des.workbench.testing.reader import RuleTest
+    from suave_des.workbench.testing.reading import RuleTest, TestedKnowledge, TestFile
     from suave_des.workbench.testing.run import TestResult
-    from suave_des.workbench.testing.suite import TestedKnowledge, TestFile
 
 FAILED = 1
 """Exit status when a test fails."""
@@ -198,7 +197,7 @@ class Suite:
 
 def _suites(knowledge: Tested, files: Sequence[Path], time_limit_s: float) -> list[Suite]:
     """Read all files before anything runs, so that a mistake in the last one comes first."""
-    from suave_des.workbench.testing.suite import TestFile, shipped_tests
+    from suave_des.workbench.testing.reading import TestFile, shipped_tests
 
     benches: dict[TestedKnowledge, KnowledgeBase] = {}
     suites = []

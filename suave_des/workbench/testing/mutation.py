@@ -31,7 +31,7 @@ from suave_des.workbench.policy_space import PolicySpace
 from suave_des.workbench.prover import Body, Entailed, Outcome, Prover, Situation
 from suave_des.workbench.ranges import numbers_in
 from suave_des.workbench.testing.mutants import Mutant, follows_anyway, is_horn, touching
-from suave_des.workbench.testing.reader import RuleTest
+from suave_des.workbench.testing.reading import RuleTest
 from suave_des.workbench.testing.run import Runner
 
 KILLED, EQUIVALENT, SURVIVED = "killed", "equivalent", "survived"

@@ -18,7 +18,7 @@ from suave_des.workbench.explain import explain
 from suave_des.workbench.fact_reader import NEW_INDIVIDUAL
 from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.prover import Outcome, Prover, Situation
-from suave_des.workbench.testing.reader import RuleTest
+from suave_des.workbench.testing.reading import RuleTest
 from suave_des.workbench.why_not import RuleQuestions
 
 #: What XML 1.0 has no place for.

@@ -16,7 +16,7 @@ from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.prover import Prover, Situation
 from suave_des.workbench.replay import mission_scenario
 from suave_des.workbench.state_input import recorded_states, state_dict
-from suave_des.workbench.testing.suite import TestedKnowledge
+from suave_des.workbench.testing.reading import TestedKnowledge
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,16 @@
-"""Read one test of a file: what is given, and what is expected."""
+"""Read tests of rules from YAML files.
+
+    rules: [spare.swrl]
+    tests:
+    - name: a search that is too high for the visibility is in error
+      given:
+        groundings: {f_generate_search_path: fd_spiral_high}
+        measurements: {water_visibility: "< 3.25"}
+      follows: ["fg_status(fg_spiral_high, IN_ERROR_NFR)"]
+      decides: {f_generate_search_path: fd_spiral_medium}
+
+The guide docs/guides/test-rules.md describes all keys.
+"""
 
 from __future__ import annotations
 
@@ -11,17 +23,126 @@ from typing import Any, Final
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown
 from suave_des.knowledge.deliberation import NONE_LEFT, STAYS
 from suave_des.knowledge.state import Fact, KnowledgeState
-from suave_des.scenario.yamlfile import YamlDocument
+from suave_des.resources import find, shipped_folder
+from suave_des.scenario.loader import Replacements
+from suave_des.scenario.yamlfile import YamlDocument, read_yaml
 from suave_des.workbench.fact_reader import FactReader
 from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.prover import Situation
 from suave_des.workbench.ranges import ValueRange, measurements_in, parse_region
 from suave_des.workbench.state_input import StateBuilder, recorded_state, recorded_states
 
+_FILE_KEYS: Final = ("scenario", "ontologies", "rules", "disabled_rules", "tests")
 _TEST_KEYS: Final = ("name", "given", "follows", "follows_not", "decides", "contradiction", "without", "changes")
 _EXPECTATIONS: Final = ("follows", "follows_not", "decides", "contradiction", "changes")
 _STATE_KEYS: Final = ("objectives", "groundings", "components", "measurements")
 _GIVEN_KEYS: Final = (*_STATE_KEYS, "facts", "mission", "run", "at_s")
+
+
+@dataclass(frozen=True)
+class TestedKnowledge:
+    """The knowledge base that a file of tests is about.
+
+    Attributes:
+        scenario: name or path.
+        ontologies: files in place of the scenario's.
+        rules: files of rules besides the scenario's.
+        disabled_rules: names of rules to switch off.
+    """
+
+    scenario: str = "seams2023"
+    ontologies: tuple[Path, ...] = ()
+    rules: tuple[Path, ...] = ()
+    disabled_rules: tuple[str, ...] = ()
+
+    def with_replacements(self, scenario: str | None, more: Replacements) -> TestedKnowledge:
+        """Replace scenario and ontologies where others are given, and add rules and names of disabled ones."""
+        ontologies = tuple(map(Path, more.get("ontologies", ())))
+        return TestedKnowledge(
+            scenario or self.scenario,
+            ontologies or self.ontologies,
+            (*self.rules, *map(Path, more.get("rules", ()))),
+            (*self.disabled_rules, *more.get("disabled_rules", ())),
+        )
+
+    def load(self, time_limit_s: float, values: Mapping[str, Any] | None = None) -> KnowledgeBase:
+        """Load the knowledge base.
+
+        Args:
+            time_limit_s: for each inference.
+            values: new values of the scenario, by key path.
+
+        Raises:
+            InputError: a file or name cannot be used.
+        """
+        return KnowledgeBase.load(
+            self.ontologies,
+            scenario=self.scenario,
+            rules=self.rules,
+            disabled_rules=self.disabled_rules,
+            values=values,
+            time_limit_s=time_limit_s,
+        )
+
+
+@dataclass(frozen=True)
+class TestFile:
+    """A file of tests, read as far as that is possible without its knowledge base.
+
+    Attributes:
+        document: its content.
+        knowledge: what it is about.
+    """
+
+    __test__ = False  # pytest takes it for a test otherwise
+    document: YamlDocument
+    knowledge: TestedKnowledge
+
+    @classmethod
+    def read(cls, path: Path) -> TestFile:
+        """Read a file of tests.
+
+        Raises:
+            InputError: it cannot be read, or has other keys at its top, with line and key.
+        """
+        document = read_yaml(path)
+        data = document.data
+        _check_keys(document, data, (), _FILE_KEYS)
+        if not isinstance(data.get("tests"), list) or not data["tests"]:
+            raise document.error("has no tests", ("tests",), "write them as a list under `tests:`")
+
+        def files(key: str) -> tuple[Path, ...]:
+            names = enumerate(_texts_at(document, data.get(key, []), (key,)))
+            return tuple(_beside(document, name, (key, at)) for at, name in names)
+
+        scenario = data.get("scenario", TestedKnowledge.scenario)
+        if not isinstance(scenario, str):
+            raise document.error(f"{shown(scenario)} is not a scenario", ("scenario",), "a name or a path")
+        if (path.parent / scenario).is_file():
+            scenario = str(path.parent / scenario)
+        disabled = _texts_at(document, data.get("disabled_rules", []), ("disabled_rules",))
+        return cls(document, TestedKnowledge(scenario, files("ontologies"), files("rules"), tuple(disabled)))
+
+    def tests(self, bench: KnowledgeBase) -> tuple[RuleTest, ...]:
+        """Read the tests themselves, with all their names looked up in a knowledge base.
+
+        Raises:
+            InputError: a name is unknown, or something is not as it must be, with line and key.
+        """
+        count = len(self.document.data["tests"])
+        return tuple(TestReader.of(self.document, bench, number).test() for number in range(count))
+
+
+def shipped_tests() -> tuple[Path, ...]:
+    """The tests of the shipped rules."""
+    return tuple(sorted((shipped_folder("ontology") / "tests").glob("*.yaml")))
+
+
+def _beside(document: YamlDocument, name: str, place: KeyPath) -> Path:
+    try:
+        return find(name, "ontology", beside=document.path.parent)
+    except InputError as error:
+        raise document.error(f"{name}: {error.problem}", place, error.remedy) from None
 
 
 @dataclass(frozen=True)
@@ -76,7 +197,7 @@ class TestReader:
         """Start with the test of a number, from 0."""
         place = ("tests", number)
         content = document.data["tests"][number]
-        check_keys(document, content, place, _TEST_KEYS)
+        _check_keys(document, content, place, _TEST_KEYS)
         return cls(document, bench, place, content, FactReader(bench.base))
 
     def test(self) -> RuleTest:
@@ -126,7 +247,7 @@ class TestReader:
         content: Any = self.content
         for key in place:
             content = (content or {}).get(key)
-        return texts(self.document, content or [], (*self.place, *place))
+        return _texts_at(self.document, content or [], (*self.place, *place))
 
     def _mapping(self, key: str, example: str) -> Iterator[tuple[str, Any]]:
         content = self.content.get(key) or {}
@@ -179,7 +300,7 @@ class TestReader:
 
     def _situations(self) -> tuple[Situation, ...]:
         given = self.content.get("given") or {}
-        check_keys(self.document, given, (*self.place, "given"), _GIVEN_KEYS)
+        _check_keys(self.document, given, (*self.place, "given"), _GIVEN_KEYS)
         asserted = self._texts("given", "facts")
         triples = []
         for at, text in enumerate(asserted):
@@ -230,7 +351,7 @@ class TestReader:
             builder.add_state(recorded_state(records, at_s))
 
 
-def check_keys(document: YamlDocument, content: Any, place: KeyPath, known: Sequence[str]) -> None:
+def _check_keys(document: YamlDocument, content: Any, place: KeyPath, known: Sequence[str]) -> None:
     """Check that a part of a file is a mapping of known keys.
 
     Raises:
@@ -243,7 +364,7 @@ def check_keys(document: YamlDocument, content: Any, place: KeyPath, known: Sequ
             raise document.error(f"{shown(key)} is not a key here", (*place, key), did_you_mean(key, known))
 
 
-def texts(document: YamlDocument, content: Any, place: KeyPath) -> list[str]:
+def _texts_at(document: YamlDocument, content: Any, place: KeyPath) -> list[str]:
     """Read a text, or a list of texts.
 
     Raises:
