@@ -6,8 +6,7 @@ import pytest
 
 from suave_des.knowledge.ontology import Ontology
 from suave_des.resources import shipped_folder
-from suave_des.workbench.difference import compare_axioms
-from suave_des.workbench.mission_difference import MissionsToCompare, compare_missions
+from suave_des.workbench.difference import MissionsToCompare, compare_axioms, compare_missions
 from tests.helpers.owl_text import SUAVE, TOMASYS
 
 OWL = "http://www.w3.org/2002/07/owl#"

@@ -16,8 +16,7 @@ from suave_des.cli.options import Quiet, Seed, Workers, grouped_options
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from suave_des.workbench.difference import PolicyDifference
-    from suave_des.workbench.mission_difference import MissionDifference
+    from suave_des.workbench.difference import MissionDifference, PolicyDifference
 
 _MOST_RUNS = 10
 """Numbers of missions that are listed; all of them are in the JSON form."""
@@ -71,7 +70,7 @@ def diff(
 
 
 def _missions(knowledge: Asked, files: tuple[Path, Path], flown: Flown) -> MissionDifference:
-    from suave_des.workbench.mission_difference import MissionsToCompare, compare_missions
+    from suave_des.workbench.difference import MissionsToCompare, compare_missions
 
     assert flown.missions is not None
     which = MissionsToCompare(knowledge.scenario, flown.missions, flown.seed, flown.workers)
@@ -82,7 +81,7 @@ def _missions(knowledge: Asked, files: tuple[Path, Path], flown: Flown) -> Missi
 
 def _table(difference: PolicyDifference, missions: MissionDifference) -> Table:
     """Decisions and missions in one table."""
-    from suave_des.workbench.mission_difference import METRICS
+    from suave_des.workbench.difference import METRICS
 
     headings = ("", "A", "B", "B - A", "95% interval", "different")
     table = plain_table(headings, right=headings[1:])
