@@ -19,6 +19,7 @@ from suave_des.report.result_files import Missions, missions_of, read_missions
 from suave_des.report.sweep_figures import draw_sweep
 
 ENDINGS = (".png", ".pdf", ".svg")
+_UNDATED = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
 AUTO, SWEEP, PATHS = "auto", "sweep", "paths"
 _PUBLISHED_SCENARIO = "seams2023"
 
@@ -90,15 +91,20 @@ def check_picture(out: Path) -> None:
         raise InputError(problem, file=out, remedy=f"one of {', '.join(ENDINGS)}")
 
 
-def write_picture(figure: Figure, out: Path) -> None:
-    """Write a figure, whole or not at all.
+def write_picture(figure: Figure, out: Path, *, bbox_inches: str | None = None) -> None:
+    """Write a figure, whole or not at all, and without the time at which it is written.
+
+    Args:
+        figure: to write.
+        out: .png, .pdf or .svg.
+        bbox_inches: "tight" trims it to what is drawn; None: it has the figure's own size.
 
     Raises:
         InputError: it cannot be written.
     """
     temporary = out.with_name(f".{os.getpid()}{out.suffix}")
     try:
-        figure.savefig(temporary)
+        figure.savefig(temporary, bbox_inches=bbox_inches, metadata=_UNDATED.get(out.suffix.lower()))
         temporary.replace(out)
     except OSError as error:
         remedy = "give a path in a folder that is yours"

@@ -10,6 +10,7 @@ from typing import Any
 
 from suave_des.errors import InputError
 from suave_des.knowledge.deliberation import NONE_LEFT, STAYS
+from suave_des.report.figures import check_picture, write_picture
 from suave_des.report.style import MODE_COLOURS, OTHER_MODES, VERMILION, WIDTH_IN, publication
 from suave_des.workbench.policy import FLIP_FLOP, INCONSISTENT, NO_GROUNDING, Policy
 from suave_des.workbench.policy_table import FunctionTable, TableRow, function_table
@@ -35,10 +36,7 @@ def draw_policy(policy: Policy, path: Path) -> None:
         raise InputError(
             f"the policy depends on {len(policy.attributes)} measured values", remedy="a picture needs one or two"
         )
-    if path.suffix.lower() not in (".png", ".pdf", ".svg"):
-        raise InputError(
-            "is not a kind of picture that can be drawn", file=path, remedy="end it with .png, .pdf or .svg"
-        )
+    check_picture(path)
     tables = [table for table in (function_table(policy, name) for name in policy.functions) if _has_choice(table)]
     if not tables:
         raise InputError("no function has a choice to draw")
@@ -56,15 +54,9 @@ def draw_policy(policy: Policy, path: Path) -> None:
             for name, colour in colours.items()
         ]
         figure.legend(handles=handles, loc="outside lower center", ncols=min(4, len(handles)))
-        temporary = path.with_name(f".{path.name}.part{path.suffix}")
         try:
-            metadata = {"CreationDate": None} if path.suffix.lower() == ".pdf" else None
-            figure.savefig(temporary, bbox_inches="tight", metadata=metadata)
-            temporary.replace(path)
-        except OSError as error:
-            raise InputError(f"cannot be written: {error.strerror}", file=path) from None
+            write_picture(figure, path, bbox_inches="tight")
         finally:
-            temporary.unlink(missing_ok=True)
             plt.close(figure)
 
 

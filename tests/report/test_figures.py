@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pandas
 import pytest
+from matplotlib.figure import Figure
 
 from suave_des.campaign.campaign import run_campaign
 from suave_des.campaign.single import run_mission
@@ -15,7 +16,7 @@ from suave_des.errors import InputError
 from suave_des.estimates import estimate
 from suave_des.report import mission_map
 from suave_des.report.campaign_figures import draw_detections, draw_distributions, draw_rainclouds
-from suave_des.report.figures import CAMPAIGN_KINDS, draw_folder, draw_results
+from suave_des.report.figures import CAMPAIGN_KINDS, draw_folder, draw_results, write_picture
 from suave_des.report.grouping import grouped
 from suave_des.report.mission_record import (
     MissionRecord,
@@ -95,6 +96,12 @@ def test_a_missing_file_is_named(missing: str, mission: Path, tmp_path: Path) ->
 def test_a_picture_that_cannot_be_written_is_told(mission: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"map\.png: cannot be written"):
         draw_folder(mission, tmp_path / "nowhere" / "map.png")
+
+
+@pytest.mark.parametrize(("ending", "date"), [(".pdf", b"CreationDate"), (".svg", b"dc:date")])
+def test_no_picture_has_the_time_at_which_it_was_written(ending: str, date: bytes, tmp_path: Path) -> None:
+    write_picture(Figure(), tmp_path / f"empty{ending}")
+    assert date not in (tmp_path / f"empty{ending}").read_bytes()
 
 
 def test_a_campaign_without_missions_is_told(campaign: Path, tmp_path: Path) -> None:

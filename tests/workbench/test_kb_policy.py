@@ -238,7 +238,7 @@ class TestFiles:
         assert table.attributes == ("battery_level", "water_visibility")
 
     def test_a_picture_of_another_kind_is_refused(self, policy, tmp_path):
-        with pytest.raises(InputError, match=r"end it with \.png"):
+        with pytest.raises(InputError, match=r"one of \.png"):
             draw_policy(policy, tmp_path / "policy.gif")
 
 
