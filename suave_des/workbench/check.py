@@ -26,13 +26,14 @@ from suave_des.knowledge.rules.syntax import Place, Rule
 from suave_des.knowledge.rules.writer import write_atom
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.resources import shipped_folder
-from suave_des.workbench.dead_rules import dead_rules, unmeasured_rules
 from suave_des.workbench.findings import Finding, Level, finding_about, finding_from, has_level, ordered, relative_path
 from suave_des.workbench.model_checks import (
     check_designs,
     check_shapes,
+    dead_rules,
     designs_without_performance,
     undefined_names,
+    unmeasured_rules,
     unused_individuals,
 )
 from suave_des.workbench.policy_space import has_effect
