@@ -21,8 +21,8 @@ from suave_des.resources import find
 from suave_des.scenario.layers import Files
 from suave_des.scenario_knowledge import open_base, read_base
 from suave_des.workbench.knowledge_base import KnowledgeBase
+from suave_des.workbench.reasons.tracing import Derivation
 from suave_des.workbench.state_input import ManagingSettings
-from suave_des.workbench.tracing import Derivation
 
 _FEWEST_DIGITS = 2
 

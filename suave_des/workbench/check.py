@@ -36,7 +36,7 @@ from suave_des.workbench.model_checks import (
     unmeasured_rules,
     unused_individuals,
 )
-from suave_des.workbench.policy_space import has_effect
+from suave_des.workbench.policy.space import has_effect
 from suave_des.workbench.ranges import numbers_in, ranges_between
 
 #: States that Pellet is asked about; `kb policy` goes through all.

@@ -16,7 +16,7 @@ from suave_des.errors import InputError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import RDF_TYPE, Lit, Triple, facts_of, is_fact, local_name, term_of
 from suave_des.knowledge.rules.writer import literal_text
-from suave_des.workbench.policy import Policy, PolicyCase, no_proof
+from suave_des.workbench.policy.cases import Policy, PolicyCase, no_proof
 from suave_des.workbench.ranges import ValueRange
 
 if TYPE_CHECKING:

@@ -16,10 +16,10 @@ from suave_des.knowledge.state import KnowledgeState, Number
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario_knowledge import open_base
 from suave_des.workbench.difference import PolicyDifference, compare_policies
-from suave_des.workbench.explain import Explanation, explain
-from suave_des.workbench.policy import OnCount, Policy, make_policy
-from suave_des.workbench.policy_space import PolicySpace
+from suave_des.workbench.policy.cases import OnCount, Policy, make_policy
+from suave_des.workbench.policy.space import PolicySpace
 from suave_des.workbench.query import QueryResult, answer, graph_of
+from suave_des.workbench.reasons.explain import Explanation, explain
 from suave_des.workbench.state_input import ManagingSettings, StateBuilder
 
 DEFAULT_SCENARIO = "seams2023"

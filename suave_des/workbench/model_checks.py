@@ -1,4 +1,4 @@
-"""Check the model in the ontologies: names, functions, designs and modes, shape (SHACL), and rules that cannot fire in it."""
+"""Check the model in the ontologies: names, functions, designs, modes, shape (SHACL), and rules that can never fire."""
 
 from __future__ import annotations
 
@@ -304,8 +304,9 @@ class _Possible:
 def dead_rules(content: Content, model: Model) -> list[tuple[Rule, Atom]]:
     """Find the enabled rules that fire in no state, each with an atom of its body that can never hold.
 
-    What no ontology asserts, no state adds and no rule that can fire concludes, cannot hold. Each property is considered
-    by itself, and individuals are not told apart. So a rule that is returned is dead, but not every dead rule is returned.
+    What no ontology asserts, no state adds and no rule that can fire concludes, cannot hold. Each property is
+    considered by itself, and individuals are not told apart. So a rule that is returned is dead, but not every dead
+    rule is returned.
     """
     possible = _Possible(content, model)
     waiting = list(content.enabled_rules)

@@ -19,7 +19,7 @@ from suave_des.knowledge.rdf import XSD, Lit, Triple, facts_of
 from suave_des.knowledge.rules.rdf import with_triples
 from suave_des.knowledge.rules.syntax import Atom, Named, Rule
 from suave_des.knowledge.state import ContradictionError, Fact, Inference, KnowledgeState
-from suave_des.workbench.policy import PolicyCase
+from suave_des.workbench.policy.cases import PolicyCase
 
 if TYPE_CHECKING:
     from suave_des.workbench.knowledge_base import KnowledgeBase

@@ -27,8 +27,8 @@ from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import Scenario
 from suave_des.scenario_knowledge import read_base
 from suave_des.workbench.knowledge_base import KnowledgeBase
+from suave_des.workbench.reasons.tracing import Tracer, pellet_for
 from suave_des.workbench.state_input import ManagingSettings
-from suave_des.workbench.tracing import Tracer, pellet_for
 
 _MISSION_FILE = "mission.json"
 _GIVEN = Path("the rule to try")

@@ -13,8 +13,8 @@ from typing import Any
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.scenario.loader import load_scenario
 from suave_des.workbench.fact_reader import FactReader
+from suave_des.workbench.reasons.why_not import RuleQuestions, open_without_unusable
 from suave_des.workbench.state_input import ManagingSettings, StateBuilder
-from suave_des.workbench.why_not import RuleQuestions, open_without_unusable
 from tests.helpers.owl_text import SUAVE, TOMASYS, XSD
 
 SEARCH, MOTION = "f_generate_search_path", "f_maintain_motion"

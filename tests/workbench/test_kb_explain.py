@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from suave_des.errors import InputError
 from suave_des.resources import shipped_folder
 from suave_des.workbench import KnowledgeBase
-from suave_des.workbench.tracing import Tracer
+from suave_des.workbench.reasons.tracing import Tracer
 
 MOTION, SEARCH = "f_maintain_motion", "f_generate_search_path"
 CLASH = (

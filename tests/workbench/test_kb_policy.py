@@ -12,14 +12,14 @@ import pytest
 from suave_des.errors import InputError
 from suave_des.knowledge.state import exact
 from suave_des.workbench import KnowledgeBase
-from suave_des.workbench.policy import make_policy
-from suave_des.workbench.policy_figure import draw_policy
-from suave_des.workbench.policy_space import (
+from suave_des.workbench.policy.cases import make_policy
+from suave_des.workbench.policy.figure import draw_policy
+from suave_des.workbench.policy.space import (
     PolicySpace,
     component_reports,
     interchangeable_components,
 )
-from suave_des.workbench.policy_table import function_table
+from suave_des.workbench.policy.table import function_table
 from suave_des.workbench.ranges import ValueRange, ranges_between, values_in
 from suave_des.workbench.state_input import ManagingSettings
 

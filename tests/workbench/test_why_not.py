@@ -11,7 +11,7 @@ from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.scenario.loader import load_scenario
 from suave_des.workbench.prover import Prover, Situation
-from suave_des.workbench.why_not import RuleQuestions, open_without_unusable
+from suave_des.workbench.reasons.why_not import RuleQuestions, open_without_unusable
 from tests.helpers.number_ontology import NS, NUMBERS, numbers_ontology
 from tests.helpers.rule_questions import CASES, prepared
 

@@ -32,8 +32,8 @@ from suave_des.interrupts import ends_at_once
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from suave_des.workbench.policy import Policy
-    from suave_des.workbench.policy_table import FunctionTable
+    from suave_des.workbench.policy.cases import Policy
+    from suave_des.workbench.policy.table import FunctionTable
     from suave_des.workbench.state_input import StateBuilder
 
 _EXAMPLES = 5
@@ -109,14 +109,14 @@ def policy(
     Measured values count by range: between any two numbers of the knowledge base, and on each of them.
     """
     from suave_des.files import csv_text, write_files
-    from suave_des.workbench.policy_table import columns_of, function_table, rows_of
+    from suave_des.workbench.policy.table import columns_of, function_table, rows_of
 
     if csv is not None and csv.is_dir():
         raise InputError("is a folder", file=csv, remedy="name a file, such as policy.csv")
     with counted("states", errors()) as on_count:
         found = knowledge.bench().policy(max_failed, on_count)
     if png is not None:
-        from suave_des.workbench.policy_figure import draw_policy
+        from suave_des.workbench.policy.figure import draw_policy
 
         draw_policy(found, png)
     if csv is not None:
@@ -185,7 +185,7 @@ def _function_table(table: FunctionTable, *, breaks_names: bool) -> Table:
 
 def _policy_summary(found: Policy) -> Iterator[str]:
     from suave_des.knowledge.deliberation import NONE_LEFT
-    from suave_des.workbench.policy import no_proof
+    from suave_des.workbench.policy.cases import no_proof
 
     kinds, most = len(found.cases), found.max_failed
     yield f"{found.states} states in {kinds} equivalence classes, with at most {most} components reporting"
@@ -289,8 +289,8 @@ def why_not(
     from suave_des.knowledge.rules.syntax import RuleError
     from suave_des.scenario_knowledge import open_base
     from suave_des.workbench.fact_reader import FactReader
+    from suave_des.workbench.reasons.why_not import RuleQuestions, UnusableRule, open_without_unusable
     from suave_des.workbench.state_input import ManagingSettings, StateBuilder
-    from suave_des.workbench.why_not import RuleQuestions, UnusableRule, open_without_unusable
 
     loaded = sources.loaded()
     try:

@@ -14,10 +14,10 @@ from suave_des.knowledge.rules.syntax import COMPARISON_OF, COMPARISONS, Rule
 from suave_des.knowledge.rules.writer import write_atom
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.workbench.knowledge_base import KnowledgeBase
-from suave_des.workbench.matching import testable_order
-from suave_des.workbench.policy import PolicyCase, kinds_of_states
-from suave_des.workbench.policy_space import PolicySpace
+from suave_des.workbench.policy.cases import PolicyCase, kinds_of_states
+from suave_des.workbench.policy.space import PolicySpace
 from suave_des.workbench.prover import Body, Prover, Situation
+from suave_des.workbench.reasons.matching import testable_order
 
 FIRES, FIRES_NOT, HOLDS, FAILS = "fires", "does not fire", "holds", "fails"
 #: How the values of a comparison can relate, with the built-in that says so.

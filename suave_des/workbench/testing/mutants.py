@@ -32,8 +32,8 @@ from suave_des.knowledge.rules.syntax import COMPARISON_OF, COMPARISONS, Atom, N
 from suave_des.knowledge.rules.writer import literal_text, write_atom
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.workbench.knowledge_base import KnowledgeBase
-from suave_des.workbench.matching import FACT_KINDS, instance, matched
 from suave_des.workbench.prover import Body, Prover, Situation
+from suave_des.workbench.reasons.matching import FACT_KINDS, instance, matched
 
 _NOT_HORN: Final = (
     *("unionOf", "complementOf", "oneOf", "disjointUnionOf", "maxCardinality", "maxQualifiedCardinality"),

@@ -26,8 +26,8 @@ from suave_des.knowledge.rdf import DECISION_PROPERTIES, HAS_VALUE, TOMASYS, fac
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.knowledge.state import ContradictionError, Fact, Inference, KnowledgeState
 from suave_des.workbench.knowledge_base import KnowledgeBase
-from suave_des.workbench.policy import PolicyCase, kinds_of_states
-from suave_des.workbench.policy_space import PolicySpace
+from suave_des.workbench.policy.cases import PolicyCase, kinds_of_states
+from suave_des.workbench.policy.space import PolicySpace
 from suave_des.workbench.prover import Body, Entailed, Outcome, Prover, Situation
 from suave_des.workbench.ranges import numbers_in
 from suave_des.workbench.testing.mutants import Mutant, follows_anyway, is_horn, touching

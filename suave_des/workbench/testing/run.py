@@ -14,12 +14,12 @@ from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.deliberation import STAYS
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.state import Fact
-from suave_des.workbench.explain import explain
 from suave_des.workbench.fact_reader import NEW_INDIVIDUAL
 from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.prover import Outcome, Prover, Situation
+from suave_des.workbench.reasons.explain import explain
+from suave_des.workbench.reasons.why_not import RuleQuestions
 from suave_des.workbench.testing.reading import RuleTest
-from suave_des.workbench.why_not import RuleQuestions
 
 #: What XML 1.0 has no place for.
 _FORBIDDEN: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")

@@ -12,8 +12,8 @@ from suave_des.errors import InputError
 from suave_des.knowledge.deliberation import NONE_LEFT, STAYS
 from suave_des.report.figures import check_picture, write_picture
 from suave_des.report.style import MODE_COLOURS, OTHER_MODES, VERMILION, WIDTH_IN, publication
-from suave_des.workbench.policy import FLIP_FLOP, INCONSISTENT, NO_GROUNDING, Policy
-from suave_des.workbench.policy_table import FunctionTable, TableRow, function_table
+from suave_des.workbench.policy.cases import FLIP_FLOP, INCONSISTENT, NO_GROUNDING, Policy
+from suave_des.workbench.policy.table import FunctionTable, TableRow, function_table
 from suave_des.workbench.ranges import ValueRange
 
 _FIXED = {INCONSISTENT: "#B00020", NONE_LEFT: "#D9D9D9", NO_GROUNDING: "#FFFFFF"}

@@ -12,7 +12,7 @@ from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.deliberation import NONE_LEFT, STAYS, Conclusion
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.state import ContradictionError, KnowledgeState
-from suave_des.workbench.policy_space import (
+from suave_des.workbench.policy.space import (
     ComponentReports,
     PolicySpace,
     component_reports,

@@ -6,8 +6,8 @@ import itertools
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
 
-from suave_des.workbench.policy import Policy
-from suave_des.workbench.policy_space import ComponentReports
+from suave_des.workbench.policy.cases import Policy
+from suave_des.workbench.policy.space import ComponentReports
 from suave_des.workbench.ranges import ValueRange
 
 _Groundings = tuple[tuple[str, str], ...]

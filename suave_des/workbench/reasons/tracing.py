@@ -28,7 +28,7 @@ from suave_des.knowledge.pellet import (
 from suave_des.knowledge.rdf import OWL, RDF_TYPE, Lit, Triple, canonical, facts_of, is_fact, n_triple, value_of
 from suave_des.knowledge.rules.syntax import Atom, AtomKind, Rule
 from suave_des.knowledge.state import Fact, KnowledgeState, Value
-from suave_des.workbench.matching import Binding, Facts, matched
+from suave_des.workbench.reasons.matching import Binding, Facts, matched
 
 _FACT: Final = re.compile(r"^(prop|type)\(([^,()]+),([^,()]+)")
 _IRI: Final = re.compile(r"[a-z]+:[^\s,()]+")

@@ -14,8 +14,8 @@ from suave_des.knowledge.planning import performance
 from suave_des.knowledge.rdf import Triple, facts_of
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import ContradictionError, Decision, Fact, KnowledgeState, objective_name, value_text
-from suave_des.workbench.tracing import Clash, Derivation, Tracer
-from suave_des.workbench.why_not import RuleQuestions, WhyNot
+from suave_des.workbench.reasons.tracing import Clash, Derivation, Tracer
+from suave_des.workbench.reasons.why_not import RuleQuestions, WhyNot
 
 #: Rules that are named for a fact that does not follow.
 NEAREST: Final = 3

@@ -22,10 +22,10 @@ from suave_des.knowledge.rules.writer import write_atom
 from suave_des.knowledge.state import ContradictionError, Fact, KnowledgeState, Value, value_text
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario_knowledge import open_base
-from suave_des.workbench.atom_failure import describe_failure
-from suave_des.workbench.matching import FACT_KINDS, Binding, Facts, NearestFinder, bound, unified
 from suave_des.workbench.prover import Prover, Situation
-from suave_des.workbench.tracing import Tracer
+from suave_des.workbench.reasons.atom_failure import describe_failure
+from suave_des.workbench.reasons.matching import FACT_KINDS, Binding, Facts, NearestFinder, bound, unified
+from suave_des.workbench.reasons.tracing import Tracer
 
 
 @dataclass(frozen=True)

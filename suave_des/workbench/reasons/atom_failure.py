@@ -11,7 +11,7 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import NUMERIC, OWL, TOMASYS, Lit, local_name, value_of
 from suave_des.knowledge.rules.syntax import COMPARISONS, Atom, Variable
 from suave_des.knowledge.rules.writer import literal_text
-from suave_des.workbench.matching import FACT_KINDS, Binding, Facts, bound
+from suave_des.workbench.reasons.matching import FACT_KINDS, Binding, Facts, bound
 
 _WORDS: Final = {
     "<": "less than",
