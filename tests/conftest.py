@@ -3,6 +3,7 @@
 Cached inferences are kept in a folder of the test run, away from the user's, which all its processes share.
 """
 
+import gc
 import os
 import shutil
 import signal
@@ -20,6 +21,11 @@ __all__ = ["_warm_process", "quick_workers"]
 settings.register_profile("repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("repeatable")
 
+# Modules and tests are a million objects, which Python's search for cycles would go through again and again: it was a
+# fifth of the tests' time. What has been imported is left out of it; of the rest, half a million come before a search.
+gc.disable()
+_searched_without = 0
+
 # Machine code and Java's archive are the same for all: they are kept where they always are, so that each run of the
 # tests need not make them anew. So are compiled modules, whatever the environment says: hundreds of processes start.
 os.environ.setdefault("NUMBA_CACHE_DIR", str(private_cache("numba")))
@@ -33,6 +39,25 @@ os.environ.pop("COLUMNS", None)  # which several test processes at once are give
 
 # A shell that runs tests in the background has them ignore Ctrl-C: those that press it, and their children, need it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_finish() -> None:
+    """Search for cycles from now on, but not among what the collection of tests has imported."""
+    _leave_out_of_the_search()
+    gc.set_threshold(500_000, 10, 10)
+    gc.enable()
+
+
+def pytest_runtest_teardown() -> None:
+    """Leave out of the search what a test has imported, if it is much."""
+    if len(sys.modules) > _searched_without + 50:
+        _leave_out_of_the_search()
+
+
+def _leave_out_of_the_search() -> None:
+    global _searched_without
+    gc.freeze()
+    _searched_without = len(sys.modules)
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
