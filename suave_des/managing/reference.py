@@ -18,7 +18,8 @@ from suave_des.scenario.modes import DEFAULT_MODE, UNGROUND_MODE
 if TYPE_CHECKING:
     from suave_des.scenario.loader import LoadedScenario
 
-_LOOK_EVERY_S = 0.05
+_LOOK_PERIOD_S = 0.05
+"""The vehicle's time step: a mode that was requested between two steps would not act sooner."""
 
 
 class FixedMode(NoManager):
@@ -134,7 +135,7 @@ class Oracle(Threshold):
         env, thresholds_m = self.system.env, tuple(sorted(self.thresholds_m))
         region = bisect_right(thresholds_m, self._visibility_m(0.0))
         for step in count(1):
-            t_s = step * _LOOK_EVERY_S
+            t_s = step * _LOOK_PERIOD_S
             if (now_in := bisect_right(thresholds_m, self._visibility_m(t_s))) != region:
                 region = now_in
                 yield env.timeout(t_s - env.now)

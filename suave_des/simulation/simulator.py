@@ -14,7 +14,7 @@ from suave_des.metrics.result import MissionResult
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.simulation.mission import MissionRun
 from suave_des.simulation.prepared import PreparedScenario
-from suave_des.vehicle.kernel import ROW
+from suave_des.vehicle.kernel import COLUMNS
 from suave_des.vehicle.vehicle import track_rows
 
 OnTime = Callable[[float, float], None]
@@ -65,7 +65,7 @@ class Simulator(PreparedScenario):
         Raises:
             MissionError, InputError: as `run`.
         """
-        track = self._spare_tracks.pop() if self._spare_tracks else np.empty((track_rows(self.duration_s), ROW))
+        track = self._spare_tracks.pop() if self._spare_tracks else np.empty((track_rows(self.duration_s), COLUMNS))
         try:
             return MissionRun(self, manager, run, seed, track, record=record, manager_type=manager_type)
         except BaseException:

@@ -1,18 +1,7 @@
 """The vehicle's motion: rigid body, thrusters and guided autopilot, stepped on a fixed grid by one compiled loop.
 
-One row of the track holds everything that the next step needs:
-
-    0:3   position p in the world frame, m (x east, y north, z up)
-    3:7   attitude: unit quaternion (w, x, y, z), body to world
-    7:13  nu, body frame, m/s and rad/s
-    13:16 integral of the velocity error, world frame, as an acceleration, m/s^2
-    16    integral of the heading error, as an angular acceleration, rad/s^2
-    17:20 start of the leg that the autopilot flies, world frame, m
-    20:23 its end, the set-point, m
-    23    time on the leg, s
-    24    number of the set-point
-
-Attitude is a quaternion (Handbook, 2.2.2): no trigonometry in the loop, and no singularity for a vehicle that tumbles.
+One row of the track holds everything that the next step needs. Attitude is a quaternion (Handbook, 2.2.2): no
+trigonometry in the loop, and no singularity for a vehicle that tumbles.
 """
 
 import math
@@ -21,30 +10,55 @@ import numpy as np
 
 from suave_des.compiling import Array, IntArray, compiled
 
-ROW = 25
-POSITION, ATTITUDE, VELOCITY, INTEGRAL = slice(0, 3), slice(3, 7), slice(7, 13), slice(13, 17)
-LEG_START, LEG_END = slice(17, 20), slice(20, 23)
+# Columns of the track; the world frame has x east, y north, z up.
+POSITION = slice(0, 3)  # p, world frame, m
+ATTITUDE = slice(3, 7)  # unit quaternion (w, x, y, z), body to world
+VELOCITY = slice(7, 13)  # nu, body frame, m/s and rad/s
+VELOCITY_INTEGRAL = slice(13, 16)  # of the velocity error, world frame, as an acceleration, m/s^2
+HEADING_INTEGRAL = 16  # of the heading error, as an angular acceleration, rad/s^2
+LEG_START = slice(17, 20)  # of the leg that the autopilot flies, world frame, m
+LEG_END = slice(20, 23)  # the set-point, world frame, m
+LEG_TIME = 23  # since the leg began, s
+SET_POINT_NUMBER = 24  # of the set-point that the leg leads to; the one at the start is number 0
+COLUMNS = 25
 
-# Places in the parameter vector, see `autopilot.kernel_parameters`. Drag takes six, the current three.
-MASS, IXX, IYY, IZZ, NET_BUOYANCY, RIGHTING, DRAG = range(7)
-THRUST_LIMIT, POSITION_GAIN, POSITION_GAIN_Z, JERK = range(12, 16)
-VELOCITY_GAIN, VELOCITY_INTEGRAL_GAIN, VELOCITY_GAIN_Z, VELOCITY_INTEGRAL_GAIN_Z, INTEGRAL_LIMIT = range(16, 21)
-ROLL_GAIN, ROLL_RATE_GAIN = 21, 22
-HEADING_GAIN, HEADING_RATE_GAIN, HEADING_INTEGRAL_GAIN, HEADING_INTEGRAL_LIMIT = range(23, 27)
-CURRENT, FLOOR, CEILING = 27, 30, 31
+# Places in the set-point vector, after x, y and z of its position, world frame, m.
+HALF_HEADING_COS, HALF_HEADING_SIN = 3, 4  # cosine and sine of half the heading
+NUMBER = 5  # how many set-points were given before
+
+# Places in the parameter vector, see `autopilot.kernel_parameters`.
+MASS = 0  # kg
+IXX, IYY, IZZ = 1, 2, 3  # principal moments of inertia, kg m^2
+NET_BUOYANCY = 4  # buoyancy less weight, N
+RIGHTING = 5  # buoyancy times its height above the centre of mass, N m
+DRAG = 6  # six coefficients of -c |nu| nu, N s^2/m^2 and N m s^2
+THRUST_LIMIT = 12  # of each thruster, N
+POSITION_GAIN, POSITION_GAIN_Z = 13, 14  # velocity for a position error, 1/s
+JERK = 15  # of a leg, m/s^3
+VELOCITY_GAIN, VELOCITY_INTEGRAL_GAIN = (
+    16,
+    17,
+)  # acceleration for a horizontal velocity error, 1/s, and its integral, 1/s^2
+VELOCITY_GAIN_Z, VELOCITY_INTEGRAL_GAIN_Z = 18, 19  # the same for a vertical one
+INTEGRAL_LIMIT = 20  # of each velocity integral, m/s^2
+ROLL_GAIN, ROLL_RATE_GAIN = 21, 22  # angular acceleration for a roll error, 1/s^2, and for its rate, 1/s
+HEADING_GAIN, HEADING_RATE_GAIN = 23, 24  # the same for the heading
+HEADING_INTEGRAL_GAIN = 25  # 1/s^3
+HEADING_INTEGRAL_LIMIT = 26  # rad/s^2
+CURRENT = 27  # constant velocity of the water, world frame, three components, m/s
+FLOOR, CEILING = 30, 31  # z of sea bed and surface, m
+WAVE_X, WAVE_Y = 32, 33  # amplitude of the varying part of the current, east and north, m/s
+WAVE_RATE, WAVE_PHASE = 34, 35  # its angle per row and at row 0, rad
 
 ARRIVED_M = 2.0
 """ArduPilot's WPNAV_RADIUS: a leg is completed when its time is over and the vehicle is as near as this to its end."""
-
-WAVE_X, WAVE_Y, WAVE_RATE, WAVE_PHASE = CEILING + 1, CEILING + 2, CEILING + 3, CEILING + 4
-"""After those: the varying part of the current, east and north in m/s, its angle per row and at row 0 in rad."""
 
 Dynamics = tuple[float, Array, Array, Array, Array]
 """What moves the vehicle, besides its state:
 
 - the time between rows, as the simulated world counts it, s;
-- set-point: x, y, z in m, cosine and sine of half the heading, world frame, and its number, shape (6,);
-- parameters: constants in the places named above;
+- set-point: position, heading and number, shape (6,);
+- parameters: constants, shape (36,);
 - allocation: thrusts for a demanded wrench, shape (6 thrusters, 6);
 - effectiveness: wrench for thrusts, each thruster's health included, shape (6, 6 thrusters).
 """
@@ -70,7 +84,7 @@ def begin_leg(track: Array, row: int, prm: Array) -> tuple[float, float, float, 
     to_x, to_y, to_z = track[row, 20], track[row, 21], track[row, 22]
     leg_x, leg_y, leg_z = to_x - track[row, 17], to_y - track[row, 18], to_z - track[row, 19]
     length = math.sqrt(leg_x * leg_x + leg_y * leg_y + leg_z * leg_z)
-    is_over = track[row, 23] >= 4.0 * quarter_of_leg(length, prm[JERK])
+    is_over = track[row, LEG_TIME] >= 4.0 * quarter_of_leg(length, prm[JERK])
     if is_over and (to_x - x) ** 2 + (to_y - y) ** 2 + (to_z - z) ** 2 <= ARRIVED_M * ARRIVED_M:
         return to_x, to_y, to_z, track[row, 13], track[row, 14]
     qw, qx, qy, qz = track[row, 3], track[row, 4], track[row, 5], track[row, 6]
@@ -89,14 +103,14 @@ def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
     """Fill rows first + 1 .. last of the track from row `first`, with one set-point and thruster health throughout.
 
     Args:
-        track: shape (rows, 25), see above; written in place.
+        track: shape (rows, COLUMNS); written in place.
         first: row to start from.
         last: last row to fill.
         dynamics: time step, set-point and constants.
     """
     h, set_point, prm, allocation, effectiveness = dynamics
     mass, ixx, iyy, izz = prm[MASS], prm[IXX], prm[IYY], prm[IZZ]
-    heading_w, heading_z = set_point[3], set_point[4]
+    heading_w, heading_z = set_point[HALF_HEADING_COS], set_point[HALF_HEADING_SIN]
     # Number by number: to unpack a slice makes an array of it, which takes as long as a step.
     x, y, z = track[first, 0], track[first, 1], track[first, 2]
     qw, qx, qy, qz = track[first, 3], track[first, 4], track[first, 5], track[first, 6]
@@ -105,8 +119,8 @@ def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
     ix, iy, iz, ir = track[first, 13], track[first, 14], track[first, 15], track[first, 16]
     from_x, from_y, from_z = track[first, 17], track[first, 18], track[first, 19]
     to_x, to_y, to_z = track[first, 20], track[first, 21], track[first, 22]
-    leg_time = track[first, 23]
-    if track[first, 24] != set_point[5]:
+    leg_time = track[first, LEG_TIME]
+    if track[first, SET_POINT_NUMBER] != set_point[NUMBER]:
         from_x, from_y, from_z, ix, iy = begin_leg(track, first, prm)
         to_x, to_y, to_z, leg_time = set_point[0], set_point[1], set_point[2], 0.0
     along_x, along_y, along_z = to_x - from_x, to_y - from_y, to_z - from_z
@@ -247,7 +261,7 @@ def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
         track[row, 13], track[row, 14], track[row, 15], track[row, 16] = ix, iy, iz, ir
         track[row, 17], track[row, 18], track[row, 19] = from_x, from_y, from_z
         track[row, 20], track[row, 21], track[row, 22] = to_x, to_y, to_z
-        track[row, 23], track[row, 24] = leg_time, set_point[5]
+        track[row, LEG_TIME], track[row, SET_POINT_NUMBER] = leg_time, set_point[NUMBER]
 
 
 @compiled
@@ -304,7 +318,7 @@ def fly_waypoints(
         set_point[0] = waypoints[reached, 0] + sent_as[0]
         set_point[1] = waypoints[reached, 1] + sent_as[1]
         set_point[2] = sent_as[2]
-        set_point[5] += 1.0
+        set_point[NUMBER] += 1.0
         computed = row  # rows beyond it were flown to another set-point
         last = tick + most
         tick += fewest

@@ -133,7 +133,7 @@ class Vehicle:
     def __post_init__(self, memory: Array | None) -> None:
         model, start, rows = self.model, self.start, track_rows(self.duration_s)
         self.last_row = rows - 1
-        self.track: Array = np.empty((rows, kernel.ROW)) if memory is None else memory
+        self.track: Array = np.empty((rows, kernel.COLUMNS)) if memory is None else memory
         self.track[0] = 0.0
         self.track[0, kernel.POSITION] = self.track[0, kernel.LEG_START] = self.track[0, kernel.LEG_END] = start[:3]
         self.track[0, kernel.ATTITUDE] = quaternion(*start[3:])
@@ -150,7 +150,7 @@ class Vehicle:
         """Give the autopilot a new position set-point; it replaces the one before."""
         self._cancel_after(t_s)
         self._set_point[:3] = x_m, y_m, z_m + self.altitude_error_m
-        self._set_point[5] += 1.0
+        self._set_point[kernel.NUMBER] += 1.0
         self._notify(t_s)
 
     def set_thruster_health(self, t_s: float, thruster: int, health: float) -> None:
@@ -250,7 +250,7 @@ class Vehicle:
         set_point, (x_m, y_m, z_m) = self._set_point, sent_as_m
         set_point[0], set_point[1] = waypoints.item(place, 0) + x_m, waypoints.item(place, 1) + y_m
         set_point[2] = z_m
-        set_point[5] += new
+        set_point[kernel.NUMBER] += new
 
     def _cancel_after(self, t_s: float) -> None:
         """Fill the track up to time t, and no further; from there on the set-point in force then is the only one."""
@@ -268,7 +268,7 @@ class Vehicle:
 
 
 def track_rows(duration_s: float) -> int:
-    """Rows of the track of a mission; each has `kernel.ROW` columns."""
+    """Rows of the track of a mission; each has `kernel.COLUMNS` columns."""
     return row_at(duration_s) + 2
 
 

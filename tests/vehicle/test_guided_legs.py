@@ -58,10 +58,10 @@ def test_an_interrupted_leg_loses_the_integral() -> None:
     vehicle = Vehicle(BLUEROV2, Autopilot(), START, 30.0, current_m_per_s=(-0.3, 0.0, 0.0))
     vehicle.command(0.0, 3.0, 0.0, -18.0)
     vehicle.position(2.5)
-    assert vehicle.track[row_at(2.0), kernel.INTEGRAL][0] > 0.1
+    assert vehicle.track[row_at(2.0), kernel.VELOCITY_INTEGRAL][0] > 0.1
     vehicle.command(2.0, 3.0, 1.0, -18.0)
     vehicle.position(2.5)
-    assert abs(vehicle.track[row_at(2.0) + 1, kernel.INTEGRAL][0]) < 0.05
+    assert abs(vehicle.track[row_at(2.0) + 1, kernel.VELOCITY_INTEGRAL][0]) < 0.05
 
 
 def test_after_a_completed_leg_the_next_one_starts_at_the_last_set_point() -> None:
