@@ -61,13 +61,13 @@ class MissionCoordinator:
         return self.follow.distance_m if self._inspected_m is None else self._inspected_m
 
     def start(self, request: Callable[[Task], None], cancel: Callable[[Task], None]) -> None:
-        """Start the mission, which calls these to request and to cancel its tasks."""
+        """Start the mission; `request` is called when a task begins, `cancel` when it ends."""
         self._request, self._cancel = request, cancel
         self.env.process(self._watch_time_limit())
         self._tasks = self.env.process(self._carry_out_tasks())
 
     def leak_handler(self, surfaced: simpy.Event) -> Callable[[], None]:
-        """What is to be called at a leak: everything else is given up, and the mission ends at an event, `surfaced`."""
+        """Make the function to call at a leak: tasks are cancelled, and the mission ends after the event `surfaced`."""
         self._surfaced = surfaced
 
         def leak() -> None:
@@ -76,12 +76,12 @@ class MissionCoordinator:
 
         return leak
 
-    def end_with(self, battery: BatteryLevel, least_level: float) -> None:
-        """End the mission when the battery is at a level, or below it; looked at when the level is measured."""
+    def end_at_battery_level(self, battery: BatteryLevel, least_level: float) -> None:
+        """End the mission when the battery is at a level, or below it, at a time at which it is measured."""
         self.env.process(self._watch_battery(battery, least_level))
 
     def search_time_or_limit_s(self) -> float:
-        """The search time metric; the time limit when the pipeline was not found."""
+        """Give the search time metric; the time limit when the pipeline was not found."""
         return self.timing.time_limit_s if self.search_time_s is None else self.search_time_s
 
     def _carry_out_tasks(self) -> Process:

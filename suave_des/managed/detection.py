@@ -1,4 +1,4 @@
-"""Pipeline detection: looks ahead along the vehicle's way for the moment of the first sight."""
+"""Pipeline detection: looks ahead along the vehicle's track for the moment of the first sight."""
 
 import math
 from dataclasses import dataclass
@@ -11,10 +11,10 @@ from suave_des.managed.node import Log
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
 from suave_des.world.pipeline import first_detection
 
-_FEWEST_ROWS = 22
+_MIN_ROWS_AHEAD = 22
 """Minimum look-ahead; beyond it, as far as guidance has computed. There the set-point usually changes."""
 _AFTER_CONTROL_S = 0.6 * STEP_S
-"""Delay past the last checked row before looking on: a control change that rounds to that row comes first."""
+"""Delay past the last checked row before more are checked: a control change that rounds to that row comes first."""
 
 
 @dataclass(eq=False)
@@ -46,13 +46,13 @@ class PipelineDetector:
 
     def __post_init__(self) -> None:
         self.detected: simpy.Event = self.env.event()
-        self._alarm = Alarm(self.env, self._arrive)
+        self._alarm = Alarm(self.env, self._ring)
         self.vehicle.control_listeners.append(self._look_ahead)
         self._look_ahead(0)
 
     def _look_ahead(self, row: int) -> None:
-        """Check the rows from one on; return at the first sight, or where no later row has been checked."""
-        last = min(max(row + _FEWEST_ROWS, self.vehicle.computed_row), self.vehicle.last_row)
+        """Check the rows from one on; set the alarm to the first sight, or to the last row that was checked."""
+        last = min(max(row + _MIN_ROWS_AHEAD, self.vehicle.computed_row), self.vehicle.last_row)
         if row >= last:
             self._alarm.cancel()
             return
@@ -66,7 +66,7 @@ class PipelineDetector:
         else:
             self._alarm.set(seen_row * STEP_S)
 
-    def _arrive(self) -> None:
+    def _ring(self) -> None:
         if self._seen < 0:
             self._look_ahead(self._row)
             return

@@ -32,13 +32,13 @@ class InspectionPath(NamedTuple):
 
     @classmethod
     def along(cls, points_m: Array, altitude_m: float) -> Self:
-        """The path above points: x and y in the first two columns, shape (points, at least 2)."""
+        """Make the path above points: x and y in the first two columns, shape (points, at least 2)."""
         x_y_m = points_m[:, :2]
         lengths_m = (math.dist(a, b) for a, b in pairwise(x_y_m.tolist()))
         return cls(np.insert(x_y_m, 2, SEA_BED_Z_M + altitude_m, axis=1), (0.0, *lengths_m))
 
     def from_point(self, first: int) -> Self:
-        """The rest of the path from a point on."""
+        """Make the rest of the path, from a point on."""
         return type(self)(self.points_m[first:], self.lengths_m[first:])
 
 
@@ -57,7 +57,7 @@ class FollowPipeline(FunctionNode, WaypointSource):
     sender: SetPointSender
     revision: FollowRevision
     path: Callable[[], InspectionPath]
-    _way: InspectionPath = field(default=NO_PATH, init=False)
+    _route: InspectionPath = field(default=NO_PATH, init=False)
     _next: int = field(default=0, init=False)
     _has_arrived: bool = field(default=False, init=False)
     _travelled_m: float = field(default=0.0, init=False)
@@ -83,8 +83,8 @@ class FollowPipeline(FunctionNode, WaypointSource):
         self._has_arrived = False
         if self.revision.restarts_on_activation:
             self._next = 0
-        self._way = self.path()
-        if self._way.lengths_m and not self.finished.triggered:
+        self._route = self.path()
+        if self._route.lengths_m and not self.finished.triggered:
             self._guidance.start_at(self.env.now)
 
     def deactivated(self) -> None:
@@ -94,7 +94,7 @@ class FollowPipeline(FunctionNode, WaypointSource):
         self._guidance.stop()
         if self.revision.adds_remaining_way and self._has_arrived:
             x_m, y_m, _ = self.sender.vehicle.position(self.env.now)
-            self._travelled_m += math.dist(self._way.points_m[self._next - 1, :2].tolist(), (x_m, y_m))
+            self._travelled_m += math.dist(self._route.points_m[self._next - 1, :2].tolist(), (x_m, y_m))
             self._published_m = self._travelled_m
 
     def _arrival_check(self, start_s: float) -> ArrivalCheck:
@@ -106,20 +106,20 @@ class FollowPipeline(FunctionNode, WaypointSource):
         return ArrivalCheck(start_s, period_s, width_m, math.inf, 0, *waits)
 
     def waypoints(self, count: int) -> Array:
-        """The present point and those after it; none when the end is reached."""
-        return self._way.points_m[self._next : self._next + count]
+        """Give the present point and those after it; none when the end is reached."""
+        return self._route.points_m[self._next : self._next + count]
 
     def completed(self) -> None:
         """Report that the end of the path is reached."""
         self.finished.succeed()
 
     def set_point_z_m(self) -> float:
-        """The altitude of following above the sea bed."""
+        """Give the z at which the pipeline is followed."""
         return SEA_BED_Z_M + self.revision.altitude_m
 
     def reached(self, count: int) -> None:
         """Add up the distance, from the first point on; it is published at each point after that."""
-        lengths_m = self._way.lengths_m[self._next + (not self._has_arrived) : self._next + count]
+        lengths_m = self._route.lengths_m[self._next + (not self._has_arrived) : self._next + count]
         self._next += count
         self._has_arrived = True
         for length_m in lengths_m:

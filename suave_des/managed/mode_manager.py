@@ -44,15 +44,15 @@ class ModeManager:
     _in_use: set[str] = field(default_factory=set)
 
     def available_modes(self, function: str) -> tuple[str, ...]:
-        """All modes of a function, in the order of the modes file; none for one that is unknown or has no node."""
+        """List a function's modes, in the order of the modes file; none for one that is unknown or has no node."""
         return self.table.modes(function) if function in self.table and function in self.nodes else ()
 
     def current_mode(self, function: str) -> str | None:
-        """The mode that was requested last; none before the first request."""
+        """Give the mode that was requested last; none before the first request."""
         return self._requested.get(function)
 
     def end_task(self, functions: Iterable[str]) -> None:
-        """The functions' task has ended: mode changes do not count as adaptations until they are active again."""
+        """End the functions' task: mode changes do not count as adaptations until they are in use again."""
         self._in_use.difference_update(functions)
 
     def change_mode(self, function: str, mode: str, latency_s: float | None = None) -> bool:
@@ -83,7 +83,7 @@ class ModeManager:
         return True
 
     def _missing(self, function: str, mode: str) -> str:
-        """What a request lacks that is refused."""
+        """Say why a request is refused."""
         if function not in self.table:
             return f"{function}: the modes file has no such function"
         if function not in self.nodes:

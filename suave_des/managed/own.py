@@ -1,4 +1,4 @@
-"""Functions of one's own: a node for a function that the exemplar does not have."""
+"""User-defined functions: nodes for functions that the exemplar does not have."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from suave_des.vehicle.vehicle import Point
 
 @dataclass(frozen=True)
 class FunctionContext:
-    """What a function of one's own can see and do.
+    """What a user-defined function can see and do.
 
     Attributes:
         name: of the function.
@@ -39,16 +39,16 @@ class FunctionContext:
     log: Callable[[str, str], None]
 
     def position(self) -> Point:
-        """Where the vehicle is now: x, y, z in m, world frame."""
+        """Read the vehicle's position now: x, y, z in m, world frame."""
         return self.sender.vehicle.position(self.env.now)
 
 
 class FunctionError(Exception):
-    """What a hook of a function of one's own raised, with the function's name."""
+    """What a hook of a user-defined function raised, with the function's name."""
 
 
 class OwnFunction(FunctionNode):
-    """Base of functions of one's own: override what happens on activation, deactivation and a change of parameters.
+    """Base of user-defined functions: override what happens on activation, deactivation and a change of parameters.
 
     The hooks are called at the mission time at which a mode takes effect. They must not block; what goes on over time
     is a process: `self.env.process(...)`.

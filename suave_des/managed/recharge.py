@@ -24,14 +24,14 @@ class GenerateRechargePath(FunctionNode):
 
     def activated(self) -> None:
         """Set off for the station."""
-        self._process = self.env.process(self._go())
+        self._process = self.env.process(self._go_to_station())
 
     def deactivated(self) -> None:
         """Leave the autopilot to other functions."""
         if self._process is not None:
             self._process.interrupt()
 
-    def _go(self) -> Process:
+    def _go_to_station(self) -> Process:
         try:
             while True:
                 self.sender.send(*self.station_m)

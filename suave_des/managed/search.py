@@ -25,7 +25,7 @@ def spiral(
     centre_m: tuple[float, float],
     waypoints: Array,
 ) -> None:
-    """Way-points of the spiral.
+    """Generate way-points of the spiral.
 
     Args:
         step, radius_m: the spiral's step counter and its radius before the first of them.
@@ -84,7 +84,7 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         if altitude is not None and altitude != self.altitude_m:
             self._guidance.catch_up()
             self.altitude_m = float(altitude)
-            self._guidance.way_changed()
+            self._guidance.waypoints_changed()
 
     def activated(self) -> None:
         """Start ticking; revision 1.5 begins a new spiral here."""
@@ -109,7 +109,7 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
             self._last_altitude_m = self.altitude_m
 
     def waypoints(self, count: int) -> Array:
-        """The present way-point and those that follow it at the present altitude."""
+        """Give the present way-point and those that follow it at the present altitude."""
         if self._present is None:
             self.reached(1)
         waypoints = np.empty((count, 4))
@@ -118,7 +118,7 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         return waypoints
 
     def set_point_z_m(self) -> float:
-        """The present altitude, less what was lowered; whether it is reached is checked against the way-point's."""
+        """Give the z of the altitude, less what was commanded lower; arrival is checked at the way-point's own z."""
         return SEA_BED_Z_M + self.altitude_m - self._lowered_m
 
     def reached(self, count: int) -> None:

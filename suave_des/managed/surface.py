@@ -10,7 +10,7 @@ from suave_des.managed.node import FunctionNode
 from suave_des.vehicle.guidance import SetPointSender
 
 ABOVE_M = 3.0
-"""How far above the surface the set-point is: an autopilot that stops short of it is up nevertheless."""
+"""How far above the surface the set-point is: an autopilot that stops short of it still surfaces."""
 SURFACED_M = 0.1
 CHECKS_A_SECOND = 2
 RESEND_CHECKS = 20
@@ -32,14 +32,14 @@ class Surface(FunctionNode):
 
     def activated(self) -> None:
         """Set off for the surface."""
-        self._process = self.env.process(self._go())
+        self._process = self.env.process(self._ascend())
 
     def deactivated(self) -> None:
         """Leave the autopilot to other functions."""
         if self._process is not None and self._process.is_alive:
             self._process.interrupt()
 
-    def _go(self) -> Process:
+    def _ascend(self) -> Process:
         x_m, y_m, _ = self.sender.vehicle.position(self.env.now)
         try:
             while True:

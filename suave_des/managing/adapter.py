@@ -25,15 +25,15 @@ class TaskBridge:
     def pass_on(self, task: Task, update: Callable[[tuple[str, ...]], None]) -> None:
         """Call `update` with the task's functions at the bridge's next tick."""
 
-        def arrive() -> None:
+        def deliver() -> None:
             update(task.functions)
             self.system.state_changed()
 
         env = self.system.env
         if self.period_s > 0.0:
-            Alarm(env, arrive).set(tick_at_or_after(env.now, self.phase_s, self.period_s))
+            Alarm(env, deliver).set(tick_at_or_after(env.now, self.phase_s, self.period_s))
         else:
-            Alarm(env, arrive).set_now()
+            Alarm(env, deliver).set_now()
 
 
 class Adapter:
@@ -44,7 +44,7 @@ class Adapter:
         self._without_design: frozenset[str] = frozenset()  # functions, as far as that is recorded
 
     def is_in_force(self, plan: Plan) -> bool:
-        """Whether carrying a plan out would neither change a mode nor record anything."""
+        """Tell whether carrying a plan out would neither change a mode nor record anything."""
         current_mode = self._system.modes.current_mode
         for decision in plan.decisions:
             if decision.design is not None and current_mode(decision.function) != decision.design:

@@ -49,7 +49,7 @@ class Knowledge(Protocol):
         """The quality attributes of which some function design expects a value."""
 
     def distinguished(self, measured: Collection[float]) -> Hashable:
-        """What the rules can tell of measured values: states in which it is equal lead to equal conclusions."""
+        """Give what the rules can tell of measured values: where it is equal, conclusions are."""
 
     def analyze(self, state: KnowledgeState) -> Inference:
         """Infer what the rules say about a state."""
@@ -112,7 +112,7 @@ class ManagedSystem:
         return float(self.env.now)
 
     def measured(self, attribute: str, since_s: float = 0.0) -> float | None:
-        """Value of a quality attribute, such as water_visibility, that was published last, not before `since_s`.
+        """Look up the value of a quality attribute, such as water_visibility, published last, not before `since_s`.
 
         None if there is none; a repetition of the value before is not a publication.
         """
@@ -122,7 +122,7 @@ class ManagedSystem:
         return measurements.values[published - 1] if measurements.times_s[published - 1] >= since_s else None
 
     def first_cycle_s(self) -> float:
-        """When metacontrol's first cycle is due: in step with the other timers, or with a phase drawn for the run."""
+        """Find when metacontrol's first cycle is due: in step with other timers, or with a phase drawn for the run."""
         period_s = self.scenario.managers.metacontrol.reasoning_period_s
         in_step = "metacontrol" in self.scenario.revision.timers_in_step
         return period_s if in_step else self.stream("metacontrol/phase").uniform(0.0, period_s)
@@ -137,7 +137,7 @@ class ManagedSystem:
         return self.modes.change_mode(function, mode, latency_s)
 
     def file(self, name: str) -> Path:
-        """Where an input file of the manager's is on this machine.
+        """Find an input file of the manager's on this machine.
 
         Args:
             name: as `ManagingSubsystem.input_files` gave it.

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 @dataclass(eq=False)
 class Behaviour:
-    """A part of a behaviour tree, ticked as a whole: nothing here takes longer than a tick.
+    """A part of a behaviour tree; nothing here takes longer than a tick.
 
     Attributes:
         name: for drawings and timelines.
@@ -30,7 +30,7 @@ class Behaviour:
         raise NotImplementedError
 
     def all(self) -> Iterator[Behaviour]:
-        """This part and those below, depth first."""
+        """Go through this part and those below, depth first."""
         yield self
         for child in self.children:
             yield from child.all()

@@ -59,7 +59,7 @@ class BehaviourTree(FunctionsManager):
             self.system.log("tick", requested)
 
     def drawing(self) -> str:
-        """The tree as text."""
+        """Draw the tree as text."""
         return behaviours.drawing(self.root)
 
     @property

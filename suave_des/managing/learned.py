@@ -39,7 +39,7 @@ class Learned:
     learned: dict[str, Any]
 
     def text(self) -> str:
-        """The file.
+        """Write the file's content.
 
         Raises:
             InputError: what was learned cannot be written as JSON.

@@ -98,7 +98,7 @@ class Metacontrol(ManagingSubsystem):
                     self.measurements[attribute] = value
 
     def measured(self, attribute: str) -> float | None:
-        """The value of a quality attribute that `monitor` takes; none if nothing was published."""
+        """Look up the value of a quality attribute for `monitor`; none if nothing was published."""
         return self.system.measured(attribute, self._listens_since_s)
 
     def analyze(self) -> Inference:
@@ -194,14 +194,14 @@ class Metacontrol(ManagingSubsystem):
         return conclusion
 
     def _symbolic_state(self) -> Hashable:
-        """The state, with regions in place of measured values, unless the mission is recorded: then with the values."""
+        """Make the key of the state: with regions of measured values, or with the values if the mission is recorded."""
         measured = self.measurements.values()
         values = tuple(measured) if self.system.recorded else self._knowledge.distinguished(measured)
         known = tuple(self.objectives.items()), tuple(self.groundings.items()), tuple(self.components.items())
         return known, tuple(self.measurements), values
 
     def _changes_nothing(self, conclusion: Conclusion) -> bool:
-        """Whether executing a plan would change nothing."""
+        """Tell whether executing a plan would change nothing."""
         adds_statuses = self.system.recorded and conclusion.statuses - self._recorded_statuses
         if adds_statuses or RECOVERED in self.components.values():
             return False
@@ -218,7 +218,7 @@ class Metacontrol(ManagingSubsystem):
         return bool(self.objectives) or not self._revision.ignores_diagnostics_without_objective
 
     def _attributes_to_await(self) -> frozenset[str]:
-        """The signals of which some function design expects a value, if cycles wait for the first ones."""
+        """Find the signals of which some function design expects a value, if cycles wait for the first ones."""
         if not self._revision.waits_for_first_measurement:
             return frozenset()
         return self._knowledge.expected_attributes.intersection(self.system.measurements, self.system.scenario.signals)

@@ -1,4 +1,4 @@
-"""Managers made of a py_trees tree of one's own (extra bt)."""
+"""Managers made of a user-defined tree of py_trees (extra bt)."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from py_trees.common import Status
 
 from suave_des.managing.base import FunctionsManager, ManagedSystem
 
-MOST_TICKED: Final = 100_000
-"""So many behaviours a tick may go through; more, and it is taken not to end."""
+MAX_TICKED: Final = 100_000
+"""A tick that goes through more behaviours than this is taken not to end."""
 
 
 class PyTreesManager(FunctionsManager):
     """Base of managers that tick a tree of py_trees; derive from it, and make the tree.
 
-    The setting `tick_period_s` (0.1 s) under managers: is the period. Each tick that comes to something else than the
-    one before is in the timeline of a recorded mission.
+    The setting `tick_period_s` (0.1 s) under managers: is the period. Each tick whose outcome differs from that of
+    the one before is in the timeline of a recorded mission.
 
     Attributes:
         root: of the tree.
@@ -47,11 +47,11 @@ class PyTreesManager(FunctionsManager):
         raise NotImplementedError("derive from PyTreesManager, and return the root of your tree from make_tree")
 
     def condition(self, name: str, holds: Callable[[], bool]) -> Behaviour:
-        """A behaviour that succeeds while something holds."""
+        """Make a behaviour that succeeds while something holds."""
         return _Condition(name, holds)
 
     def set_mode(self, function: str, mode: str) -> Behaviour:
-        """A behaviour that requests a mode, and succeeds; it fails while nothing needs the function."""
+        """Make a behaviour that requests a mode, and succeeds; it fails while nothing needs the function."""
         return _SetMode(self, function, mode)
 
     def adapt(self) -> None:
@@ -61,8 +61,8 @@ class PyTreesManager(FunctionsManager):
             RuntimeError: the tick does not end.
         """
         for ticked_before, behaviour in enumerate(self.root.tick()):
-            if ticked_before >= MOST_TICKED:
-                problem = f"a tick of the tree does not end: {MOST_TICKED:,} behaviours so far"
+            if ticked_before >= MAX_TICKED:
+                problem = f"a tick of the tree does not end: {MAX_TICKED:,} behaviours so far"
                 raise RuntimeError(f"{problem}, the last one {behaviour.name!r}")
         if not self.system.recorded:
             return
@@ -74,13 +74,13 @@ class PyTreesManager(FunctionsManager):
             self.system.log("tick", ticked)
 
     def drawing(self) -> str:
-        """The tree as text."""
+        """Draw the tree as text."""
         text: str = py_trees.display.unicode_tree(self.root)
         return text.rstrip("\n")
 
 
 def _is_ticked_leaf(behaviour: Behaviour) -> bool:
-    """Whether a behaviour was ticked, and is not made of others."""
+    """Tell whether a behaviour was ticked, and has no children."""
     return not behaviour.children and behaviour.status != Status.INVALID
 
 

@@ -88,7 +88,7 @@ class Threshold(FunctionsManager):
             self.system.change_mode(function, mode)
 
     def wanted(self, visibility_m: float | None) -> Iterator[tuple[str, str]]:
-        """The mode that fits, of each function; a visibility that is not known yet counts as good."""
+        """Choose the mode that fits, for each function; a visibility that is not known yet counts as good."""
         for function in self.functions:
             if function == MAINTAIN_MOTION:
                 yield function, "fd_recover_thrusters" if self.failed else "fd_all_thrusters"
@@ -103,7 +103,7 @@ class Threshold(FunctionsManager):
 class Oracle(Threshold):
     """oracle: the same decisions from the true visibility, at once and without latency.
 
-    What is left between it and a manager of the same thresholds is the price of measuring, deciding and changing modes.
+    The difference to a manager of the same thresholds is the cost of measuring, deciding and changing modes.
     """
 
     def __init__(self, system: ManagedSystem) -> None:

@@ -34,7 +34,7 @@ class RandomManager(ManagingSubsystem):
         super().__init__(system)
         self.period_s = system.scenario.managers.random.adaptation_period_s
         self._stream = system.stream("random_manager/picks")
-        # Timers of nodes run since launch: the phase at t = 0 is another one in each run.
+        # Timers of nodes run since launch: the phase at t = 0 differs from run to run.
         self.starts_s = system.stream("random_manager/phase").uniform(0.0, self.period_s)
         self._functions: tuple[str, ...] = ()
 
@@ -45,7 +45,7 @@ class RandomManager(ManagingSubsystem):
             self.adapt()
 
     def task_cancelled(self, task: Task) -> None:
-        """Forget them, and set them to fd_unground."""
+        """Forget the task's functions, and set them to fd_unground."""
         self._functions = ()
         super().task_cancelled(task)
 

@@ -59,7 +59,7 @@ class DiagnosticsBus:
             self._subscribers[kind].append(subscriber)
 
     def has_subscribers(self, kind: Kind) -> bool:
-        """Whether anybody subscribes to a kind of diagnostic."""
+        """Tell whether anybody subscribes to a kind of diagnostic."""
         return bool(self._subscribers[kind])
 
     def publish(self, diagnostic: Diagnostic) -> None:

@@ -25,7 +25,7 @@ Crossings = tuple[list[float], list[int]]
 
 
 def region_of(value: float, thresholds: Thresholds) -> int:
-    """Number of a value's region."""
+    """Find the number of a value's region."""
     return bisect_left(thresholds, value) + bisect_right(thresholds, value)
 
 
@@ -45,16 +45,16 @@ class Measured(Protocol):
         """The values that were published, and those that will be if it is tabulated."""
 
     def count_until(self, t_s: float) -> int:
-        """How many values are published until mission time t."""
+        """Count the values that are published until mission time t."""
 
     def value(self, t_s: float) -> float | None:
-        """The value that was published last at mission time t; none before the first."""
+        """Look up the value that was published last at mission time t; none before the first."""
 
     def region(self, t_s: float, thresholds: Thresholds) -> int:
-        """Region of the value that was published last at mission time t."""
+        """Find the region of the value that was published last at mission time t."""
 
     def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
-        """First time after mission time t at which the region changes, or, if that is not known, may change."""
+        """Find the first time after mission time t at which the region changes, or may change if that is not known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,11 +75,11 @@ class Measurements:
     _crossings: dict[Thresholds, Crossings] = field(default_factory=dict, repr=False, compare=False)
 
     def count_until(self, t_s: float) -> int:
-        """How many values are published until mission time t."""
+        """Count the values that are published until mission time t."""
         return bisect_right(self.times_s, t_s)
 
     def crossings(self, thresholds: Thresholds) -> Crossings:
-        """The measurements that are in another region than the one before; the first one counts."""
+        """Find the measurements that are in another region than the one before; the first one counts."""
         crossings = self._crossings.get(thresholds)
         if crossings is None:
             indices, regions = _crossing_indices(self.arrays[1].tobytes(), thresholds)
@@ -87,24 +87,24 @@ class Measurements:
         return crossings
 
     def region(self, t_s: float, thresholds: Thresholds) -> int:
-        """Region of the value that was published last at mission time t."""
+        """Find the region of the value that was published last at mission time t."""
         times_s, regions = self.crossings(thresholds)
         passed = bisect_right(times_s, t_s)
         return regions[passed - 1] if passed else -1
 
     def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
-        """Time of the first value after mission time t that is in another region than the one before; inf: none is."""
+        """Find the time of the first value after mission time t in another region than the one before; or inf."""
         times_s, _ = self.crossings(thresholds)
         passed = bisect_right(times_s, t_s)
         return times_s[passed] if passed < len(times_s) else math.inf
 
     def value(self, t_s: float) -> float | None:
-        """The value that was published last at mission time t; none before the first."""
+        """Look up the value that was published last at mission time t; none before the first."""
         published = self.count_until(t_s)
         return self.values[published - 1] if published else None
 
     def next_message_s(self, t_s: float) -> float:
-        """Time of the first message, changed or not, at or after t."""
+        """Find the time of the first message, changed or not, at or after t."""
         return tick_at_or_after(t_s, self.phase_s, self.period_s)
 
 
@@ -144,11 +144,11 @@ def measure(
     period_s, phase_s = timing.period_s, timing.phase_s
     messages = max(0, math.floor((duration_s - phase_s) / period_s)) + 1
     times: Array = phase_s + period_s * np.arange(messages, dtype=np.float64)
-    read_at = times
+    read_s = times
     if (step_s := timing.time_step_s) > 0.0:
         # A time within a millionth of a step below a multiple counts as it: timers add up rounding errors.
-        read_at = np.floor(times / step_s + 1e-6) * step_s
-    values, changes = _sampled(signal, read_at.tobytes())
+        read_s = np.floor(times / step_s + 1e-6) * step_s
+    values, changes = _sampled(signal, read_s.tobytes())
     if noise is not None:
         values = values + np.array([noise() for _ in range(len(times))])
     if is_lost is not None:
@@ -162,7 +162,7 @@ def measure(
 
 
 def _changes(values: Array) -> tuple[IntArray, Array, tuple[float, ...]]:
-    """Indices of the values that differ from the one before, as the first one does, and these values, twice."""
+    """Find the values that differ from the one before, the first one too: indices, values, and these as numbers."""
     indices = np.flatnonzero(np.diff(values, prepend=np.nan))
     return indices, values[indices], tuple(values[indices].tolist())
 
@@ -172,7 +172,7 @@ def _changes(values: Array) -> tuple[IntArray, Array, tuple[float, ...]]:
 
 @lru_cache(maxsize=16)
 def _sampled(signal: Signal, times_s: bytes) -> tuple[Array, tuple[IntArray, Array, tuple[float, ...]]]:
-    """Values of a signal at some times, and their changes."""
+    """Read a signal at some times; return the values, and their changes."""
     times = np.frombuffer(times_s)
     first, _, different_s = _changes(times)
     values = np.repeat([signal(t_s) for t_s in different_s], np.diff(first, append=len(times)))
@@ -181,7 +181,7 @@ def _sampled(signal: Signal, times_s: bytes) -> tuple[Array, tuple[IntArray, Arr
 
 @lru_cache(maxsize=64)
 def _crossing_indices(values: bytes, thresholds: Thresholds) -> tuple[list[int], list[int]]:
-    """Indices of the values that are in another region than the one before, and the regions' numbers."""
+    """Find the values that are in another region than the one before: indices, and the regions' numbers."""
     measured = np.frombuffer(values)
     regions = np.searchsorted(thresholds, measured) + np.searchsorted(thresholds, measured, side="right")
     indices = np.flatnonzero(np.diff(regions, prepend=-1))
@@ -221,7 +221,7 @@ class BatteryLevel:
         self._next_s = self.timing.phase_s
 
     def count_until(self, t_s: float) -> int:
-        """How many values are published until mission time t, which must not lie in the future."""
+        """Count the values that are published until mission time t, which must not lie in the future."""
         while self._next_s <= t_s:
             if at_station := self.is_at_station(self._next_s):
                 self._full_at_s = self._next_s
@@ -235,12 +235,12 @@ class BatteryLevel:
         return bisect_right(self.times_s, t_s)
 
     def value(self, t_s: float) -> float | None:
-        """The level that was published last at mission time t; none before the first."""
+        """Look up the level that was published last at mission time t; none before the first."""
         published = self.count_until(t_s)
         return self.values[published - 1] if published else None
 
     def level(self, t_s: float) -> float:
-        """The true level at mission time t, which is now."""
+        """Compute the true level at mission time t, which is now."""
         self.count_until(t_s)
         return self._level(t_s)
 
@@ -248,19 +248,19 @@ class BatteryLevel:
         return max(0.0, 1.0 - (t_s - self._full_at_s) / self.discharge_time_s)
 
     def region(self, t_s: float, thresholds: Thresholds) -> int:
-        """Region of the level that was published last at mission time t."""
+        """Find the region of the level that was published last at mission time t."""
         published = self.count_until(t_s)
         return region_of(self.values[published - 1], thresholds) if published else -1
 
     def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
-        """Time from which on a level after t, which is now, can be in another region; it depends on the vehicle's way.
+        """Find the earliest time after t, which is now, at which the level can be in another region.
 
-        The level falls, or is back at 1 at once. In the region that 1 is in, only falling leads to another one; to wait
-        until then takes a fifth less CPU time in a mission of bt_extended.
+        The level falls, or is back at 1 at once. In the region that 1 is in, only falling leads to another one; waiting
+        until then saves a fifth of the CPU time of a mission of bt_extended.
         """
         region = self.region(t_s, thresholds)
         if self.noise is not None or region != region_of(1.0, thresholds):
             return self._next_s
-        least = max([each for each in thresholds if each <= 1.0], default=-math.inf)
-        falls_s = (1.0 - least) * self.discharge_time_s
+        threshold = max([each for each in thresholds if each <= 1.0], default=-math.inf)
+        falls_s = (1.0 - threshold) * self.discharge_time_s
         return max(self._next_s, self._full_at_s + falls_s - self.timing.period_s)

@@ -21,13 +21,13 @@ def signal_monitor(env: simpy.Environment, bus: DiagnosticsBus, measurements: Me
 
 def battery_monitor(env: simpy.Environment, bus: DiagnosticsBus, level: BatteryLevel) -> Process:
     """Publish the battery's level, once a period."""
-    known = 0
+    published_before = 0
     yield until(env, level.timing.phase_s)
     while True:
         published = level.count_until(env.now)
-        if published > known:  # or the message was lost
+        if published > published_before:  # else the message was lost
             bus.publish(Diagnostic(env.now, Kind.QA_STATUS, level.key, level.values[published - 1]))
-        known = published
+        published_before = published
         yield env.timeout(level.timing.period_s)
 
 

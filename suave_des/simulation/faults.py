@@ -12,7 +12,7 @@ from suave_des.vehicle.vehicle import Vehicle
 
 
 def schedule(scenario: Scenario, chance: Chance) -> list[ScheduledEvent]:
-    """The thruster events of a run, with the times that were drawn for it."""
+    """List the thruster events of a run, with the times that are drawn for it."""
     times_s = [
         chance.draw(f"thruster_events.{number}.time_s", event.time_s, least=0.0)
         for number, event in enumerate(scenario.thruster_events)
@@ -43,7 +43,7 @@ class ThrusterFaults:
     listeners: list[Callable[[], None]] = field(default_factory=list, init=False)
     unrecoverable: set[int] = field(default_factory=set, init=False)
 
-    def happens(self, t_s: float, event: ScheduledEvent) -> None:
+    def apply(self, t_s: float, event: ScheduledEvent) -> None:
         """Apply one of the scenario's events at mission time t."""
         if event.fails and self._is_without_effect(t_s, event):
             self.log("thruster_monitor", "failure_without_effect", thruster_name(event.thruster))
@@ -61,7 +61,7 @@ class ThrusterFaults:
             listener()
 
     def _is_without_effect(self, t_s: float, event: ScheduledEvent) -> bool:
-        """Whether a failure does not reach the vehicle."""
+        """Tell whether a failure has no effect on the vehicle."""
         failures = self.scenario.revision.thruster_failures
         if t_s < failures.effective_from_s:
             return True

@@ -15,13 +15,13 @@ if TYPE_CHECKING:  # or a process that only hands out missions would load the ve
 
 
 def built_in_functions(scenario: Scenario) -> tuple[str, ...]:
-    """The functions that the exemplar has, in a mission of this scenario."""
+    """List the functions that the exemplar has, in a mission of this scenario."""
     recharge = () if scenario.battery is None else (GENERATE_RECHARGE_PATH,)
     return *MISSION_FUNCTIONS, *recharge, *(() if scenario.leak is None else (SURFACE,))
 
 
 def own_functions(loaded: LoadedScenario) -> dict[str, type[OwnFunction]]:
-    """The classes of a scenario's further functions, by the name of the function.
+    """Find the classes of a scenario's further functions, by the name of the function.
 
     They are named under `functions:`; one that a package registers under the function's own name needs no entry.
 

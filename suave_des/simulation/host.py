@@ -131,7 +131,7 @@ class ManagerHost:
             requests = modes.requests
             adaptation = self._guarded(self.manager.adapt)
             if adaptation is not None:
-                yield from self._guarded_steps(adaptation)
+                yield from self._guarded_process(adaptation)
             if adaptation is not None or modes.requests > requests:
                 self._idle_regions.clear()
             while due_s <= env.now:
@@ -162,7 +162,7 @@ class ManagerHost:
             return tick_s
 
     def _next_event_s(self, due_s: float, period_s: float) -> float:
-        """First time of `adapt` at which measured values lie, or may lie, outside all idle regions."""
+        """Find the first time of `adapt` at which measured values lie, or may lie, outside all idle regions."""
         tick_s = self.system.env.now
         while True:
             event_s = min(
@@ -178,13 +178,13 @@ class ManagerHost:
     def _regions(self, t_s: float) -> tuple[int, ...]:
         return tuple([each.region(t_s, thresholds) for each, thresholds in self._depends_on])
 
-    def _guarded_steps(self, adaptation: AdaptationProcess) -> Process:
+    def _guarded_process(self, adaptation: AdaptationProcess) -> Process:
         resume: Callable[[Any], object] = adaptation.send
-        outcome, steps, since_s = None, 0, self.system.env.now
+        outcome, yields, since_s = None, 0, self.system.env.now
         while True:
-            steps, since_s = (steps + 1, since_s) if self.system.env.now == since_s else (0, self.system.env.now)
+            yields, since_s = (yields + 1, since_s) if self.system.env.now == since_s else (0, self.system.env.now)
             try:
-                if steps > _MAX_YIELDS_AT_ONE_TIME:
+                if yields > _MAX_YIELDS_AT_ONE_TIME:
                     raise RuntimeError(f"adapt yielded {_MAX_YIELDS_AT_ONE_TIME} events, and no mission time passed")
                 event = resume(outcome)
                 if not isinstance(event, simpy.Event):
@@ -206,7 +206,7 @@ class ManagerHost:
 
 
 def _tick_at_or_after(t_s: float, due_s: float, period_s: float) -> float:
-    """First of due_s, due_s + period_s, ... (summed, rounding included) that is not before t."""
+    """Find the first of due_s, due_s + period_s, ... (summed, rounding included) that is not before t."""
     while due_s < t_s:
         due_s += period_s
     return due_s

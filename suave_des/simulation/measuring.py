@@ -13,7 +13,7 @@ _DELIVERY_S = 0.01
 def monitor_timing(
     scenario: Scenario, chance: Chance, monitor: str, period_s: float, time_step_s: float = 0.0
 ) -> MonitorTiming:
-    """When a monitor measures in a run: in step with the other timers, or with a phase that is drawn."""
+    """Find when a monitor measures in a run: in step with the other timers, or with a phase that is drawn."""
     in_step = "monitors" in scenario.revision.timers_in_step
     return MonitorTiming(period_s, period_s + _DELIVERY_S if in_step else chance.phase(monitor, period_s), time_step_s)
 

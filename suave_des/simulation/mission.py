@@ -153,7 +153,7 @@ class MissionRun:
             raise self._host.mission_error(error) from error
 
     def metrics(self) -> MissionMetrics:
-        """The metrics, as of now if the mission is not over."""
+        """Compute the metrics, as of now if the mission is not over."""
         coordinator, detector = self._coordinator, self._detector
         found = coordinator.search_time_s is not None
         x_m, y_m = self._prepared.points[detector.first_point, :2].tolist() if found else (None, None)
@@ -251,7 +251,7 @@ class MissionRun:
         )
         battery = self._scenario.battery
         if self._battery is not None and battery is not None and battery.mission_ends_at_level is not None:
-            coordinator.end_with(self._battery, battery.mission_ends_at_level)
+            coordinator.end_at_battery_level(self._battery, battery.mission_ends_at_level)
         if self._scenario.leak is not None:
             detected = coordinator.leak_handler(self._surface.surfaced)
             self.env.process(leak_monitor(self.env, self.bus, self._chance.value("leak.time_s"), detected))
@@ -310,7 +310,7 @@ class MissionRun:
     # The beginning.
 
     def _begin(self) -> None:
-        """Start what goes on by itself."""
+        """Start the coordinator, the monitors and the manager."""
         self._coordinator.start(self._host.request, self._host.cancel)
         self._start_monitors()
         self._coordinator.ended.callbacks.append(StopSimulation.callback)  # or `advance` would run past it
@@ -340,7 +340,7 @@ class MissionRun:
             schedule(self._scenario, self._chance),
             monitors.thruster_event_times == "after_previous",
         )
-        self.env.process(thruster_monitor(self.env, bus, events, self._faults.happens, timing, after_previous))
+        self.env.process(thruster_monitor(self.env, bus, events, self._faults.apply, timing, after_previous))
 
     def _publish_detection(self, _: simpy.Event) -> None:
         point = float(self._detector.first_point or 0)

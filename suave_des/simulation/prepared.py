@@ -59,7 +59,7 @@ class PreparedScenario:
         return open_knowledge(self.loaded)
 
     def learned(self, manager: str) -> Mapping[str, Any]:
-        """What a manager has learned: in training what it may change, else the content of its file, if it has one.
+        """Give what a manager has learned: in training what it may change, else the content of its file, if it has one.
 
         Raises:
             InputError: the file cannot be read, or has something else in it.
@@ -73,7 +73,7 @@ class PreparedScenario:
         return self._learned[manager]
 
     def manager_files(self, manager: str) -> Mapping[str, Path]:
-        """Where the files are that a manager declares, by their names as given.
+        """Find the files that a manager declares, by their names as given.
 
         Raises:
             InputError: one is not there.

@@ -17,7 +17,7 @@ from suave_des.vehicle.vehicle import CurrentWave, Point, Vehicle
 
 @lru_cache(maxsize=64)
 def vehicle_model(description: VehicleDescription) -> VehicleModel:
-    """The constants of a vehicle; equal descriptions give the same object, by which its matrices are cached."""
+    """Give a vehicle's constants; equal descriptions give the same object, by which its matrices are cached."""
     return VehicleModel(
         mass_kg=description.mass_kg,
         inertia_kg_m2=description.inertia_kg_m2,
@@ -89,7 +89,7 @@ def make_vehicle(
 
 
 def _current(scenario: Scenario, chance: Chance) -> tuple[Point, CurrentWave]:
-    """The constant part of the current, and the one that varies over time."""
+    """Draw the current: its constant part, and the one that varies over time."""
     value, wave = chance.value, scenario.current.wave
     x, y, z = (value(f"current.{axis}_m_per_s") for axis in "xyz")
     if wave is None:

@@ -44,7 +44,7 @@ class Autopilot(NamedTuple):
 
 @lru_cache(maxsize=64)
 def kernel_parameters(model: VehicleModel, autopilot: Autopilot, z_limits_m: tuple[float, float]) -> Array:
-    """Constants of vehicle and autopilot, in the order of the places that `kernel` names; in water at rest."""
+    """Put the constants of vehicle and autopilot into the places that `kernel` names, in water at rest."""
     ap = autopilot
     # An integral may ask for as much as the four horizontal thrusters together give along one axis, and no more.
     integral_limit = 4.0 * model.thrust_limit_n * math.sqrt(0.5) / model.mass_kg

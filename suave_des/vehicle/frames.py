@@ -18,7 +18,7 @@ class Pose(NamedTuple):
 
 
 def quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> tuple[float, float, float, float]:
-    """Unit quaternion (w, x, y, z) of Euler angles (Handbook, 2.2.3)."""
+    """Convert Euler angles to a unit quaternion (w, x, y, z) (Handbook, 2.2.3)."""
     cr, cp, cy = cos(roll_rad / 2), cos(pitch_rad / 2), cos(yaw_rad / 2)
     sr, sp, sy = sin(roll_rad / 2), sin(pitch_rad / 2), sin(yaw_rad / 2)
     w, x = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
@@ -26,7 +26,7 @@ def quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> tuple[float
 
 
 def euler_angles(attitude: Array) -> tuple[float, float, float]:
-    """Roll, pitch and yaw in rad of a unit quaternion (w, x, y, z), shape (4,) (Handbook, 2.2.3)."""
+    """Convert a unit quaternion (w, x, y, z), shape (4,), to roll, pitch and yaw in rad (Handbook, 2.2.3)."""
     w, x, y, z = attitude.tolist()
     roll = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     pitch = asin(min(1.0, max(-1.0, 2.0 * (w * y - z * x))))

@@ -19,7 +19,7 @@ from suave_des.compiling import Array
 from suave_des.vehicle.vehicle import ArrivalCheck, Vehicle
 
 QUEUED_WAYPOINTS: Final = 20
-"""At most so many way-points are queued at a time, besides the present one: with 10 missions take 7% more CPU time."""
+"""Way-points that are queued at a time, besides the present one; with 10, missions take 7% more CPU time."""
 
 
 class OneShotTimer(Protocol):
@@ -43,11 +43,11 @@ class WaypointSource(Protocol):
     """What guidance asks of a function that generates way-points."""
 
     def tick(self) -> None:
-        """Called at a timer tick, before guidance acts; does nothing by default."""
+        """React to a timer tick, before guidance does. By default: nothing."""
         return
 
     def waypoints(self, count: int) -> Array:
-        """At most `count` way-points from the present one on: x, y, z in the first three columns, shape (n, >= 3).
+        """Give at most `count` way-points from the present one on: x, y, z in the first three columns, shape (n, >= 3).
 
         None is left when the last one has been reached.
         """
@@ -57,7 +57,7 @@ class WaypointSource(Protocol):
         return
 
     def set_point_z_m(self) -> float:
-        """The z to send, which need not be the way-point's."""
+        """Give the z to send, which need not be the way-point's."""
 
     def reached(self, count: int) -> None:
         """Go on by `count` way-points: the present one, and those after it, have been reached."""
@@ -116,7 +116,7 @@ class SetPointSender:
         return is_lost
 
     def _draw(self) -> int:
-        """How many messages arrive until one is lost: the geometric distribution, by inversion."""
+        """Draw how many messages arrive until one is lost: the geometric distribution, by inversion."""
         if self.stream is None or self.loss_probability == 0.0:
             return 0
         return int(math.log(1.0 - self.stream.random()) / math.log(1.0 - self.loss_probability))
@@ -152,7 +152,7 @@ class Guidance:
         self.sender.vehicle.control_listeners.append(self._control_changed)
 
     def start_at(self, t_s: float, *, resumes: bool = False) -> None:
-        """Tick from mission time t on, and send the present way-point, unless the one sent last before is resumed."""
+        """Tick from mission time t on, and send the present way-point, unless the one that was sent last is resumed."""
         self._is_due, self._is_repeated = not resumes, self._is_repeated and resumes
         self._arrivals, self._act_at, self._is_planned = [], 0, False
         if t_s > self._timer.now_s:
@@ -175,8 +175,8 @@ class Guidance:
         if self._check is not None:
             self._count_arrivals(self._last_tick(self._check))
 
-    def way_changed(self) -> None:
-        """Plan again at the next tick: the function's way-points have changed (call `catch_up` before they do)."""
+    def waypoints_changed(self) -> None:
+        """Plan again at the next tick, as the function's way-points have changed (call `catch_up` before they do)."""
         check = self._check
         if check is not None and self._act_at > (tick := self._last_tick(check)):
             self._is_acting = True

@@ -66,7 +66,7 @@ Dynamics = tuple[float, Array, Array, Array, Array]
 
 @compiled
 def quarter_of_leg(length: float, jerk: float) -> float:
-    """Time of a quarter of a leg from rest to rest, flown with a constant jerk that changes its sign twice."""
+    """Compute a quarter of the time of a leg from rest to rest, at a constant jerk that changes its sign twice."""
     return float((length / (2.0 * jerk)) ** (1.0 / 3.0))
 
 
@@ -148,20 +148,20 @@ def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
         # Guided autopilot. Its target moves along the leg: jerk +, -, -, + for a quarter of the leg's time each.
         wx, wy, wz = r00 * u + r01 * v + r02 * w, r10 * u + r11 * v + r12 * w, r20 * u + r21 * v + r22 * w
         leg_time += h
-        way, speed = length, 0.0
+        distance, speed = length, 0.0
         left = min(leg_time, 4.0 * quarter - leg_time)  # time to the nearer end
         if left > 0.0:
             if left < quarter:
                 speed = 0.5 * prm[JERK] * left * left
-                way = speed * left / 3.0
+                distance = speed * left / 3.0
             else:
                 left = 2.0 * quarter - left  # time to the middle
-                way = left * left * prm[JERK]
-                speed = top_speed - 0.5 * way
-                way = 0.5 * length - left * (top_speed - way / 6.0)
+                slower = 0.5 * (left * left * prm[JERK])
+                speed = top_speed - slower
+                distance = 0.5 * length - left * (top_speed - slower / 3.0)
             if leg_time > 2.0 * quarter:
-                way = length - way
-        ex, ey, ez = from_x + way * along_x - x, from_y + way * along_y - y, from_z + way * along_z - z
+                distance = length - distance
+        ex, ey, ez = from_x + distance * along_x - x, from_y + distance * along_y - y, from_z + distance * along_z - z
         # Outer loop: position error to velocity, besides the target's own. Inner loop: proportional-integral on the
         # velocity's error in the world frame, demanded as a force in the body frame.
         ex = prm[POSITION_GAIN] * ex + along_x * speed - wx

@@ -57,14 +57,14 @@ class VehicleModel:
 
 @cache
 def allocation_matrix(model: VehicleModel) -> Array:
-    """B in tau = B u, shape (6, number of thrusters): column i is the wrench of thruster i at 1 N (Handbook, 12.3)."""
+    """Compute B in tau = B u, shape (6, number of thrusters); column i: thruster i's wrench at 1 N (Handbook, 12.3)."""
     wrenches = [(*each.direction, *np.cross(each.position_m, each.direction)) for each in model.thrusters]
     return _read_only(np.array(wrenches).T)
 
 
 @cache
 def autopilot_allocation(model: VehicleModel) -> Array:
-    """Pseudo-inverse of B, shape (number of thrusters, 6): how an autopilot spreads a demanded wrench.
+    """Compute B's pseudo-inverse, shape (number of thrusters, 6), by which an autopilot spreads a demanded wrench.
 
     The autopilot allocates as if every thruster worked; a wrench that no thruster can make (pitch, on a BlueROV2) gets
     none.

@@ -41,11 +41,11 @@ class ArrivalCheck:
     resend_again_ticks: int
 
     def time_s(self, tick: int) -> float:
-        """Time of a tick."""
+        """Give the time of a tick."""
         return self.start_s + tick * self.period_s
 
     def last_tick_until(self, t_s: float) -> int:
-        """Number of the last tick until time t; one at t counts, as it comes before whatever else happens then."""
+        """Find the last tick until time t; one at t counts, as it comes before whatever else happens then."""
         tick = math.floor((t_s - self.start_s) / self.period_s + 1e-9)
         return tick if self.time_s(tick) <= t_s else tick - 1
 
@@ -60,7 +60,7 @@ class _Queue(NamedTuple):
     sent_as_m: Point
 
     def sent_until(self, t_s: float) -> int:
-        """How many are sent until time t."""
+        """Count those that are sent until time t."""
         return bisect_right(self.ticks, self.check.last_tick_until(t_s))
 
 
@@ -78,7 +78,7 @@ class CurrentWave(NamedTuple):
     shift_s: float = 0.0
 
     def parameters(self) -> tuple[float, float, float, float]:
-        """What `kernel.advance` needs of it: east and north, angle per row of the track, and at row 0."""
+        """Give what `kernel.advance` needs of it: east and north, angle per row of the track, and at row 0."""
         rate = 2.0 * math.pi / self.period_s
         return *self.amplitude_m_per_s, rate * STEP_S, rate * self.shift_s
 
@@ -190,7 +190,7 @@ class Vehicle:
         sent_as_m = *sent_as_m[:2], sent_as_m[2] + self.altitude_error_m
         if send:
             self._cancel_after(t_s)
-            self._take(waypoints, 0, sent_as_m, new=1)
+            self._replace_set_point(waypoints, 0, sent_as_m, new=1)
         elif self._queue is not None and self._queue.sent_until(t_s) < len(self._queue.ticks):
             waypoints = waypoints[:1]
         count, before = len(waypoints), self._set_point.copy()
@@ -216,16 +216,16 @@ class Vehicle:
             self._notify(t_s)
 
     def position(self, t_s: float) -> Point:
-        """Position x, y, z in m at time t."""
+        """Read the position at time t: x, y, z in m."""
         row = self._row(t_s)
         return self.track.item(row, 0), self.track.item(row, 1), self.track.item(row, 2)
 
     def pose(self, t_s: float) -> Pose:
-        """Pose eta at time t."""
+        """Read the pose eta at time t."""
         return Pose(*self.position(t_s), *euler_angles(self.track[self._row(t_s), kernel.ATTITUDE]))
 
     def nu(self, t_s: float) -> tuple[float, ...]:
-        """Velocity nu in the body frame at time t, six components in m/s and rad/s."""
+        """Read the velocity nu at time t: body frame, six components in m/s and rad/s."""
         return tuple(self.track[self._row(t_s), kernel.VELOCITY].tolist())
 
     def look_ahead(self, row: int) -> None:
@@ -246,7 +246,7 @@ class Vehicle:
         self.look_ahead(row)
         return row
 
-    def _take(self, waypoints: Array, place: int, sent_as_m: Point, *, new: int) -> None:
+    def _replace_set_point(self, waypoints: Array, place: int, sent_as_m: Point, *, new: int) -> None:
         set_point, (x_m, y_m, z_m) = self._set_point, sent_as_m
         set_point[0], set_point[1] = waypoints.item(place, 0) + x_m, waypoints.item(place, 1) + y_m
         set_point[2] = z_m
@@ -259,7 +259,7 @@ class Vehicle:
         if queue is not None:
             self._set_point[:] = queue.before
             if sent := queue.sent_until(t_s):
-                self._take(queue.waypoints, sent, queue.sent_as_m, new=sent)
+                self._replace_set_point(queue.waypoints, sent, queue.sent_as_m, new=sent)
 
     def _notify(self, t_s: float) -> None:
         row = row_at(t_s)
@@ -268,10 +268,10 @@ class Vehicle:
 
 
 def track_rows(duration_s: float) -> int:
-    """Rows of the track of a mission; each has `kernel.COLUMNS` columns."""
+    """Count the rows of a mission's track; each has `kernel.COLUMNS` columns."""
     return row_at(duration_s) + 2
 
 
 def row_at(t_s: float) -> int:
-    """Row of the track nearest to a mission time, halves to even, as everywhere that times become rows."""
+    """Find the row of the track nearest to a mission time, halves to even, as everywhere that times become rows."""
     return round(t_s / STEP_S)

@@ -15,10 +15,10 @@ _MAX_CELLS = 4_000_000
 
 
 def covered_area_m2(track: Array, last_row: int, visibility_m: Array, sea_bed_z_m: float, view_tangent: float) -> float:
-    """Area of the sea bed that the camera, looking straight down, has seen at least once.
+    """Measure the area of the sea bed that the camera, looking straight down, has seen at least once.
 
-    A place is seen when it is in view, and the height above it is at most the water visibility. Areas are counted in
-    squares of 0.1 m, larger ones for very long tracks.
+    A place is seen when it is in view, and the camera's height above it is at most the water visibility. Areas are
+    counted in squares of 0.1 m, larger ones for very long tracks.
 
     Args:
         track: positions x, y, z in the first three columns, shape (rows, at least 3), m.

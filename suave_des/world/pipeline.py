@@ -10,7 +10,7 @@ from suave_des.compiling import Array, compiled
 
 @cache
 def sample_points(vertices_m: tuple[tuple[float, float, float], ...], points_per_piece: int = 20) -> Array:
-    """Points along the pipeline, shape (pieces * points_per_piece, 3), in m.
+    """Sample points along the pipeline, shape (pieces * points_per_piece, 3), in m.
 
     Each straight piece gives evenly spaced points, its first vertex excluded and its last included.
     """
@@ -21,9 +21,9 @@ def sample_points(vertices_m: tuple[tuple[float, float, float], ...], points_per
 
 
 def there_and_back(points: Array) -> Array:
-    """The way along all points, shape (n, at least 2), and back: x and y in m, shape (2 n, 2).
+    """Make the path along all points, shape (n, at least 2), and back: x and y in m, shape (2 n, 2).
 
-    From its element i on it is the way to follow when point i is seen first: on to the far end, then back along all.
+    From its element i on it is the path to follow when point i is seen first: on to the far end, then back along all.
     """
     return np.concatenate((points[:, :2], points[::-1, :2]))
 
@@ -32,7 +32,7 @@ def there_and_back(points: Array) -> Array:
 def first_point_in_view(
     x_m: float, y_m: float, z_m: float, visibility_m: float, points: Array, view_tangent: float
 ) -> int:
-    """Lowest index of the points that a camera at (x, y, z) sees, -1 if none.
+    """Find the lowest index of the points that a camera at (x, y, z) sees, -1 if none.
 
     With h the vertical distance to a point, the point is in view within h * tan(field of view / 2) in x and in y, and
     visible if h is at most the water visibility. `view_tangent` is the tangent of half the field of view.
@@ -54,7 +54,7 @@ def first_detection(
     points: Array,
     view_tangent: float,
 ) -> tuple[int, int]:
-    """First row from which a point is seen, and the point's index; (-1, -1) if none.
+    """Find the first row from which a point is seen, and the point's index; (-1, -1) if none.
 
     Args:
         track: positions x, y, z in the first three columns, shape (rows, at least 3), m.

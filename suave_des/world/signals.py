@@ -1,4 +1,4 @@
-"""Signals over mission time: what the water, or anything else that is measured, does by itself."""
+"""Signals: quantities over mission time that do not depend on the vehicle, such as the water visibility."""
 
 import math
 from bisect import bisect_right
@@ -11,25 +11,31 @@ Signal = Callable[[float], float]
 
 @lru_cache(maxsize=64)
 def sinusoid(period_s: float, minimum: float, maximum: float, shift_s: float = 0.0) -> Signal:
-    """a cos(2 pi (t + shift) / period) + a + minimum, a = (maximum - minimum) / 2: the exemplar's water visibility."""
+    """Make a sinusoid, the exemplar's water visibility.
+
+    a cos(2 pi (t + shift) / period) + a + minimum, with the amplitude a = (maximum - minimum) / 2.
+    """
     amplitude = (maximum - minimum) / 2.0
     return lambda t_s: amplitude * math.cos(2.0 * math.pi * (t_s + shift_s) / period_s) + amplitude + minimum
 
 
 @lru_cache(maxsize=64)
 def constant(value: float) -> Signal:
-    """The same value all the time."""
+    """Make a signal of one value."""
     return lambda t_s: value
 
 
 @lru_cache(maxsize=64)
 def step(time_s: float, before: float, after: float) -> Signal:
-    """`before` until time_s, `after` from then on."""
+    """Make a step: `before` until time_s, `after` from then on."""
     return lambda t_s: after if t_s >= time_s else before
 
 
 def table(times_s: Sequence[float], values: Sequence[float], *, linear: bool = False) -> Signal:
-    """Values at given times (increasing); between them the value before, or a straight line; the end values outside."""
+    """Make a signal from values at given times, ascending.
+
+    Between two of them it is the value before, or on a straight line; before the first and after the last, their value.
+    """
 
     def value(t_s: float) -> float:
         after = bisect_right(times_s, t_s)

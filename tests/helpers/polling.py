@@ -77,7 +77,7 @@ class PollingGuidance:
         while self._check is not None and self._next_tick <= self._check.last_tick_until(self._timer.now_s):
             self._tick()
 
-    def way_changed(self) -> None:
+    def waypoints_changed(self) -> None:
         """The next tick asks for the way-point anyway."""
 
     def _tick(self) -> None:
