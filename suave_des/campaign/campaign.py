@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Unpack
 
-from suave_des.campaign.executors import InProcess, LocalWorkers, end_worker_of_script
+from suave_des.campaign.executors.local import InProcess, LocalWorkers, end_worker_of_script
 from suave_des.campaign.inputs import (
     check_same,
     check_trusted,
@@ -247,7 +247,7 @@ class _Campaign:
         """Return what runs the missions; a cluster is contacted only when all else is checked."""
         if self.spec.scheduler is None:
             return self._local
-        from suave_des.campaign.dask_cluster import connected
+        from suave_des.campaign.executors.dask_cluster import connected
 
         return self._stack.enter_context(connected(self.spec.scheduler))
 

@@ -214,7 +214,7 @@ class CampaignSpec:
         workers = 1 if self.workers is None else self.workers
         check_workers(workers)
         if self.scheduler is not None:
-            from suave_des.campaign.dask_cluster import check_scheduler
+            from suave_des.campaign.executors.dask_cluster import check_scheduler
 
             check_scheduler(self.scheduler, workers)
         check_seed(self.seed)

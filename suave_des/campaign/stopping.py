@@ -114,7 +114,7 @@ def check_size(job: JobSpec, total: int, workers: int) -> None:
     """
     if total <= LARGE:
         return
-    from suave_des.campaign.mission_runner import MissionRunner
+    from suave_des.campaign.executors.mission_runner import MissionRunner
 
     managers = range(len(job.managers))
     few = tuple(MissionKey(0, manager, run) for manager in managers for run in range(1, _TIMED_RUNS + 1))

@@ -12,9 +12,9 @@ from typing import IO, Any
 
 import pytest
 
-from suave_des.campaign import executors
 from suave_des.campaign.campaign import CampaignInterrupted, resume_campaign, run_campaign
-from suave_des.campaign.mission_runner import MissionRunner
+from suave_des.campaign.executors import local
+from suave_des.campaign.executors.mission_runner import MissionRunner
 from suave_des.campaign.missions import WorkerError
 from suave_des.errors import InputError
 from tests.helpers import AWKWARD
@@ -125,14 +125,14 @@ def test_a_mission_that_takes_too_long_has_failed_and_the_others_go_on(workers: 
 
 
 def test_a_mission_that_cannot_be_interrupted_ends_with_its_worker(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(executors, "_MARGIN_S", 2.0)
+    monkeypatch.setattr(local, "_MARGIN_S", 2.0)
     result = run_campaign("seams2023", [f"{AWKWARD}:BlocksInSome"], 3, 1, 2, time_out_s=8.0)
     assert [(failure.run, failure.cause) for failure in result.failures] == [(2, "not done after 8 s (time-out)")]
     assert result.done == 2
 
 
 def test_it_does_so_too_when_no_other_mission_ends_after_it_began(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(executors, "_MARGIN_S", 1.0)
+    monkeypatch.setattr(local, "_MARGIN_S", 1.0)
     started_s = time.monotonic()
     result = run_campaign("seams2023", [f"{AWKWARD}:BlocksInSome"], 2, 201, 2, time_out_s=1.0)
     assert [failure.run for failure in result.failures] == [1, 2]

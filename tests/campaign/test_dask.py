@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from benchmarks import chaos
-from suave_des.campaign import dask_cluster
 from suave_des.campaign.campaign import CampaignInterrupted, Progress, resume_campaign, run_campaign
+from suave_des.campaign.executors import dask_cluster
 from suave_des.campaign.missions import WorkerError
 from suave_des.campaign.store import STORE_FILE
 from suave_des.errors import InputError

@@ -12,9 +12,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from suave_des.campaign import dask_worker
-from suave_des.campaign.dask_worker import Parcel, Unpacked, pack
-from suave_des.campaign.mission_runner import MissionRunner
+from suave_des.campaign.executors import dask_worker
+from suave_des.campaign.executors.dask_worker import Parcel, Unpacked, pack
+from suave_des.campaign.executors.mission_runner import MissionRunner
 from suave_des.campaign.missions import Finished, JobSpec, MissionFailure, MissionKey
 from suave_des.campaign.own_modules import own_modules
 from suave_des.campaign.variation import Variation

@@ -16,7 +16,7 @@ import pytest
 
 from benchmarks import chaos
 from suave_des.campaign.campaign import resume_campaign, run_campaign
-from suave_des.campaign.executors import LocalWorkers
+from suave_des.campaign.executors.local import LocalWorkers
 from suave_des.campaign.store import LOCK_FILE, NEW_STORE_FILE, STORE_FILE
 
 STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
@@ -119,7 +119,7 @@ class TestInterruptedAtAnAwkwardMoment:
             "suave_des.campaign.campaign.make_store",
             "suave_des.campaign.store.remove_store",
             "suave_des.campaign.campaign.Store.__init__",
-            "suave_des.campaign.executors.InProcess.outcomes",
+            "suave_des.campaign.executors.local.InProcess.outcomes",
         ],
     )
     def test_before_the_first_mission_nothing_is_left(

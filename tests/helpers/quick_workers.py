@@ -59,6 +59,6 @@ def _warm_process() -> None:
 @pytest.fixture
 def quick_workers(_warm_process: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Have campaigns of this process fork their workers."""
-    from suave_des.campaign import executors
+    from suave_des.campaign.executors import local
 
-    monkeypatch.setattr(executors, "SpawnProcess", _Forked)
+    monkeypatch.setattr(local, "SpawnProcess", _Forked)

@@ -1,6 +1,6 @@
 """What a worker process has imported and loaded before its first mission: modules and machine code."""
 
-from suave_des.campaign import mission_runner  # noqa: F401
+from suave_des.campaign.executors import mission_runner  # noqa: F401
 from suave_des.scenario.loader import load_scenario
 from suave_des.simulation.simulator import Simulator
 

@@ -22,7 +22,7 @@ from itertools import islice
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from suave_des.campaign.dask_worker import misfit, needs, pack
+from suave_des.campaign.executors.dask_worker import misfit, needs, pack
 from suave_des.campaign.missions import Chunk, Finished, JobSpec, MissionKey, WorkerError
 from suave_des.errors import InputError, SuaveDesError
 
@@ -180,7 +180,7 @@ def _remote() -> Callable[..., Any]:
     """
 
     def suave_des(name: str, *arguments: Any) -> Any:
-        from suave_des.campaign import dask_worker
+        from suave_des.campaign.executors import dask_worker
 
         return getattr(dask_worker, name)(*arguments)
 

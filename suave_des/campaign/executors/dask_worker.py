@@ -26,7 +26,7 @@ from suave_des.campaign.own_modules import own_modules
 from suave_des.errors import InputError, SuaveDesError
 
 if TYPE_CHECKING:
-    from suave_des.campaign.mission_runner import MissionRunner
+    from suave_des.campaign.executors.mission_runner import MissionRunner
 
 EXIT_AFTER_S = 30.0
 """A mission that is so much over its time, in code that cannot be interrupted, ends its worker."""
@@ -226,7 +226,7 @@ def _unpack(parcel: Parcel, scratch: str) -> Unpacked:
 
 
 def _make_runner(unpacked: Unpacked) -> MissionRunner:
-    from suave_des.campaign.mission_runner import MissionRunner
+    from suave_des.campaign.executors.mission_runner import MissionRunner
 
     for place in unpacked.modules:
         names = place.removesuffix(".py").removesuffix("/__init__").split("/")

@@ -28,7 +28,7 @@ from suave_des.interrupts import INTERRUPTS, signals_deferred
 from suave_des.registry import is_built_in
 
 if TYPE_CHECKING:
-    from suave_des.campaign.mission_runner import MissionRunner
+    from suave_des.campaign.executors.mission_runner import MissionRunner
 
 _LARGEST_CHUNK = 10
 """Missions: few, as chunks under way are lost when a campaign is stopped, and workers are to end together."""
@@ -56,7 +56,9 @@ class InProcess:
 
     def outcomes(self, job: JobSpec, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
         """Yield outcomes mission by mission; see Executor."""
-        from suave_des.campaign.mission_runner import MissionRunner  # with it comes the compiler, which takes a while
+        from suave_des.campaign.executors.mission_runner import (
+            MissionRunner,  # with it comes the compiler, which takes a while
+        )
 
         for finished in MissionRunner(job).each(missions):
             yield [finished]
@@ -356,7 +358,7 @@ def _end_with_parent() -> None:
 
 def _import() -> None:
     """Import what missions need, with the compiler, before the job is there."""
-    import suave_des.campaign.mission_runner  # noqa: F401
+    import suave_des.campaign.executors.mission_runner  # noqa: F401
 
 
 def _prepare(job: JobSpec) -> None:
@@ -366,7 +368,7 @@ def _prepare(job: JobSpec) -> None:
 
 @cache
 def _runner() -> MissionRunner:
-    from suave_des.campaign.mission_runner import MissionRunner
+    from suave_des.campaign.executors.mission_runner import MissionRunner
 
     return MissionRunner(_jobs[-1])
 
