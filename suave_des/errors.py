@@ -85,6 +85,11 @@ def place_text(line: int, key_path: KeyPath) -> str:
     return f"line {line}, {keys}" if keys else f"line {line}"
 
 
+def line_error(file: Path, line: int, problem: str, remedy: str | None = None) -> InputError:
+    """Make the error for a line of a file."""
+    return InputError(problem, file=file, place=place_text(line, ()), remedy=remedy)
+
+
 _WRITTEN = {"None": "nothing", "True": "true", "False": "false", "inf": ".inf", "-inf": "-.inf", "nan": ".nan"}
 """Python's spelling of a value, and YAML's."""
 

@@ -18,7 +18,7 @@ from pathlib import Path
 from statistics import fmean, stdev
 from typing import TYPE_CHECKING
 
-from suave_des.errors import InputError, shown
+from suave_des.errors import InputError, line_error, shown
 from suave_des.estimates import estimate, t_quantile
 from suave_des.files import decode, read_bytes
 from suave_des.resources import find
@@ -95,14 +95,14 @@ def read_ensemble(name: str | Path, beside: Path | None = None) -> tuple[Ensembl
         header = [cell.strip() for cell in next(reader, [])]
         rows = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
     except csv.Error as error:
-        raise _wrong(path, reader.line_num, f"is not valid CSV: {error}", "a row for each member") from None
+        raise line_error(path, reader.line_num, f"is not valid CSV: {error}", "a row for each member") from None
     places = [place for place, each in enumerate(header) if each not in _NO_PARAMETERS]
     if not places or not all(header):
-        raise _wrong(path, 1, "has no columns of parameters", "name each by its key path in the scenario")
+        raise line_error(path, 1, "has no columns of parameters", "name each by its key path in the scenario")
     if repeated := next((each for each in header if header.count(each) > 1), None):
-        raise _wrong(path, 1, f"has column {shown(repeated)} twice", "name each parameter once")
+        raise line_error(path, 1, f"has column {shown(repeated)} twice", "name each parameter once")
     if len(rows) < 2:
-        raise _wrong(path, 1, f"has {len(rows)} members", "an ensemble has two or more")
+        raise line_error(path, 1, f"has {len(rows)} members", "an ensemble has two or more")
     members = tuple(tuple(_number(path, line, header, row, place) for place in places) for line, row in rows)
     ensemble = Ensemble(path.stem, tuple(header[place] for place in places), members)
     return ensemble, path, hashlib.sha256(content).hexdigest()
@@ -110,18 +110,14 @@ def read_ensemble(name: str | Path, beside: Path | None = None) -> tuple[Ensembl
 
 def _number(path: Path, line: int, header: Sequence[str], row: Sequence[str], place: int) -> float:
     if len(row) != len(header):
-        raise _wrong(path, line, f"has {len(row)} values, but the header has {len(header)}", "give each column one")
+        raise line_error(path, line, f"has {len(row)} values, but the header has {len(header)}", "give each column one")
     try:
         number = float(row[place])
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        raise _wrong(path, line, f"{header[place]}: expected a number, got {shown(row[place])}", "give it a value")
+        raise line_error(path, line, f"{header[place]}: expected a number, got {shown(row[place])}", "give it a value")
     return number
-
-
-def _wrong(path: Path, line: int, problem: str, remedy: str) -> InputError:
-    return InputError(problem, file=path, place=f"line {line}", remedy=remedy)
 
 
 def with_ensemble(loaded: LoadedScenario, variation: Variation, ensemble: Ensemble, path: Path) -> Variation:

@@ -12,7 +12,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from decimal import Decimal, InvalidOperation
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, overload
 
 from rdflib import BNode, Literal
 from rdflib.term import Node
@@ -119,12 +119,18 @@ def term_of(term: Node) -> str | Lit:
     return literal(term) if isinstance(term, Literal) else str(term)
 
 
-def canonical(value: Lit) -> Lit:
-    """Return a number in one form for all that Pellet takes for the same value.
+@overload
+def canonical(value: Lit) -> Lit: ...
+@overload
+def canonical(value: str | Lit) -> str | Lit: ...
+def canonical(value: str | Lit) -> str | Lit:
+    """Return a number in one form for all that Pellet takes for the same value; anything else as it is.
 
     A rule's 2.00 is meant to match a measured 2.0. Whole numbers of all datatypes are compared by value, and never
     match a decimal; neither of them matches a double.
     """
+    if isinstance(value, str):
+        return value
     text = value.text.strip()
     if value.datatype == XSD + "decimal" and (found := _DECIMAL.fullmatch(text)):
         sign, whole, part = found.groups()

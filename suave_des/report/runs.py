@@ -17,7 +17,7 @@ import numpy as np
 import pandas
 from numpy.typing import NDArray
 
-from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.errors import InputError, did_you_mean, line_error, shown
 from suave_des.files import decode, read_bytes
 from suave_des.metrics.result import MissionMetrics
 from suave_des.report.compared_metrics import PAPER_METRICS
@@ -104,7 +104,7 @@ class Runs:
 
     def error(self, line: int, problem: str, remedy: str | None) -> InputError:
         """Make an error about a line of the file."""
-        return _error(self.path, line, problem, remedy)
+        return line_error(self.path, line, problem, remedy)
 
     def check_simulated(self, managers: Sequence[str], scenario: str | None) -> None:
         """Check that these missions are of one scenario, and that there are some of each manager.
@@ -172,14 +172,14 @@ def read_runs(
                     continue
                 if len(cells) != len(header):
                     problem = f"has {len(cells)} values, but the header has {len(header)}"
-                    raise _error(path, reader.line_num, problem, "give each column a value, if only an empty one")
+                    raise line_error(path, reader.line_num, problem, "give each column a value, if only an empty one")
                 rows.append(tuple(map(str.strip, chosen(cells))))
                 lines.append(reader.line_num)
     except csv.Error as error:
         remedy = "one line for each mission, cells separated by commas"
-        raise _error(path, reader.line_num, f"is not valid CSV: {error}", remedy) from None
+        raise line_error(path, reader.line_num, f"is not valid CSV: {error}", remedy) from None
     if not rows:
-        raise _error(path, 1, "has no missions under its header", "one line for each mission is needed")
+        raise line_error(path, 1, "has no missions under its header", "one line for each mission is needed")
     cells_by_name = pandas.DataFrame(rows, columns=names, index=lines, dtype=str)
     checked = _Cells(path, cells_by_name)
     frame = _missions(checked, layout)
@@ -216,11 +216,11 @@ def choose_names(wanted: str | None, managers: Iterable[str], source: str) -> tu
 def _layout(path: Path, header: Sequence[str], further: Sequence[str]) -> _Layout:
     for column in header:
         if header.count(column) > 1:
-            raise _error(path, 1, f"has column {shown(column)} twice", "name each column once")
+            raise line_error(path, 1, f"has column {shown(column)} twice", "name each column once")
     nearest = max(_LAYOUTS, key=lambda layout: len(set(layout[:3]) & set(header)))
     for column in (needed := (*nearest[:3], *further)):
         if column not in header:
-            raise _error(path, 1, f"has no column {column!r}", f"the columns {', '.join(needed)} are needed")
+            raise line_error(path, 1, f"has no column {column!r}", f"the columns {', '.join(needed)} are needed")
     return nearest
 
 
@@ -319,7 +319,7 @@ class _Cells:
         if len(wrong):
             text = self.text[column].iloc[wrong[0]]
             problem = f"{column}: expected {wanted}, got {shown(text)}"
-            raise _error(self.path, self.text.index[wrong[0]], problem, "correct it, or leave the mission out")
+            raise line_error(self.path, self.text.index[wrong[0]], problem, "correct it, or leave the mission out")
 
 
 def _first_word(cells: Sequence[str]) -> str:
@@ -338,7 +338,3 @@ def _numbers(text: pandas.Series[str]) -> NDArray[np.float64]:
         with suppress(ValueError):
             return np.array([float(cell) if cell else math.nan for cell in cells])
     return pandas.to_numeric(text, errors="coerce").to_numpy(float)
-
-
-def _error(path: Path, line: int, problem: str, remedy: str | None) -> InputError:
-    return InputError(problem, file=path, place=f"line {line}", remedy=remedy)

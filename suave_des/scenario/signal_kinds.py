@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from suave_des.errors import InputError, shown
+from suave_des.errors import line_error, shown
 from suave_des.files import decode, read_bytes
 from suave_des.scenario.quantities import (
     LARGEST,
@@ -138,24 +138,26 @@ def read_table(path: Path) -> tuple[SignalTable, str]:
     try:
         header = [name.strip() for name in next(rows, [])]
         if sorted(header) != sorted(_LARGEST):
-            raise _error(path, 1, f"the columns are {shown(','.join(header))}", f"the first line must be {_COLUMNS}")
+            raise line_error(
+                path, 1, f"the columns are {shown(','.join(header))}", f"the first line must be {_COLUMNS}"
+            )
         for row in rows:
             if not any(cell.strip() for cell in row):
                 continue
             if len(row) != len(header):
                 remedy = f"each line has two, separated by a comma: {_COLUMNS}"
-                raise _error(path, rows.line_num, f"has {len(row)} values", remedy)
+                raise line_error(path, rows.line_num, f"has {len(row)} values", remedy)
             cells = dict(zip(header, row, strict=True))
             time_s, value = (_number(path, rows.line_num, column, cells[column]) for column in _LARGEST)
             if table and time_s <= table[-1][0]:
                 remedy = "sort the rows, and give each time once"
-                raise _error(path, rows.line_num, f"t_s {time_s:g} does not come after {table[-1][0]:g}", remedy)
+                raise line_error(path, rows.line_num, f"t_s {time_s:g} does not come after {table[-1][0]:g}", remedy)
             table.append((time_s, value))
     except csv.Error as error:
         remedy = f"write lines of two numbers: {_COLUMNS}"
-        raise _error(path, rows.line_num, f"is not valid CSV: {error}", remedy) from None
+        raise line_error(path, rows.line_num, f"is not valid CSV: {error}", remedy) from None
     if not table:
-        raise _error(path, 1, "has no row under its header", f"write lines of two numbers: {_COLUMNS}")
+        raise line_error(path, 1, "has no row under its header", f"write lines of two numbers: {_COLUMNS}")
     times_s, values = zip(*table, strict=True)
     return (times_s, values), hashlib.sha256(content).hexdigest()
 
@@ -164,14 +166,10 @@ def _number(path: Path, line: int, column: str, cell: str) -> float:
     try:
         number = float(cell)
     except ValueError:
-        raise _error(path, line, f"expected a number as {column}, got {shown(cell)}", "such as 12.5") from None
+        raise line_error(path, line, f"expected a number as {column}, got {shown(cell)}", "such as 12.5") from None
     if not math.isfinite(number):
-        raise _error(path, line, f"{column} {shown(cell)} is not finite", "leave that row out")
+        raise line_error(path, line, f"{column} {shown(cell)} is not finite", "leave that row out")
     if abs(number) > _LARGEST[column]:
         remedy = f"must be at least {-_LARGEST[column]:g} and at most {_LARGEST[column]:g}"
-        raise _error(path, line, f"{column} {shown(cell)} is out of range", remedy)
+        raise line_error(path, line, f"{column} {shown(cell)} is out of range", remedy)
     return number
-
-
-def _error(path: Path, line: int, problem: str, remedy: str) -> InputError:
-    return InputError(problem, file=path, place=f"line {line}", remedy=remedy)

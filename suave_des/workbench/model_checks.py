@@ -240,7 +240,7 @@ class _Possible:
             if predicate == RDF_TYPE and isinstance(value, str) and not value.startswith(LANGUAGE_NAMESPACES):
                 self.classes.add(value)
             elif not predicate.startswith(LANGUAGE_NAMESPACES):
-                self.values.setdefault(predicate, set()).add(canonical(value) if isinstance(value, Lit) else value)
+                self.values.setdefault(predicate, set()).add(canonical(value))
         for name in ("typeF", "typeFD", "solvesO", "o_always_improve"):
             self.values[TOMASYS + name] = {_ANY}
         for name in ("o_status", "c_status"):

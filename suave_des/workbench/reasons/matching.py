@@ -16,9 +16,10 @@ from rdflib import BNode
 from suave_des.knowledge import jvm
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.pellet import load_n_triples, one_at_a_time, read_term
-from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, canonical
+from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Names, Triple, canonical, value_of
 from suave_des.knowledge.rules.rdf import with_triples
 from suave_des.knowledge.rules.syntax import TESTERS, Atom, Named, Rule, Term, Variable
+from suave_des.knowledge.state import Value
 
 #: What the variables of a rule stand for: IRIs and literals by name.
 Binding = Mapping[str, str | Lit]
@@ -52,13 +53,18 @@ def unified(terms: Sequence[Term], values: Iterable[str | Lit | None], binding: 
     for term, value in zip(terms, values, strict=False):
         if value is None:
             continue
-        wanted = _canonical(value)
+        wanted = canonical(value)
         if isinstance(term, Variable):
             if found.setdefault(term.name, wanted) != wanted:
                 return None
-        elif _canonical(term.iri if isinstance(term, Named) else term) != wanted:
+        elif canonical(term.iri if isinstance(term, Named) else term) != wanted:
             return None
     return found
+
+
+def shown_bindings(binding: Binding, names: Names) -> tuple[tuple[str, Value], ...]:
+    """Give what variables stand for as people write it, by the names of the variables in their order."""
+    return tuple((name, value_of(binding[name], names)) for name in sorted(binding))
 
 
 def matched(atom: Atom, triple: Triple, binding: Binding) -> Binding | None:
@@ -71,16 +77,11 @@ def matched(atom: Atom, triple: Triple, binding: Binding) -> Binding | None:
     return unified(atom.arguments, (subject, value), binding) if fits else None
 
 
-def _canonical(value: str | Lit) -> str | Lit:
-    """A number in its one shortest form; anything else as it is."""
-    return canonical(value) if isinstance(value, Lit) else value
-
-
 class Facts:
     """What follows in a state, to be looked up by property and subject."""
 
     def __init__(self, known: Iterable[Triple]) -> None:
-        self.all = tuple((subject, predicate, _canonical(value)) for subject, predicate, value in known)
+        self.all = tuple((subject, predicate, canonical(value)) for subject, predicate, value in known)
         self._by_predicate: dict[str, list[Triple]] = {}
         self._by_subject: dict[tuple[str, str], list[Triple]] = {}
         for triple in self.all:
@@ -224,7 +225,7 @@ class NearestFinder:
         values = self._answers[asked]
         if computes:
             name = atom.arguments[0].name  # type: ignore[union-attr]
-            return [{**binding, name: _canonical(value)} for value in values]
+            return [{**binding, name: canonical(value)} for value in values]
         return [binding] if values else []
 
     def _distance(self, number: int, binding: Binding) -> tuple[int, int]:

@@ -25,10 +25,10 @@ from suave_des.knowledge.pellet import (
     read_term,
     trace_contradiction,
 )
-from suave_des.knowledge.rdf import OWL, RDF_TYPE, Lit, Triple, canonical, facts_of, is_fact, n_triple, value_of
+from suave_des.knowledge.rdf import OWL, RDF_TYPE, Lit, Triple, canonical, facts_of, is_fact, n_triple
 from suave_des.knowledge.rules.syntax import Atom, AtomKind, Rule
 from suave_des.knowledge.state import Fact, KnowledgeState, Value
-from suave_des.workbench.reasons.matching import Binding, Facts, matched
+from suave_des.workbench.reasons.matching import Binding, Facts, matched, shown_bindings
 
 _FACT: Final = re.compile(r"^(prop|type)\(([^,()]+),([^,()]+)")
 _IRI: Final = re.compile(r"[a-z]+:[^\s,()]+")
@@ -178,7 +178,10 @@ class Tracer:
             for binding, body in _matches(rule, {}, self.facts):
                 concluded = self._step(rule, frozenset(body))
                 if concluded:
-                    yield self._bindings(binding), tuple(self._fact(each) for each in sorted(concluded, key=str))
+                    yield (
+                        shown_bindings(binding, self.base.names),
+                        tuple(self._fact(each) for each in sorted(concluded, key=str)),
+                    )
 
     def _derive(self, triple: Triple, above: frozenset[Triple]) -> Derivation | None:
         """The first tree for a triple that does not depend on itself or on what is above it; None if there is none."""
@@ -203,7 +206,9 @@ class Tracer:
                             yield self._by_rule(triple, rule, binding, premises)
 
     def _by_rule(self, triple: Triple, rule: Rule, binding: Binding, premises: Sequence[Derivation]) -> Derivation:
-        return Derivation(self._fact(triple), "rule", rule.name, self._bindings(binding), premises=tuple(premises))
+        return Derivation(
+            self._fact(triple), "rule", rule.name, shown_bindings(binding, self.base.names), premises=tuple(premises)
+        )
 
     def _by_schema(self, triple: Triple, above: frozenset[Triple]) -> Iterator[Derivation]:
         """What follows from one other fact about the same thing: a class by a domain, an inverse, a sub-property."""
@@ -306,9 +311,6 @@ class Tracer:
         """A text of Pellet's with names in place of IRIs."""
         return _IRI.sub(lambda iri: self.base.names.short(iri.group()), text)
 
-    def _bindings(self, binding: Binding) -> _Bindings:
-        return tuple((name, value_of(binding[name], self.base.names)) for name in sorted(binding))
-
     def _leaf(self, triple: Triple) -> Derivation:
         return Derivation(self._fact(triple), "state" if triple in self.situation else "ontology")
 
@@ -334,8 +336,7 @@ def _matches(rule: Rule, binding: Binding, facts: Facts) -> list[tuple[Binding, 
 
 def _canonical(triple: Triple) -> Triple:
     """A triple with a number in its one shortest form."""
-    subject, predicate, value = triple
-    return subject, predicate, canonical(value) if isinstance(value, Lit) else value
+    return (*triple[:2], canonical(triple[2]))
 
 
 def _values_of(knowledge_base: Any, atoms: Iterable[Atom]) -> Iterator[Triple]:

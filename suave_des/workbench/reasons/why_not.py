@@ -24,7 +24,15 @@ from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario_knowledge import open_base
 from suave_des.workbench.prover import Prover, Situation
 from suave_des.workbench.reasons.atom_failure import describe_failure
-from suave_des.workbench.reasons.matching import FACT_KINDS, Binding, Facts, NearestFinder, bound, unified
+from suave_des.workbench.reasons.matching import (
+    FACT_KINDS,
+    Binding,
+    Facts,
+    NearestFinder,
+    bound,
+    shown_bindings,
+    unified,
+)
 from suave_des.workbench.reasons.tracing import Tracer
 
 
@@ -150,7 +158,7 @@ class RuleQuestions:
         identities = [number for number, atom in enumerate(rule.body) if atom.kind in ("same", "different")]
         if not match.failing and identities and not self._fires_in_pellet(rule, state):
             match = replace(match, failing=(identities[0],))
-        bindings = self._bindings(match.binding)
+        bindings = shown_bindings(match.binding, self.base.names)
         if not match.failing:
             return WhyNot(rule.name, self._fires(rule, match.binding, facts), True, bindings=bindings)
         first = rule.body[match.failing[0]]
@@ -220,7 +228,7 @@ class RuleQuestions:
             others = self._other_values(atom, binding, facts)
             if others:
                 stays = f"; {others[0]} stays beside it, as rules only add"
-        bound = ", ".join(f"?{name} = {value}" for name, value in self._bindings(binding))
+        bound = ", ".join(f"?{name} = {value}" for name, value in shown_bindings(binding, self.base.names))
         return f"it fires{f' with {bound}' if bound else ''}, and concludes {', '.join(concluded)}{stays}"
 
     def _instance(self, atom: Atom, binding: Binding) -> str:
@@ -265,9 +273,6 @@ class RuleQuestions:
                 start = unified(head.arguments, wanted, {})
                 if start is not None:
                     yield other, start
-
-    def _bindings(self, binding: Binding) -> tuple[tuple[str, Value], ...]:
-        return tuple((name, value_of(binding[name], self.base.names)) for name in sorted(binding))
 
 
 def _with_languages(known: Iterable[Triple], asserted: Iterable[Triple]) -> list[Triple]:
