@@ -46,15 +46,16 @@ class Metacontrol(ManagingSubsystem):
         scenario, revision = system.scenario, system.scenario.revision.metacontrol
         self._revision = revision
         self._knowledge = system.knowledge()
-        # What a derived class makes of analyze and plan may depend on more than the state.
+        # What a derived class makes of analyze and plan may depend on more than the state: nothing of it is cached.
         methods = type(self).analyze, type(self).plan
         self._is_cacheable = methods == (Metacontrol.analyze, Metacontrol.plan)
-        self._conclusions = _cached.setdefault(self._knowledge, {}).setdefault(revision, {})
+        cached = _cached.setdefault(self._knowledge, {}).setdefault(revision, {})
+        self._conclusions: dict[Hashable, Conclusion] = cached if self._is_cacheable else {}
         self.objectives: dict[str, str | None] = {}
         self.groundings: dict[str, str] = {}
         self.components: dict[str, str] = {}
         self.measurements: dict[str, float] = {}
-        self._listens_since_s = 0.0
+        self._listens_since_s = 0.0  # values that were published before are ignored
         self._cancelled: set[str] = set()  # functions, since the last cycle began
         self._recorded_statuses: frozenset[str] = frozenset()
         self._awaited = self._attributes_to_await()
@@ -180,17 +181,15 @@ class Metacontrol(ManagingSubsystem):
 
     def _analyze_and_plan(self) -> Conclusion:
         """Analyze and plan, or look up what both gave for an equal state."""
-        if not self._is_cacheable:
-            inference = self.analyze()
-            return Conclusion(inference, self.plan(inference))
         state = self._symbolic_state()
         conclusion = self._conclusions.get(state)
         if conclusion is None:
             inference = self.analyze()
             conclusion = Conclusion(inference, self.plan(inference))
-            if len(self._conclusions) >= _MAX_CACHED:
-                self._conclusions.clear()
-            self._conclusions[state] = conclusion
+            if self._is_cacheable:
+                if len(self._conclusions) >= _MAX_CACHED:
+                    self._conclusions.clear()
+                self._conclusions[state] = conclusion
         return conclusion
 
     def _symbolic_state(self) -> Hashable:

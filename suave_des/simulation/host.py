@@ -10,7 +10,7 @@ import simpy
 from suave_des.clock import Process, exactly_at, until
 from suave_des.domain import Task
 from suave_des.errors import InputError, MissionError, SuaveDesError, did_you_mean, shown
-from suave_des.managing.base import AdaptationProcess, ManagedSystem, ManagingSubsystem
+from suave_des.managing.base import AdaptationProcess, Dependencies, ManagedSystem, ManagingSubsystem
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus
 from suave_des.registry import is_built_in, manager_class
@@ -62,16 +62,12 @@ class ManagerHost:
             self.manager = manager_type(self.system)
             if not hasattr(self.manager, "system"):
                 raise TypeError(f"{manager_type.__name__}.__init__ does not begin with super().__init__(system)")
-            declares = "depends_on" in vars(manager_type)  # a derived class may depend on more
-            is_user_defined = not is_built_in(self.name)
-            declared = self.manager.depends_on if declares and (self.skips_idle_calls or is_user_defined) else None
-            if declared is not None:
-                declared = {name: tuple(sorted(map(float, each))) for name, each in declared.items()}
+            declared = self._declared() if "depends_on" in vars(manager_type) else None  # a derived class may add to it
         except InputError:
             raise  # such as an ontology that cannot be used: it concerns every mission
         except RAISED as error:
             raise self.mission_error(error) from error
-        if is_user_defined:
+        if not is_built_in(self.name):
             self.remarks = tuple(_unmeasured(declared or (), self.system.measurements))
         self._is_event_triggered = declared is not None and self.skips_idle_calls
         thresholds = (declared or {}) if self._is_event_triggered else {}
@@ -85,6 +81,15 @@ class ManagerHost:
             if not period_s > 0.0:
                 raise self.mission_error(ValueError(f"period_s is {period_s}; it must be above 0, or None"))
             self._process = self.system.env.process(self._adapt_periodically(period_s))
+
+    def _declared(self) -> Dependencies | None:
+        """Ask the manager what it depends on, if calls are to be left out, or its author is to be told of mistakes."""
+        if not self.skips_idle_calls and is_built_in(self.name):
+            return None
+        declared = self.manager.depends_on
+        if declared is None:
+            return None
+        return {name: tuple(sorted(map(float, each))) for name, each in declared.items()}
 
     def start(self) -> None:
         """Tell the manager that the mission begins."""

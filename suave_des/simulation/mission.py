@@ -1,6 +1,7 @@
 """One mission: scenario, manager, run and seed, wired into a SimPy environment."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 
 import simpy
@@ -17,7 +18,7 @@ from suave_des.managed.follow import NO_PATH, FollowPipeline, InspectionPath
 from suave_des.managed.mode_manager import ModeManager
 from suave_des.managed.motion import MaintainMotion
 from suave_des.managed.node import FunctionNode
-from suave_des.managed.own import FunctionContext, OwnFunction
+from suave_des.managed.own import FunctionContext
 from suave_des.managed.recharge import GenerateRechargePath
 from suave_des.managed.search import GenerateSearchPath
 from suave_des.managed.surface import Surface
@@ -44,29 +45,35 @@ from suave_des.simulation.vehicles import draw_start, make_vehicle
 from suave_des.vehicle.guidance import SetPointSender
 
 
-class MissionRun:
-    """The parts of one mission, made and connected; see `Simulator.start` for the arguments."""
+@dataclass(frozen=True, slots=True)
+class RunSpec:
+    """Which mission of a scenario to run; see `Simulator.start`."""
 
-    def __init__(
-        self,
-        prepared: PreparedScenario,
-        manager: str,
-        run: int,
-        seed: int,
-        track: Array,
-        *,
-        record: bool,
-        manager_type: type[ManagingSubsystem] | None = None,
-    ) -> None:
-        self._prepared = prepared
+    manager: str
+    run: int
+    seed: int
+    record: bool
+    manager_type: type[ManagingSubsystem] | None
+
+
+class MissionRun:
+    """The parts of one mission, made and connected.
+
+    Args:
+        prepared: the scenario.
+        spec: which of its missions.
+        track: to be filled with the vehicle's states.
+    """
+
+    def __init__(self, prepared: PreparedScenario, spec: RunSpec, track: Array) -> None:
+        self._prepared, self._spec = prepared, spec
         self._scenario = scenario = prepared.loaded.scenario
         self._revision = scenario.revision
-        self._manager, self._run_number, self._seed = manager, run, seed
         self.track = track
-        self._chance = chance = Chance(prepared.distributions, seed, run, prepared.runs_per_draw)
+        self._chance = chance = Chance(prepared.distributions, spec.seed, spec.run, prepared.runs_per_draw)
         self.env = simpy.Environment()
         self.bus = DiagnosticsBus()
-        self._recorder = Recorder(self.env, enabled=record)
+        self._recorder = Recorder(self.env, enabled=spec.record)
 
         # The vehicle.
         self._start = draw_start(chance)
@@ -74,9 +81,12 @@ class MissionRun:
         self._faults = ThrusterFaults(scenario, chance, self._vehicle, self._recorder.log)
 
         # What monitors measure.
-        names, tables, duration_s = sorted(scenario.signals), prepared.loaded.tables, prepared.duration_s
-        self._true = {name: chance.signal(name, scenario.signals[name], tables) for name in names}
-        self._signals = {name: measure_signal(scenario, chance, name, self._true[name], duration_s) for name in names}
+        described, tables = scenario.signals, prepared.loaded.tables
+        self._true_signals = {name: chance.signal(name, described[name], tables) for name in sorted(described)}
+        self._signals = {
+            name: measure_signal(scenario, chance, name, signal, prepared.duration_s)
+            for name, signal in self._true_signals.items()
+        }
         self._battery = measure_battery(scenario, chance, self._vehicle)
         self._measured: dict[str, Measured] = {**self._signals}
         if self._battery is not None:
@@ -90,12 +100,12 @@ class MissionRun:
         # Metrics and record.
         self._reactions = self._make_reaction_meter()
         self._further = self._make_further_metrics()
-        if record:
+        if spec.record:
             self._record_changes()
 
         # The managing subsystem.
-        self._host = self._make_host(manager_type)
-        self._begin()
+        self._host = self._make_host()
+        self._start_processes()
 
     @property
     def manager(self) -> ManagingSubsystem:
@@ -159,9 +169,9 @@ class MissionRun:
         x_m, y_m = self._prepared.points[detector.first_point, :2].tolist() if found else (None, None)
         return MissionMetrics(
             scenario=self._scenario.name,
-            manager=self._manager,
-            run=self._run_number,
-            seed=self._seed,
+            manager=self._spec.manager,
+            run=self._spec.run,
+            seed=self._spec.seed,
             initial_x_m=self._start.position_m[0],
             initial_y_m=self._start.position_m[1],
             mission_duration_s=float(self.env.now),
@@ -210,13 +220,13 @@ class MissionRun:
         if self._scenario.leak is not None:
             self._surface = Surface(env, make_sender(domain.SURFACE))
             nodes[domain.SURFACE] = self._surface
-        for name, kind in self._prepared.own_functions.items():
-            nodes[name] = self._make_own_function(name, kind, make_sender(name))
+        for name, function_type in self._prepared.own_functions.items():
+            nodes[name] = function_type(self._function_context(name, make_sender(name)))
         return nodes
 
-    def _make_own_function(self, name: str, kind: type[OwnFunction], sender: SetPointSender) -> OwnFunction:
+    def _function_context(self, name: str, sender: SetPointSender) -> FunctionContext:
         settings = self._scenario.functions.get(name)
-        context = FunctionContext(
+        return FunctionContext(
             name=name,
             env=self.env,
             settings=(settings.model_extra or {}) if settings is not None else {},
@@ -225,7 +235,6 @@ class MissionRun:
             stream=lambda stream: self._chance.stream(f"functions/{name}/{stream}"),
             log=partial(self._recorder.log, name),
         )
-        return kind(context)
 
     def _make_sender(self, loss_probability: float, node: str) -> SetPointSender:
         value, offset = self._chance.value, "revision.set_points.node_frame_offset_"
@@ -281,8 +290,8 @@ class MissionRun:
         self.bus.subscribe(self._recorder.diagnostic_of(metric.visibility_thresholds_m, metric.battery_limit))
         self.modes.listeners.append(self._recorder.mode_effect)
 
-    def _make_host(self, manager_type: type[ManagingSubsystem] | None) -> ManagerHost:
-        name = self._manager
+    def _make_host(self) -> ManagerHost:
+        spec, name = self._spec, self._spec.manager
         system = ManagedSystem(
             env=self.env,
             scenario=self._scenario,
@@ -296,20 +305,19 @@ class MissionRun:
             state_changed=lambda: self._host.state_changed(),
             measurements=self._measured,
             record_reasoning_time=(lambda duration_s: None) if self._further is None else self._further.reasoning_took,
-            recorded=self._recorder.enabled,
+            recorded=spec.record,
             pose=lambda: self._vehicle.pose(self.env.now),
             distance_inspected_m=lambda: self._follow.distance_m,
-            true_signal=self._true.__getitem__,
-            files={} if manager_type else self._prepared.manager_files(name),
+            true_signal=self._true_signals.__getitem__,
+            files={} if spec.manager_type else self._prepared.manager_files(name),
             learned=self._prepared.learned(name),
             training=self._prepared.training is not None,
         )
-        skips_idle_calls = not self._recorder.enabled
-        return ManagerHost(name, self._run_number, system, self.bus, skips_idle_calls, manager_type)
+        return ManagerHost(name, spec.run, system, self.bus, not spec.record, spec.manager_type)
 
-    # The beginning.
+    # The start.
 
-    def _begin(self) -> None:
+    def _start_processes(self) -> None:
         """Start the coordinator, the monitors and the manager."""
         self._coordinator.start(self._host.request, self._host.cancel)
         self._start_monitors()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from suave_des.chance import Distributions
+from suave_des.compiling import Array
 from suave_des.managed.follow import InspectionPath
 from suave_des.managing.learned import read_learned
 from suave_des.registry import manager_class
@@ -22,14 +23,7 @@ if TYPE_CHECKING:  # owlready2 is loaded only when it is needed
 
 
 class PreparedScenario:
-    """A scenario, with what does not change between its missions made once.
-
-    Args:
-        loaded: the scenario with its files.
-        runs_per_draw: how many runs in a row share the value drawn for a key path; one, if the path is not in it.
-        training: what each manager has learned, by its name, kept from mission to mission; None: missions are no
-            training.
-    """
+    """A scenario, with what does not change between its missions made once; see `Simulator` for the arguments."""
 
     def __init__(
         self,
@@ -48,6 +42,7 @@ class PreparedScenario:
         self.own_functions = own_functions(loaded)
         self.vehicle_model = vehicle_model(scenario.vehicle)
         self.view_tangent = scenario.vehicle.camera.tangent
+        self.spare_tracks: list[Array] = []  # to allocate one for each mission would fragment memory
         self._learned: dict[str, Mapping[str, Any]] = {}
         self._manager_files: dict[str, Mapping[str, Path]] = {}
 

@@ -1,18 +1,14 @@
 """Runs missions of one scenario."""
 
-from collections.abc import Callable, Mapping
-from types import MappingProxyType
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 import simpy
 
 from suave_des.clock import Process
-from suave_des.compiling import Array
 from suave_des.managing.base import ManagingSubsystem
 from suave_des.metrics.result import MissionResult
-from suave_des.scenario.loader import LoadedScenario
-from suave_des.simulation.mission import MissionRun
+from suave_des.simulation.mission import MissionRun, RunSpec
 from suave_des.simulation.prepared import PreparedScenario
 from suave_des.vehicle.kernel import COLUMNS
 from suave_des.vehicle.vehicle import track_rows
@@ -35,15 +31,6 @@ class Simulator(PreparedScenario):
         119.0
     """
 
-    def __init__(
-        self,
-        loaded: LoadedScenario,
-        runs_per_draw: Mapping[str, int] = MappingProxyType({}),
-        training: dict[str, dict[str, Any]] | None = None,
-    ) -> None:
-        super().__init__(loaded, runs_per_draw, training)
-        self._spare_tracks: list[Array] = []  # to allocate one for each mission would fragment memory
-
     def start(
         self,
         manager: str,
@@ -65,16 +52,16 @@ class Simulator(PreparedScenario):
         Raises:
             MissionError, InputError: as `run`.
         """
-        track = self._spare_tracks.pop() if self._spare_tracks else np.empty((track_rows(self.duration_s), COLUMNS))
+        track = self.spare_tracks.pop() if self.spare_tracks else np.empty((track_rows(self.duration_s), COLUMNS))
         try:
-            return MissionRun(self, manager, run, seed, track, record=record, manager_type=manager_type)
+            return MissionRun(self, RunSpec(manager, run, seed, record, manager_type), track)
         except BaseException:
-            self._spare_tracks.append(track)
+            self.spare_tracks.append(track)
             raise
 
     def give_back(self, mission: MissionRun) -> None:
         """Keep the memory of a mission that is no longer needed for the next one."""
-        self._spare_tracks.append(mission.track)
+        self.spare_tracks.append(mission.track)
 
     def run(
         self, manager: str, run: int, seed: int, *, record: bool = False, on_time: OnTime | None = None

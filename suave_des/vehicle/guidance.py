@@ -143,7 +143,7 @@ class Guidance:
     _act_at: int = 0  # tick that the timer is set to
     _is_planned: bool = False  # until that tick
     _is_due: bool = False  # whether a way-point is to be sent then
-    _is_acting: bool = False
+    _is_acting: bool = False  # whether a change of control is guidance's own
     _is_repeated: bool = False  # whether the present way-point was sent again
 
     def __post_init__(self) -> None:

@@ -186,11 +186,11 @@ class Published:
 class PlainMission(mission.MissionRun):
     """A mission whose managers read what monitors have published."""
 
-    def _make_host(self, manager_type: type[ManagingSubsystem] | None) -> ManagerHost:
+    def _make_host(self) -> ManagerHost:
         measured = self._measured
         self._measured = {name: self._published(name) for name in measured}
         try:
-            return super()._make_host(manager_type)
+            return super()._make_host()
         finally:
             self._measured = measured
 
