@@ -29,7 +29,7 @@ class MaintainMotion(FunctionNode):
     _recovery: simpy.Process | None = field(default=None, init=False)
 
     def activated(self) -> None:
-        """Begin a recovery, unless an earlier one still goes on."""
+        """Begin a recovery, unless an earlier one is still under way."""
         if self._recovery is None:
             self._recovery = self.env.process(self._recover())
 

@@ -50,7 +50,7 @@ class FunctionError(Exception):
 class OwnFunction(FunctionNode):
     """Base of user-defined functions: override what happens on activation, deactivation and a change of parameters.
 
-    The hooks are called at the mission time at which a mode takes effect. They must not block; what goes on over time
+    The hooks are called at the mission time at which a mode takes effect. They must not block; what takes mission time
     is a process: `self.env.process(...)`.
 
     Attributes:

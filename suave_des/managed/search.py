@@ -79,7 +79,7 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         self._present: Array | None = None  # way-point, none before the first
 
     def configure(self, mode: Mode) -> None:
-        """Apply the mode's spiral_altitude; the spiral itself goes on."""
+        """Apply the mode's spiral_altitude; the spiral itself continues."""
         altitude = mode.parameters.get("spiral_altitude")
         if altitude is not None and altitude != self.altitude_m:
             self._guidance.catch_up()

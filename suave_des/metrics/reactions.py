@@ -34,21 +34,21 @@ class ReactionMeter:
     visibility: Measurements
     initial_altitude_m: float
     battery: Measured | None = None
-    _noted: list[_Entry] = field(default_factory=list, init=False)
+    _entries: list[_Entry] = field(default_factory=list, init=False)
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
         """Note a component's status."""
         if diagnostic.value == FAILED:
-            self._noted.append((self.env.now, _OpenEvents.failure, None))
+            self._entries.append((self.env.now, _OpenEvents.failure, None))
 
     def mode_effect(self, function: str, mode: Mode) -> None:
         """Note that a mode has taken effect."""
-        self._noted.append((self.env.now, _OpenEvents.mode_effect, (function, mode)))
+        self._entries.append((self.env.now, _OpenEvents.mode_effect, (function, mode)))
 
     def reactions_s(self) -> list[float]:
         """The reactions completed by now, in the order of their completion."""
         open_events = _OpenEvents(self.visibility.next_message_s, self.initial_altitude_m)
-        entries = [*self._fitting_altitudes(), *self._low_battery(), *self._noted]
+        entries = [*self._fitting_altitudes(), *self._low_battery(), *self._entries]
         for t_s, method, value in sorted(entries, key=itemgetter(0)):
             method(open_events, t_s, value)
         return open_events.completed_s

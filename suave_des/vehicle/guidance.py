@@ -23,7 +23,7 @@ QUEUED_WAYPOINTS: Final = 20
 
 
 class OneShotTimer(Protocol):
-    """What guidance needs of the mission's clock: a call at a mission time; setting it anew replaces a pending one."""
+    """What guidance needs of the mission's clock: a call at a mission time; setting it again replaces the call."""
 
     @property
     def now_s(self) -> float:

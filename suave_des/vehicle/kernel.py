@@ -74,7 +74,7 @@ def quarter_of_leg(length: float, jerk: float) -> float:
 def begin_leg(track: Array, row: int, prm: Array) -> tuple[float, float, float, float, float]:
     """Begin the leg to a new set-point, as ArduPilot's waypoint controller does (AC_WPNav, set_wp_destination).
 
-    If the leg before is completed, the new one starts at its end. If not, the controller starts anew: from the stopping
+    If the leg before is completed, the new one starts at its end. If not, the controller starts from the stopping
     point of the vehicle, without the integral that it had built up.
 
     Returns:
