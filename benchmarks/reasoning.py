@@ -25,8 +25,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from suave_des.knowledge.cached_pellet import CachedPellet
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet.cached import CachedPellet
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.knowledge.state import Inference, KnowledgeState, ObjectiveState
 from suave_des.resources import shipped_folder

@@ -38,7 +38,7 @@ print(scipy.linalg.det(numpy.eye(2)))
 
 REASONING = """
 import sys
-from suave_des.knowledge import jvm
+from suave_des.knowledge.pellet import jvm
 jvm.start()
 print("numpy" in sys.modules)
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import owlready2
 
-from suave_des.knowledge.java import java_executable
+from suave_des.knowledge.pellet.java import java_executable
 from suave_des.resources import shipped_folder
 
 TIME_LIMIT_S = 300.0

@@ -129,7 +129,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _abandoned() -> int:
     """Count the reasoners that this process has abandoned after a time-out."""
-    limit = sys.modules.get("suave_des.knowledge.limit")
+    limit = sys.modules.get("suave_des.knowledge.pellet.limit")
     return 0 if limit is None else int(limit.times_abandoned())
 
 

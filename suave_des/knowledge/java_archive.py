@@ -25,7 +25,7 @@ from typing import Final
 
 from suave_des.caches import private_cache
 from suave_des.errors import InputError
-from suave_des.knowledge.java import OPTIONS, jars, java_library
+from suave_des.knowledge.pellet.java import OPTIONS, jars, java_library
 
 _SWITCH: Final = "SUAVE_DES_JAVA_ARCHIVE"
 #: Archives that are kept, 25 to 35 MB each; the least recently used are removed.
@@ -50,13 +50,13 @@ option = f"-XX:AOTCacheOutput={sys.argv[1]}"
 #: The training runs, by the reasoner's name: one inference each.
 _TRAINING: Final = {
     "pellet": f"""{_STATE}
-from suave_des.knowledge import jvm
+from suave_des.knowledge.pellet import jvm
 jvm.start(option)
-from suave_des.knowledge.pellet import InProcessPellet
+from suave_des.knowledge.pellet.in_process import InProcessPellet
 InProcessPellet(ontology).infer(ontology.assertions(state))
 """,
     "owlready2": f"""{_STATE}
-from suave_des.knowledge.stock import StockPellet
+from suave_des.knowledge.pellet.stock import StockPellet
 StockPellet(ontology, options=[option]).infer(ontology.assertions(state))
 """,
 }

@@ -12,8 +12,8 @@ from typing import Final, Protocol
 
 from suave_des.errors import InputError
 from suave_des.knowledge.content import Terms
-from suave_des.knowledge.limit import LOADING, TimeLimit, reasoning_on
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet.limit import LOADING, TimeLimit, reasoning_on
 from suave_des.knowledge.rdf import Triple, facts_of
 from suave_des.knowledge.state import Inference, KnowledgeState
 
@@ -67,7 +67,7 @@ class _StateCache:
 
 
 def _pellet(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Reasoner:
-    from suave_des.knowledge.pellet import InProcessPellet
+    from suave_des.knowledge.pellet.in_process import InProcessPellet
 
     pellet = limit.run(lambda: InProcessPellet(ontology, terms), LOADING, ontology.rules)
 
@@ -78,8 +78,8 @@ def _pellet(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Reason
 
 
 def _owlready2(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Reasoner:
-    from suave_des.knowledge.pellet import InProcessPellet
-    from suave_des.knowledge.stock import StockPellet
+    from suave_des.knowledge.pellet.in_process import InProcessPellet
+    from suave_des.knowledge.pellet.stock import StockPellet
 
     stock = StockPellet(ontology, terms)
     checker: list[InProcessPellet] = []
@@ -101,7 +101,7 @@ def _owlready2(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Rea
 
 
 def _cached(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Reasoner:
-    from suave_des.knowledge.cached_pellet import CachedPellet
+    from suave_des.knowledge.pellet.cached import CachedPellet
 
     return CachedPellet(ontology, limit=limit, terms=terms)
 

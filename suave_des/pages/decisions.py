@@ -9,8 +9,8 @@ from pathlib import Path
 
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.deliberation import Conclusion
-from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet.limit import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.planning import performance
 from suave_des.knowledge.rdf import local_name
 from suave_des.knowledge.rules.writer import write_rule

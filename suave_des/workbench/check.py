@@ -13,10 +13,10 @@ from typing import Final
 
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.content import Content, merge, with_rules
-from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit, times_abandoned
 from suave_des.knowledge.model import Model, assumption, build_model, check_values, with_operators
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, collect, enumerated_texts
+from suave_des.knowledge.pellet.limit import TIME_LIMIT_S, TimeLimit, times_abandoned
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.regions import regions_of
 from suave_des.knowledge.rules.checks import check_rule

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from suave_des.knowledge.deliberation import Conclusion, Deliberation
-from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet.limit import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import KnowledgeState, Number
 from suave_des.scenario.loader import load_scenario

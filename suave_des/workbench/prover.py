@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from rdflib import BNode
 
 from suave_des.knowledge.deliberation import STAYS, Conclusion
-from suave_des.knowledge.limit import LOADING, TimeLimit, reasoning_on
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet import InProcessPellet
+from suave_des.knowledge.pellet.in_process import InProcessPellet
+from suave_des.knowledge.pellet.limit import LOADING, TimeLimit, reasoning_on
 from suave_des.knowledge.planning import plan
 from suave_des.knowledge.rdf import XSD, Lit, Triple, facts_of
 from suave_des.knowledge.rules.rdf import with_triples

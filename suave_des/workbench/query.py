@@ -13,7 +13,7 @@ from rdflib.namespace import RDFS
 
 from suave_des.errors import InputError
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet import InProcessPellet
+from suave_des.knowledge.pellet.in_process import InProcessPellet
 from suave_des.knowledge.rdf import MROS, OWL, RDF, SUAVE, SWRL, TOMASYS, XSD, Triple, n_triple
 from suave_des.knowledge.state import KnowledgeState
 

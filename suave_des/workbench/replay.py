@@ -16,9 +16,9 @@ from suave_des.campaign.knowledge_records import CAMPAIGN_KNOWLEDGE_FILE, KNOWLE
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.content import with_rules
 from suave_des.knowledge.deliberation import NONE_LEFT
-from suave_des.knowledge.limit import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet import InProcessPellet
+from suave_des.knowledge.pellet.in_process import InProcessPellet
+from suave_des.knowledge.pellet.limit import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.rules.files import hash_with_rules, read_rule
 from suave_des.knowledge.rules.parser import parse_rule
 from suave_des.knowledge.state import ContradictionError, Fact, KnowledgeState, Value

@@ -15,7 +15,7 @@ from suave_des import caches
 from suave_des.cli.console import plain
 from suave_des.cli.main import main
 from suave_des.errors import InputError
-from suave_des.knowledge.limit import TimeLimit
+from suave_des.knowledge.pellet.limit import TimeLimit
 
 COMMAND = [sys.executable, "-P", "-m", "suave_des"]
 CHECKOUT = Path(caches.__file__).parent.parent

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.limit import TimeLimit
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet.limit import TimeLimit
 from suave_des.knowledge.planning import plan
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.knowledge.state import Fact, Inference, KnowledgeState, ObjectiveState

@@ -15,8 +15,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.cached_pellet import CachedPellet, InferenceCache, cache_digest
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet import cached
+from suave_des.knowledge.pellet.cached import CachedPellet, InferenceCache, cache_digest
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.knowledge.regions import Regions, regions_of
 from suave_des.knowledge.state import Inference, KnowledgeState, ObjectiveState, exact
@@ -206,7 +207,7 @@ def no_pellet(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object) -> None:
         raise AssertionError("Pellet was asked")
 
-    monkeypatch.setattr("suave_des.knowledge.pellet.InProcessPellet.__init__", refuse)
+    monkeypatch.setattr("suave_des.knowledge.pellet.in_process.InProcessPellet.__init__", refuse)
 
 
 STATES = [searching(f"fd_spiral_{name}", value) for name in ("low", "high") for value in ("1.0", "1.25", "2.0", "4")]
@@ -227,6 +228,18 @@ def test_a_filled_memory_asks_nobody(kb: Ontology, pellet: Reasoner, filled: Pat
         assert cached.infer(state) == pellet.infer(state)
     with pytest.raises(AssertionError, match="asked"):
         cached.infer(searching("fd_spiral_medium", "1.0"))
+
+
+def test_the_cache_depends_on_the_code_of_every_package_for_knowledge(
+    kb: Ontology, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = cache_digest(kb)
+    monkeypatch.setattr(cached, "_code", cached._code.__wrapped__)
+    assert cache_digest(kb) == before
+    read = Path.read_bytes
+    for changed in ("ontology.py", "pellet/in_process.py", "rules/parser.py"):
+        monkeypatch.setattr(Path, "read_bytes", lambda path: read(path) + b"#" * path.as_posix().endswith(changed))  # noqa: B023
+        assert cache_digest(kb) != before
 
 
 def test_another_knowledge_base_does_not_use_it(filled: Path, tmp_path: Path, kb: Ontology) -> None:

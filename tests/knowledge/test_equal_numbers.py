@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from suave_des.knowledge.limit import TimeLimit
+from suave_des.knowledge.pellet.limit import TimeLimit
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import KnowledgeState
 from tests.helpers.number_ontology import numbers_ontology

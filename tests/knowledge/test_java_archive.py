@@ -10,17 +10,17 @@ import owlready2.reasoning
 import pytest
 
 from suave_des.knowledge import java_archive
-from suave_des.knowledge.java import SHORT_LIVED
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet.java import SHORT_LIVED
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from tests.helpers.knowledge_states import searching
 
 STATE = searching("fd_spiral_high", "1.0")
 
 _FIRST = """
-from suave_des.knowledge import jvm
+from suave_des.knowledge.pellet import jvm
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet import InProcessPellet
+from suave_des.knowledge.pellet.in_process import InProcessPellet
 assert InProcessPellet(Ontology.load()).infer(())
 print(jvm.java_class("java.lang.System").getProperty("java.vm.info"))
 """
@@ -70,7 +70,7 @@ class TestOfStockOwlready2:
             program = (
                 "import resource\n"
                 "from suave_des.knowledge.ontology import Ontology\n"
-                "from suave_des.knowledge.stock import StockPellet\n"
+                "from suave_des.knowledge.pellet.stock import StockPellet\n"
                 "assert StockPellet(Ontology.load()).infer(())\n"
                 "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime)\n"
             )

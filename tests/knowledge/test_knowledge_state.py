@@ -62,7 +62,8 @@ def test_importing_the_room_starts_and_loads_nothing() -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
     code = (
-        "import suave_des.knowledge.reasoners, suave_des.knowledge.pellet, suave_des.knowledge.stock, jpype\n"
+        "import jpype, suave_des.knowledge.reasoners\n"
+        "from suave_des.knowledge.pellet import cached, in_process, stock\n"
         "print(jpype.isJVMStarted())"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

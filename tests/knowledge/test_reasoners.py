@@ -13,8 +13,8 @@ import pytest
 
 import suave_des
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.knowledge import java
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet import java
 from suave_des.knowledge.reasoners import BACKENDS, CACHED_STATES, Reasoner, make_reasoner
 from tests.helpers.knowledge_states import SEARCH, searching
 

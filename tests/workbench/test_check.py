@@ -14,7 +14,7 @@ import pytest
 from suave_des.cli.main import main
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet import InProcessPellet
+from suave_des.knowledge.pellet.in_process import InProcessPellet
 from suave_des.resources import shipped_folder
 from suave_des.workbench.check import MAX_STATES, Subject, check, combined, simple_states
 from suave_des.workbench.findings import Finding, Level, folded, has_level

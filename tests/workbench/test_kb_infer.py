@@ -11,7 +11,7 @@ import pytest
 
 import suave_des
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.knowledge.limit import TimeLimit, times_abandoned
+from suave_des.knowledge.pellet.limit import TimeLimit, times_abandoned
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import ObjectiveState
 from suave_des.workbench import KnowledgeBase
@@ -148,9 +148,11 @@ def test_one_file_or_name_may_stand_alone(bench, tmp_path):
 
 class TestTimeLimit:
     def test_names_the_state_that_takes_too_long_and_refuses_more(self, bench, monkeypatch):
-        monkeypatch.setattr("suave_des.knowledge.limit._abandoned", [])
+        monkeypatch.setattr("suave_des.knowledge.pellet.limit._abandoned", [])
         released = threading.Event()
-        monkeypatch.setattr("suave_des.knowledge.pellet.InProcessPellet.infer", lambda *_: released.wait(60.0))
+        monkeypatch.setattr(
+            "suave_des.knowledge.pellet.in_process.InProcessPellet.infer", lambda *_: released.wait(60.0)
+        )
         limit = TimeLimit()
         reasoner = make_reasoner("pellet", bench.base, limit)
         limit.seconds = 0.2
@@ -166,11 +168,11 @@ class TestTimeLimit:
         rules.write_text(EXPLOSION)
         program = f"""
 import sys
-from suave_des.knowledge import limit, stock
+from suave_des.knowledge.pellet import limit, stock
 limit.TimeLimit.__init__.__defaults__ = (1.0, None)
 if {reasoner == "owlready2"}:  # its own limit, without the check by the Pellet in this process
-    from suave_des.knowledge import pellet
-    pellet.InProcessPellet.__init__ = lambda self, *_: None
+    from suave_des.knowledge.pellet import in_process
+    in_process.InProcessPellet.__init__ = lambda self, *_: None
 from suave_des.cli.main import main
 main(["run", "seams2023", "--reasoner", {reasoner!r}, "--rules", {str(rules)!r}])
 """
@@ -194,8 +196,8 @@ main(["run", "seams2023", "--reasoner", {reasoner!r}, "--rules", {str(rules)!r}]
         def interrupted(*_):
             raise KeyboardInterrupt
 
-        monkeypatch.setattr("suave_des.knowledge.limit._abandoned", [])
-        monkeypatch.setattr("suave_des.knowledge.limit.Future.result", interrupted)
+        monkeypatch.setattr("suave_des.knowledge.pellet.limit._abandoned", [])
+        monkeypatch.setattr("suave_des.knowledge.pellet.limit.Future.result", interrupted)
         with pytest.raises(KeyboardInterrupt):
             TimeLimit().run(lambda: None, "reasoning")
         assert times_abandoned() == 1
@@ -212,7 +214,7 @@ main(["run", "seams2023", "--reasoner", {reasoner!r}, "--rules", {str(rules)!r}]
 import sys
 from suave_des.errors import KnowledgeError
 from suave_des.workbench import KnowledgeBase
-from suave_des.knowledge.limit import TimeLimit, times_abandoned
+from suave_des.knowledge.pellet.limit import TimeLimit, times_abandoned
 bench = KnowledgeBase.load(reasoner="pellet")  # Java starts in another thread than this one
 state = bench.state(groundings={HIGH["groundings"]!r}, measurements={HIGH["measurements"]!r})
 assert bench.infer(state).plan.decisions
@@ -233,8 +235,8 @@ sys.exit(5)
         program = """
 import atexit, sys, threading
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge import jvm
-from suave_des.knowledge.limit import TimeLimit
+from suave_des.knowledge.pellet import jvm
+from suave_des.knowledge.pellet.limit import TimeLimit
 thread = jvm.java_class("java.lang.Thread")
 atexit.register(lambda: print([each.name for each in threading.enumerate() if each.name == "reasoner"]))
 inner = TimeLimit()  # as a reasoner has its own limit

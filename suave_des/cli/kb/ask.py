@@ -285,7 +285,7 @@ def why_not(
 
     Exit status: 0 also if a rule fires.
     """
-    from suave_des.knowledge.limit import TimeLimit
+    from suave_des.knowledge.pellet.limit import TimeLimit
     from suave_des.knowledge.rules.syntax import RuleError
     from suave_des.scenario_knowledge import open_base
     from suave_des.workbench.fact_reader import FactReader

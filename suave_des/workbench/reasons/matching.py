@@ -13,9 +13,9 @@ from typing import Final
 
 from rdflib import BNode
 
-from suave_des.knowledge import jvm
 from suave_des.knowledge.content import Content
-from suave_des.knowledge.pellet import load_n_triples, one_at_a_time, read_term
+from suave_des.knowledge.pellet import jvm
+from suave_des.knowledge.pellet.in_process import load_n_triples, one_at_a_time, read_term
 from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Names, Triple, canonical, value_of
 from suave_des.knowledge.rules.rdf import with_triples
 from suave_des.knowledge.rules.syntax import TESTERS, Atom, Named, Rule, Term, Variable

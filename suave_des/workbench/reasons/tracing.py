@@ -14,10 +14,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Final
 
-from suave_des.knowledge import jvm
 from suave_des.knowledge.content import Content, Terms
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet import (
+from suave_des.knowledge.pellet import jvm
+from suave_des.knowledge.pellet.in_process import (
     InProcessPellet,
     Trace,
     load_n_triples,

@@ -12,8 +12,8 @@ from functools import cached_property
 
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.knowledge.content import with_rules
-from suave_des.knowledge.limit import TimeLimit
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet.limit import TimeLimit
 from suave_des.knowledge.rdf import RDF_TYPE, Lit, Triple, facts_of, value_of
 from suave_des.knowledge.rules.checks import RuleProblem, check_rule
 from suave_des.knowledge.rules.files import RulesFile

@@ -14,9 +14,9 @@ from functools import cache
 from typing import Any, Final, NamedTuple
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge import jvm
 from suave_des.knowledge.content import RULE_IRI, Terms
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet import jvm
 from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, canonical, facts_of, for_pellet, n_triple
 from suave_des.knowledge.rules.syntax import Rule
 from suave_des.knowledge.state import ContradictionError

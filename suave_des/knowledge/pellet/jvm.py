@@ -15,7 +15,7 @@ from typing import Any, Final
 from suave_des.errors import InputError
 from suave_des.imports import hidden
 from suave_des.knowledge import java_archive
-from suave_des.knowledge.java import OPTIONS, jars, java_library, without_options_of_others
+from suave_des.knowledge.pellet.java import OPTIONS, jars, java_library, without_options_of_others
 
 with hidden("numpy"):  # takes 0.1 s, and JPype needs it only to recognise numpy's truth values
     import jpype

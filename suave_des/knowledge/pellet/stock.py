@@ -23,9 +23,9 @@ from rdflib.term import Node
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge import java_archive
 from suave_des.knowledge.content import Terms
-from suave_des.knowledge.java import SHORT_LIVED, java_executable, launcher_environment
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet import unescape
+from suave_des.knowledge.pellet.in_process import unescape
+from suave_des.knowledge.pellet.java import SHORT_LIVED, java_executable, launcher_environment
 from suave_des.knowledge.rdf import RDF as RDF_IRI
 from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, n_triple, term_of
 

@@ -20,16 +20,17 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from suave_des import knowledge
 from suave_des.caches import private_cache
 from suave_des.knowledge.content import Terms
-from suave_des.knowledge.limit import TimeLimit, reasoning_on
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet.limit import TimeLimit, reasoning_on
 from suave_des.knowledge.rdf import Triple, facts_of
 from suave_des.knowledge.regions import Key, regions_of
 from suave_des.knowledge.state import Fact, Inference, KnowledgeState, Value
 
 if TYPE_CHECKING:
-    from suave_des.knowledge.pellet import InProcessPellet
+    from suave_des.knowledge.pellet.in_process import InProcessPellet
 
 #: To be raised when the form of entries changes.
 _FORMAT: Final = 1
@@ -98,7 +99,7 @@ class CachedPellet:
 
     def _entailed(self, assertions: tuple[Triple, ...]) -> frozenset[Triple]:
         if self._pellet is None:
-            from suave_des.knowledge.pellet import InProcessPellet
+            from suave_des.knowledge.pellet.in_process import InProcessPellet
 
             self._pellet = InProcessPellet(self._ontology, self._terms)
         return self._pellet.infer(assertions)
@@ -112,7 +113,7 @@ class CachedPellet:
 
 
 def cache_digest(ontology: Ontology, terms: Terms | None = None) -> str:
-    """Identify all that an inference depends on: ontologies, rules, values, libraries, and this package's code."""
+    """Identify all that an inference depends on: ontologies, rules, values, libraries, and our code for knowledge."""
     total = hashlib.sha256(f"{ontology.content_hash}{terms or ''}".encode())
     for name in _LIBRARIES:
         total.update(f"{name} {version(name)}\n".encode())
@@ -123,7 +124,7 @@ def cache_digest(ontology: Ontology, terms: Terms | None = None) -> str:
 @lru_cache(maxsize=1)
 def _code() -> str:
     total = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
+    for path in sorted(Path(knowledge.__file__).parent.rglob("*.py")):
         total.update(path.read_bytes())
     return total.hexdigest()
 
