@@ -7,8 +7,11 @@ import gc
 import os
 import shutil
 import signal
+import subprocess
 import sys
 import tempfile
+from importlib.util import cache_from_source, find_spec
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -39,6 +42,20 @@ os.environ.pop("COLUMNS", None)  # which several test processes at once are give
 
 # A shell that runs tests in the background has them ignore Ctrl-C: those that press it, and their children, need it.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_setupnodes(config: pytest.Config, specs: list[object]) -> None:
+    """In a new checkout or environment, compile modules and inner loops once, which each process would do otherwise."""
+    sources = [Path(find_spec(name).origin) for name in ("pandas", "suave_des.simulation.mission")]
+    if len(specs) < 2 or all(Path(cache_from_source(source)).exists() for source in sources):
+        return
+    programs = (("-m", "tests.helpers.warm_worker"), ("-m", "pytest", "--collect-only", "-n", "0", *config.args))
+    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    for process in [
+        subprocess.Popen([sys.executable, *program], cwd=Path(__file__).parents[1], **silent) for program in programs
+    ]:
+        process.wait()
 
 
 def pytest_collection_finish() -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import random
 import shutil
-import signal
 import sqlite3
 import subprocess
 import sys
@@ -110,23 +109,6 @@ def test_killed_with_its_workers_or_without_the_bytes_are_the_same(
     done = chaos.survive(kills, random.Random(7), tmp_path, asked, longest_s=0.3)
     assert done == sorted(done)
     assert (tmp_path / "out" / "runs.csv").read_bytes() == whole
-
-
-def test_ctrl_c_on_the_command_line(scenario: Path, tmp_path: Path) -> None:
-    process = chaos.start([str(scenario), "--managers", "none", "--runs", "100000", "--out", "out"], tmp_path)
-    started = time.monotonic()
-    while not (tmp_path / "out" / STORE_FILE).exists():
-        assert time.monotonic() < started + 60
-        time.sleep(0.05)
-    time.sleep(0.5)
-    process.send_signal(signal.SIGINT)
-    status, err = chaos.ended(process)
-    assert status == 130
-    assert err.startswith("suave-des: interrupted")
-    assert err.count("\n") == 1
-    if "missions are done" in err:
-        assert "suave-des campaign --resume out does the rest" in err
-        assert (tmp_path / "out" / "runs.csv").exists()
 
 
 class TestRefusals:

@@ -14,7 +14,6 @@ import pytest
 
 from suave_des.campaign.spec import RUNS_LIMIT_DEFAULT
 from suave_des.cli.main import main
-from tests.helpers.command import suave_des_command
 
 
 @dataclass(frozen=True)
@@ -353,25 +352,6 @@ class TestCampaign:
         rows = rows_of(tmp_path / "out" / "runs.csv")
         assert [row["run"] for row in rows if row["manager"] == "none"] == ["1", "2"]
         assert len(rows) == 2
-
-    def test_interrupted_it_ends_with_status_130_and_says_what_is_kept(self, tmp_path: Path) -> None:
-        manager = (
-            "import contextlib, os, signal\n"
-            "from suave_des.managing.simple import NoManager\n"
-            "class CtrlC(NoManager):\n"
-            "    def task_requested(self, task):\n"
-            "        with contextlib.suppress(FileNotFoundError):\n"
-            "            os.unlink('once')\n"
-            "            os.kill(os.getppid(), signal.SIGINT)\n"
-            "        super().task_requested(task)\n"
-        )
-        (tmp_path / "impatient.py").write_text(manager)
-        (tmp_path / "once").touch()
-        arguments = ("--managers", "none,impatient:CtrlC", "--runs", "100", "--quiet", *OUT)
-        ended = suave_des_command("campaign", "seams2023", *arguments, cwd=tmp_path)
-        assert ended.returncode == 130
-        assert _matches(ended.stderr, r"suave-des: interrupted; \d+ of 200 missions are done, and kept in out")
-        assert (tmp_path / "out" / "runs.csv").is_file()
 
 
 class TestReproduce:
