@@ -118,7 +118,7 @@ class Metacontrol(ManagingSubsystem):
 
     def execute(self, conclusion: Conclusion, latency_s: float) -> AdaptationProcess:
         """Request the plan's modes after the reasoner's latency; their objectives lose their status."""
-        recovered = self._recovered()
+        recovered = [component for component, status in self.components.items() if status == RECOVERED]
         yield self.system.env.timeout(latency_s)
         if self.system.recorded:
             for line in sorted(conclusion.statuses - self._recorded_statuses):
@@ -209,9 +209,6 @@ class Metacontrol(ManagingSubsystem):
             if design is not None and (self.groundings.get(function), self.objectives[function]) != (design, None):
                 return False
         return self._adapter.is_in_force(conclusion.plan)
-
-    def _recovered(self) -> list[str]:
-        return [component for component, status in self.components.items() if status == RECOVERED]
 
     def _is_listening(self) -> bool:
         return bool(self.objectives) or not self._revision.ignores_diagnostics_without_objective
