@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import nbformat
+from jupyter_client.manager import KernelManager
 from nbclient import NotebookClient
 
 FOLDER = Path(__file__).resolve().parent / "notebooks"
@@ -21,12 +22,13 @@ NOTEBOOKS = tuple(sorted(FOLDER.glob("*.ipynb")))
 _TIME_OUT_S = 300
 
 
-def executed(path: Path, folder: Path) -> Any:
+def executed(path: Path, folder: Path, kernel: KernelManager | None = None) -> Any:
     """Run a notebook from its beginning.
 
     Args:
         path: the notebook.
         folder: where it runs, and writes its files.
+        kernel: runs it in place of a new one, without the names that notebooks before it defined.
 
     Returns:
         The notebook with its outputs.
@@ -35,8 +37,14 @@ def executed(path: Path, folder: Path) -> Any:
         nbclient.exceptions.CellExecutionError: a cell raises.
     """
     notebook = nbformat.read(path, as_version=4)
+    if kernel is not None:
+        notebook.cells.insert(0, nbformat.v4.new_code_cell(f"%reset -f\n%cd -q {folder}"))
     resources = {"metadata": {"path": str(folder)}}
-    NotebookClient(notebook, timeout=_TIME_OUT_S, record_timing=False, resources=resources).execute()
+    client = NotebookClient(notebook, kernel, timeout=_TIME_OUT_S, record_timing=False, resources=resources)
+    client.execute()
+    if kernel is not None:
+        client.kc.stop_channels()
+        del notebook.cells[0]
     notebook.metadata.pop("widgets", None)
     notebook.metadata["language_info"] = {"name": "python"}  # without the version of this machine's
     return notebook
