@@ -54,7 +54,7 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         centre_m: x and y of the spiral's centre; in revision 2023 the local frame's origin.
         view_tangent: tangent of half the camera's field of view.
         phase_s: mission time of a tick of the node's timer.
-        ready_s: mission time before which the node does not tick, whatever its mode.
+        start_latency_s: from the first activation to the first tick.
         altitude_m: the node's altitude parameter.
     """
 
@@ -63,9 +63,10 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
     centre_m: tuple[float, float]
     view_tangent: float
     phase_s: float
-    ready_s: float = 0.0
+    start_latency_s: float = 0.0
     altitude_m: float = field(init=False)
     _lowered_m: float = field(default=0.0, init=False)
+    _ready_s: float | None = field(default=None, init=False)  # mission time of the first tick at the soonest
 
     def __post_init__(self) -> None:
         self.altitude_m = self.revision.initial_altitude_m
@@ -95,7 +96,9 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         is_first = self._present is None
         if self.revision.centre == "activation" or (self.revision.centre == "first_activation" and is_first):
             self.centre_m = self.sender.vehicle.position(self.env.now)[:2]
-        first_s = tick_at_or_after(max(self.env.now, self.ready_s), self.phase_s, self.revision.tick_period_s)
+        if self._ready_s is None:
+            self._ready_s = self.env.now + self.start_latency_s
+        first_s = tick_at_or_after(max(self.env.now, self._ready_s), self.phase_s, self.revision.tick_period_s)
         self._guidance.start_at(first_s, resumes=not (is_first or self.revision.resends_on_activation))
 
     def deactivated(self) -> None:

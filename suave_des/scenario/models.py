@@ -28,6 +28,7 @@ from suave_des.scenario.quantities import (
     Real,
     Strict,
     Within,
+    mean,
     wrong,
 )
 from suave_des.scenario.revision import Revision
@@ -75,8 +76,8 @@ class Latencies(Strict):
 
     task_start_s: DelayDistribution = 0.0
     """From guided mode to the request of the first task."""
-    guided_start_s: DelayDistribution = 0.0
-    """From guided mode to the moment at which the search node has noticed it and sends set-points."""
+    search_start_s: DelayDistribution = 0.0
+    """From the first activation of the search, in guided mode, to its first set-point; drawn once a run."""
     mode_change_s: DelayDistribution = 0.0
     """From the mode manager's answer to the mode's effect."""
     inference_s: DelayDistribution = 1.0
@@ -110,6 +111,10 @@ class Calibration(Strict):
     """The same, north."""
     real_time_factor_loss: Annotated[Distribution, Within(0.0, 1000.0, is_floor=True)] = 0.0
     """The simulated world runs 1 / (1 + loss) as fast as the software's clock; drawn once a run."""
+    reasoning_slowdown: Annotated[Distribution, Within(0.0, 1000.0, is_floor=True)] = 0.0
+    """What is added to that loss while the reasoner runs beside the simulator; drawn once a run, and spread over the
+    mission by the share of time that an inference takes of metacontrol's period.
+    """
 
 
 class ReactionMetric(Strict):
@@ -338,6 +343,10 @@ class Scenario(Strict):
         return tuple(
             dict.fromkeys((*MISSION_FUNCTIONS, *own.lasting, *own.search_pipeline, *own.inspect_pipeline, *surface))
         )
+
+    def reasoning_share(self) -> float:
+        """Share of the time in which metacontrol's reasoner runs: one inference in each of its periods."""
+        return min(1.0, mean(self.latencies.inference_s) / self.managers.metacontrol.reasoning_period_s)
 
     @property
     def further_columns(self) -> tuple[str, ...]:

@@ -257,6 +257,21 @@ def draw(distribution: AnyDistribution, stream: random.Random) -> float:
     return distribution if isinstance(distribution, float | int) else distribution.draw(stream)
 
 
+def mean(distribution: AnyDistribution) -> float:
+    """Mean of a distribution; of a normal one before it is cut."""
+    match distribution:
+        case Normal():
+            return distribution.mean
+        case Uniform():
+            return (distribution.minimum + distribution.maximum) / 2
+        case Exponential():
+            return distribution.minimum + distribution.mean
+        case Choice():
+            return sum(distribution.values) / len(distribution.values)
+        case number:
+            return float(number)
+
+
 def _stated(distribution: AnyDistribution) -> list[tuple[str, float]]:
     """The values that a scenario states for a distribution, with their keys: itself, its mean, bounds, choices."""
     match distribution:

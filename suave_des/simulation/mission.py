@@ -37,6 +37,7 @@ from suave_des.monitor.monitors import (
     state_monitor,
     thruster_monitor,
 )
+from suave_des.registry import manager_class
 from suave_des.simulation.faults import ThrusterFaults, schedule
 from suave_des.simulation.host import RAISED, ManagerHost
 from suave_des.simulation.measuring import measure_battery, measure_signal, monitor_timing
@@ -77,7 +78,10 @@ class MissionRun:
 
         # The vehicle.
         self._start = draw_start(chance)
-        self._vehicle = make_vehicle(scenario, prepared.vehicle_model, chance, self._start, prepared.duration_s, track)
+        reasons = (manager_type or manager_class(manager)).needs_knowledge
+        self._vehicle = make_vehicle(
+            scenario, prepared.vehicle_model, chance, self._start, prepared.duration_s, track, reasons=reasons
+        )
         self._faults = ThrusterFaults(scenario, chance, self._vehicle, self._recorder.log)
 
         # What monitors measure.
@@ -202,7 +206,7 @@ class MissionRun:
         follow, search, recharge = domain.FOLLOW_PIPELINE, domain.GENERATE_SEARCH_PATH, domain.GENERATE_RECHARGE_PATH
         make_sender = partial(self._make_sender, loss_probability)
         phase_s = chance.phase(search, revision.spiral.tick_period_s)
-        ready_s, view_tangent = chance.value("latencies.guided_start_s"), self._prepared.view_tangent
+        latency_s, view_tangent = chance.value("latencies.search_start_s"), self._prepared.view_tangent
         recovery_s = chance.sampler("revision.recovery.delay_s", revision.recovery.delay_s)
         self._follow = FollowPipeline(env, make_sender(follow), revision.follow, self._path)
         nodes: dict[str, FunctionNode] = {
@@ -210,7 +214,7 @@ class MissionRun:
                 env, self.bus, revision.recovery, self._faults.set_health, recovery_s, self._faults.unrecoverable
             ),
             search: GenerateSearchPath(
-                env, make_sender(search), revision.spiral, self._start.origin_m, view_tangent, phase_s, ready_s
+                env, make_sender(search), revision.spiral, self._start.origin_m, view_tangent, phase_s, latency_s
             ),
             follow: self._follow,
         }

@@ -50,7 +50,14 @@ def draw_start(chance: Chance) -> StartPlace:
 
 
 def make_vehicle(
-    scenario: Scenario, model: VehicleModel, chance: Chance, start: StartPlace, duration_s: float, track: Array
+    scenario: Scenario,
+    model: VehicleModel,
+    chance: Chance,
+    start: StartPlace,
+    duration_s: float,
+    track: Array,
+    *,
+    reasons: bool,
 ) -> Vehicle:
     """Make the vehicle of one mission.
 
@@ -61,6 +68,7 @@ def make_vehicle(
         start: where the vehicle is put.
         duration_s: of the mission.
         track: to be filled with the vehicle's states, a row for each time step.
+        reasons: whether a reasoner runs on the simulator's computer, and slows it down.
     """
     value, calibration = chance.value, scenario.calibration
     z_m, heading_rad = value("start.z_m"), value("start.heading_rad")
@@ -73,6 +81,9 @@ def make_vehicle(
         calibration.heading_frequency_rad_per_s,
         calibration.heading_integral_gain_per_s3,
     )
+    loss = value("calibration.real_time_factor_loss")
+    if reasons:
+        loss += scenario.reasoning_share() * value("calibration.reasoning_slowdown")
     current_m_per_s, wave = _current(scenario, chance)
     return Vehicle(
         model,
@@ -82,7 +93,7 @@ def make_vehicle(
         altitude_error_m=altitude_error_m,
         current_m_per_s=current_m_per_s,
         current_wave=wave,
-        time_scale=1.0 / (1.0 + value("calibration.real_time_factor_loss")),
+        time_scale=1.0 / (1.0 + loss),
         z_limits_m=(domain.SEA_BED_Z_M, domain.SURFACE_Z_M),
         memory=track,
     )

@@ -31,7 +31,7 @@ from suave_des.scenario.loader import load_scenario, value_at, with_values
 from suave_des.simulation.simulator import Simulator
 from suave_des.validation.shares import Share
 
-JERK, START = "calibration.jerk_m_per_s3", "latencies.guided_start_s"
+JERK, START = "calibration.jerk_m_per_s3", "latencies.search_start_s"
 ORIGIN = "calibration.origin_y_m"
 BOTH = ["seams2023", "planta_exp1_campaign.yaml"]
 SCENARIOS = {name: load_scenario(name) for name in ("seams2023", "planta_exp1")}

@@ -68,7 +68,7 @@ def test_the_search_goes_on_around_the_same_centre(manager: str) -> None:
     on_way = is_on_the_way(result)
     left, back = on_way.index(True), len(on_way) - on_way[::-1].index(True)
     assert distance_m[back] > 10.0
-    assert distance_m[-1] == pytest.approx(distance_m[left], abs=2.0)
+    assert distance_m[left] - 1.0 < distance_m[-1] < distance_m[left] + 4.0  # a turn of a minute adds up to 3.5 m
 
 
 @RECHARGES
