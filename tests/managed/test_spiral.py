@@ -64,6 +64,24 @@ def test_first_set_point_is_that_of_step_1_around_the_revisions_centre(name: str
 
 
 @BOTH
+def test_the_first_set_point_comes_some_time_after_the_first_activation_and_later_ones_at_once(name: str) -> None:
+    search = Search(name, PlacedVehicle(obeys=True))
+    search.node.start_latency_s = 4.5
+    search.ticks(20)
+    search.node.apply(spiral_at(1.0))
+    search.ticks(5)  # the last one at 24.25 s
+    assert search.vehicle.commands == []
+    search.ticks(1)
+    assert len(search.vehicle.commanded) == 1
+    search.node.apply(INACTIVE)
+    search.ticks(10)
+    search.vehicle.commands.clear()
+    search.node.apply(spiral_at(1.0))
+    search.ticks(1)
+    assert len(search.vehicle.commanded) == 1
+
+
+@BOTH
 @pytest.mark.parametrize("altitude_m", [1.0, 2.0, 3.0])
 def test_set_points_are_at_the_modes_altitude_above_the_bed(name: str, altitude_m: float) -> None:
     search = searching(name, altitude_m)

@@ -52,7 +52,7 @@ def test_release15_is_the_same_vehicle_in_other_software():
     assert ours.revision.name == "1.5"
     assert ours.managers.random.adaptation_period_s == 30
     assert ours.managers.metacontrol.reasoning_period_s == 1.5
-    of_2023_alone = ("altitude_error_m", "origin_y_m", "real_time_factor_loss")
+    of_2023_alone = ("altitude_error_m", "origin_y_m")
     shared = other.calibration.model_copy(update=dict.fromkeys(of_2023_alone, 0.0))
     assert (ours.calibration, ours.start, ours.pipeline) == (shared, other.start, other.pipeline)
 

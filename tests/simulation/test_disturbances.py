@@ -55,7 +55,7 @@ def test_a_current_that_varies_moves_a_vehicle_without_thrust_as_the_water_moves
     wave = "{mean_m_per_s: 0.05, amplitude_m_per_s: 0.2, period_s: 100, direction_rad: 0.0}"
     result = fly(
         "base: release15.yaml\nrevision: {thruster_failures: {effective_from_s: 0.0, loss_probability: 0.0}}\n"
-        "calibration: {real_time_factor_loss: 0.0}\nmission: {time_limit_s: 215}\n"
+        "mission: {time_limit_s: 215}\n"
         f"thruster_events: [{lost}]\ncurrent: {{wave: {wave}}}\n"
     )
     x_m = {round(point.t_s): point.x_m for point in result.trajectory}

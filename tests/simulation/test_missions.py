@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from suave_des.metrics.result import MissionResult
+from suave_des.managing.bt import BehaviourTree
+from suave_des.metrics.result import MissionResult, TrajectoryPoint
 from suave_des.world.pipeline import there_and_back
 
-NO_ERRORS = {"calibration": {"altitude_error_m": 0.0, "real_time_factor_loss": 0.0}}
+NO_ERRORS = {"calibration": {"altitude_error_m": 0.0, "reasoning_slowdown": 0.0}}
 MANAGERS = ("none", "random", "bt", "bt_extended")
 SCENARIOS = pytest.mark.parametrize("scenario", ["seams2023", "release15"])
 manager_names = st.sampled_from(MANAGERS)
@@ -254,6 +255,29 @@ def test_a_slower_simulated_world_inspects_less(simulator) -> None:
         return simulator(calibration=calibration).run("bt", 1, 1).metrics.distance_inspected_m
 
     assert distance_m(1.0) < 0.8 * distance_m(0.0)
+
+
+class ReasoningTree(BehaviourTree):
+    """Does what bt does, with a reasoner beside it."""
+
+    needs_knowledge = True
+
+
+@pytest.mark.parametrize(("inference_s", "share"), [(0.5, 0.25), (1.0, 0.5), (5.0, 1.0), ((0.5, 1.5), 0.5)])
+def test_the_reasoner_slows_the_world_down_in_proportion_to_its_share_of_the_time(
+    simulator, inference_s: float | tuple[float, float], share: float
+) -> None:
+    if isinstance(inference_s, tuple):
+        inference_s = {"distribution": "uniform", "minimum": inference_s[0], "maximum": inference_s[1]}
+
+    def flown(kind: type[BehaviourTree], **calibration: float) -> list[TrajectoryPoint]:
+        latencies = {"inference_s": inference_s}  # in metacontrol's period of 2 s
+        made = simulator(calibration={"altitude_error_m": 0.0, **calibration}, latencies=latencies)
+        return made.start("bt", 1, 1, record=True, manager_type=kind).result().trajectory
+
+    slower = flown(ReasoningTree, reasoning_slowdown=0.4)
+    assert slower == flown(BehaviourTree, real_time_factor_loss=0.4 * share)
+    assert flown(BehaviourTree, reasoning_slowdown=0.4) == flown(BehaviourTree, reasoning_slowdown=0.0) != slower
 
 
 @SCENARIOS

@@ -8,7 +8,7 @@ from suave_des.errors import MissionError
 from suave_des.metrics.result import MissionResult
 from tests.helpers import OUTSIDE
 
-QUIET = {"calibration": {"altitude_error_m": 0.0, "real_time_factor_loss": 0.0}}
+QUIET = {"calibration": {"altitude_error_m": 0.0, "reasoning_slowdown": 0.0}}
 
 
 def mission(simulator, manager: str, scenario: str = "seams2023", **changes: object) -> MissionResult:

@@ -1,7 +1,7 @@
 """A small guard: the shipped calibration still gives missions like the published ones.
 
-Sixty missions a manager, with fixed seeds, against bounds that are wide for that number; `suave-des validate` with
-2,000 missions is the real check, and docs/background/fidelity.md shows what it found.
+Sixty missions a manager, and 24 for the runs of 2025, with fixed seeds, against bounds that are wide for these numbers;
+`suave-des validate` with 2,000 missions is the real check, and docs/background/fidelity.md shows what it found.
 """
 
 import pandas as pd
@@ -40,7 +40,7 @@ def test_a_cell_of_the_papers_table_is_still_near(
 
 @pytest.mark.parametrize("metric", PAPER_METRICS)
 def test_metacontrol_is_still_the_best_by_far(simulated: pd.DataFrame, metric: str) -> None:
-    means = simulated.groupby("manager")[metric].mean()
+    means = simulated.groupby("manager", observed=True)[metric].mean()
     sign = -1.0 if metric == "search_time_s" else 1.0
     others = max(sign * means["none"], sign * means["random"])
     assert sign * means["metacontrol"] > others + (20.0 if metric == "search_time_s" else 8.0)
@@ -52,3 +52,12 @@ def test_metacontrols_two_clusters_are_still_there(simulated: pd.DataFrame) -> N
     assert times.between(118, 135).mean() > 0.12
     late = simulated[(simulated["manager"] == "metacontrol") & simulated["search_time_s"].between(120, 130)]
     assert late["detection_x_m"].between(-19.5, -18.5).mean() > 0.6
+
+
+@pytest.mark.parametrize(
+    ("metric", "least", "most"), [("search_time_s", 0.5, 6.0), ("distance_inspected_m", -5.0, -0.4)]
+)
+def test_as_in_the_runs_of_2025_metacontrol_comes_a_little_after_bt(metric: str, least: float, most: float) -> None:
+    runs = run_campaign("planta_exp1_campaign.yaml", ("bt", "metacontrol"), 4, 1).frame()
+    means = runs.groupby("manager", observed=True)[metric].mean()
+    assert least < means["metacontrol"] - means["bt"] < most
