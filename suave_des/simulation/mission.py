@@ -78,7 +78,7 @@ class MissionRun:
 
         # The vehicle.
         self._start = draw_start(chance)
-        reasons = (manager_type or manager_class(manager)).needs_knowledge
+        reasons = (spec.manager_type or manager_class(spec.manager)).needs_knowledge
         self._vehicle = make_vehicle(
             scenario, prepared.vehicle_model, chance, self._start, prepared.duration_s, track, reasons=reasons
         )
