@@ -141,6 +141,7 @@ def make(archive: Path | None = None, reasoner: str = "pellet") -> Path | None:
         made.unlink(missing_ok=True)
     for old in sorted(archive.parent.glob("*.aot"), key=lambda path: path.stat().st_mtime)[:-MAX_FILES]:
         old.unlink(missing_ok=True)
+        old.with_suffix(".tried").unlink(missing_ok=True)  # so that its next user makes it again at once
     return archive
 
 

@@ -106,6 +106,20 @@ class _Started:
     returncode: int | None = None
 
 
+def test_one_that_gave_way_to_newer_ones_is_made_again_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[object] = []
+    monkeypatch.setattr(subprocess, "Popen", lambda *command, **_: started.append(command) or _Started())
+    monkeypatch.setattr(subprocess, "run", lambda command, **_: Path(command[-1]).touch())
+    archives = [tmp_path / f"{number}.aot" for number in range(java_archive.MAX_FILES + 1)]
+    for number, archive in enumerate(archives):
+        java_archive.make_later(archive)
+        java_archive.make(archive)
+        os.utime(archive, (number, number))
+    assert not archives[0].exists()
+    java_archive.make_later(archives[0])
+    assert len(started) == len(archives) + 1
+
+
 def test_a_folder_that_cannot_be_written_to_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: pytest.fail("a process was started"))
     (tmp_path / "file").touch()
