@@ -16,8 +16,8 @@ FEWEST_RUNS = 20
 FEWEST_PAIRS = 100
 """Runs at least, for a difference: most runs differ little, a few by far, and fewer runs may have none of these.
 
-Of differences between metacontrol and bt in search time (9% of them beyond 20 s), intervals at which a campaign stops
-cover the true one in 81% of cases if it may stop after 20 runs, in 94% if after 100.
+Where 9% of the differences between two managers' search times were beyond 20 s, intervals at which a campaign stopped
+covered the true one in 81% of cases if it might stop after 20 runs, in 94% if after 100.
 """
 SEARCH_TIME = "search_time_s"
 
