@@ -152,7 +152,8 @@ def main(reasoner: str = "pellet", archive: str | None = None) -> int:
     try:
         print(make(Path(archive) if archive else None, reasoner) or f"switched off by {_SWITCH}")
     except (OSError, subprocess.SubprocessError) as error:
-        lines = (getattr(error, "stderr", None) or b"").decode(errors="replace").strip().splitlines()
+        said = error.stderr if isinstance(error, subprocess.CalledProcessError) else b""
+        lines = (said or b"").decode(errors="replace").strip().splitlines()
         print(f"suave-des: Java could not make its archive: {lines[-1] if lines else error}", file=sys.stderr)
         return 2
     return 0
