@@ -160,7 +160,8 @@ class ManagingSubsystem:
         system: what can be seen and done.
         period_s: time between calls of `adapt`; none: never called.
         starts_s: mission time of the first call of `adapt`.
-        needs_knowledge: whether missions need the knowledge base, so that it is checked before the first one.
+        needs_knowledge: whether missions need the knowledge base, so that it is checked before the first one, and a
+            reasoner runs beside the simulator, which slows it down (`calibration.reasoning_slowdown`).
         subscribes_to: kinds of diagnostics that `diagnostic` is called with. A manager that reads `system.measured`
             when it adapts need not subscribe to measured values; publishing each of them takes time. Pose and distance
             come once a second, to those who name their kinds.
