@@ -15,6 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
+from weakref import WeakSet
 
 from filelock import FileLock, Timeout
 
@@ -106,6 +107,7 @@ class Store:
         self.path = path
         self._committed_s = time.monotonic()
         self._inode = 0
+        self._cursors: WeakSet[sqlite3.Cursor] = WeakSet()
         if path is not None and not path.is_file():
             raise InputError("there is no campaign to resume", file=path.parent, remedy="start one with --out")
         with _user_errors(path):
@@ -150,7 +152,7 @@ class Store:
             InputError: nothing was and there is no default, or it is damaged.
         """
         with _user_errors(self.path):
-            found = self._db.execute("SELECT value, crc FROM about WHERE name = ?", (name,)).fetchone()
+            found = self._select("SELECT value, crc FROM about WHERE name = ?", name).fetchone()
         if found is None and default is not None:
             return default
         if found is None or _note_crc(name, found[0]) != found[1]:
@@ -202,13 +204,13 @@ class Store:
     def settled(self, group: MissionGroup) -> set[int]:
         """Return the runs of a group that have an outcome."""
         with _user_errors(self.path):
-            found = self._db.execute("SELECT run FROM outcomes WHERE point = ? AND manager = ?", group)
+            found = self._select("SELECT run FROM outcomes WHERE point = ? AND manager = ?", *group)
             return {run for (run,) in found}
 
     def count(self) -> int:
         """Return the number of outcomes."""
         with _user_errors(self.path):
-            (number,) = self._db.execute("SELECT count(*) FROM outcomes").fetchone()
+            (number,) = self._select("SELECT count(*) FROM outcomes").fetchone()
         return int(number)
 
     def outcomes(self) -> Iterator[Finished]:
@@ -218,16 +220,25 @@ class Store:
             InputError: the store is damaged.
         """
         with _user_errors(self.path):
-            for record in self._db.execute(_ALL):
+            for record in self._select(_ALL):
                 yield _finished(record, self.path)
+
+    def _select(self, query: str, *values: object) -> sqlite3.Cursor:
+        cursor = self._db.execute(query, values)
+        self._cursors.add(cursor)
+        return cursor
 
     def close(self) -> None:
         """Leave one plain file behind. If the disk is full, a journal stays beside it, from which the rest is read."""
-        with suppress(sqlite3.Error):
-            self._db.execute("COMMIT")
-        with suppress(sqlite3.Error):
-            self._db.execute("PRAGMA journal_mode = DELETE")
-        self._db.close()
+        try:
+            for cursor in list(self._cursors):  # one that an interruption left unread would keep the file locked
+                cursor.close()
+            with suppress(sqlite3.Error):
+                self._db.execute("COMMIT")
+            with suppress(sqlite3.Error):
+                self._db.execute("PRAGMA journal_mode = DELETE")
+        finally:
+            self._db.close()
 
 
 def make_store(path: Path, about: Mapping[str, Any]) -> None:

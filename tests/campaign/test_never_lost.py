@@ -18,6 +18,8 @@ import suave_des
 from benchmarks import chaos
 from suave_des.campaign import store as stores
 from suave_des.campaign.campaign import CampaignInterrupted, Progress, resume_campaign, run_campaign
+from suave_des.campaign.missions import MissionOutcome
+from suave_des.campaign.progress import GroupTracker
 from suave_des.campaign.store import STORE_FILE, Store, StoreError
 from suave_des.errors import InputError
 from tests.helpers import AWKWARD
@@ -66,6 +68,27 @@ def test_resumed_on_any_number_of_workers_the_bytes_are_the_same(
     assert seen[0].done > 15  # what was done is not done again
     assert (tmp_path / "out" / "summary.csv").read_bytes() == (tmp_path / "whole" / "summary.csv").read_bytes()
     assert (tmp_path / "out" / "manifest.json").read_bytes() == (tmp_path / "whole" / "manifest.json").read_bytes()
+
+
+def test_an_interruption_while_earlier_outcomes_are_read_is_one_like_others(
+    scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What was read is still held by the exception then, and must not keep the database locked."""
+    interrupted(scenario, tmp_path / "out")
+    count, counted = GroupTracker.add, []
+
+    def ctrl_c(tracker: GroupTracker, run: int, outcome: MissionOutcome) -> None:
+        counted.append(run)
+        if len(counted) == 3:
+            raise KeyboardInterrupt
+        count(tracker, run, outcome)
+
+    monkeypatch.setattr(GroupTracker, "add", ctrl_c)
+    with pytest.raises(CampaignInterrupted):
+        resume_campaign(tmp_path / "out")
+    monkeypatch.undo()
+    resume_campaign(tmp_path / "out")
+    assert (tmp_path / "out" / "runs.csv").read_bytes() == undisturbed(scenario, 20, tmp_path / "whole")
 
 
 def test_a_campaign_that_is_done_may_get_more_runs(scenario: Path, tmp_path: Path) -> None:
