@@ -152,9 +152,12 @@ def main(reasoner: str = "pellet", archive: str | None = None) -> int:
     try:
         print(make(Path(archive) if archive else None, reasoner) or f"switched off by {_SWITCH}")
     except (OSError, subprocess.SubprocessError) as error:
-        said = error.stderr if isinstance(error, subprocess.CalledProcessError) else b""
-        lines = (said or b"").decode(errors="replace").strip().splitlines()
-        print(f"suave-des: Java could not make its archive: {lines[-1] if lines else error}", file=sys.stderr)
+        reason = str(error)
+        if isinstance(error, subprocess.CalledProcessError):
+            lines = [line for line in error.stderr.decode(errors="replace").splitlines() if line.strip()]
+            said = [line for line in lines if not line.startswith("Picked up ")]  # options that Java was given
+            reason = "; ".join([*said[-1:], f"exit status {error.returncode}"])
+        print(f"suave-des: Java could not make its archive: {reason}", file=sys.stderr)
         return 2
     return 0
 

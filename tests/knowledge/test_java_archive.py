@@ -151,3 +151,14 @@ def test_other_libraries_or_options_mean_another_archive(tmp_path: Path, monkeyp
     paths.add(java_archive.archive_path([str(jar)], ["-Xrs"]))
     assert len(paths) == 3 and None not in paths
     assert java_archive.archive_path([str(tmp_path / "none.jar")], ["-Xrs"]) is None
+
+
+def test_why_no_archive_could_be_made_is_what_was_said_last_with_the_exit_status(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    said = "No space left\nPicked up JAVA_TOOL_OPTIONS: -Xmx512m"
+    monkeypatch.setattr(java_archive, "_TRAINING", {"pellet": f"import sys; sys.stderr.write({said!r}); sys.exit(3)"})
+    monkeypatch.setattr(os, "nice", lambda increment: increment)
+    assert java_archive.main("pellet", str(tmp_path / "archive.aot")) == 2
+    assert capsys.readouterr().err == "suave-des: Java could not make its archive: No space left; exit status 3\n"
+    assert list(tmp_path.iterdir()) == []
