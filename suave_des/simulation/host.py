@@ -13,7 +13,7 @@ from suave_des.errors import InputError, MissionError, SuaveDesError, did_you_me
 from suave_des.managing.base import AdaptationProcess, Dependencies, ManagedSystem, ManagingSubsystem
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus
-from suave_des.registry import is_built_in, manager_class
+from suave_des.registry import is_built_in
 
 RAISED = (Exception, SystemExit)
 """What a manager may raise: one that calls sys.exit must end neither a campaign nor, without an error, its mission."""
@@ -34,30 +34,30 @@ class ManagerHost:
 
     Attributes:
         name: the manager's name, or module:Class.
+        manager_type: its class.
         run: number of the run, for errors.
         system: the manager's view of the managed subsystem.
         bus: where the diagnostics come from that the manager subscribes to.
         skips_idle_calls: whether calls are left out at all.
-        manager_type: the manager's class; None: the one that its name leads to.
 
     Raises:
         MissionError: the manager raised; here, or in any hook later.
-        InputError: there is no such manager, or it cannot work with the mission's input.
+        InputError: the manager cannot work with the mission's input.
     """
 
     name: str
+    manager_type: type[ManagingSubsystem]
     run: int
     system: ManagedSystem
     bus: DiagnosticsBus
     skips_idle_calls: bool
-    manager_type: type[ManagingSubsystem] | None = None
     manager: ManagingSubsystem = field(init=False)
     remarks: tuple[str, ...] = ()  # what its author should know
     _is_waiting: bool = False  # for an event
     _idle_regions: set[tuple[int, ...]] = field(default_factory=set)  # of measured values: there, calls change nothing
 
     def __post_init__(self) -> None:
-        manager_type = self.manager_type or manager_class(self.name)
+        manager_type = self.manager_type
         try:
             self.manager = manager_type(self.system)
             if not hasattr(self.manager, "system"):

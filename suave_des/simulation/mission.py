@@ -68,6 +68,7 @@ class MissionRun:
 
     def __init__(self, prepared: PreparedScenario, spec: RunSpec, track: Array) -> None:
         self._prepared, self._spec = prepared, spec
+        self._manager_type = spec.manager_type or manager_class(spec.manager)
         self._scenario = scenario = prepared.loaded.scenario
         self._revision = scenario.revision
         self.track = track
@@ -78,10 +79,7 @@ class MissionRun:
 
         # The vehicle.
         self._start = draw_start(chance)
-        reasons = (spec.manager_type or manager_class(spec.manager)).needs_knowledge
-        self._vehicle = make_vehicle(
-            scenario, prepared.vehicle_model, chance, self._start, prepared.duration_s, track, reasons=reasons
-        )
+        self._vehicle = make_vehicle(prepared, chance, self._start, track, reasons=self._manager_type.needs_knowledge)
         self._faults = ThrusterFaults(scenario, chance, self._vehicle, self._recorder.log)
 
         # What monitors measure.
@@ -317,7 +315,7 @@ class MissionRun:
             learned=self._prepared.learned(name),
             training=self._prepared.training is not None,
         )
-        return ManagerHost(name, spec.run, system, self.bus, not spec.record, spec.manager_type)
+        return ManagerHost(name, self._manager_type, spec.run, system, self.bus, skips_idle_calls=not spec.record)
 
     # The start.
 

@@ -1,7 +1,7 @@
 """What the missions of one scenario have in common."""
 
 from collections.abc import Mapping
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -14,8 +14,9 @@ from suave_des.managed.follow import InspectionPath
 from suave_des.managing.learned import read_learned
 from suave_des.registry import manager_class
 from suave_des.scenario.loader import LoadedScenario
+from suave_des.scenario.physical import VehicleDescription
 from suave_des.simulation.functions import own_functions
-from suave_des.simulation.vehicles import vehicle_model
+from suave_des.vehicle.model import Thruster, VehicleModel
 from suave_des.world.pipeline import sample_points, there_and_back
 
 if TYPE_CHECKING:  # owlready2 is loaded only when it is needed
@@ -76,3 +77,18 @@ class PreparedScenario:
         if manager not in self._manager_files:
             self._manager_files[manager] = dict(self.loaded.declared_files(manager, manager_class(manager)))
         return self._manager_files[manager]
+
+
+@lru_cache(maxsize=64)
+def vehicle_model(description: VehicleDescription) -> VehicleModel:
+    """Give a vehicle's constants; equal descriptions give the same object, by which its matrices are cached."""
+    return VehicleModel(
+        mass_kg=description.mass_kg,
+        inertia_kg_m2=description.inertia_kg_m2,
+        displaced_volume_m3=description.displaced_volume_m3,
+        water_density_kg_per_m3=description.water_density_kg_per_m3,
+        centre_of_buoyancy_m=description.centre_of_buoyancy_m,
+        quadratic_drag=description.quadratic_drag,
+        thrust_limit_n=description.thrust_limit_n,
+        thrusters=tuple(Thruster(each.position_m, each.direction) for each in description.thrusters),
+    )

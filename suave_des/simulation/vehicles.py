@@ -1,6 +1,5 @@
 """The vehicle that a scenario describes, where a mission puts it, and the current it is in."""
 
-from functools import lru_cache
 from math import cos, sin
 from typing import NamedTuple
 
@@ -8,26 +7,10 @@ from suave_des import domain
 from suave_des.chance import Chance
 from suave_des.compiling import Array
 from suave_des.scenario.models import Scenario
-from suave_des.scenario.physical import VehicleDescription
+from suave_des.simulation.prepared import PreparedScenario
 from suave_des.vehicle.autopilot import Autopilot
 from suave_des.vehicle.frames import Pose
-from suave_des.vehicle.model import Thruster, VehicleModel
 from suave_des.vehicle.vehicle import CurrentWave, Point, Vehicle
-
-
-@lru_cache(maxsize=64)
-def vehicle_model(description: VehicleDescription) -> VehicleModel:
-    """Give a vehicle's constants; equal descriptions give the same object, by which its matrices are cached."""
-    return VehicleModel(
-        mass_kg=description.mass_kg,
-        inertia_kg_m2=description.inertia_kg_m2,
-        displaced_volume_m3=description.displaced_volume_m3,
-        water_density_kg_per_m3=description.water_density_kg_per_m3,
-        centre_of_buoyancy_m=description.centre_of_buoyancy_m,
-        quadratic_drag=description.quadratic_drag,
-        thrust_limit_n=description.thrust_limit_n,
-        thrusters=tuple(Thruster(each.position_m, each.direction) for each in description.thrusters),
-    )
 
 
 class StartPlace(NamedTuple):
@@ -50,27 +33,19 @@ def draw_start(chance: Chance) -> StartPlace:
 
 
 def make_vehicle(
-    scenario: Scenario,
-    model: VehicleModel,
-    chance: Chance,
-    start: StartPlace,
-    duration_s: float,
-    track: Array,
-    *,
-    reasons: bool,
+    prepared: PreparedScenario, chance: Chance, start: StartPlace, track: Array, *, reasons: bool
 ) -> Vehicle:
     """Make the vehicle of one mission.
 
     Args:
-        scenario: has the calibration of the autopilot.
-        model: the vehicle's constants.
+        prepared: the scenario.
         chance: of the run.
         start: where the vehicle is put.
-        duration_s: of the mission.
         track: to be filled with the vehicle's states, a row for each time step.
         reasons: whether a reasoner runs on the simulator's computer, and slows it down.
     """
-    value, calibration = chance.value, scenario.calibration
+    scenario, value = prepared.loaded.scenario, chance.value
+    calibration = scenario.calibration
     z_m, heading_rad = value("start.z_m"), value("start.heading_rad")
     altitude_error_m = value("calibration.altitude_error_m")
     autopilot = Autopilot(
@@ -86,10 +61,10 @@ def make_vehicle(
         loss += scenario.reasoning_share() * value("calibration.reasoning_slowdown")
     current_m_per_s, wave = _current(scenario, chance)
     return Vehicle(
-        model,
+        prepared.vehicle_model,
         autopilot,
         Pose(*start.position_m, z_m, 0.0, 0.0, heading_rad),
-        duration_s,
+        prepared.duration_s,
         altitude_error_m=altitude_error_m,
         current_m_per_s=current_m_per_s,
         current_wave=wave,

@@ -202,14 +202,14 @@ class PlainMission(mission.MissionRun):
 
 def time_triggered(
     name: str,
+    manager_type: type[ManagingSubsystem],
     run: int,
     system: ManagedSystem,
     bus: DiagnosticsBus,
     skips_idle_calls: bool,
-    manager_type: type[ManagingSubsystem] | None = None,
 ) -> ManagerHost:
     """A host that calls its manager at each of its times."""
-    return ManagerHost(name, run, system, bus, skips_idle_calls=False, manager_type=manager_type)
+    return ManagerHost(name, manager_type, run, system, bus, skips_idle_calls=False)
 
 
 PARTS: Final = {

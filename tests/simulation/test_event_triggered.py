@@ -309,7 +309,8 @@ def test_calls_that_are_not_skipped_come_at_the_very_same_times(
             knowledge=lambda: None,
             measurements={measured.key: measured},
         )
-        ManagerHost(f"{OUTSIDE}:{manager}", 1, system, bus, skips_idle_calls=skips_idle_calls)
+        name = f"{OUTSIDE}:{manager}"
+        ManagerHost(name, manager_class(name), 1, system, bus, skips_idle_calls=skips_idle_calls)
         for time in reports:
             Alarm(env, lambda publish=bus.publish: publish(FAILURE)).set(time * period_s)
         env.run(until=12.0 * period_s)
