@@ -17,6 +17,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from suave_des.caches import private_cache
+from suave_des.knowledge.java_archive import archive_path
 from tests.helpers.quick_workers import _warm_process, quick_workers
 
 __all__ = ["_warm_process", "quick_workers"]
@@ -46,11 +47,19 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_setupnodes(config: pytest.Config, specs: list[object]) -> None:
-    """In a new checkout or environment, compile modules and inner loops once, which each process would do otherwise."""
-    sources = [Path(find_spec(name).origin) for name in ("pandas", "suave_des.simulation.mission")]
-    if len(specs) < 2 or all(Path(cache_from_source(source)).exists() for source in sources):
+    """In a new checkout or environment, make once what each process would make otherwise, or do without.
+
+    That is compiled modules, machine code of inner loops, and Java's archives.
+    """
+    if len(specs) < 2:
         return
-    programs = (("-m", "tests.helpers.warm_worker"), ("-m", "pytest", "--collect-only", "-n", "0", *config.args))
+    sources = [Path(find_spec(name).origin) for name in ("pandas", "suave_des.simulation.mission")]
+    archive = archive_path()
+    programs = []
+    if not all(Path(cache_from_source(source)).exists() for source in sources):
+        programs += [("-m", "tests.helpers.warm_worker"), ("-m", "pytest", "--collect-only", "-n", "0", *config.args)]
+    if archive is not None and not archive.exists():
+        programs.append(("-m", "tests.helpers.java_archives"))
     silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     for process in [
         subprocess.Popen([sys.executable, *program], cwd=Path(__file__).parents[1], **silent) for program in programs
