@@ -1,4 +1,4 @@
-"""Further metrics of a mission, for scenarios that ask for them, and to which degree requirements are fulfilled."""
+"""Further metrics of a mission, for scenarios that ask for them, and the degree to which requirements are satisfied."""
 
 from __future__ import annotations
 
@@ -83,11 +83,11 @@ class FurtherMetrics:
         self._working.append((self.env.now, self.vehicle.working_thrusters))
 
     def columns(self, metrics: MissionMetrics) -> dict[str, MetricValue]:
-        """The further metrics and the fulfilment of requirements as of now, by column."""
+        """The further metrics and the satisfaction of requirements as of now, by column."""
         scenario, now_s = self.scenario, float(self.env.now)
         asked = (*scenario.metrics, *(str(each.metric) for each in scenario.requirements.values()))
         found = {metric: self.value(metric) for metric in asked if metric in FURTHER_METRICS}
-        degrees = fulfilments(scenario.requirements, metrics, found, self.measured, now_s)
+        degrees = satisfaction_degrees(scenario.requirements, metrics, found, self.measured, now_s)
         columns = {**found, **{f"requirement_{name}": degree for name, degree in degrees.items()}}
         return {name: columns[name] for name in scenario.further_columns}
 
@@ -131,14 +131,14 @@ def measured_at_rows(times_s: Sequence[float], values: Sequence[float], rows: in
     return np.repeat(np.append(np.nan, values), np.diff(since_rows, prepend=0, append=rows))
 
 
-def fulfilments(
+def satisfaction_degrees(
     requirements: Mapping[str, Requirement],
     metrics: MissionMetrics,
     further: Mapping[str, MetricValue],
     measured: Mapping[str, Measured],
     now_s: float,
 ) -> dict[str, float | None]:
-    """To which degree each requirement is fulfilled, from 0 to 1; none where there is no value.
+    """Compute the degree to which each requirement is satisfied, from 0 to 1; None if there is no value.
 
     Args:
         requirements: by name.
@@ -153,7 +153,7 @@ def fulfilments(
             continue
         metric = str(requirement.metric)
         value = further[metric] if metric in further else getattr(metrics, metric)
-        found[name] = None if value is None else requirement.fulfilment(float(value))
+        found[name] = None if value is None else requirement.satisfaction(float(value))
     return found
 
 
@@ -164,5 +164,5 @@ def _over_time(requirement: Requirement, measured: Measured, now_s: float) -> fl
         return None
     ends_s = (*times_s[1:], now_s)
     shares = zip(times_s, ends_s, values, strict=True)
-    total_s = sum((end_s - since_s) * requirement.fulfilment(value) for since_s, end_s, value in shares)
+    total_s = sum((end_s - since_s) * requirement.satisfaction(value) for since_s, end_s, value in shares)
     return float(total_s / (now_s - times_s[0]))

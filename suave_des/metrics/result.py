@@ -100,7 +100,7 @@ class MissionResult:
     refused: dict[tuple[str, str], int] = field(default_factory=dict)
     """How many requests of a mode were refused, by function and mode."""
     further: dict[str, float | int | None] = field(default_factory=dict)
-    """Further metrics and the fulfilment of requirements, if the scenario asks for them, by column."""
+    """Further metrics and the satisfaction of requirements, if the scenario asks for them, by column."""
     remarks: tuple[str, ...] = ()
     """What the manager's author should know, such as a name that it depends on and that nothing measures."""
 

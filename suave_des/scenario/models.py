@@ -43,7 +43,7 @@ _LONGEST_MISSION_S = 100_000.0
 
 
 class MissionFunctions(Strict):
-    """Functions that the mission needs besides the exemplar's."""
+    """Functions that the mission needs in addition to the exemplar's."""
 
     lasting: tuple[Name, ...] = ()
     """Needed from launch to the end."""
@@ -54,7 +54,7 @@ class MissionFunctions(Strict):
 
 
 class FunctionSettings(Strict):
-    """A function of one's own: its class, and whatever settings that has."""
+    """A user-defined function: its class, and the settings of that class."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -63,29 +63,29 @@ class FunctionSettings(Strict):
 
 
 class MissionSettings(Strict):
-    """The coordinator's limit, and what its tasks need."""
+    """The coordinator's time limit, and further functions that its tasks need."""
 
     time_limit_s: Annotated[Real, Within(gt=0, le=_LONGEST_MISSION_S, unit="s")] = 300.0
-    """When the current task is cancelled and the metrics are taken."""
+    """Time at which the current task is cancelled and the metrics are taken."""
     functions: MissionFunctions = MissionFunctions()
-    """Functions that are needed besides the exemplar's."""
+    """Functions that are needed in addition to the exemplar's."""
 
 
 class Latencies(Strict):
-    """Mission time that software takes, drawn anew at every occurrence; never negative."""
+    """Mission time that the software takes, drawn at every occurrence; never negative."""
 
     task_start_s: DelayDistribution = 0.0
     """From guided mode to the request of the first task."""
     search_start_s: DelayDistribution = 0.0
-    """From the first activation of the search, in guided mode, to its first set-point; drawn once a run."""
+    """From the first activation of the search, in guided mode, to its first set-point; drawn once per run."""
     mode_change_s: DelayDistribution = 0.0
-    """From the mode manager's answer to the mode's effect."""
+    """From the mode manager's answer until the mode takes effect."""
     inference_s: DelayDistribution = 1.0
-    """One analyze and plan (stock Pellet starts a Java machine for each)."""
+    """One analyze and plan step (stock Pellet starts a Java virtual machine for each)."""
 
 
 class Calibration(Strict):
-    """Parameters of vehicle, autopilot and simulator that the sources leave open, alike for every manager."""
+    """Parameters of vehicle, autopilot and simulator that the sources do not give, the same for every manager."""
 
     position_gain_per_s: Annotated[Real, Within(gt=0, le=100, unit="1/s")] = 1.0
     """Horizontal velocity demanded for each metre of position error; ArduSub's default."""
@@ -94,40 +94,42 @@ class Calibration(Strict):
     velocity_gain_per_s: Annotated[Real, Within(gt=0, le=10, unit="1/s")] = 4.0
     """Horizontal acceleration demanded for each m/s of velocity error."""
     velocity_integral_gain_per_s2: Annotated[Real, Within(0, 10, unit="1/s^2")] = 1.2
-    """Horizontal acceleration demanded for each metre that the velocity error sums up to; each new leg starts anew."""
+    """Horizontal acceleration demanded for each metre of the integrated velocity error; reset at each new leg."""
     heading_frequency_rad_per_s: Annotated[Real, Within(gt=0, le=10, unit="rad/s")] = 4.5
     """Natural frequency of heading control."""
     heading_integral_gain_per_s3: Annotated[Real, Within(0, 100, unit="1/s^3")] = 0.0
-    """Angular acceleration demanded for each rad s that the heading error sums up to."""
+    """Angular acceleration demanded for each rad s of the integrated heading error."""
     altitude_error_m: OffsetDistribution = 0.0
-    """Steady error of the held altitude whose cause is not explained, drawn once a run: set-point plus this."""
+    """Steady, unexplained error of the held altitude, drawn once per run: the held altitude is the set-point plus
+    this."""
     drift_x_m: CoordinateDistribution = 0.0
-    """Way east from the start to where guided mode begins, drawn once a run."""
+    """Offset to the east from the start to where guided mode begins, drawn once per run."""
     drift_y_m: CoordinateDistribution = 0.0
     """The same, north."""
     origin_x_m: OffsetDistribution = 0.0
-    """Way east from where guided mode begins to the local frame's origin, the spiral's centre; drawn once a run."""
+    """Offset to the east from where guided mode begins to the local frame's origin, the spiral's centre; drawn
+    once per run."""
     origin_y_m: OffsetDistribution = 0.0
     """The same, north."""
     real_time_factor_loss: Annotated[Distribution, Within(0.0, 1000.0, is_floor=True)] = 0.0
-    """The simulated world runs 1 / (1 + loss) as fast as the software's clock; drawn once a run."""
+    """The simulated world runs 1 / (1 + loss) as fast as the software's clock; drawn once per run."""
     reasoning_slowdown: Annotated[Distribution, Within(0.0, 1000.0, is_floor=True)] = 0.0
-    """What is added to that loss while the reasoner runs beside the simulator; drawn once a run, and spread over the
+    """Additional loss while the reasoner runs beside the simulator; drawn once per run, and spread over the
     mission by the share of time that an inference takes of metacontrol's period.
     """
 
 
 class ReactionMetric(Strict):
-    """What revision 1.5 calls a reaction (its metrics node)."""
+    """Definition of a reaction in revision 1.5 (its metrics node)."""
 
     visibility_thresholds_m: tuple[Number, ...] = (3.25, 2.25, 1.25)
-    """Falling visibilities; the first that is reached decides which altitude fits."""
+    """Visibilities in descending order; the first that is reached decides which altitude fits."""
     expected_altitudes_m: tuple[Number, ...] = (3.0, 2.0, 1.0)
     """Fitting altitude for each threshold."""
     battery_limit: Number = 0.25
     """Battery level below which the recharge path is expected to become active."""
     undone_within_s: Duration = 4.0
-    """An adaptation that is taken back within this time is undone; two cycles of metacontrol in revision 2023."""
+    """An adaptation that is reverted within this time counts as undone; two cycles of metacontrol in revision 2023."""
 
     @model_validator(mode="after")
     def _paired(self) -> Self:
@@ -145,13 +147,13 @@ class Knowledge(Strict):
     ontologies: Annotated[tuple[FileName, ...], Field(min_length=1)] = ("suave.owl",)
     """Ontology files; what they import is resolved through the catalogue beside them."""
     rules: tuple[FileName, ...] = ()
-    """Files of rules as text; a rule takes the place of those of its name in the ontologies."""
+    """Files of rules as text; a rule replaces the rules of the same name in the ontologies."""
     disabled_rules: tuple[Name, ...] = ()
-    """Rules to switch off, by name."""
+    """Names of rules to disable."""
     values: dict[str, Number] = Field(default_factory=dict)
     """New value (hasValue) of named individuals of QAvalue, such as qa_water_visibility_low: 0.5."""
     reasoner: ReasonerName = "cached"
-    """Which reasoner analyzes; owlready2 is the reference, and slow."""
+    """The reasoner for analyze; owlready2 is the reference, but slow."""
 
 
 def paired(part: Strict, one: str, other: str) -> None:
@@ -181,13 +183,13 @@ class BehaviourTreeSettings(Strict):
     tick_period_s: Period = 0.1
     """Period at which the tree is ticked."""
     visibility_thresholds_m: tuple[Number, ...] = (3.25, 2.25, 1.25)
-    """Visibility from which on each of search_modes is chosen; the first that is reached wins."""
+    """Minimum visibility for each of search_modes; the first threshold that is reached decides."""
     search_modes: tuple[str, ...] = ("fd_spiral_high", "fd_spiral_medium", "fd_spiral_low")
     """Search modes, one for each threshold."""
     battery_limit: Number = 0.25
     """Battery level below which the extended tree goes to recharge."""
     records_ticks: bool = False
-    """Whether the timeline of a recorded mission has each tick that came to something else than the one before."""
+    """Whether the timeline of a recorded mission has each tick whose outcome differs from the previous one's."""
 
     @model_validator(mode="after")
     def _paired(self) -> Self:
@@ -233,23 +235,23 @@ Metric = (
 
 
 class Requirement(Strict):
-    """A requirement that may be fulfilled in part, as in RELAX (Whittle et al., Requirements Engineering 15, 2010).
+    """A requirement that may be partially satisfied, as in RELAX (Whittle et al., Requirements Engineering 15, 2010).
 
-    Exactly one of `metric` and `attribute` is given. Fulfilment is 1 where the value is as required, and falls to 0
-    in a straight line where it is off by the tolerance. Without tolerance it is RELAX's SHALL; with one, at_least is
+    Exactly one of `metric` and `attribute` is given. Satisfaction is 1 if the value is as required, and falls
+    linearly to 0 when it is off by the tolerance. Without tolerance it is RELAX's SHALL; with one, at_least is
     AS MANY AS POSSIBLE, at_most AS FEW (or AS EARLY) AS POSSIBLE, close_to AS CLOSE AS POSSIBLE TO.
     """
 
     metric: Metric | None = None
     """A metric of the mission."""
     attribute: str | None = None
-    """A measured quality attribute; its fulfilment is the mean over mission time, from the first measurement on."""
+    """A measured quality attribute; its satisfaction is the mean over mission time, from the first measurement on."""
     relation: Literal["at_least", "at_most", "close_to"]
-    """How the value has to lie to the required one."""
+    """Required relation of the value to the required one."""
     value: Number
     """The required value."""
     tolerance: NotNegative = 0.0
-    """How far off the value may be; 0: not at all."""
+    """Tolerated deviation from the required value; 0: none."""
 
     @model_validator(mode="after")
     def _is_about_one_thing(self) -> Self:
@@ -257,8 +259,8 @@ class Requirement(Strict):
             raise wrong("is about no value, or about two", "give either metric or attribute", "metric")
         return self
 
-    def fulfilment(self, value: float) -> float:
-        """To which degree a value fulfils the requirement, from 0 to 1."""
+    def satisfaction(self, value: float) -> float:
+        """Compute the degree to which a value satisfies the requirement, from 0 to 1."""
         off = value - self.value
         gap = {"at_least": -off, "at_most": off, "close_to": abs(off)}[self.relation]
         if gap <= 0.0:
@@ -275,51 +277,51 @@ class Scenario(Strict):
     """One mission's world, vehicle, software and knowledge."""
 
     name: Name
-    """Name in result files. In a YAML file: left out, the file's name without its ending."""
+    """Name in result files; in a YAML file by default the file's name without its extension."""
     description: str = ""
     """For people."""
     revision: Revision
-    """How the exemplar's software of one revision behaves."""
+    """Behaviour of the exemplar's software in one revision."""
     vehicle: VehicleDescription
-    """Body, thrusters and camera; left out in a file: `bluerov2`."""
+    """Body, thrusters and camera; in a file by default `bluerov2`."""
     mission: MissionSettings = MissionSettings()
-    """The coordinator's limit, and what its tasks need."""
+    """The coordinator's time limit, and further functions that its tasks need."""
     start: Start = Start()
-    """Pose before the drift, each part drawn once a run."""
+    """Pose before the drift; each component is drawn once per run."""
     pipeline: Pipeline = Pipeline()
     """The pipeline on the sea bed."""
     current: Current = Current()
     """Velocity of the water."""
     signals: dict[Name, SignalDescription]
-    """What is measured, by the name of its quality attribute; water_visibility (m) is needed."""
+    """Measured signals, by the name of their quality attribute; water_visibility (m) is required."""
     thruster_events: tuple[ThrusterEvent, ...] = ()
     """Failures and recoveries, in order."""
     thruster_monitor: Monitor = Monitor()
-    """What is wrong with the monitor of the thrusters."""
+    """Faults of the thruster monitor."""
     battery: Battery | None = None
-    """The battery; left out: there is none."""
+    """The battery, if there is one."""
     leak: Leak | None = None
-    """A leak; left out: there is none. It needs a function f_surface in the modes file, and designs of it."""
+    """A leak, if there is one. It needs a function f_surface in the modes file, and designs for it."""
     latencies: Latencies = Latencies()
-    """Times that software takes."""
+    """Times that the software takes."""
     calibration: Calibration = Calibration()
-    """What the sources leave open."""
+    """Parameters that the sources do not give."""
     modes_file: FileName = "suave_modes.yaml"
     """System Modes file."""
     default_modes: dict[Name, str] = Field(default_factory=lambda: dict(_DEFAULT_MODES))
-    """Mode that the manager none sets for each function; functions left out keep their default."""
+    """Mode that the manager none sets for each function; functions that are not listed keep their default."""
     functions: dict[Name, FunctionSettings] = Field(default_factory=dict)
-    """Functions of one's own, by the name that they have in the modes file."""
+    """User-defined functions, by their name in the modes file."""
     knowledge: Knowledge = Knowledge()
     """The knowledge base."""
     managers: ManagerSettings = ManagerSettings()
-    """Settings of managing subsystems, by name; an outside manager finds its own under its own name."""
+    """Settings of managing subsystems, by name, including those of managers that are not built in."""
     reaction_metric: ReactionMetric = ReactionMetric()
-    """What counts as a reaction."""
+    """Definition of a reaction."""
     metrics: Metrics = ()
     """Further metrics, each with a column of its own; see [further metrics](csv.md#further-metrics)."""
     requirements: dict[Name, Requirement] = Field(default_factory=dict)
-    """Requirements by name; how far each is fulfilled is a column, requirement_NAME."""
+    """Requirements by name; the degree to which each is satisfied is a column, requirement_NAME."""
 
     @field_validator("signals", mode="after")
     @classmethod

@@ -44,7 +44,7 @@ class Camera(Strict):
     """The camera, which looks straight down."""
 
     field_of_view_deg: Annotated[Real, Within(gt=0, lt=180, unit="degrees")]
-    """Full angle of view, in x and in y alike; the search spaces the turns of its spiral by it, too."""
+    """Full angle of view, the same in x and y; it also determines the spacing of the search spiral's turns."""
 
     @property
     def tangent(self) -> float:
@@ -95,22 +95,22 @@ class VehicleDescription(Strict):
 
 
 class CurrentWaveDescription(Strict):
-    """A current whose speed goes up and down: mean + amplitude sin(2 pi (t + shift) / period), in one direction."""
+    """A current whose speed oscillates: mean + amplitude sin(2 pi (t + shift) / period), in one direction."""
 
     mean_m_per_s: CurrentDistribution = 0.0
-    """Mean speed, drawn once a run."""
+    """Mean speed, drawn once per run."""
     amplitude_m_per_s: CurrentDistribution = 0.0
-    """How far the speed departs from it, drawn once a run."""
+    """Amplitude of the oscillation, drawn once per run."""
     period_s: Annotated[Real, Within(1.0, LONGEST_S, unit="s")] = 120.0
-    """Time from one greatest speed to the next."""
+    """Time from one maximum of the speed to the next."""
     shift_s: ShiftDistribution = 0.0
-    """Added to mission time, drawn once a run."""
+    """Added to mission time, drawn once per run."""
     direction_rad: HeadingDistribution = 0.0
-    """Where the water flows to, from east towards north, drawn once a run."""
+    """Direction in which the water flows, from east towards north, drawn once per run."""
 
 
 class Current(Strict):
-    """Velocity of the water in the world frame: a constant part, drawn once a run, and one that varies over time."""
+    """Velocity of the water in the world frame: a constant part, drawn once per run, and one that varies over time."""
 
     x_m_per_s: CurrentDistribution = 0.0
     """Towards east."""
@@ -119,14 +119,14 @@ class Current(Strict):
     z_m_per_s: CurrentDistribution = 0.0
     """Upwards."""
     wave: CurrentWaveDescription | None = None
-    """The part that varies over time; left out: none."""
+    """The part that varies over time, if any."""
 
 
 class Leak(Strict):
-    """A leak: the vehicle gives up everything else, and surfaces."""
+    """A leak: the vehicle abandons its tasks and surfaces."""
 
     time_s: TimeDistribution
-    """When it is detected, drawn once a run."""
+    """Time at which it is detected, drawn once per run."""
 
 
 class Start(Strict):
@@ -171,9 +171,10 @@ class ThrusterEvent(Strict):
     event: Literal["failure", "recovery"]
     """What happens to it."""
     recoverable: bool = True
-    """Whether f_maintain_motion can bring the thruster back after this failure."""
+    """Whether f_maintain_motion can recover the thruster after this failure."""
     time_s: TimeDistribution
-    """When, drawn once a run; the revision decides whether after the start or after the event before. Below 0 is 0."""
+    """Time, drawn once per run; the revision decides whether it counts from the start or from the previous event.
+    A draw below 0 is 0."""
 
     @model_validator(mode="before")
     @classmethod
@@ -209,10 +210,10 @@ class Battery(Monitor):
     station_radius_m: Length = 0.5
     """Half-width of the box in x and y within which the vehicle counts as docked."""
     noise: ValueDistribution = 0.0
-    """Added to each measurement of the level, drawn anew each time."""
+    """Added to each measurement of the level, drawn each time."""
     approach_altitude_m: Length = 1.25
     """Altitude above the sea bed at which the station is approached."""
     mission_ends_at_level: Annotated[Real, Within(0.0, lt=1.0)] | None = None
-    """Level at which, or below which, the mission ends; left out: it goes on with an empty battery."""
+    """Level at or below which the mission ends; by default it continues with an empty battery."""
     resend_period_s: Period = 10.0
-    """Period at which the station is sent to the autopilot again."""
+    """Period at which the station is sent to the autopilot again as a set-point."""

@@ -138,14 +138,14 @@ class Drawn(Strict):
 
 
 class Normal(Drawn):
-    """Normal distribution, optionally cut to [minimum, maximum] (values outside are drawn again)."""
+    """Normal distribution, optionally truncated to [minimum, maximum] (values outside are drawn again)."""
 
     distribution: Literal["normal"]
     """Bell-shaped."""
     mean: Number
-    """Mean, before the cut."""
+    """Mean, before truncation."""
     std: NotNegative
-    """Standard deviation, before the cut."""
+    """Standard deviation, before truncation."""
     minimum: Number | None = None
     """Smallest value, if any."""
     maximum: Number | None = None
@@ -178,7 +178,7 @@ class Uniform(Drawn):
     """Uniform distribution over [minimum, maximum]."""
 
     distribution: Literal["uniform"]
-    """Every value between two bounds alike."""
+    """All values between two bounds, with equal density."""
     minimum: Number
     """Smallest value."""
     maximum: Number
@@ -195,12 +195,12 @@ class Uniform(Drawn):
 
 
 class Exponential(Drawn):
-    """Exponential distribution: `minimum` plus a time of the given mean."""
+    """Exponential distribution: `minimum` plus an exponential value of the given mean."""
 
     distribution: Literal["exponential"]
-    """Often small, seldom great."""
+    """Mostly small values, rarely large ones."""
     mean: NotNegative
-    """Mean of what is added to the minimum."""
+    """Mean of the value that is added to the minimum."""
     minimum: Number = 0.0
     """Smallest value."""
 
@@ -210,7 +210,7 @@ class Exponential(Drawn):
 
 
 class Choice(Drawn):
-    """One of the given values, each with equal chance; a value given twice counts twice."""
+    """One of the given values, each with equal probability; a value given twice counts twice."""
 
     distribution: Literal["choice"]
     """One of a list."""

@@ -25,16 +25,16 @@ Count = Annotated[int, Field(strict=True), Within(1, 1_000_000)]
 
 
 class CoordinatorRevision(Strict):
-    """The mission node: how it polls, and what it writes down."""
+    """The mission node: how it polls, and what it records."""
 
     poll_period_s: Period
     """Period of its loop."""
     limit_check_period_s: Annotated[Real, Within(0.001, 1000, unit="s")]
     """Period at which the time limit is checked."""
     search_time: Literal["poll", "detection"]
-    """Time of the poll that saw the detection, or of the detection itself; cut to whole seconds."""
+    """Time of the poll that saw the detection, or of the detection itself; truncated to whole seconds."""
     maintain_motion_per_task: bool
-    """Whether maintain_motion is cancelled with each task and requested anew with the next."""
+    """Whether maintain_motion is cancelled with each task and requested again with the next."""
 
 
 class SpiralRevision(Strict):
@@ -43,11 +43,12 @@ class SpiralRevision(Strict):
     centre: Literal["origin", "activation", "first_activation"]
     """Where the spiral is centred: the local frame's origin, the position at each activation, or at the first."""
     restarts_on_activation: bool
-    """Whether each activation starts the spiral afresh (else it goes on from the same counter)."""
+    """Whether each activation restarts the spiral (otherwise it continues from the same counter)."""
     resends_on_activation: bool = False
-    """Whether a spiral that goes on sends its way-point at once (else when it has waited for it long enough)."""
+    """Whether a spiral that continues sends its way-point at once (otherwise only when ticks_before_resending have
+    passed)."""
     tick_period_s: Period
-    """Period of its timer; at most one way-point is reached a tick."""
+    """Period of its timer; at most one way-point is reached per tick."""
     angle_step_rad: Annotated[Real, Within(gt=0, le=6.3, unit="rad")]
     """Angle from one way-point to the next."""
     acceptance_m: Length
@@ -57,9 +58,9 @@ class SpiralRevision(Strict):
     initial_altitude_m: Length
     """Altitude above the sea bed before any mode is set."""
     workaround_step_m: Length
-    """How much the commanded altitude is lowered each time that z alone is not reached."""
+    """Amount by which the commanded altitude is lowered each time that only z is not reached."""
     workaround_cleared_on_activation: bool
-    """Whether each activation starts without what was lowered before."""
+    """Whether each activation discards earlier lowering."""
 
 
 class FollowRevision(Strict):
@@ -70,59 +71,61 @@ class FollowRevision(Strict):
     altitude_m: Length
     """Altitude above the sea bed."""
     poll_period_s: Period
-    """Period at which it looks whether the point is reached."""
+    """Period at which it checks whether the point is reached."""
     polls_before_resending: Count
     """A point that is not reached is sent again after this many polls."""
     restarts_on_activation: bool
-    """Whether the path starts again from its first point (else it goes on with those not yet reached)."""
+    """Whether the path restarts from its first point (otherwise it continues with those not yet reached)."""
     distance_goes_on: bool = False
-    """Whether the distance goes on counting on activation (else from zero); an interrupted piece is left out."""
+    """Whether the distance keeps accumulating after an activation (otherwise it restarts at zero); an interrupted
+    piece does not count."""
     adds_remaining_way: bool
-    """Whether a deactivation adds the way from the last point to the present position to the distance."""
+    """Whether a deactivation adds the stretch from the last point to the current position to the distance."""
     resends_at_each_poll: bool
-    """Whether a point that is not reached after the tenth poll is sent again at each poll (else after ten more)."""
+    """Whether a point that is not reached after the tenth poll is sent again at each poll (otherwise after ten
+    more)."""
 
 
 class RecoveryRevision(Strict):
     """Thruster recovery in maintain_motion."""
 
     delay_s: DelayDistribution
-    """Time from the activation to the recovery of the first thruster, drawn anew each time."""
+    """Time from the activation to the recovery of the first thruster, drawn each time."""
     thruster_period_s: Period
     """Time from one thruster to the next."""
     survives_deactivation: bool
-    """Whether a recovery under way goes on when the function is deactivated."""
+    """Whether an ongoing recovery continues when the function is deactivated."""
 
 
 class MonitorsRevision(Strict):
     """Monitors and detection mock-up."""
 
     thruster_event_times: Literal["after_previous", "after_start"]
-    """What the time of a thruster event counts from: the event before, or the start of the mission."""
+    """Reference of a thruster event's time: the previous event, or the start of the mission."""
     thruster_check_period_s: Period
-    """Period at which it is checked whether a thruster event is due: at most one happens at a time."""
+    """Period at which the monitor checks whether a thruster event is due; at most one happens at a time."""
     visibility_publishing_period_s: Period
-    """Period at which signals are measured that give none themselves."""
+    """Period at which signals are measured that do not give their own."""
     detected_point_height_m: Annotated[Real, Within(0, FARTHEST_M, unit="m")]
     """Height above the pipeline's points at which the detection mock-up looks for them."""
 
 
 class ThrusterFailureRevision(Strict):
-    """Whether a thruster failure, which the monitor publishes in any case, reaches the vehicle."""
+    """Whether a thruster failure, which the monitor publishes in any case, affects the vehicle."""
 
     effective_from_s: NotNegative = 0.0
-    """A failure before this mission time does not."""
+    """A failure before this mission time has no effect."""
     loss_probability: Annotated[Real, Within(0.0, 1.0)] = 0.0
-    """Chance that a later one does not, for each on its own."""
+    """Probability that a later failure has no effect, independently for each."""
 
 
 class SetPointRevision(Strict):
-    """How functions hand set-points to the autopilot."""
+    """How functions send set-points to the autopilot."""
 
     loss_probability: Annotated[Distribution, Within(0.0, lt=1.0, is_floor=True)]
-    """Chance that a set-point is lost, drawn once a run: a publisher made for each call may publish undiscovered."""
+    """Probability that a set-point is lost, drawn once per run: a new publisher may publish before it is discovered."""
     node_frame_offset_x_m: OffsetDistribution
-    """Steady error of one node's frame against the simulator's, east; drawn once per node and run."""
+    """Steady offset of a node's frame from the simulator's, east; drawn once per node and run."""
     node_frame_offset_y_m: OffsetDistribution
     """The same, north."""
     node_frame_offset_z_m: OffsetDistribution
@@ -140,9 +143,10 @@ class RandomRevision(Strict):
     """The random manager."""
 
     on_task_request: bool
-    """Whether it picks a mode on each task request too."""
+    """Whether it also picks a mode on each task request."""
     ungrounds_search_at_detection: bool
-    """Whether it sets the search to fd_unground when the pipeline is detected (else when the task is cancelled)."""
+    """Whether it sets the search to fd_unground when the pipeline is detected (otherwise when the task is
+    cancelled)."""
 
 
 class MetacontrolRevision(Strict):
@@ -151,13 +155,13 @@ class MetacontrolRevision(Strict):
     task_bridge_period_s: NotNegative
     """Tasks reach the reasoner at ticks of this period; 0: at once."""
     objectives_at_launch: bool
-    """Whether the first task's objectives exist from launch on."""
+    """Whether the first task's objectives exist from launch."""
     waits_for_first_measurement: bool
-    """Whether it plans nothing for a measured attribute before its first measurement."""
+    """Whether reasoning waits for the first measurement of each attribute of which a design expects a value."""
     search_always_improves: bool
-    """Whether search objectives carry o_always_improve (1.5); see search_improves_when_exceeded."""
+    """Whether search objectives have o_always_improve (1.5); see search_improves_when_exceeded."""
     search_improves_when_exceeded: bool
-    """Whether the search is also adapted when a measured value exceeds what its present design expects."""
+    """Whether the search is also adapted when a measured value exceeds what its current design expects."""
     ignores_diagnostics_without_objective: bool
     """Whether diagnostics are ignored while there is no objective."""
 
@@ -172,7 +176,7 @@ class Revision(Strict):
     name: str
     """Name in result files."""
     timers_in_step: tuple[Timer, ...]
-    """Timers that the message starts which says that guided mode has begun; each other one has a phase of its own."""
+    """Timers that are started by the message that guided mode has begun; every other timer has its own phase."""
     coordinator: CoordinatorRevision
     """The mission node."""
     spiral: SpiralRevision
@@ -184,12 +188,13 @@ class Revision(Strict):
     monitors: MonitorsRevision
     """Monitors and detection."""
     thruster_failures: ThrusterFailureRevision = ThrusterFailureRevision()
-    """Whether thruster failures reach the vehicle."""
+    """Whether thruster failures affect the vehicle."""
     set_points: SetPointRevision
     """How set-points reach the autopilot."""
     random: RandomRevision
     """The random manager."""
     comparison_operators: dict[str, Literal["<", "<=", ">", ">="]]
-    """How a measured value is worse than an expected one, for attributes whose ontology has no operator."""
+    """Operator with which a measured value is worse than an expected one, for attributes to which the ontology
+    gives none."""
     metacontrol: MetacontrolRevision
     """The metacontrol manager."""

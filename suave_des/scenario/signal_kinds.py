@@ -29,10 +29,10 @@ from suave_des.scenario.quantities import (
 
 
 class Monitor(Strict):
-    """What can be wrong with any monitor."""
+    """Faults that any monitor can have."""
 
     dropout_probability: Annotated[Real, Within(0.0, 1.0)] = 0.0
-    """Chance that a message is lost, each for itself."""
+    """Probability that a message is lost, independently for each message."""
     outages_s: tuple[tuple[NotNegative, NotNegative], ...] = ()
     """Intervals of mission time, [from, to], in which every message is lost."""
 
@@ -51,11 +51,11 @@ class Monitor(Strict):
 
 class _Signal(Monitor):
     publishing_period_s: Period | None = None
-    """Period of the monitor that measures it; left out: the revision's visibility_publishing_period_s."""
+    """Period of the monitor that measures it; by default the revision's visibility_publishing_period_s."""
     time_step_s: NotNegative = 1.0
-    """Time is cut to multiples of this first (whole seconds in the exemplar); 0: not cut."""
+    """Time is first truncated to a multiple of this (whole seconds in the exemplar); 0: not truncated."""
     noise: ValueDistribution = 0.0
-    """Added to each measurement, drawn anew each time."""
+    """Added to each measurement, drawn each time."""
 
 
 class SinusoidSignal(_Signal):
@@ -73,7 +73,7 @@ class SinusoidSignal(_Signal):
     maximum: Number
     """Greatest value, reached at t = -shift_s."""
     shift_s: ShiftDistribution = 0.0
-    """Phase shift, drawn once a run."""
+    """Phase shift, drawn once per run."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -87,7 +87,7 @@ class ConstantSignal(_Signal):
     kind: Literal["constant"]
     """A constant value."""
     value: ValueDistribution
-    """The value, drawn once a run."""
+    """The value, drawn once per run."""
 
 
 class StepSignal(_Signal):
@@ -96,7 +96,7 @@ class StepSignal(_Signal):
     kind: Literal["step"]
     """One value until a time, another from then on."""
     time_s: ShiftDistribution
-    """Mission time of the step, drawn once a run."""
+    """Mission time of the step, drawn once per run."""
     before: Number
     """Value before the step."""
     after: Number

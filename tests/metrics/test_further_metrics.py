@@ -1,4 +1,4 @@
-"""Further metrics: indecision, configurations, reasoning, area, thrusters; and requirements fulfilled in part."""
+"""Further metrics: indecision, configurations, reasoning, area, thrusters; and partially satisfied requirements."""
 
 import math
 
@@ -125,20 +125,20 @@ def test_measurements_after_the_end_are_left_out() -> None:
 
 
 @given(st.sampled_from(["at_least", "at_most", "close_to"]), st.floats(-9, 9), st.floats(0, 9), st.floats(-99, 99))
-def test_fulfilment_is_a_degree_and_full_where_the_value_is_as_required(relation, value, tolerance, measured) -> None:
+def test_satisfaction_is_a_degree_and_full_where_the_value_is_as_required(relation, value, tolerance, measured) -> None:
     requirement = Requirement(metric="search_time_s", relation=relation, value=value, tolerance=tolerance)
-    assert 0.0 <= requirement.fulfilment(measured) <= 1.0
-    assert requirement.fulfilment(value) == 1.0
+    assert 0.0 <= requirement.satisfaction(measured) <= 1.0
+    assert requirement.satisfaction(value) == 1.0
 
 
 @pytest.mark.parametrize(
     ("relation", "measured", "degree"),
     [("at_most", 130.0, 0.75), ("at_most", 160.0, 0.0), ("at_least", 90.0, 0.75), ("close_to", 140.0, 0.5)],
 )
-def test_fulfilment_falls_in_a_line_over_the_tolerance(relation: str, measured: float, degree: float) -> None:
+def test_satisfaction_falls_in_a_line_over_the_tolerance(relation: str, measured: float, degree: float) -> None:
     value = {"at_most": 120.0, "at_least": 100.0, "close_to": 120.0}[relation]
     requirement = Requirement(metric="search_time_s", relation=relation, value=value, tolerance=40.0)
-    assert requirement.fulfilment(measured) == pytest.approx(degree)
+    assert requirement.satisfaction(measured) == pytest.approx(degree)
 
 
 @pytest.fixture
