@@ -24,8 +24,8 @@ _Data = Annotated[
     typer.Option(
         "--data",
         metavar="[NAME=]FILE",
-        help="Real missions; repeat it for several files. With several scenarios, NAME says of which. Left out, those"
-        " published for the scenario; of one scenario alone, or else the 60 of the SUAVE paper.",
+        help="Real missions; repeat it for several files. With several scenarios, NAME is the one that they belong to."
+        " By default those published for the scenario; for a single scenario, or else the 60 of the SUAVE paper.",
         show_default=False,
     ),
 ]
@@ -34,19 +34,19 @@ _Parameters = Annotated[
     typer.Option(
         "--parameters",
         metavar="FILE",
-        help="Free parameters and their bounds.",
-        show_default="the shipped file of the scenario's name, or seams2023; of several scenarios: shared",
+        help="File of free parameters and their bounds.",
+        show_default="the shipped file with the scenario's name, or seams2023; for several scenarios: shared",
     ),
 ]
 _Managers = Annotated[
-    str | None, typer.Option("--managers", metavar="NAME,...", help="Of those in the data; left out: all.")
+    str | None, typer.Option("--managers", metavar="NAME,...", help="Managers to compare; by default all in the data.")
 ]
 _FitConditions = Annotated[
     str | None,
     typer.Option(
         "--fit-conditions",
         metavar="NUMBER,...",
-        help="Fit these conditions of the campaign files alone, and judge the fit by the others, too.",
+        help="Fit only these conditions of the campaign files, and evaluate the fit on the others.",
     ),
 ]
 
@@ -64,12 +64,13 @@ def calibrate(
     runs: Annotated[
         int,
         typer.Option(
-            min=2, help="Missions for each manager and set of values; of a campaign file, among all conditions."
+            min=2,
+            help="Missions for each manager and parameter set; with a campaign file, over all conditions.",
         ),
     ] = 150,
     evaluations: Annotated[int, typer.Option(min=1, help="Approximate number of parameter sets to evaluate.")] = 500,
     profile: Annotated[
-        bool, typer.Option(help="Profile each parameter, to see how well the data determine it.")
+        bool, typer.Option(help="Vary each parameter around the fit, to show how well the data determine it.")
     ] = True,
     workers: Workers = 2,
     seed: Seed = 1,
@@ -80,7 +81,7 @@ def calibrate(
 ) -> None:
     """Fit free parameters to real missions, and write the fitted scenarios.
 
-    With a campaign file that sweeps the conditions of the real missions, each is compared with those of its own.
+    With a campaign file that sweeps the conditions of the real missions, each is compared under its own condition.
     """
     from suave_des.calibration import report
     from suave_des.calibration.cases import read_cases

@@ -58,8 +58,8 @@ class NewCampaign(OptionGroup):
         str | None,
         typer.Option(
             metavar="FILE",
-            help="Give each run one of this file's parameter sets, which fit the real runs equally well; for instance"
-            " seams2023, which is shipped.",
+            help="Give each run one of this file's parameter sets, which fit the real runs equally well; seams2023 is"
+            " shipped.",
         ),
     ] = None
     time_out: TimeOut = None
@@ -113,8 +113,8 @@ def campaign(
         typer.Option(
             metavar="METRIC:HALF_WIDTH",
             help="Stop a manager when the half-width of the 95% interval of its mean is below HALF_WIDTH, after 20 to"
-            " --runs missions (10000 if left out), as in search_time_s:5; or stop all when the difference of two"
-            " managers is known that well, after at least 100 runs, as in 'metacontrol - bt: search_time_s: 2'.",
+            " --runs missions (by default 10000), as in search_time_s:5; or stop all when the difference of two"
+            " managers is known that precisely, after at least 100 runs, as in 'metacontrol - bt: search_time_s: 2'.",
         ),
     ] = None,
     quiet: Quiet = False,
@@ -231,7 +231,7 @@ def reproduce(
     workers: CampaignWorkers = None,
     seed: Seed = 1,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder for result files; left out, none are written.")
+        Path | None, typer.Option(metavar="DIR", help="Folder for result files; without it, none are written.")
     ] = None,
     overwrite: Overwrite = False,
     quiet: Quiet = False,

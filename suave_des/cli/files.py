@@ -47,12 +47,12 @@ class SchemaOf(StrEnum):
 def schema(
     what: Annotated[
         SchemaOf,
-        typer.Argument(metavar="WHAT", help="scenario: scenario files; exec: messages of managers exec:COMMAND."),
+        typer.Argument(metavar="WHAT", help="scenario: scenario files; exec: messages of exec:COMMAND managers."),
     ] = SchemaOf.SCENARIO,
 ) -> None:
     """Print the JSON Schema of scenario files, or of messages.
 
-    Editors and other tools use it to complete and check scenarios, and the messages that programs of one's own exchange
+    Editors and other tools use it to complete and check scenarios and the messages that your own programs exchange
     with missions.
     """
     import json
@@ -82,7 +82,7 @@ def import_config(
     base: Annotated[
         str | None,
         typer.Option(
-            metavar="SCENARIO", help="Scenario to build on; left out, the shipped one of the files' revision."
+            metavar="SCENARIO", help="Scenario to build on; by default the shipped one of the files' revision."
         ),
     ] = None,
     revision: Annotated[
@@ -93,14 +93,14 @@ def import_config(
         int | None,
         typer.Option(
             metavar="SEED",
-            help="Write what the exemplar's runner draws from this seed (its random_seed), in place of draws anew.",
+            help="Write the values that the exemplar's runner draws from this seed (its random_seed).",
         ),
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
     """Import the exemplar's configuration files.
 
-    What has no counterpart is reported, a line each. Files of any revision are read, with or without leading slashes.
+    Keys without a counterpart are reported. Files may be of any revision, with or without leading slashes.
     """
     from suave_des.cli.console import plain
     from suave_des.errors import InputError
@@ -132,7 +132,7 @@ def import_config(
 
 def tree(
     manager: Annotated[str, typer.Argument(metavar="MANAGER", help="bt, bt_extended, or module:Class with a tree.")],
-    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="Scenario whose settings the tree has.")] = (
+    scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="Scenario that provides the tree's settings.")] = (
         "release15"
     ),
 ) -> None:

@@ -24,7 +24,8 @@ def run(
     ] = "metacontrol",
     seed: Seed = 1,
     run_number: Annotated[
-        int, typer.Option("--run", metavar="K", help="Run of a campaign with this seed: the same mission again.")
+        int,
+        typer.Option("--run", metavar="K", help="Run number; with the seed, it identifies a mission of a campaign."),
     ] = 1,
     out: Annotated[
         Path | None,
@@ -64,10 +65,10 @@ def run(
 @grouped_options
 def train(
     manager: Annotated[str, typer.Argument(metavar="MODULE:CLASS", help="The manager.")],
-    missions: Annotated[int, typer.Option(help="Number of training missions: runs 1 to NUMBER, in order.")],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="File for what the manager has learned.")],
+    missions: Annotated[int, typer.Option(help="Number of training missions; they are runs 1 to NUMBER.")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="File for the training result.")],
     scenario: Annotated[str, typer.Option(metavar="SCENARIO", help="Scenario to train on.")] = "seams2023",
-    seed: Annotated[int, typer.Option(help="Training seed; use another for the campaign that evaluates.")] = 0,
+    seed: Annotated[int, typer.Option(help="Training seed; use a different one for the evaluation.")] = 0,
     start: Annotated[
         Path | None, typer.Option("--from", metavar="FILE", help="Continue from the file of an earlier training.")
     ] = None,
@@ -76,9 +77,9 @@ def train(
     *,
     files: Files,
 ) -> None:
-    """Train a manager: missions in one process, in order, and a file at the end.
+    """Train a manager on missions that run in order, in one process.
 
-    A campaign takes it with --manager-option learned=FILE; there nothing is learned any more.
+    A campaign uses the resulting file with --manager-option learned=FILE, and does not change it.
     """
     from suave_des.campaign.single import blocks
     from suave_des.campaign.single import train as trained
@@ -131,14 +132,14 @@ def bench(
     ] = 10_000,
     large: Annotated[bool, typer.Option("--large", help="Measure memory with 100,000 missions, too.")] = False,
     json_file: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE", help="Write the figures to a file.")
+        Path | None, typer.Option("--json", metavar="FILE", help="Write the measurements to a file.")
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace that file if it exists already.")] = False,
 ) -> None:
     """Measure how fast missions are on this machine.
 
-    Takes some two minutes, best with nothing else running. Compares the figures with the goals of the project, and a
-    mission with the same inferences by stock libraries. Your own memory of inferences and caches are not used.
+    Takes about two minutes, best with nothing else running. Compares the figures with the project's goals, and a
+    mission with the same inferences by stock libraries. Your own caches are not used.
     """
     from dataclasses import asdict
 

@@ -20,7 +20,7 @@ Scenario = Annotated[str, typer.Argument(metavar="SCENARIO", help="A scenario fi
 Ontologies = Annotated[
     list[Path] | None,
     typer.Option(
-        "--ontology", metavar="FILE", help="Ontology in place of the scenario's; repeat it for several files."
+        "--ontology", metavar="FILE", help="Ontology to use instead of the scenario's; repeat it for several files."
     ),
 ]
 Results = Annotated[
@@ -30,7 +30,7 @@ Results = Annotated[
     ),
 ]
 Modes = Annotated[
-    Path | None, typer.Option("--modes", metavar="FILE", help="System Modes file in place of the scenario's.")
+    Path | None, typer.Option("--modes", metavar="FILE", help="System Modes file to use instead of the scenario's.")
 ]
 Reasoner = Annotated[
     str | None, typer.Option("--reasoner", metavar="NAME", help="cached, pellet, or owlready2 (slow).")
@@ -46,7 +46,7 @@ DisabledRules = Annotated[
 SetValues = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", metavar="KEY=VALUE", help="Override a scenario value, such as mission.time_limit_s=400; repeat it."
+        "--set", metavar="KEY=VALUE", help="Override a scenario value, such as mission.time_limit_s=400; repeatable."
     ),
 ]
 Seed = Annotated[int, typer.Option("--seed", help="Random seed.")]
@@ -176,7 +176,7 @@ ManagerOptions = Annotated[
     typer.Option(
         "--manager-option",
         metavar="[MANAGER.]KEY=VALUE",
-        help="Setting of a manager; without its name, of each that is not built in. Repeat it.",
+        help="Setting of a manager; without MANAGER, of every manager that is not built in; repeat it for several.",
     ),
 ]
 

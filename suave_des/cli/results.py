@@ -52,13 +52,13 @@ def compare(
     half_width: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="METRIC:VALUE", help="Give the runs needed for an interval this narrow; repeat it for several."
+            metavar="METRIC:VALUE", help="Estimate the runs needed for an interval this narrow; repeat it for several."
         ),
     ] = None,
     unpaired: Annotated[
         bool, typer.Option("--unpaired", help="Treat runs as independent although they share random numbers.")
     ] = False,
-    as_format: Annotated[CompareFormat, typer.Option("--format", help="What to print.")] = CompareFormat.TABLE,
+    as_format: Annotated[CompareFormat, typer.Option("--format", help="Output format.")] = CompareFormat.TABLE,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write .csv, .json, .md or .tex instead of printing.")
     ] = None,
@@ -126,17 +126,17 @@ def figure(
     kind: Annotated[
         FigureKind,
         typer.Option(
-            help="Of a mission: map, timeline; of several: paths; of a campaign: distributions, raincloud, detections,"
-            " convergence, reactions; of a sweep: sweep."
+            help="For a mission: map, timeline; for several: paths; for a campaign: distributions, raincloud,"
+            " detections, convergence, reactions; for a sweep: sweep."
         ),
     ] = FigureKind.AUTO,
     parameters: Annotated[
-        str | None, typer.Option(metavar="KEY,...", help="Of a sweep: draw these.", show_default="all")
+        str | None, typer.Option(metavar="KEY,...", help="Swept parameters to draw.", show_default="all")
     ] = None,
 ) -> None:
     """Draw a mission's map or a campaign's results.
 
-    Left to itself it draws what is in DIR: the map of a mission, the paths of several, a campaign's distributions, or
+    By default the contents of DIR decide: the map of a mission, the paths of several, a campaign's distributions, or
     the means of a sweep.
     """
     from suave_des.report.figures import draw_results
@@ -172,19 +172,19 @@ def replay(
         ),
     ] = None,
     scenario: Annotated[
-        str | None, typer.Option(metavar="SCENARIO", help="In place of DIR: run missions of this scenario.")
+        str | None, typer.Option(metavar="SCENARIO", help="Run missions of this scenario instead of reading DIR.")
     ] = None,
     managers: Annotated[
         str | None,
         typer.Option(
             metavar="NAME,...",
             help="One or two managing subsystems, on the same random numbers.",
-            show_default="metacontrol; of a campaign the last and the first",
+            show_default="metacontrol; for a campaign, the last and the first",
         ),
     ] = None,
     run_number: Annotated[
         int | None,
-        typer.Option("--run", metavar="K", help="Run of the campaign, or with this seed.", show_default=str(_RUN)),
+        typer.Option("--run", metavar="K", help="Run number.", show_default=str(_RUN)),
     ] = None,
     seed: SeedIfNew = None,
     point: Annotated[
@@ -238,7 +238,7 @@ def report(
         int | None,
         typer.Option(
             metavar="N",
-            help="Runs of each manager whose way and timeline are in the page; 0: none.",
+            help="Number of runs of each manager whose path and timeline are in the page.",
             show_default=str(_PATHS),
         ),
     ] = None,
@@ -247,7 +247,7 @@ def report(
     ] = None,
     show: Open = False,
 ) -> None:
-    """Make a page about a campaign: what follows from it, its tables, charts to explore, and how it was made.
+    """Make a page about a campaign: its conclusion, tables, interactive charts, and how it was made.
 
     It is one file that needs no network.
     """

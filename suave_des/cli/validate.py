@@ -38,13 +38,13 @@ _Data = Annotated[
     typer.Option(
         "--data",
         metavar="FILE",
-        help="Real missions; repeat it for several files. Left out, those published for the scenario, or else the 60 of"
-        " the SUAVE paper.",
+        help="Real missions; repeat it for several files. By default those published for the scenario, or else the 60"
+        " of the SUAVE paper.",
         show_default=False,
     ),
 ]
 _Managers = Annotated[
-    str | None, typer.Option("--managers", metavar="NAME,...", help="Of those in the data; left out: all.")
+    str | None, typer.Option("--managers", metavar="NAME,...", help="Managers to compare; by default all in the data.")
 ]
 
 
@@ -65,13 +65,13 @@ def validate(
     managers: _Managers = None,
     targets: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Shares to compare; left out, NAME.targets.yaml beside NAME.csv."),
+        typer.Option(metavar="FILE", help="Shares to compare; by default NAME.targets.yaml beside NAME.csv."),
     ] = None,
     runs: Annotated[
         int | None,
         typer.Option(
-            help="Missions for each manager, and under each condition of a campaign file.",
-            show_default=f"{_RUNS}, among all conditions",
+            help="Missions for each manager; with a campaign file, under each condition.",
+            show_default=f"{_RUNS}, over all conditions",
         ),
     ] = None,
     workers: CampaignWorkers = None,
@@ -89,7 +89,7 @@ def validate(
 ) -> None:
     """Compare simulated missions with real ones: distributions, clusters, conclusions.
 
-    With a campaign file that sweeps the conditions of the real missions, each is compared with those of its own.
+    With a campaign file that sweeps the conditions of the real missions, each is compared under its own condition.
     """
     from suave_des.cli.console import output, progress
     from suave_des.cli.validation_tables import print_validation

@@ -80,7 +80,7 @@ def explain(
         str,
         typer.Argument(
             metavar="QUESTION",
-            help='A fact, as a rule atom says it, or "why DESIGN?", "why not DESIGN?"; left out: all that follows.',
+            help='A fact (written as a rule atom), "why DESIGN?" or "why not DESIGN?"; by default all that follows.',
         ),
     ] = "",
     form: AsFormat = Format.TEXT,
@@ -98,15 +98,15 @@ def explain(
 def policy(
     knowledge: Asked,
     max_failed: MaxFailed = 2,
-    csv: Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write every row of the table.")] = None,
+    csv: Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write all rows of the table.")] = None,
     png: Annotated[
-        Path | None, typer.Option("--png", metavar="FILE", help="Draw it, over one or two measured values.")
+        Path | None, typer.Option("--png", metavar="FILE", help="Draw it over one or two measured values.")
     ] = None,
     form: AsFormat = Format.TEXT,
 ) -> None:
-    """Tabulate what is decided in every state.
+    """Tabulate the decision in every state.
 
-    Measured values count by range: between any two numbers of the knowledge base, and on each of them.
+    Measured values are divided into ranges: at and between the numbers that the knowledge base mentions.
     """
     from suave_des.files import csv_text, write_files
     from suave_des.workbench.policy.table import columns_of, function_table, rows_of
@@ -221,11 +221,11 @@ def query(
         str, typer.Argument(metavar="QUERY", help="SPARQL; the prefixes suave, tomasys, mros and owl are known.")
     ],
     inferred: Annotated[bool, typer.Option("--inferred", help="Include what Pellet infers.")] = False,
-    form: Annotated[TableFormat, typer.Option("--format", help="A table to read, CSV or JSON.")] = TableFormat.TEXT,
+    form: Annotated[TableFormat, typer.Option("--format", help="Output format.")] = TableFormat.TEXT,
 ) -> None:
     """Query the knowledge base in SPARQL.
 
-    Without any option that gives a state, the query is answered from the ontologies alone.
+    Without any option that gives a state, only the ontologies are queried.
     """
     from suave_des.files import csv_text
 
@@ -272,7 +272,7 @@ def why_not(
     sources: SourcesInState,
     parts: StateAnywhere,
     names: Annotated[
-        list[str] | None, typer.Argument(metavar="RULE", help="Names of rules; left out: all that do not fire.")
+        list[str] | None, typer.Argument(metavar="RULE", help="Names of rules; by default all that do not fire.")
     ] = None,
     facts: Annotated[
         list[str] | None,
@@ -281,9 +281,9 @@ def why_not(
     time_limit: TimeLimitS = 60.0,
     form: AsFormat = Format.TEXT,
 ) -> None:
-    """Say why a rule does not fire: the first atom that fails, what was found and what is needed.
+    """Show why a rule does not fire: the first atom that fails, the value found and the value needed.
 
-    Exit status: 0 also if a rule fires.
+    The exit status is 0 even if a rule fires.
     """
     from suave_des.knowledge.pellet.limit import TimeLimit
     from suave_des.knowledge.rules.syntax import RuleError

@@ -29,7 +29,7 @@ app = typer.Typer(
     cls=_Commands,
     add_completion=False,
     rich_markup_mode=None,
-    help="Look at the knowledge base, edit its rules, and ask what they do.",
+    help="Inspect the knowledge base, edit its rules, and show what they do.",
 )
 add_commands(app, _Commands.headings)
 

@@ -41,7 +41,7 @@ def diff(
     flown: Flown,
     one: Annotated[
         Path,
-        typer.Argument(metavar="A", help="An ontology, or a .swrl file of rules besides the other ontologies."),
+        typer.Argument(metavar="A", help="An ontology, or a .swrl file of rules to add to the ontologies."),
     ],
     other: Annotated[Path, typer.Argument(metavar="B", help="The same.")],
     max_failed: MaxFailed = 2,
@@ -49,8 +49,8 @@ def diff(
 ) -> None:
     """Show what differs between two ontologies, or two sets of rules: axioms, decisions, and missions.
 
-    --ontology, --rules and --disable-rule count for both; an ontology given as A or B takes the place of the
-    scenario's. Decisions are compared in every state; missions with the same numbers have common random numbers.
+    --ontology, --rules and --disable-rule apply to both; an ontology given as A or B replaces the
+    scenario's. Decisions are compared in every state; missions with the same number use common random numbers.
     """
     from suave_des.workbench.difference import compare_axioms
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Format(StrEnum):
-    """How to print."""
+    """Output format."""
 
     TEXT = "text"
     JSON = "json"
@@ -30,7 +30,8 @@ class Format(StrEnum):
 
 AsFormat = Annotated[Format, typer.Option("--format", help="Output format: text or JSON.")]
 TimeLimitS = Annotated[
-    float, typer.Option("--time-limit", metavar="S", min=0.01, help="Seconds that the reasoner may take for a state.")
+    float,
+    typer.Option("--time-limit", metavar="S", min=0.01, help="Time limit of the reasoner for a state, in seconds."),
 ]
 MaxFailed = Annotated[
     int,
@@ -98,7 +99,7 @@ class InState(KnowledgeFiles):
         typer.Option(
             "--set",
             metavar="NAME=VALUE",
-            help="Measured value of a quality attribute; or, of a key with a dot, value of the scenario. Repeat it.",
+            help="Measured value of a quality attribute; if NAME has a dot, scenario value. Repeat it for several.",
         ),
     ] = None
 
@@ -129,7 +130,7 @@ class Replayed(KnowledgeFiles):
 
     scenario: Annotated[
         str | None,
-        typer.Option("--scenario", metavar="SCENARIO", help="In place of the scenario that was recorded."),
+        typer.Option("--scenario", metavar="SCENARIO", help="Scenario to use instead of the recorded one."),
     ] = None
     reasoner: Reasoner = None
     time_limit: TimeLimitS = 60.0
@@ -147,14 +148,14 @@ class StateParts:
         list[str] | None, typer.Option("--component", metavar="NAME=STATUS", help="Reported c_status of a component.")
     ] = None
     ground: Annotated[
-        list[str] | None, typer.Option("--ground", metavar="FUNCTION=DESIGN", help="Function design now in use.")
+        list[str] | None, typer.Option("--ground", metavar="FUNCTION=DESIGN", help="Function design in use.")
     ] = None
     objective: Annotated[
         list[str] | None,
         typer.Option(
             "--objective",
             metavar="FUNCTION[=STATUS]",
-            help="Objective that the mission has; without any: those of the groundings, else those of the search task.",
+            help="Objective of the mission; by default those of the groundings, or else those of the search task.",
         ),
     ] = None
 

@@ -49,11 +49,11 @@ def check(
     ),
     time_limit: TimeLimitS = 60.0,
     verbose: Annotated[bool, typer.Option("--verbose", help="Show all notes on the shipped ontologies, too.")] = False,
-    form: Annotated[FindingsFormat, typer.Option("--format", help="How to print.")] = FindingsFormat.TEXT,
+    form: Annotated[FindingsFormat, typer.Option("--format", help="Output format.")] = FindingsFormat.TEXT,
 ) -> None:
     """Check ontologies and rules: names, arguments, variables, model, shapes, contradictions.
 
-    Exit status: 0 no findings of the level of --fail-on; 1 such findings; 2 something cannot be read.
+    Exit status: 0 no findings at the level of --fail-on or above; 1 such findings; 2 something cannot be read.
     """
     from suave_des.domain import MISSION_FUNCTIONS
     from suave_des.resources import shipped_folder
@@ -93,7 +93,7 @@ def check(
 
 @grouped_options
 def rules(sources: Sources, form: AsFormat = Format.TEXT) -> None:
-    """List all rules as text that --rules reads back."""
+    """List all rules as text, in the format that --rules reads."""
     from suave_des.scenario_knowledge import open_base
 
     base = open_base(sources.loaded())
@@ -172,7 +172,7 @@ def try_(
             help="Output folder of run, or of a campaign that recorded its knowledge, or a folder of such folders.",
         ),
     ],
-    rule: Annotated[str | None, typer.Argument(metavar="RULE", help='As "name: body -> head".')] = None,
+    rule: Annotated[str | None, typer.Argument(metavar="RULE", help='Rule to try: "name: body -> head".')] = None,
     disable: Annotated[
         str | None, typer.Option("--disable", metavar="NAME", help="Evaluate without this rule.")
     ] = None,
@@ -180,8 +180,8 @@ def try_(
 ) -> None:
     """Show when a rule would have fired in recorded missions, and which decisions would have been different.
 
-    No mission is run again: each recorded state is reasoned about with and without the rule. What another decision
-    would have led to, only a new run shows.
+    No mission is run again: the reasoner evaluates each recorded state with and without the rule. Only a new run shows
+    the consequences of a different decision.
     """
     from suave_des.workbench.replay import RuleChange
     from suave_des.workbench.replay import try_rule as replayed

@@ -38,7 +38,7 @@ class Tested(KnowledgeFiles):
     """Options that replace or add to what the files of tests say of their knowledge base."""
 
     scenario: Annotated[
-        str | None, typer.Option("--scenario", metavar="SCENARIO", help="In place of the one that the tests name.")
+        str | None, typer.Option("--scenario", metavar="SCENARIO", help="Scenario to use instead of the tests' own.")
     ] = None
 
 
@@ -46,7 +46,7 @@ class Tested(KnowledgeFiles):
 def test(
     knowledge: Tested,
     files: Annotated[
-        list[Path] | None, typer.Argument(metavar="FILE", help="Tests in YAML; left out: those of the shipped rules.")
+        list[Path] | None, typer.Argument(metavar="FILE", help="Tests in YAML; by default those of the shipped rules.")
     ] = None,
     select: Annotated[
         str | None, typer.Option("-k", metavar="TEXT", help="Only tests with this text in their name.")
@@ -55,7 +55,7 @@ def test(
         Path | None, typer.Option("--junit-xml", "--junitxml", metavar="FILE", help="Write the results as JUnit XML.")
     ] = None,
     coverage: Annotated[
-        bool, typer.Option("--coverage", help="Show what the tests cover of rules, atoms and comparisons.")
+        bool, typer.Option("--coverage", help="Show which rules, atoms and comparisons the tests cover.")
     ] = False,
     mutate: Annotated[
         bool,
@@ -64,11 +64,11 @@ def test(
         ),
     ] = False,
     mutants: Annotated[
-        int | None, typer.Option("--mutants", min=1, metavar="N", help="Maximum number of mutants; all if left out.")
+        int | None, typer.Option("--mutants", min=1, metavar="N", help="Maximum number of mutants; by default all.")
     ] = None,
     only: Annotated[
         list[str] | None,
-        typer.Option("--only", metavar="NAME", help="Mutants of this rule or individual only; repeat it for several."),
+        typer.Option("--only", metavar="NAME", help="Only mutants of this rule or individual; repeat it for several."),
     ] = None,
     from_mission: Annotated[
         Path | None,
@@ -76,7 +76,7 @@ def test(
     ] = None,
     write: Annotated[
         Path | None,
-        typer.Option("--write", metavar="FILE", help="Where --from-mission and --coverage write tests."),
+        typer.Option("--write", metavar="FILE", help="File to which --from-mission and --coverage write tests."),
     ] = None,
     max_failed: MaxFailed = 1,
     time_limit: TimeLimitS = 60.0,
