@@ -113,7 +113,7 @@ def read_cases(
         own = [manager for manager in wanted if manager in real.managers]
         if not own:
             remedy = f"it has {', '.join(real.managers)}"
-            raise InputError(f"{name}: its data have no mission of {', '.join(wanted)}", remedy=remedy)
+            raise InputError(f"{name}: the data have no missions of {', '.join(wanted)}", remedy=remedy)
         real.check_can_be_run(own)
         frame = real.frame[real.frame["manager"].isin(own)].reset_index(drop=True)
         if CONDITION not in frame:
@@ -141,7 +141,7 @@ def _files(scenarios: Mapping[str, str], data: Sequence[str]) -> Mapping[str, li
             )
         else:
             remedy = f"for instance --data {next(iter(scenarios))}={word}"
-            raise InputError(f"{word} is of one of {len(scenarios)} scenarios", place="--data", remedy=remedy)
+            raise InputError(f"{word} could belong to any of {len(scenarios)} scenarios", place="--data", remedy=remedy)
     for name, given in scenarios.items():
         if not found[name]:
             path = published_for(given)

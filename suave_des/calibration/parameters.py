@@ -88,18 +88,18 @@ def read_problem(path: Path, cases: Sequence[Case], runs: int, seed: int) -> Pro
         swept = [name for values in case.conditions.values() for name in values]
         for each in parameters:
             if each.is_of(case) and each.path in swept:
-                problem = f"{each.path} is free, and the conditions of {case.name} have values of it"
-                raise InputError(problem, file=path, remedy="leave it out here, or in the campaign's sweep")
+                problem = f"{each.path} is free, but the conditions of {case.name} set it"
+                raise InputError(problem, file=path, remedy="remove it here, or from the campaign's sweep")
     return Problem(tuple(replace(case, loaded=formed[case.name]) for case in cases), parameters, runs, seed)
 
 
 def _parameter(layer: Layer, index: int, entry: FreeEntry, scenarios: Mapping[str, LoadedScenario]) -> FreeParameter:
     if entry.scenarios == ():
         remedy = f"name some of {', '.join(scenarios)}, or leave scenarios out for all"
-        raise layer.error(f"{entry.path} is of no scenario", ("free", index, "scenarios"), remedy)
+        raise layer.error(f"{entry.path} belongs to no scenario", ("free", index, "scenarios"), remedy)
     for place, name in enumerate(entry.scenarios or ()):
         if name not in scenarios:
-            problem = f"{entry.path} is of scenario {shown(name)}, which is not fitted"
+            problem = f"{entry.path} belongs to scenario {shown(name)}, which is not fitted"
             remedy = did_you_mean(name, scenarios, "fitted are")
             raise layer.error(problem, ("free", index, "scenarios", place), remedy)
     names = tuple(scenarios) if entry.scenarios is None else entry.scenarios

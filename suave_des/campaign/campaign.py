@@ -116,8 +116,8 @@ def run_campaign(
         campaign = _Campaign(spec, file, stack, loaded)
         if spec.suave_format and campaign.variation.sweep.points > 1:
             raise InputError(
-                "the exemplar's results file has no column for what a sweep varies",
-                remedy="leave --format suave out, or run a campaign for each point",
+                "the exemplar's results file has no columns for swept values",
+                remedy="omit --format suave, or run a campaign for each point",
             )
         if not spec.confirmed:
             check_size(campaign.job, campaign.tracker.total, campaign.spec.processes)
@@ -170,7 +170,7 @@ def resume_campaign(
     spec = _stored_spec(folder, runs, until_ci)
     spec = replace(spec, out=folder, workers=workers, scheduler=scheduler)
     if unknown := [name for name in managers if name not in spec.managers]:
-        problem = f"the campaign has no manager {unknown[0]!r}, and goes on as it began"
+        problem = f"the campaign has no manager {unknown[0]!r}, and cannot be given new ones"
         raise InputError(problem, file=folder, remedy=did_you_mean(unknown[0], spec.managers, "its managers"))
     check_trusted(spec.managers, managers, folder, confirmed=confirmed)
     with ExitStack() as stack:
@@ -190,7 +190,7 @@ def _check_new(folder: Path, *, overwrite: bool) -> None:
         raise InputError(
             "the output folder is not empty: it has a campaign in it",
             file=folder,
-            remedy=f"--resume {folder} goes on with it, --overwrite replaces it",
+            remedy=f"--resume {folder} continues it, --overwrite replaces it",
         )
 
 
@@ -384,7 +384,7 @@ class _Campaign:
     def _how_to_go_on(self) -> str:
         if self.spec.out is None or not (self.spec.out / STORE_FILE).exists():
             return ""
-        return f"; what was kept before is safe: suave-des campaign --resume {self.spec.out} does the rest"
+        return f"; what was kept before is safe: suave-des campaign --resume {self.spec.out} runs the rest"
 
 
 def _remove_empty(folder: Path) -> None:

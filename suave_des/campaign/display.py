@@ -26,8 +26,8 @@ _RATE_PERIOD_S = 10.0
 """Missions a second are those of this time."""
 _NOTEBOOK_WIDTH = 90
 _WAITS_S = 2.0
-_FIRST_TIME = "(the first time, missions are compiled: 20 to 60 s)"
-_WAITING = "Java starts, or missions are long"
+_FIRST_TIME = "(the first run compiles the mission code: 20 to 60 s)"
+_WAITING = "Java is starting, or missions are long"
 
 
 @contextmanager

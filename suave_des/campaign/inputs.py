@@ -154,7 +154,7 @@ def trained_on(loaded: LoadedScenario, managers: Sequence[str], seed: int, runs:
             learned = read_file(loaded.manager_file(manager, str(name)))
             if (learned.scenario, learned.seed) == (loaded.scenario.name, seed):
                 seen = min(runs, learned.missions)
-                yield f"{manager}: runs 1 to {seen} are missions that it was trained on; give another --seed"
+                yield f"{manager}: runs 1 to {seen} are missions that it was trained on; give a different --seed"
 
 
 def check_trusted(managers: Iterable[str], named: Iterable[str], folder: Path, *, confirmed: bool) -> None:
@@ -174,9 +174,9 @@ def check_trusted(managers: Iterable[str], named: Iterable[str], folder: Path, *
     unknown = [name for name in managers if not (is_installed(name) or name in set(named) or _is_imported(name))]
     if unknown and not confirmed:
         raise InputError(
-            f"the campaign would run the code of {', '.join(unknown)}, which this folder names",
+            f"the campaign would run the code of {', '.join(unknown)}, which this folder refers to",
             file=folder,
-            remedy=f"if you trust it, name it: --managers {','.join(unknown)}; or give --yes",
+            remedy=f"if you trust them, give --managers {','.join(unknown)}or --yes",
         )
 
 
@@ -274,9 +274,9 @@ def check_same(before: Mapping[str, Any], now: Mapping[str, Any], folder: Path) 
         if (place == "runs" and new >= old) or (place == "until_ci.half_width" and new <= old):
             continue
         raise InputError(
-            f"the campaign cannot be resumed: {place} was {shown(old)}, and is {shown(new)} now",
+            f"the campaign cannot be resumed: {place} was {shown(old)}, and is now {shown(new)}",
             file=folder,
-            remedy="undo that, or start anew in another folder or with --overwrite",
+            remedy="undo that, or start a new campaign in another folder or with --overwrite",
         )
 
 

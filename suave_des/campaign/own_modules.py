@@ -52,7 +52,7 @@ def own_modules(managers: Iterable[str], functions: Mapping[str, type] = Mapping
             if module == "__main__":
                 raise InputError(
                     f"{what} is defined in a script or a notebook, which workers do not have",
-                    remedy="put the class into a module of its own, beside it",
+                    remedy="put the class into a separate module, beside it",
                 )
             _add(found, module)
     return found
@@ -71,7 +71,7 @@ def _add(found: dict[str, Path], module: str) -> None:
         path = Path(spec.origin)
         if path.suffix != ".py":
             raise InputError(
-                "is compiled, so it cannot be taken to workers", file=path, remedy="install it there and here, by pip"
+                "is compiled, so it cannot be sent to workers", file=path, remedy="install it with pip, there and here"
             )
         is_package = spec.submodule_search_locations is not None
         place = "/".join(parts[:depth]) + ("/__init__.py" if is_package else ".py")

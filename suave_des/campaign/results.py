@@ -189,7 +189,7 @@ class CampaignResult:
         kept = f"{self.done} of {self.planned} missions are done"
         if self.folder is None:
             return kept
-        return f"{kept}, and kept in {self.folder}; suave-des campaign --resume {self.folder} does the rest"
+        return f"{kept}, and kept in {self.folder}; suave-des campaign --resume {self.folder} runs the rest"
 
 
 def _shown_summary(record: Mapping[str, Any]) -> tuple[str, ...]:

@@ -154,9 +154,7 @@ def train(
     for run in range(1, missions + 1):
         on_mission(simulator.run(manager, run, seed).metrics)
     if not learned:
-        raise InputError(
-            f"manager {manager} has learned nothing", remedy="have it keep what it learns in system.learned"
-        )
+        raise InputError(f"manager {manager} has learned nothing", remedy="store training results in system.learned")
     result = Learned(manager, loaded.scenario.name, seed, missions, dict(sorted(inputs.items())), learned)
     write_files(Path(out).parent, {Path(out).name: result.text()})
     return result
@@ -230,7 +228,7 @@ def opened_campaign(folder: Path, named: Collection[str] = ()) -> Iterator[Opene
     path = (folder / STORE_FILE).absolute()
     if not path.is_file():
         remedy = "give the --out folder of suave-des run or campaign"
-        raise InputError("has no campaign whose missions could be run again", file=folder, remedy=remedy)
+        raise InputError("has no campaign whose missions can be run again", file=folder, remedy=remedy)
     with closing(Store(path)) as store:
         spec = CampaignSpec.of_stored(store.about("request"))
     started_in = Path(spec.folder)

@@ -137,7 +137,7 @@ class Store:
             raise InputError(
                 f"is a campaign's store of version {version}, and this suave-des has version {_VERSION}",
                 file=self.path,
-                remedy="resume it with the suave-des that began it, or start anew with --overwrite",
+                remedy="resume it with the suave-des version that began it, or start a new one with --overwrite",
             )
         (verdict,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
         if verdict != "ok":
@@ -194,7 +194,7 @@ class Store:
         except OSError:
             same = False
         if not same:
-            raise StoreError(f"{path} was removed while the campaign ran; its content is lost, so start anew")
+            raise StoreError(f"{path} was removed while the campaign ran; its content is lost, so start a new campaign")
 
     def forget_passing_failures(self) -> None:
         """Remove failures that may not happen again."""
@@ -301,7 +301,7 @@ def _user_errors(path: Path | None) -> Iterator[None]:
 
 
 def _damaged(path: Path | None, what: object) -> InputError:
-    remedy = "put a copy in its place, or start anew with --overwrite; result files beside it are whole"
+    remedy = "restore it from a copy, or start a new campaign with --overwrite; result files beside it are complete"
     return InputError(f"is damaged: {what}", file=path, remedy=remedy)
 
 

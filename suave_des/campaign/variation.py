@@ -269,12 +269,12 @@ def _sweep(given: Mapping[str, Any], seed: int) -> tuple[Sweep, dict[str, str]]:
     if not forms:
         return Sweep(grid=_columns("sweep", given), seed=seed), {name: f"sweep.{name}" for name in given}
     if others := [name for name in given if name not in _FORMS]:
-        raise _wrong(f"sweep.{others[0]}", f"is beside {forms[0]}", "put it under grid, zip or sample")
+        raise _wrong(f"sweep.{others[0]}", f"stands beside {forms[0]}", "put it under grid, zip or sample")
     zipped = _columns("sweep.zip", given.get("zip", {}))
     lengths = {name: len(values) for name, values in zipped.items()}
     if len(set(lengths.values())) > 1:
         listed = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-        raise _wrong("sweep.zip", f"the lists differ in length: {listed}", "give equally many values, or use grid")
+        raise _wrong("sweep.zip", f"the lists differ in length: {listed}", "give lists of the same length, or use grid")
     sample = _sample(given["sample"]) if "sample" in given else None
     sweep = Sweep(_columns("sweep.grid", given.get("grid", {})), zipped, sample, seed)
     ranges = sample.ranges if sample else {}
@@ -293,7 +293,7 @@ def _columns(place: str, given: Any) -> dict[str, list[Any]]:
                 f"{place}.{name}", f"expected a list, got {shown(values)}", f"write it in brackets: [{values}]"
             )
         if not values:
-            raise _wrong(f"{place}.{name}", "is empty", "give at least one value, or leave it out")
+            raise _wrong(f"{place}.{name}", "is empty", "give at least one value, or remove the key")
         if place != "sweep.zip" and (repeated := _repeated(values)) is not None:
             raise _wrong(f"{place}.{name}", f"{shown(repeated)} is given twice", "name each value once")
     return {name: list(values) for name, values in given.items()}
@@ -358,7 +358,7 @@ def _check_drawn(loaded: LoadedScenario, perturbed: Mapping[str, str]) -> None:
         if path not in drawn:
             raise _wrong(
                 f"perturbations.{name}",
-                "is not drawn once in a run, but at each use",
+                "is drawn at each use, not once per run",
                 "put the distribution into the scenario itself, or sweep its parameters",
             )
 

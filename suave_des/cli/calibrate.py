@@ -107,7 +107,7 @@ def calibrate(
         console.print(note, soft_wrap=True, markup=False)
 
     def print_generation(count: int, best: Evaluation) -> None:
-        console.print(f"{count:5d} sets tried, least loss {best.loss:.4f}")
+        console.print(f"{count:5d} sets tried, lowest loss {best.loss:.4f}")
 
     tried = fit(problem, evaluations, workers=workers, seed=seed, on_generation=print_generation)
     best = select(problem, tried, workers)
@@ -126,7 +126,7 @@ def calibrate(
     judged = report.judge_halves(larger(problem), halves, best.values)
     done = report.Fit(problem, tried, best, spread, found, judged)
     console.print(
-        f"\nloss {best.loss:.4f} with {problem.runs * FINAL_FACTOR} missions for each manager and other streams"
+        f"\nloss {best.loss:.4f} with {problem.runs * FINAL_FACTOR} missions for each manager and fresh random numbers"
     )
     _print_fit(console, done, values)
     if out is None:
@@ -165,7 +165,7 @@ def _halves(cases: Sequence[Case], given: str | None) -> list[tuple[Case, Case |
     words = [word.strip() for word in given.split(",")]
     if not all(word.isascii() and word.isdigit() for word in words) or len(set(words)) < len(words):
         remedy = f"numbers from 1, each once, such as {option} 1,3,5"
-        raise InputError(f"{given!r} is no list of conditions", place=option, remedy=remedy)
+        raise InputError(f"{given!r} is not a list of conditions", place=option, remedy=remedy)
     numbers = list(map(int, words))
     if not any(case.has_conditions for case in cases):
         remedy = "give a campaign file that sweeps the conditions of the real missions"
@@ -176,7 +176,7 @@ def _halves(cases: Sequence[Case], given: str | None) -> list[tuple[Case, Case |
         if not case.has_conditions:
             halves.append((case, None))
         elif not others:
-            problem = f"{case.name} has no other condition, by which the fit could be judged"
+            problem = f"{case.name} has no other condition on which to evaluate the fit"
             raise InputError(problem, place=option, remedy=f"leave it out to fit all {len(case.conditions)}")
         else:
             halves.append((case.only(numbers), case.only(others)))

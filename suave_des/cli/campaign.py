@@ -138,7 +138,7 @@ def campaign(
     if resume is not None:
         check_no_use(
             {"SCENARIO": scenario, "--out": out, **new.given, **files.given},
-            "with --resume: the campaign goes on as it began",
+            "cannot be changed with --resume",
             "leave it out, or start anew in another folder",
         )
     elif scenario is None or out is None:

@@ -111,10 +111,12 @@ def import_config(
 
     targets = [out] if campaign is None else [out, campaign]
     if campaign is not None and campaign.resolve() == out.resolve():
-        raise InputError("scenario and campaign cannot be one file", file=out, remedy="give --campaign another name")
+        raise InputError(
+            "scenario and campaign cannot be one file", file=out, remedy="give --campaign a different name"
+        )
     for target in targets:
         if target.resolve() in [file.resolve() for file in files]:
-            raise InputError("is one of the files to import", file=target, remedy="give the output another name")
+            raise InputError("is one of the files to import", file=target, remedy="give the output a different name")
         check_output_file(target, overwrite=overwrite)
     options = ImportOptions(base, revision, campaign, runner_seed, manager_names())
     imported = imported_from(files, out, options)
@@ -125,7 +127,7 @@ def import_config(
         write_files(folder, contents)
     for note in imported.notes:
         print(plain(note))
-    print(f"{out} is written, over the base {imported.base}: {imported.why}")
+    print(f"{out} is written, based on {imported.base}: {imported.why}")
     if campaign is not None:
         print(f"{campaign} is written")
 
@@ -143,6 +145,7 @@ def tree(
     drawn = getattr(Simulator(load_scenario(scenario)).start(manager, 1, 1).manager, "drawing", None)
     if drawn is None:
         raise InputError(
-            f"manager {manager!r} has no tree", remedy="bt and bt_extended have, and those that have drawing()"
+            f"manager {manager!r} has no tree",
+            remedy="bt and bt_extended have one, and managers with a method drawing()",
         )
     print(drawn())

@@ -99,7 +99,7 @@ def train(
         table.add_row(f"{first} to {last}", f"{time_s:.2f}", f"{distance_m:.2f}")
     console = output()
     print_table(console, f"{manager} on {scenario}, means", table)
-    console.print(f"what it has learned is in {out}", soft_wrap=True)
+    console.print(f"the training result is in {out}", soft_wrap=True)
 
 
 @grouped_options
@@ -181,7 +181,7 @@ def _print_bench(found: Bench) -> None:
     console.print()
     print_table(console, "A mission in one process, here and with stock libraries", others)
     if is_busy(found.machine):
-        console.print("\nOther programs kept the machine busy at the start: without them, times are shorter.")
+        console.print("\nOther programs kept the machine busy at the start; without them, times are shorter.")
     if found.missions < MISSIONS:
         console.print(f"\n-: the goal is for {MISSIONS:,} missions", soft_wrap=True)
     console.print(f"\nmeasured in {found.took_s:.0f} s", soft_wrap=True)

@@ -204,8 +204,12 @@ def manager_options(words: Sequence[str] | None, managers: Sequence[str]) -> dic
             raise InputError(f"{shown(key)} is for none of the managers", place="--manager-option", remedy=remedy)
         targets = own or (list(managers) if len(managers) == 1 else []) if named is None else [named]
         if not targets:
-            remedy = f"name it, for instance {managers[0]}.{word}" if managers else "name the managers, too"
-            raise InputError(f"{shown(word)} is for no manager of one's own", place="--manager-option", remedy=remedy)
+            remedy = (
+                f"give the manager too, for instance {managers[0]}.{word}" if managers else "name the managers, too"
+            )
+            raise InputError(
+                f"{shown(word)} belongs to no manager that you wrote", place="--manager-option", remedy=remedy
+            )
         for target in targets:
             settings.setdefault(target, {})[key] = value
     return settings

@@ -175,7 +175,7 @@ def _seconds(value: Any) -> float:
         or not isfinite(value)
         or not 0 <= value <= _LONGEST_S
     ):
-        raise InputError(f"{shown(value)} is no time in s", remedy=f"a number from 0 to {_LONGEST_S:g}")
+        raise InputError(f"{shown(value)} is not a time in seconds", remedy=f"a number from 0 to {_LONGEST_S:g}")
     return float(value)
 
 

@@ -101,7 +101,7 @@ def _read_source(path: Path) -> Missions:
         missions = _of_runs(path / _RUNS_FILE)
         return Missions(missions.frame, missions.swept, tuple(_unfinished(path)))
     if (path / _STORE_FILE).is_file():
-        remedy = f"suave-des campaign --resume {path} does the rest and writes them"
+        remedy = f"suave-des campaign --resume {path} runs the rest and writes them"
         raise InputError("the campaign ended before its result files were written", file=path, remedy=remedy)
     return _read_exemplar_folder(path)
 
@@ -198,7 +198,7 @@ def _unfinished(folder: Path) -> Iterator[str]:
     except (OSError, ValueError, KeyError, TypeError):
         return
     if left_out:
-        how = f"suave-des campaign --resume {folder} does the rest"
+        how = f"suave-des campaign --resume {folder} runs the rest"
         yield f"{folder} is not finished: {left_out} of {planned} missions are missing; {how}"
     if failed:
         yield f"{folder}: {failed} of {planned} missions failed and are missing"

@@ -69,13 +69,13 @@ def draw_timeline(record: MissionRecord) -> style.Picture:
 
 
 def _draw_altitude(axes: Axes, record: MissionRecord, changes: Sequence[Adaptation]) -> None:
-    """Draw visibility and its thresholds, and the altitude asked for and flown."""
+    """Draw visibility and its thresholds, and the requested altitude and flown."""
     way = record.trajectory
     for threshold_m in record.scenario.get("reaction_metric", {}).get("visibility_thresholds_m", ()):
         axes.axhline(threshold_m, color="#B5B5B5", lw=0.7, ls=":", zorder=1)
     axes.plot(way["t_s"], way["visibility_m"], color=style.GREY, lw=1.0, label="visibility; dotted: thresholds")
     times_s, asked_m = _altitude_asked_for(record)
-    axes.step(times_s, asked_m, where="post", color=style.BLACK, lw=0.9, ls="--", label="altitude asked for")
+    axes.step(times_s, asked_m, where="post", color=style.BLACK, lw=0.9, ls="--", label="requested altitude")
     axes.plot(way["t_s"], way["z_m"] - SEA_BED_Z_M, color=style.BLUE, lw=1.3, label="altitude flown")
     found_s = record.metrics["search_time_s"]
     if record.metrics["pipeline_found"]:

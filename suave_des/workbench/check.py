@@ -153,8 +153,8 @@ def _replacing_rules(rules: Sequence[Rule], groups: Sequence[Sequence[Rule]]) ->
         for rule in group:
             old = before.get(rule.name)
             if old is not None and (old.text, old.enabled) != (rule.text, rule.enabled):
-                message = f"takes the place of the rule of this name in {relative_path(old.file)}"
-                yield _about(rule, {}, Level.WARN, message, "give it a name of its own, unless that is meant")
+                message = f"replaces the rule of this name in {relative_path(old.file)}"
+                yield _about(rule, {}, Level.WARN, message, "give it a different name, unless this is intended")
         before |= {rule.name: rule for rule in group}
 
 
@@ -210,9 +210,7 @@ def _ask_pellet(subject: Subject, before: Sequence[Finding]) -> Iterator[Finding
             operators=subject.operators,
         )
     except KnowledgeError as error:
-        message = (
-            "Pellet was not asked for contradictions: the ontologies cannot be loaded until the errors are corrected"
-        )
+        message = "contradictions were not checked with Pellet: first correct the errors that prevent loading"
         yield Finding(Level.INFO, message) if is_wrong else finding_from(error)
         return
     for reason in regions_of(base).reasons:
@@ -236,7 +234,7 @@ def _ask_pellet(subject: Subject, before: Sequence[Finding]) -> Iterator[Finding
             yield found
         else:
             message = (
-                f"Pellet was not asked for contradictions: it does not use rule {found.rule} before it is corrected"
+                f"contradictions were not checked with Pellet: it does not use rule {found.rule} until it is corrected"
             )
             yield Finding(Level.INFO, message)
 

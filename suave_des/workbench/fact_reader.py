@@ -88,7 +88,7 @@ class FactReader:
 
     def _individual(self, term: Term) -> str:
         if not isinstance(term, Named):
-            raise InputError(f"{shown(_text(term))} is a value where an individual is needed")
+            raise InputError(f"{shown(_text(term))} is a value, but an individual is needed")
         name = term.iri
         if ":" in name:
             return name

@@ -119,7 +119,7 @@ def check_designs(
                 remedy = nearest(design, spare) or (
                     "add a mode of this name to the System Modes file, or remove the design"
                 )
-                message = f"function design {design} has no mode of its name for {name}"
+                message = f"function design {design} has no mode of the same name for {name}"
                 yield finding_about(design, sources, level, message, remedy)
             for mode in sorted(spare):
                 message = f"mode {mode} of {name} has no function design, so it is never chosen"
@@ -132,7 +132,7 @@ def designs_without_performance(content: Content, model: Model, sources: Sequenc
     for name in sorted(model.designs):
         if local_name(PERFORMANCE) not in expected.get(name, {}):
             remedy = "add a hasQAestimation of type performance"
-            message = f"function design {name} has no performance, and counts 0.001"
+            message = f"function design {name} has no performance, so 0.001 is assumed"
             yield finding_about(name, sources, Level.WARN, message, remedy)
 
 

@@ -100,7 +100,9 @@ def answer(graph: rdflib.Graph, text: str) -> QueryResult:
         remedy = "for instance SELECT ?d WHERE { ?d tomasys:solvesF ?f }"
         raise InputError(f"not a SPARQL query: {reason}", remedy=remedy) from None
     if "ServiceGraphPattern" in str(query.algebra) or query.algebra.get("datasetClause"):
-        raise InputError("SERVICE and FROM read elsewhere", remedy="leave them out: only the knowledge base is asked")
+        raise InputError(
+            "SERVICE and FROM read from other sources", remedy="remove them: only the knowledge base can be queried"
+        )
     try:
         result = graph.query(query)
         if result.type == "ASK":

@@ -211,7 +211,7 @@ def _recorded_missions(folder: Path) -> Iterator[_RecordedMission]:
         raise InputError(
             f"has no {KNOWLEDGE_FILE} or {CAMPAIGN_KNOWLEDGE_FILE}, nor has a folder in it",
             file=folder,
-            remedy="run --manager metacontrol --out records what is reasoned about, campaign with --record-knowledge",
+            remedy="record with run --manager metacontrol --out, or campaign --record-knowledge",
         )
 
 
@@ -244,7 +244,7 @@ class _Comparison:
             base = read(loaded.scenario, change.ontologies or loaded.ontologies, loaded.rules)
             used = loaded.scenario
         elif change.values:
-            problem = "the scenario that was recorded stays as it is"
+            problem = "the recorded scenario cannot be changed"
             raise InputError(problem, place="--set", remedy="name one with --scenario")
         else:
             used, base = scenario, read(scenario, change.ontologies or None)

@@ -61,7 +61,7 @@ class _Document:
     def __init__(self, file: OntologyFile) -> None:
         if not file.is_xml:
             raise InputError(
-                "only RDF/XML is edited in place", file=file.path, remedy="keep rules as text, for --rules"
+                "only RDF/XML is edited in place", file=file.path, remedy="keep the rules as text, for --rules"
             )
         self.newline = b"\r\n" if b"\r\n" in file.content else b"\n"
         parser = etree.XMLParser(huge_tree=True, no_network=True)  # read_ontology has refused entity bombs

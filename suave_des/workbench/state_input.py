@@ -150,7 +150,7 @@ class StateBuilder:
         document = read_yaml(path)
         for key, content in document.data.items():
             if key not in _KEYS:
-                raise document.error(f"{shown(key)} is not part of a state", (key,), did_you_mean(key, _KEYS))
+                raise document.error(f"{shown(key)} is not a key of a state", (key,), did_you_mean(key, _KEYS))
             if isinstance(content, list) and key == "objectives":
                 entries: list[tuple[Any, Any, KeyPath]] = [(name, None, (key, at)) for at, name in enumerate(content)]
             elif isinstance(content, Mapping):
@@ -245,7 +245,7 @@ def _seconds(text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise InputError(f"{shown(text)} is not a time in s", remedy="such as flown@53.7") from None
+        raise InputError(f"{shown(text)} is not a time in seconds", remedy="such as flown@53.7") from None
 
 
 def recorded_states(folder: Path, run: int | None = None) -> tuple[KnowledgeRecord, ...]:
@@ -264,7 +264,7 @@ def recorded_states(folder: Path, run: int | None = None) -> tuple[KnowledgeReco
         if mission.run == run:
             return mission.records
     runs = sorted({mission.run for mission in missions})
-    remedy = f"run: a number from {runs[0]} to {runs[-1]}" if runs else "record a campaign with --record-knowledge"
+    remedy = f"give run: a number from {runs[0]} to {runs[-1]}" if runs else "record a campaign with --record-knowledge"
     raise InputError(f"{folder} has no states of run {shown(run)}", remedy=remedy)
 
 

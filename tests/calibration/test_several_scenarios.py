@@ -201,7 +201,7 @@ def test_a_parameter_that_a_campaign_sweeps_cannot_be_free(tmp_path: Path) -> No
         ((BOTH, ["seams2023_runs.csv"]), "for instance --data seams2023=seams2023_runs.csv"),
         ((BOTH, ["seams=seams2023_runs.csv"]), "no scenario 'seams'.*did you mean 'seams2023'"),
         ((BOTH, (), "none,bd"), "'bd'"),
-        ((["planta_exp1_campaign", "seams2023"], (), "bt"), "seams2023: its data have no mission of bt"),
+        ((["planta_exp1_campaign", "seams2023"], (), "bt"), "seams2023: the data have no missions of bt"),
     ],
 )
 def test_scenarios_and_data_that_do_not_go_together_are_refused(arguments: tuple, words: str) -> None:
@@ -273,8 +273,8 @@ def test_a_fitted_scenario_finds_the_users_own_file_that_it_builds_on(
     ("scenarios", "conditions", "words"),
     [
         (["seams2023"], "1", "no scenario has conditions"),
-        (BOTH, "1,x", "no list of conditions"),
-        (BOTH, "1,1", "no list of conditions"),
+        (BOTH, "1,x", "is not a list of conditions"),
+        (BOTH, "1,1", "is not a list of conditions"),
         (BOTH, "7", "there is no condition 7"),
         (BOTH, "1,2,3,4,5,6", "has no other condition"),
     ],

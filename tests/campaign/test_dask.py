@@ -161,7 +161,7 @@ def test_ctrl_c_on_the_command_line(cluster: Cluster, short: Path, tmp_path: Pat
     status, err = chaos.ended(process)
     assert status == 130
     assert err.startswith("suave-des: interrupted; ")
-    assert err.endswith("suave-des campaign --resume out does the rest\n")
+    assert err.endswith("suave-des campaign --resume out runs the rest\n")
     assert err.count("\n") == 1
     assert run_campaign("seams2023", ["none"], 2, 1, scheduler=cluster.address).done == 2  # workers are free for it
 
@@ -175,7 +175,7 @@ def test_interrupted_there_and_resumed_here(cluster: Cluster, short: Path, tmp_p
         "sweep": {"visibility.period_s": [40, 80]},
         "perturbations": {"start.y_m": {"distribution": "normal", "mean": 0.0, "std": 1.0}},
     }
-    with pytest.raises(CampaignInterrupted, match=r"suave-des campaign --resume .* does the rest"):
+    with pytest.raises(CampaignInterrupted, match=r"suave-des campaign --resume .* runs the rest"):
         run_campaign(*asked, out=tmp_path / "out", scheduler=cluster.address, on_progress=stop, **varied)
     resume_campaign(tmp_path / "out")
     run_campaign(*asked, out=tmp_path / "whole", **varied)
@@ -208,7 +208,7 @@ def test_a_scheduler_that_is_lost_in_the_middle(
     assert time.monotonic() < stopped_s[0] + 20.0  # Dask itself would go on for longer
     lost_it = rf"the connection to the scheduler {small_cluster.address} is lost"
     line = rf"{lost_it}; \d+ of 400 missions are done, and kept in \S+; "
-    assert re.fullmatch(rf"{line}suave-des campaign --resume \S+ does the rest", str(lost.value))
+    assert re.fullmatch(rf"{line}suave-des campaign --resume \S+ runs the rest", str(lost.value))
     assert capfd.readouterr().err == ""
     resume_campaign(tmp_path / "out")
     run_campaign(*asked, out=tmp_path / "whole")

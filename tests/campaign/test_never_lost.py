@@ -50,7 +50,7 @@ def stopped_after(missions: int):
 
 
 def interrupted(scenario: Path, folder: Path, runs: int = 20, missions: int = 15) -> None:
-    with pytest.raises(CampaignInterrupted, match=r"suave-des campaign --resume .* does the rest"):
+    with pytest.raises(CampaignInterrupted, match=r"suave-des campaign --resume .* runs the rest"):
         run_campaign(scenario, MANAGERS, runs, 1, out=folder, on_progress=stopped_after(missions))
 
 
@@ -203,7 +203,7 @@ class TestRefusals:
 
     def test_a_new_campaign_in_the_folder_of_another(self, scenario: Path, tmp_path: Path) -> None:
         interrupted(scenario, tmp_path / "out")
-        with pytest.raises(InputError, match=r"not empty: .*--resume .* goes on with it, --overwrite replaces it"):
+        with pytest.raises(InputError, match=r"not empty: .*--resume .* continues it, --overwrite replaces it"):
             run_campaign(scenario, MANAGERS, 20, 1, out=tmp_path / "out")
 
     def test_two_campaigns_on_one_folder(self, scenario: Path, tmp_path: Path) -> None:
@@ -263,7 +263,7 @@ class TestDisk:
         with monkeypatch.context() as patch:
             patch.setattr(Store, "__init__", small)
             patch.setattr(stores, "_COMMIT_PERIOD_S", 0.0)
-            with pytest.raises(StoreError, match=r"database or disk is full; what was kept .*--resume .*does the rest"):
+            with pytest.raises(StoreError, match=r"database or disk is full; what was kept .*--resume .*runs the rest"):
                 run_campaign(scenario, MANAGERS, 60, 1, out=tmp_path / "out")
         assert not (tmp_path / "out" / "runs.csv").exists()
         seen: list[Progress] = []
@@ -291,7 +291,7 @@ class TestDisk:
         )
         assert ended.returncode == 3
         assert ended.stderr.count("\n") == 1
-        assert "--resume out does the rest" in ended.stderr
+        assert "--resume out runs the rest" in ended.stderr
         resume_campaign(tmp_path / "out", 1)
         assert (tmp_path / "out" / "runs.csv").read_bytes() == undisturbed(scenario, 400, tmp_path / "whole")
 

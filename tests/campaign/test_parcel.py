@@ -155,5 +155,5 @@ class TestOnAWorker:
 
     def test_a_manager_with_other_code_is_refused(self) -> None:
         parcel = replace(pack(job("none")), manager_code={"none": "0" * 64})
-        with pytest.raises(InputError, match="worker tcp://there:1: manager 'none' has other code there than here"):
+        with pytest.raises(InputError, match="worker tcp://there:1: manager 'none' has different code there"):
             self.run(parcel, range(1, 2))

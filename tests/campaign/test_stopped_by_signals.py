@@ -50,7 +50,7 @@ def test_what_is_done_is_kept(number: signal.Signals, workers: int, scenario: Pa
     assert status == STATUS[number], err
     assert err.startswith("suave-des: interrupted; ")
     assert err.endswith(
-        f" of {RUNS} missions are done, and kept in out; suave-des campaign --resume out does the rest\n"
+        f" of {RUNS} missions are done, and kept in out; suave-des campaign --resume out runs the rest\n"
     )
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == FILES
     with (tmp_path / "out" / "runs.csv").open(newline="") as file:
@@ -72,7 +72,7 @@ def test_no_empty_folder_is_left(number: signal.Signals, moment: str, scenario: 
     status, err = chaos.ended(process)
     assert status == STATUS[number], err
     if (tmp_path / "out").exists():
-        assert "--resume out does the rest" in err, list((tmp_path / "out").iterdir())
+        assert "--resume out runs the rest" in err, list((tmp_path / "out").iterdir())
         assert sorted(path.name for path in (tmp_path / "out").iterdir()) == FILES
     else:
         assert err == "suave-des: interrupted\n"

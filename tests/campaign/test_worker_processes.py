@@ -67,7 +67,7 @@ def test_a_manager_that_the_script_defines_needs_one(scenario: Path, tmp_path: P
     assert without.returncode == 1
     assert without.stderr.count("Traceback") == 1  # of the script itself: its workers say nothing
     last = without.stderr.splitlines()[-1]
-    assert "the campaign would begin anew in each worker process; " in last
+    assert "the campaign would start again in each worker process; " in last
     assert 'into a module of its own, or the campaign under `if __name__ == "__main__":`' in last
 
 

@@ -99,7 +99,7 @@ CASES: dict[str, tuple[Any, ...]] = {
         'r: c_status(?c, "Failed") -> Component(?c)',
         {"facts": ["c_status(c_thruster_1, FAILED)"]},
         "",
-        'c_status(?c, "Failed") does not hold: found c_status "FAILED", needed "Failed"; they differ in case or blanks',
+        'c_status(?c, "Failed") does not hold: found c_status "FAILED", needed "Failed"; they differ in case or spaces',
     ),
     "a truth value where there is text": (
         None,
@@ -128,7 +128,7 @@ CASES: dict[str, tuple[Any, ...]] = {
         {},
         WORKING,
         "Working(?c) does not hold: c_thruster_1 is not known to be a Working; Working is defined by complementOf, "
-        "which never follows from facts that are missing (open world)",
+        "which never follows from missing facts (open world)",
     ),
     "two names for what may be one thing": (
         "r: Component(?a) ^ Component(?b) ^ differentFrom(?a, ?b) -> fd_realisability(fd_spiral_high, false)",
@@ -188,7 +188,7 @@ CASES: dict[str, tuple[Any, ...]] = {
         {"facts": ["depth_class(c_thruster_1, deep)"]},
         PROPERTY,
         "it fires with ?c = c_thruster_1, and concludes depth_class(c_thruster_1, shallow); depth_class(c_thruster_1, "
-        "deep) stays beside it, as rules only add",
+        "deep) remains as well, because rules only add values",
     ),
     "a state that contradicts itself": (
         None,

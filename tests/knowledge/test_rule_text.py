@@ -118,7 +118,7 @@ def test_after_a_mistake_the_other_rules_are_read() -> None:
         ("Objective(?o, ?x) -> Role(?o)", 4, "Objective is a class, but is used as a property"),
         ("o_status(?o) -> Role(?o)", 4, "o_status is a data property, but is used as a class"),
         ("solvesO(?f, ?o, ?p) -> Role(?o)", 4, "solvesO takes two arguments, not 3"),
-        ('typeFD(?f, "x") -> Role(?f)', 15, "is a value where an individual is needed"),
+        ('typeFD(?f, "x") -> Role(?f)', 15, "is a value, but an individual is needed"),
         ("fg_status(?f, fd_spiral_low) -> Role(?f)", 18, "is an individual where a value is needed"),
         ("fg_status(?f, 3) -> Role(?f)", 18, "is not a string, the range of fg_status: it never matches"),
         ("FunctionGrounding(?f) -> fg_status(?f, false)", 43, "contradicts whatever it is concluded of"),

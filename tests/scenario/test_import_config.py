@@ -623,7 +623,7 @@ class TestCommand:
         assert self.ended(*arguments) == 0
         told = capsys.readouterr().out.splitlines()
         assert told[-2:] == [
-            "mine.yaml is written, over the base release15: as asked for",
+            "mine.yaml is written, based on release15: as requested",
             "sub/campaign.yaml is written",
         ]
         assert any("no counterpart" in line and "mission_metrics.result_path" in line for line in told)

@@ -238,7 +238,7 @@ def test_a_number_with_a_comma(tmp_path: Path) -> None:
 
 
 def test_a_rule_as_text_that_takes_the_place_of_another_is_told(tmp_path: Path) -> None:
-    finding = only(found(tmp_path, "S1a: Role(?q) -> Role(?q)"), "takes the place of the rule of this name in")
+    finding = only(found(tmp_path, "S1a: Role(?q) -> Role(?q)"), "replaces the rule of this name in")
     assert (finding.level, finding.rule, finding.line) == (Level.WARN, "S1a", 1)
     assert finding.message.endswith("tomasys.owl")
     same = 'S1a: FunctionGrounding(?fg) ^ fg_status(?fg, "IN_ERROR_COMPONENT") ^ solvesO(?fg, ?o)'
@@ -447,7 +447,7 @@ class TestBeforeItRuns:
 
     def test_what_was_skipped_is_said(self, tmp_path: Path) -> None:
         findings = found(tmp_path, "A: Role(?x) -> Role(?y)")
-        assert only(findings, "Pellet was not asked").level is Level.INFO
+        assert only(findings, "not checked with Pellet").level is Level.INFO
 
     def test_notes_on_shipped_files_are_one_line(self) -> None:
         findings = check(Subject())

@@ -149,7 +149,7 @@ class TestDecisions:
     def test_nothing_to_adapt_is_said(self, bench):
         state = bench.state(groundings={SEARCH: "fd_spiral_low"}, measurements={"water_visibility": 1.25})
         (decision,) = bench.explain(state, "why not fd_spiral_high?").decisions
-        assert "calls for no adaptation, so fd_spiral_low stays" in decision.answer
+        assert "requires no adaptation, so fd_spiral_low stays" in decision.answer
         (decision,) = bench.explain(state, "why fd_recover_thrusters?").decisions
         assert "f_maintain_motion has no objective in this state" in decision.answer
 

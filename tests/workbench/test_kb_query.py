@@ -54,8 +54,8 @@ def test_labels_are_there(bench):
         ("", "not a SPARQL query"),
         ("SELECT ?s WHERE { ?s nowhere:is ?o }", "not a SPARQL query: Unknown namespace prefix : nowhere"),
         ("DELETE WHERE { ?s ?p ?o }", "not a SPARQL query"),
-        ("SELECT ?s WHERE { SERVICE <http://example.org/> { ?s ?p ?o } }", "SERVICE and FROM read elsewhere"),
-        ("SELECT ?s FROM <http://example.org/> WHERE { ?s ?p ?o }", "SERVICE and FROM read elsewhere"),
+        ("SELECT ?s WHERE { SERVICE <http://example.org/> { ?s ?p ?o } }", "SERVICE and FROM read from other sources"),
+        ("SELECT ?s FROM <http://example.org/> WHERE { ?s ?p ?o }", "SERVICE and FROM read from other sources"),
     ],
 )
 def test_what_is_no_query_of_the_knowledge_base_is_refused(bench, text, said):

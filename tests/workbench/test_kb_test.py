@@ -157,7 +157,10 @@ def test_rules_of_the_file_are_tested_and_results_are_written_as_junit_xml(tmp_p
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("- name: x\n  folows: []", "line 3, tests[0].folows: 'folows' is not a key here (did you mean 'follows'?"),
+        (
+            "- name: x\n  folows: []",
+            "line 3, tests[0].folows: 'folows' is not a known key here (did you mean 'follows'?",
+        ),
         ("- name: x", "this test expects nothing"),
         ("- name: x\n  follows: [fg_status(fg_spiral_high, IN)]", "needs quotes, because of its comma"),
         ('- name: x\n  follows: ["fg_stats(fg_spiral_high, IN)"]', "no property 'fg_stats' (did you mean fg_status?)"),

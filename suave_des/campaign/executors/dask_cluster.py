@@ -59,7 +59,7 @@ def check_scheduler(scheduler: str, workers: int) -> None:
     if workers != 1:
         raise InputError(
             f"workers: {workers} cannot be used with a scheduler, whose own workers run the missions",
-            remedy="leave it out; `dask worker --nworkers N` says how many missions run there at a time",
+            remedy="omit it; `dask worker --nworkers N` sets how many missions run there at a time",
         )
     found = _ADDRESS.fullmatch(scheduler)
     if found is None or not 0 < int(found[1]) < 65536:
@@ -108,7 +108,7 @@ def _client(distributed: Any, scheduler: str) -> Any:
             return distributed.Client(scheduler, timeout=ANSWER_TIMEOUT_S, set_as_default=False)
     raise InputError(
         f"scheduler: {scheduler} does not answer as a Dask scheduler within {ANSWER_TIMEOUT_S:g} s",
-        remedy="see that `dask scheduler` runs there, and that its port can be reached from here",
+        remedy="check that `dask scheduler` is running there, and that its port can be reached from here",
     )
 
 
@@ -146,7 +146,7 @@ def _check_workers(client: Any) -> None:
     if answers is None:
         raise InputError(
             f"scheduler: some of its workers do not answer within {_CHECK_TIMEOUT_S:g} s",
-            remedy="restart them, or end them",
+            remedy="restart or stop them",
         )
     for address, there in sorted(answers.items()):
         if isinstance(there, BaseException):
@@ -314,7 +314,7 @@ class DaskCluster:
                 return []
             self._left -= 1
             times = error.allowed_failures + 1
-            cause = f"the cluster's worker died with it, {times} times (killed, out of memory, or stuck?)"
+            cause = f"the cluster's worker died while running it, {times} times (killed, out of memory, or stuck?)"
             return [self._job.failed(chunk[0], cause)]
         except SuaveDesError:
             raise

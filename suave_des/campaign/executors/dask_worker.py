@@ -193,7 +193,7 @@ def misfit(where: str, here: Mapping[str, str], there: Mapping[str, str]) -> Inp
     name = next(name for name in here if there.get(name) != here[name])
     return InputError(
         f"{name} is {there.get(name, 'missing')} on {where}, and {here[name]} here, which could change results",
-        remedy="install the same on all machines",
+        remedy="install the same version on all machines",
     )
 
 
@@ -236,7 +236,7 @@ def _make_runner(unpacked: Unpacked) -> MissionRunner:
     sys.path.insert(0, str(unpacked.folder / _MODULES))
     for name, code in unpacked.manager_code.items():
         if manager_code(name) != code:
-            raise InputError(f"manager {name!r} has other code there than here", remedy="install the same version")
+            raise InputError(f"manager {name!r} has different code there", remedy="install the same version")
     return MissionRunner(unpacked.job, EXIT_AFTER_S)
 
 

@@ -169,7 +169,7 @@ class LocalWorkers:
         for worker in busy:
             if time.monotonic() >= worker.due_s(self._job.time_out_s):
                 if worker.is_overdue:
-                    raise WorkerError(f"worker process {worker.process.pid} was killed, and does not end")
+                    raise WorkerError(f"worker process {worker.process.pid} was killed, but has not ended")
                 worker.is_overdue, worker.since_s = True, time.monotonic()
                 worker.process.kill()
         return None
@@ -179,7 +179,7 @@ class LocalWorkers:
         worker.stop(wait=False)
         status = worker.join()
         if self._needs_script and status == _RUNS_THE_SCRIPT:
-            raise WorkerError(f"the campaign would begin anew in each worker process{_SCRIPT_HINT}")
+            raise WorkerError(f"the campaign would start again in each worker process{_SCRIPT_HINT}")
         self._in_a_row += 1
         if self._in_a_row >= _IN_A_ROW:
             raise WorkerError(

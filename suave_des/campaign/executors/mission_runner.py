@@ -32,9 +32,9 @@ from suave_des.scenario.models import MissionSettings
 from suave_des.simulation.simulator import Simulator
 
 NOT_REPEATABLE = (
-    "a mission that was run again in the same process gave another row: the class keeps something from one mission"
-    " to the next, or uses chance of its own, so its results depend on the number of workers."
-    " To learn, use `suave-des train`; for chance, system.stream"
+    "a mission that was run again in the same process gave another row: the class keeps state from one mission"
+    " to the next, or has its own source of randomness, so results depend on the number of workers."
+    " To learn, use `suave-des train`; for random numbers, system.stream"
 )
 _REPEAT_S = 1.0
 """A mission that swallowed the interruption is interrupted again after this time."""

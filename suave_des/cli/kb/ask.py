@@ -191,7 +191,7 @@ def _policy_summary(found: Policy) -> Iterator[str]:
     yield f"{found.states} states in {kinds} equivalence classes, with at most {most} components reporting"
     for group in found.alike:
         if len(group) > 1:
-            yield f"interchangeable, only their number counts: {', '.join(group)}"
+            yield f"interchangeable (only their number matters): {', '.join(group)}"
     for name in found.without_effect:
         yield f"without any effect: measured {name}"
     if found.computing:
@@ -306,7 +306,9 @@ def why_not(
     questions = RuleQuestions(base, tuple(unusable))
     named = names or sorted({*(rule.name for rule in base.rules), *(each.name for each in unusable)})
     limit = TimeLimit(time_limit, "--time-limit")
-    answers = [limit.run(partial(questions.why_not, name, state), f"looking for what {name} lacks") for name in named]
+    answers = [
+        limit.run(partial(questions.why_not, name, state), f"finding out why {name} does not fire") for name in named
+    ]
     shown = [answer for answer in answers if names or not answer.fires]
     if form is Format.JSON:
         print_json(shown)

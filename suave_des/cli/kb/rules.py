@@ -130,7 +130,7 @@ def add_rule(
     from suave_des.workbench.rule_editor import add_rule as add
 
     added = add(file, rule)
-    print(f"rule {added.name} is in {file} now; {file}.bak is as it was")
+    print(f"rule {added.name} is in {file} now; {file}.bak is the previous version")
 
 
 def remove_rule(file: OwlFile, name: RuleName) -> None:
@@ -138,7 +138,7 @@ def remove_rule(file: OwlFile, name: RuleName) -> None:
     from suave_des.workbench.rule_editor import remove_rule as remove
 
     remove(file, name)
-    print(f"rule {name} is not in {file} any more; {file}.bak is as it was")
+    print(f"rule {name} is not in {file} any more; {file}.bak is the previous version")
 
 
 def enable_rule(file: OwlFile, name: RuleName) -> None:
@@ -156,7 +156,7 @@ def _switch(file: Path, name: str, *, enabled: bool) -> None:
 
     word = "enabled" if enabled else "disabled"
     if set_enabled(file, name, enabled=enabled):
-        print(f"rule {name} is {word} in {file} now; {file}.bak is as it was")
+        print(f"rule {name} is {word} in {file} now; {file}.bak is the previous version")
     else:
         print(f"rule {name} is {word} in {file} already")
 

@@ -111,7 +111,7 @@ def test(
         _cover(console, suites, max_failed, write)
     if mutate or mutants is not None:
         if not all(result.passed for result in results):
-            console.print("no mutants while a test fails: each of them would count as killed", soft_wrap=True)
+            console.print("no mutation testing while a test fails: every mutant would count as killed", soft_wrap=True)
         else:
             _mutate(console, suites, only or (), mutants, max_failed)
     if not all(result.passed for result in results):
@@ -169,7 +169,7 @@ def _mutants(base: Ontology, only: Sequence[str], most: int | None) -> tuple[Mut
     names = list(dict.fromkeys(mutant.name for mutant in found))
     for name in only:
         if name not in names:
-            raise InputError(f"no mutant is of {shown(name)}", place="--only", remedy=did_you_mean(name, names))
+            raise InputError(f"there is no mutant of {shown(name)}", place="--only", remedy=did_you_mean(name, names))
     return sample([mutant for mutant in found if not only or mutant.name in only], most)
 
 
@@ -226,7 +226,7 @@ def _run(console: Console, suites: Iterable[Suite], select: str | None) -> list[
     ]
     total = sum(len(tests) for _, tests in chosen)
     if total == 0:
-        raise InputError(f"no test has {shown(select)} in its name", place="-k", remedy="see the names in the files")
+        raise InputError(f"no test name contains {shown(select)}", place="-k", remedy="see the names in the files")
     results: list[TestResult] = []
     runners: dict[int, Runner] = {}
     for suite, tests in chosen:
@@ -334,11 +334,11 @@ def _coverage_lines(coverage: Coverage) -> Iterator[str]:
     unreachable = [each for each in coverage.rules if each.unreachable]
     if unreachable:
         words = f"of {coverage.states} kinds of states of this model, with at most {coverage.max_failed} components"
-        yield f"never, whatever the state ({words} reporting); facts in a test may"
+        yield f"in no state ({words} reporting); facts in a test may"
         yield from (f"  {line}" for line in _unreachable(unreachable))
     if coverage.proposed:
         count = len(coverage.proposed)
-        yield f"the least set of states that would cover the rest: {count} (write them as tests with --write FILE)"
+        yield f"a smallest set of states that would cover the rest: {count} (write them as tests with --write FILE)"
         for state, goals in coverage.proposed:
             yield f"  {state}"
             yield f"    {goals[0]}" + (f" and {len(goals) - 1} more" if len(goals) > 1 else "")
@@ -358,7 +358,7 @@ def print_mutation(console: Console, report: MutationReport) -> None:
     title = f"mutation: {killed} of {killed + survived} mutants killed, {report.score:.0%}; {equivalent} equivalent"
     print_table(console, title, table)
     if survived:
-        console.print("survivors: no test notices", soft_wrap=True)
+        console.print("survivors, which no test notices", soft_wrap=True)
     for verdict in report.of(SURVIVED):
         console.print(Text(f"  {verdict.mutant}\n    {verdict.reason}\n    at {verdict.state}"), soft_wrap=True)
     count = len(report.verdicts)

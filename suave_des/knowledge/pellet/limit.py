@@ -68,7 +68,9 @@ class TimeLimit:
             KnowledgeError: it took longer, or an earlier one still has not ended.
         """
         if self._stuck is not None:
-            raise KnowledgeError(f"the reasoner is still {self._stuck}", remedy="start anew, with other rules")
+            raise KnowledgeError(
+                f"the reasoner is still {self._stuck}", remedy="restart the program with different rules"
+            )
         if self._thread is None or self._process != os.getpid():  # a process that was forked has none of the threads
             self._thread, self._process = _ReasonerThread(), os.getpid()
             self._thread.start()

@@ -161,7 +161,7 @@ def _check_argument(
     """Check that an argument is an individual or a value, as is needed, and can be one of that property."""
     name, place = local_name(atom.predicate), atom.place(number)
     if isinstance(term, Lit) and not takes_value:
-        yield RuleProblem(f"{name}: {literal_text(term)} is a value where an individual is needed", place)
+        yield RuleProblem(f"{name}: {literal_text(term)} is a value, but an individual is needed", place)
     elif isinstance(term, Named):
         thing = local_name(term.iri)
         if takes_value:

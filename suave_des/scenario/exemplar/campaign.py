@@ -228,7 +228,7 @@ def _experiments(
     most = max(runs.values())
     if fewer := [f"{manager} {number}" for manager, number in runs.items() if number < most]:
         notes.append(
-            f"{parameter.place}: every manager gets {most} runs, where fewer were asked for ({', '.join(fewer)});"
+            f"{parameter.place}: every manager gets {most} runs, although fewer were requested ({', '.join(fewer)});"
             " the first ones are the same"
         )
     return list(runs), most

@@ -64,7 +64,7 @@ def import_config(files: Sequence[Path], out: Path, options: ImportOptions) -> I
         problem = "the draws of the exemplar's runner are conditions of a campaign"
         raise InputError(problem, place="--runner-seed", remedy="add --campaign FILE")
     configuration = read_configuration(files)
-    base, why = options.base, "as asked for"
+    base, why = options.base, "as requested"
     release = None
     if base is None or options.revision is not None:
         release, why = release_of(configuration.nodes, options.revision)

@@ -108,7 +108,7 @@ def _differ(one: Parameter, other: Parameter) -> bool:
 def _given(path: str, parameter: Parameter, notes: list[str]) -> Setting:
     value, comment = parameter.value, f"{parameter.source}: {parameter.keys}"
     if path == "start.y_m" and value == 2.0:
-        comment += "; where 2.0 was asked for, the published runs have 2.56 to 2.59"
+        comment += "; the published runs, which requested 2.0, have 2.56 to 2.59"
     if path == "thruster_events" and isinstance(value, list):
         value = [each for each in value if each != ""]  # as ROS 2 writes a list without entries
         for index, event in enumerate(value):
@@ -209,7 +209,7 @@ def release_of(nodes: Collection[str], name: str | None) -> tuple[Release, str]:
                 place="--revision",
                 remedy=did_you_mean(name, RELEASES),
             )
-        return RELEASES[name], "as asked for"
+        return RELEASES[name], "as requested"
     fitting = list(RELEASES)
     reasons = [node for node in (*_FIRST_WITH, "random_reasoner_node") if node in nodes]
     for node in reasons:

@@ -69,9 +69,9 @@ class PolicyCase:
         return self.outcome(function) + (f" ({FLIP_FLOP})" if function in self.flipping else "")
 
     def present(self, function: str) -> str:
-        """The design that a function has in this state, "ungrounded" or "not asked for"."""
+        """The design that a function has in this state, "ungrounded" or "no objective"."""
         if function not in self.asked:
-            return "not asked for"
+            return "no objective"
         return self.state.grounded(function) or NO_GROUNDING
 
     @property
@@ -185,7 +185,7 @@ def kinds_of_states(
     if total > LARGEST:
         raise InputError(
             f"the policy has {total:,} kinds of states, which is too many",
-            remedy=f"at most {LARGEST:,}; lower --max-failed, or give a scenario that measures less",
+            remedy=f"at most {LARGEST:,}; lower --max-failed, or give a scenario with fewer measured attributes",
         )
     between = ranges_between(space.numbers)
     combinations = list(component_reports(space.alike, space.statuses, max_failed))

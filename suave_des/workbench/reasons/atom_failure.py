@@ -52,9 +52,9 @@ def describe_failure(base: Ontology, atom: Atom, binding: Binding, facts: Facts)
     if atom.predicate in COMPARISONS and len(atom.arguments) == 2:
         return _comparison(base, atom, binding)
     if atom.kind == "different":
-        return "that two names mean different things must be asserted: OWL does not assume it"
+        return "OWL does not assume that different names mean different individuals: assert it"
     if atom.kind == "same":
-        return "these are not known to be the same"
+        return "these individuals are not known to be the same"
     values = [f"?{name} = {_show(base, binding[name])}" for name in atom.variables() if name in binding]
     return f"it is false for {', '.join(values)}" if values else "it is false for these values"
 
@@ -99,7 +99,7 @@ def _class(base: Ontology, atom: Atom, binding: Binding, facts: Facts) -> str:
     name = local_name(atom.predicate)
     closed = next(_closed_world(base, atom.predicate), None)
     if closed is not None:
-        why = f"; {name} is defined by {closed}, which never follows from facts that are missing (open world)"
+        why = f"; {name} is defined by {closed}, which never follows from missing facts (open world)"
     else:
         why = _help(base, atom)
     subject = bound(atom.arguments[0], binding)
@@ -119,7 +119,7 @@ def _unequal(values: list[str | Lit], wanted: str | Lit) -> str:
             kinds = f"{local_name(value.datatype)} and {local_name(wanted.datatype)}"
             return f"; {kinds} never match, even where they look alike: write {literal_text(value)}"
         if value.text.strip().lower() == wanted.text.strip().lower():
-            return "; they differ in case or blanks"
+            return "; they differ in case or spaces"
     texts = [value.text for value in values if isinstance(value, Lit)]
     near = nearest(wanted.text, texts)
     return f"; {near}" if near else ""

@@ -192,7 +192,7 @@ class _Explainer:
         present = state.grounded(function)
         return DecisionExplanation(
             function,
-            f"nothing is decided: the objective of {function} calls for no adaptation, so {present or 'it'} stays",
+            f"nothing is decided: the objective of {function} requires no adaptation, so {present or 'it'} stays",
         )
 
     def decision(self, decision: Decision, asked: str | None = None, *, wanted: bool = True) -> DecisionExplanation:

@@ -146,7 +146,9 @@ class RuleQuestions:
             start: what variables must stand for.
         """
         if not rule.enabled:
-            return WhyNot(rule.name, f"never fires: it is switched off (enable-rule {rule.name}, or no --disable-rule)")
+            return WhyNot(
+                rule.name, f"never fires: it is disabled (kb enable-rule {rule.name}, or remove --disable-rule)"
+            )
         problem = next(iter(self._problems(rule)), None)
         if problem is not None:
             remedy = f"; {problem.remedy}" if problem.remedy else ""
@@ -227,7 +229,7 @@ class RuleQuestions:
             concluded.append(instance)
             others = self._other_values(atom, binding, facts)
             if others:
-                stays = f"; {others[0]} stays beside it, as rules only add"
+                stays = f"; {others[0]} remains as well, because rules only add values"
         bound = ", ".join(f"?{name} = {value}" for name, value in shown_bindings(binding, self.base.names))
         return f"it fires{f' with {bound}' if bound else ''}, and concludes {', '.join(concluded)}{stays}"
 

@@ -261,7 +261,7 @@ def _compared(original: _Original, situations: Sequence[Situation], max_failed: 
     left = [_Changed(original, number) for number in range(len(original.mutants))]
     for changed in left:
         if original.is_horn and follows_anyway(bench, changed.mutant):
-            reason = "what is left out follows from the other atoms by the schema"
+            reason = "the dropped atom follows from the others by the schema"
             verdicts[changed.number] = Verdict(changed.mutant, EQUIVALENT, reason)
     open_ones = [changed for changed in left if changed.number not in verdicts]
 
@@ -301,7 +301,7 @@ def _compared(original: _Original, situations: Sequence[Situation], max_failed: 
 def _difference(before: Outcome, after: Outcome) -> str | None:
     """What a mutant makes different, in words; None: nothing."""
     if (before.conclusion is None) != (after.conclusion is None):
-        return "it contradicts itself" if after.conclusion is None else "it contradicts itself no more"
+        return "it contradicts itself" if after.conclusion is None else "it no longer contradicts itself"
     for function in sorted({*before.changes, *after.changes}):
         one, other = before.choice(function), after.choice(function)
         if one != other:

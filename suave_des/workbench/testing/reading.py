@@ -274,7 +274,7 @@ class TestReader:
                 raise self.error(f"there is no enabled rule {shown(name)}", ("without",), did_you_mean(name, known))
         if bool(names) != bool(self.content.get("changes")):
             remedy = "without: RULE, and changes: {FUNCTION: BEFORE -> AFTER}"
-            raise self.error("`without` and `changes` need one another", (), remedy)
+            raise self.error("`without` and `changes` must be given together", (), remedy)
         return tuple(names)
 
     def _decisions(self) -> Iterator[tuple[str, str]]:
@@ -361,7 +361,7 @@ def _check_keys(document: YamlDocument, content: Any, place: KeyPath, known: Seq
         raise document.error(f"{shown(content)} is not a mapping", place, f"keys: {', '.join(known)}")
     for key in content:
         if key not in known:
-            raise document.error(f"{shown(key)} is not a key here", (*place, key), did_you_mean(key, known))
+            raise document.error(f"{shown(key)} is not a known key here", (*place, key), did_you_mean(key, known))
 
 
 def _texts_at(document: YamlDocument, content: Any, place: KeyPath) -> list[str]:

@@ -190,7 +190,7 @@ class Runner:
                 for decision in found:
                     yield from (f"{each.design}: {each.verdict}: {each.reason}" for each in decision.candidates)
                 if not found:
-                    yield f"the objective of {function} calls for no adaptation"
+                    yield f"the objective of {function} requires no adaptation"
         except (InputError, KnowledgeError) as error:
             yield str(error)
 
