@@ -57,7 +57,7 @@ def run_mission(
         out: folder for mission.json, events.csv, trajectory.csv and, of a manager that reasons,
             knowledge.jsonl; it is made if its parent exists. None: no files.
         overwrite, command: see CampaignSpec.
-        on_time: called each second of mission time with it and the time limit, in s.
+        on_time: called once per second of mission time with that time and the time limit, in s.
         replacements: ontologies, modes_file, reasoner, rules, disabled_rules, values, manager_options, as of
             load_scenario.
 

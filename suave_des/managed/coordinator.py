@@ -33,7 +33,7 @@ class MissionCoordinator:
     Attributes:
         ended: the event of the mission's end: the time limit, or the end of the path.
         search_time_s: whole seconds until the pipeline was found, as the revision counts them; none while it is not.
-        task: the task that is carried out, if there is one.
+        task: the current task, if there is one.
         lasting_functions: functions that are needed from launch to the end, and belong to no task.
     """
 
@@ -57,7 +57,7 @@ class MissionCoordinator:
 
     @property
     def distance_inspected_m(self) -> float:
-        """Distance inspected, as it was published last: until now, or before the mission's end."""
+        """Last published distance inspected, as of now or of the mission's end."""
         return self.follow.distance_m if self._inspected_m is None else self._inspected_m
 
     def start(self, request: Callable[[Task], None], cancel: Callable[[Task], None]) -> None:
@@ -77,11 +77,11 @@ class MissionCoordinator:
         return leak
 
     def end_at_battery_level(self, battery: BatteryLevel, least_level: float) -> None:
-        """End the mission when the battery is at a level, or below it, at a time at which it is measured."""
+        """End the mission at the first measurement of the battery that is at or below a level."""
         self.env.process(self._watch_battery(battery, least_level))
 
     def search_time_or_limit_s(self) -> float:
-        """Give the search time metric; the time limit when the pipeline was not found."""
+        """Return the search time metric, which is the time limit if the pipeline was not found."""
         return self.timing.time_limit_s if self.search_time_s is None else self.search_time_s
 
     def _carry_out_tasks(self) -> Process:
@@ -142,7 +142,7 @@ class MissionCoordinator:
 
     def _finish(self, why: str) -> None:
         if not self.ended.triggered:
-            # What the cancellation of the present task brings about comes too late for the metric.
+            # Effects of cancelling the current task come too late for the metric.
             self._inspected_m = self.follow.distance_m
             self._end("task_cancelled")
             self.log("coordinator", "mission_ended", why)

@@ -23,8 +23,8 @@ class InspectionPath(NamedTuple):
     """A path to inspect.
 
     Attributes:
-        points_m: where the vehicle is to be above the pipeline: x, y, z, shape (points, 3).
-        lengths_m: from the point before to each, in x and y; nothing for the first.
+        points_m: positions to visit above the pipeline: x, y, z, shape (points, 3).
+        lengths_m: distance in x and y from the previous point to each; 0 for the first.
     """
 
     points_m: Array
@@ -47,7 +47,7 @@ NO_PATH = InspectionPath(np.empty((0, 3)), ())
 
 @dataclass(eq=False)
 class FollowPipeline(FunctionNode, WaypointSource):
-    """The follow function: its way-points are the points of the path, the next one when the present one is reached.
+    """The follow function: its way-points are the points of the path, each sent when the previous one is reached.
 
     Attributes:
         path: gives the path to inspect; NO_PATH while the pipeline is not detected.
@@ -69,14 +69,14 @@ class FollowPipeline(FunctionNode, WaypointSource):
 
     @property
     def distance_m(self) -> float:
-        """Distance inspected, as it was published last."""
+        """Last published distance inspected."""
         self._guidance.catch_up()
         return self._published_m
 
     def activated(self) -> None:
-        """Start; the distance counts from zero again, though the published value stays until there is a new one.
+        """Start; the distance restarts at zero, although the published value stays until there is a new one.
 
-        Where the revision lets the distance go on, only the piece that was interrupted is not counted.
+        If the revision lets the distance accumulate, only the interrupted piece does not count.
         """
         if not self.revision.distance_goes_on:
             self._travelled_m = 0.0
@@ -88,7 +88,7 @@ class FollowPipeline(FunctionNode, WaypointSource):
             self._guidance.start_at(self.env.now)
 
     def deactivated(self) -> None:
-        """Stop; revision 2023 adds the distance from the last point to here, if one was reached."""
+        """Stop; revision 2023 adds the distance from the last point reached, if any, to the current position."""
         if self.finished.triggered:
             return
         self._guidance.stop()
@@ -106,7 +106,7 @@ class FollowPipeline(FunctionNode, WaypointSource):
         return ArrivalCheck(start_s, period_s, width_m, math.inf, 0, *waits)
 
     def waypoints(self, count: int) -> Array:
-        """Give the present point and those after it; none when the end is reached."""
+        """Return the current point and those after it; none if the end is reached."""
         return self._route.points_m[self._next : self._next + count]
 
     def completed(self) -> None:
@@ -114,11 +114,11 @@ class FollowPipeline(FunctionNode, WaypointSource):
         self.finished.succeed()
 
     def set_point_z_m(self) -> float:
-        """Give the z at which the pipeline is followed."""
+        """Return the z at which the pipeline is followed."""
         return SEA_BED_Z_M + self.revision.altitude_m
 
     def reached(self, count: int) -> None:
-        """Add up the distance, from the first point on; it is published at each point after that."""
+        """Add to the distance, starting at the first point, and publish it at each point after that."""
         lengths_m = self._route.lengths_m[self._next + (not self._has_arrived) : self._next + count]
         self._next += count
         self._has_arrived = True

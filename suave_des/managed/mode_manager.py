@@ -25,7 +25,7 @@ class ModeManager:
         adaptation_listeners: each is called at each adaptation with function, mode before and mode requested.
         adaptations: changes from one mode to another of functions in use; neither a task's first mode of a function nor
             the fd_unground at its end counts.
-        requests: requests of another mode than the one before.
+        requests: requests for a mode that differs from the previous one.
         refused: how many requests were refused, by function and mode.
     """
 
@@ -48,7 +48,7 @@ class ModeManager:
         return self.table.modes(function) if function in self.table and function in self.nodes else ()
 
     def current_mode(self, function: str) -> str | None:
-        """Give the mode that was requested last; none before the first request."""
+        """Return the last requested mode; None before the first request."""
         return self._requested.get(function)
 
     def end_task(self, functions: Iterable[str]) -> None:

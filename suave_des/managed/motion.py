@@ -14,11 +14,11 @@ from suave_des.scenario.revision import RecoveryRevision
 
 @dataclass(eq=False)
 class MaintainMotion(FunctionNode):
-    """The motion function: after a while restores thruster by thruster, and reports each on the diagnostics bus.
+    """The motion function: recovers the thrusters one by one after a delay, and reports each on the diagnostics bus.
 
     Attributes:
         delay_s: draws the time from the activation to the recovery of the first thruster.
-        unrecoverable: thrusters that cannot be restored; they are left out, and nothing is reported of them.
+        unrecoverable: thrusters that cannot be recovered; they are skipped, and not reported.
     """
 
     bus: DiagnosticsBus
@@ -29,7 +29,7 @@ class MaintainMotion(FunctionNode):
     _recovery: simpy.Process | None = field(default=None, init=False)
 
     def activated(self) -> None:
-        """Begin a recovery, unless an earlier one is still under way."""
+        """Begin a recovery, unless an earlier one is still in progress."""
         if self._recovery is None:
             self._recovery = self.env.process(self._recover())
 

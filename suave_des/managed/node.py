@@ -13,7 +13,7 @@ Log = Callable[[str, str, str], None]
 
 @dataclass(eq=False)
 class FunctionNode:
-    """A function's life-cycle node: active or inactive, as the mode that was set last says.
+    """A function's life-cycle node: active or inactive, according to its current mode.
 
     Subclasses say what happens on activation, on deactivation and on a change of parameters while active; each hook is
     called at the mission time at which the mode takes effect.

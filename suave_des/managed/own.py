@@ -23,7 +23,7 @@ class FunctionContext:
     Attributes:
         name: of the function.
         env: the mission's clock.
-        settings: the scenario's entry under functions: for this function.
+        settings: the scenario's entry for this function, under `functions:`.
         sender: the function's connection to the autopilot.
         bus: where diagnostics are published, and can be subscribed to.
         stream: makes a named random stream of this run.
@@ -44,7 +44,7 @@ class FunctionContext:
 
 
 class FunctionError(Exception):
-    """What a hook of a user-defined function raised, with the function's name."""
+    """An exception raised by a hook of a user-defined function, with the function's name."""
 
 
 class OwnFunction(FunctionNode):

@@ -14,7 +14,7 @@ class GenerateRechargePath(FunctionNode):
     """The recharge function: while active, the station is the set-point, sent again once a period.
 
     Attributes:
-        station_m: x, y and z of the place at which the vehicle is recharged.
+        station_m: x, y and z of the recharge station.
     """
 
     sender: SetPointSender
@@ -23,7 +23,7 @@ class GenerateRechargePath(FunctionNode):
     _process: simpy.Process | None = field(default=None, init=False)
 
     def activated(self) -> None:
-        """Set off for the station."""
+        """Start for the station."""
         self._process = self.env.process(self._go_to_station())
 
     def deactivated(self) -> None:

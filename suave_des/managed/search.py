@@ -48,7 +48,7 @@ def spiral(
 
 @dataclass(eq=False)
 class GenerateSearchPath(FunctionNode, WaypointSource):
-    """The search function: generates the way-points of a spiral, the next one when the present one is reached.
+    """The search function: generates the way-points of a spiral, each sent when the previous one is reached.
 
     Attributes:
         centre_m: x and y of the spiral's centre; in revision 2023 the local frame's origin.
@@ -66,7 +66,7 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
     start_latency_s: float = 0.0
     altitude_m: float = field(init=False)
     _lowered_m: float = field(default=0.0, init=False)
-    _ready_s: float | None = field(default=None, init=False)  # mission time of the first tick at the soonest
+    _ready_s: float | None = field(default=None, init=False)  # earliest mission time of the first tick
 
     def __post_init__(self) -> None:
         self.altitude_m = self.revision.initial_altitude_m
@@ -77,7 +77,7 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         self._step = 0
         self._radius_m = 0.0
         self._last_altitude_m: float | None = None  # at the tick before
-        self._present: Array | None = None  # way-point, none before the first
+        self._present: Array | None = None  # current way-point, None before the first
 
     def configure(self, mode: Mode) -> None:
         """Apply the mode's spiral_altitude; the spiral itself continues."""
@@ -106,13 +106,13 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         self._guidance.stop()
 
     def tick(self) -> None:
-        """Count a step of the spiral where the altitude differs from that at the tick before."""
+        """Count a step of the spiral if the altitude differs from that at the previous tick."""
         if self.altitude_m != self._last_altitude_m:
             self._step += 1
             self._last_altitude_m = self.altitude_m
 
     def waypoints(self, count: int) -> Array:
-        """Give the present way-point and those that follow it at the present altitude."""
+        """Return the current way-point and those that follow it at the current altitude."""
         if self._present is None:
             self.reached(1)
         waypoints = np.empty((count, 4))
@@ -121,11 +121,11 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         return waypoints
 
     def set_point_z_m(self) -> float:
-        """Give the z of the altitude, less what was commanded lower; arrival is checked at the way-point's own z."""
+        """Return the z of the altitude minus the lowering so far; arrival is checked at the way-point's own z."""
         return SEA_BED_Z_M + self.altitude_m - self._lowered_m
 
     def reached(self, count: int) -> None:
-        """Go on to the next way-point."""
+        """Advance to the next way-point."""
         self._present = self._spiral(np.empty((count, 4)))[-1]
         self._radius_m = self._present.item(3)
         self._step += count

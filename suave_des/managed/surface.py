@@ -1,4 +1,4 @@
-"""Surface: goes straight up, as a leak demands."""
+"""Surface: goes straight up, as required after a leak."""
 
 from dataclasses import dataclass, field
 
@@ -10,7 +10,7 @@ from suave_des.managed.node import FunctionNode
 from suave_des.vehicle.guidance import SetPointSender
 
 ABOVE_M = 3.0
-"""How far above the surface the set-point is: an autopilot that stops short of it still surfaces."""
+"""Height of the set-point above the surface: an autopilot that stops short of it still surfaces."""
 SURFACED_M = 0.1
 CHECKS_A_SECOND = 2
 RESEND_CHECKS = 20

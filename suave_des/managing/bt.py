@@ -80,7 +80,7 @@ class BehaviourTree(FunctionsManager):
         return self._while_needed(MAINTAIN_MOTION, Fallback("thrusters", choices))
 
     def _search(self) -> Behaviour:
-        # A visibility that was not measured yet counts as good; below the lowest threshold the lowest altitude is left.
+        # An unknown visibility counts as good; below the lowest threshold, the search stays at the lowest altitude.
         pairs = zip(self._settings.visibility_thresholds_m, self._settings.search_modes, strict=True)
         heights = [
             Sequence(mode, (self._is_clear(least_m), self._set(GENERATE_SEARCH_PATH, mode))) for least_m, mode in pairs
@@ -117,14 +117,14 @@ class ExtendedBehaviourTree(BehaviourTree):
 
     @property
     def depends_on(self) -> Dependencies:
-        """The same, and whether the battery is low."""
+        """The conditions of bt, and whether the battery is low."""
         return {**super().depends_on, "battery_level": (self._settings.battery_limit,)}
 
     def make_tree(self) -> Behaviour:
         """Make the tree; without a battery there is no station to go to."""
         if self.system.scenario.battery is None:
             return super().make_tree()
-        # Once on its way the vehicle goes on until the level has risen: the station refills the battery at once.
+        # Once under way, the vehicle continues until the level has risen: the station recharges the battery at once.
         go = Sequence("low", (self._is_low(), self._set(GENERATE_RECHARGE_PATH, "normal")))
         recharge = Fallback(GENERATE_RECHARGE_PATH, (go, self._set(GENERATE_RECHARGE_PATH, UNGROUND_MODE)))
         return Parallel("mission", (*self._branches(), recharge))

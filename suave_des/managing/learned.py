@@ -1,4 +1,4 @@
-"""What managers have learned: the file that training writes, and managers read."""
+"""Training results: the file that training writes and managers read."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _REMEDY = "give a file that suave-des train has written"
 
 @dataclass(frozen=True)
 class Learned:
-    """A file of what a manager has learned.
+    """A file with a manager's training result.
 
     Attributes:
         manager: its name, or module:Class.
@@ -28,7 +28,7 @@ class Learned:
         seed: seed of the training.
         missions: number of missions, runs 1 to that.
         inputs_sha256: SHA-256 of each file that training read, by its name as given, the manager's code among them.
-        learned: what the manager keeps as `system.learned`.
+        learned: content of the manager's `system.learned`.
     """
 
     manager: str
@@ -73,7 +73,7 @@ def read_file(path: Path) -> Learned:
 
 
 def read_learned(path: Path) -> Mapping[str, Any]:
-    """Read what a manager has learned, as something that cannot be changed: each mission finds the same.
+    """Read a training result as immutable values, so that all missions find the same.
 
     Raises:
         InputError: as read_file.

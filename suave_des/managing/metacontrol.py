@@ -32,10 +32,10 @@ class Metacontrol(ManagingSubsystem):
     transition of the state that is kept here.
 
     Attributes:
-        objectives: the status of the objective of each function that is needed; none while all is well.
+        objectives: the status of the objective of each required function; None while the objective is met.
         groundings: the function designs in use, by function.
         components: the reported statuses, by component.
-        measurements: the values measured last, by quality attribute.
+        measurements: the last measured values, by quality attribute.
     """
 
     needs_knowledge: ClassVar[bool] = True
@@ -46,7 +46,7 @@ class Metacontrol(ManagingSubsystem):
         scenario, revision = system.scenario, system.scenario.revision.metacontrol
         self._revision = revision
         self._knowledge = system.knowledge()
-        # What a derived class makes of analyze and plan may depend on more than the state: nothing of it is cached.
+        # In a derived class analyze and plan may depend on more than the state, so their results are not cached.
         methods = type(self).analyze, type(self).plan
         self._is_cacheable = methods == (Metacontrol.analyze, Metacontrol.plan)
         cached = _cached.setdefault(self._knowledge, {}).setdefault(revision, {})
@@ -56,7 +56,7 @@ class Metacontrol(ManagingSubsystem):
         self.components: dict[str, str] = {}
         self.measurements: dict[str, float] = {}
         self._listens_since_s = 0.0  # values that were published before are ignored
-        self._cancelled: set[str] = set()  # functions, since the last cycle began
+        self._cancelled: set[str] = set()  # functions whose objectives were removed since the last cycle began
         self._recorded_statuses: frozenset[str] = frozenset()
         self._awaited = self._attributes_to_await()
         latency, stream = scenario.latencies.inference_s, "metacontrol/inference"
@@ -103,7 +103,7 @@ class Metacontrol(ManagingSubsystem):
         return self.system.measured(attribute, self._listens_since_s)
 
     def analyze(self) -> Inference:
-        """Infer what the rules say about the present state."""
+        """Infer what the rules say about the current state."""
         improves = {GENERATE_SEARCH_PATH} if self._revision.search_always_improves else set()
         objectives = [ObjectiveState(name, status, name in improves) for name, status in self.objectives.items()]
         return self._knowledge.analyze(
@@ -113,7 +113,7 @@ class Metacontrol(ManagingSubsystem):
         )
 
     def plan(self, inference: Inference) -> Plan:
-        """Choose function designs for the objectives that need another one."""
+        """Choose function designs for the objectives that need a different one."""
         return self._knowledge.plan(inference, improve_exceeded=self._revision.search_improves_when_exceeded)
 
     def execute(self, conclusion: Conclusion, latency_s: float) -> AdaptationProcess:
@@ -130,8 +130,8 @@ class Metacontrol(ManagingSubsystem):
             self.system.record_reasoning_time(latency_s)
         self.groundings |= grounded
         self.objectives |= dict.fromkeys(grounded)
-        # From now on a recovered component is as if it had never failed. Kept, its status would make every objective
-        # updatable for ever, and in the exemplar's oldest files contradict the UNGROUNDED of each objective to come.
+        # From now on a recovered component counts as never failed. Otherwise its status would make every objective
+        # updatable for ever, and in the exemplar's oldest files contradict the status UNGROUNDED of later objectives.
         for component in recovered:
             if self.components.get(component) == RECOVERED:
                 del self.components[component]
@@ -160,14 +160,14 @@ class Metacontrol(ManagingSubsystem):
                 self.system.log("objective", f"{function} {UNGROUNDED}")
 
     def _remove_objectives(self, functions: tuple[str, ...]) -> None:
-        self.monitor()  # what is measured from now on may be ignored
+        self.monitor()  # later measurements may be ignored
         self._cancelled.update(functions)
         for function in functions:
             self.objectives.pop(function, None)
             self.groundings.pop(function, None)
             self.system.change_mode(function, UNGROUND_MODE)
 
-    # What the loop asks.
+    # Queries of the loop.
 
     @property
     def depends_on(self) -> Dependencies | None:
@@ -180,7 +180,7 @@ class Metacontrol(ManagingSubsystem):
         return dict.fromkeys(self.system.measurements, thresholds)
 
     def _analyze_and_plan(self) -> Conclusion:
-        """Analyze and plan, or look up what both gave for an equal state."""
+        """Analyze and plan, or look up the cached result for an equal state."""
         state = self._symbolic_state()
         conclusion = self._conclusions.get(state)
         if conclusion is None:
@@ -214,7 +214,7 @@ class Metacontrol(ManagingSubsystem):
         return bool(self.objectives) or not self._revision.ignores_diagnostics_without_objective
 
     def _attributes_to_await(self) -> frozenset[str]:
-        """Find the signals of which some function design expects a value, if cycles wait for the first ones."""
+        """Find the signals whose first measurements cycles wait for: those that function designs have values of."""
         if not self._revision.waits_for_first_measurement:
             return frozenset()
         return self._knowledge.expected_attributes.intersection(self.system.measurements, self.system.scenario.signals)

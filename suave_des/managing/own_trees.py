@@ -12,7 +12,7 @@ from py_trees.common import Status
 from suave_des.managing.base import FunctionsManager, ManagedSystem
 
 MAX_TICKED: Final = 100_000
-"""A tick that goes through more behaviours than this is taken not to end."""
+"""A tick that goes through more behaviours than this is assumed never to end."""
 
 
 class PyTreesManager(FunctionsManager):
@@ -47,11 +47,11 @@ class PyTreesManager(FunctionsManager):
         raise NotImplementedError("derive from PyTreesManager, and return the root of your tree from make_tree")
 
     def condition(self, name: str, holds: Callable[[], bool]) -> Behaviour:
-        """Make a behaviour that succeeds while something holds."""
+        """Make a behaviour that succeeds while a condition holds."""
         return _Condition(name, holds)
 
     def set_mode(self, function: str, mode: str) -> Behaviour:
-        """Make a behaviour that requests a mode, and succeeds; it fails while nothing needs the function."""
+        """Make a behaviour that requests a mode and succeeds; it fails while no task needs the function."""
         return _SetMode(self, function, mode)
 
     def adapt(self) -> None:

@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from suave_des.scenario.loader import LoadedScenario
 
 _LOOK_PERIOD_S = 0.05
-"""The vehicle's time step: a mode that was requested between two steps would not act sooner."""
+"""The vehicle's time step: a mode requested between two steps takes effect no earlier."""
 
 
 class FixedMode(NoManager):
-    """fixed:MODE: functions that have this mode get it, others their default mode; nothing is ever adapted."""
+    """fixed:MODE: functions that have this mode get it, others their default mode; it never adapts."""
 
     mode: ClassVar[str]
 
@@ -54,7 +54,7 @@ def fixed_mode(mode: str) -> type[ManagingSubsystem]:
 
 
 class Threshold(FunctionsManager):
-    """threshold: metacontrol's decisions as plain conditions; the difference is what the ontology costs.
+    """threshold: metacontrol's decisions as plain conditions; the difference is the cost of the ontology.
 
     It adapts at metacontrol's times (`managers.metacontrol.reasoning_period_s`, from the same first cycle on in each
     run), takes no time to reason, and searches by the thresholds of `managers.bt`.
@@ -112,7 +112,7 @@ class Oracle(Threshold):
         self._visibility_m = system.true_signal("water_visibility")
 
     def mission_started(self) -> None:
-        """Begin to watch the true visibility."""
+        """Start watching the true visibility."""
         self.system.env.process(self._watch())
 
     def task_requested(self, task: Task) -> None:

@@ -10,7 +10,7 @@ from suave_des.scenario.modes import UNGROUND_MODE
 
 
 class NoManager(ManagingSubsystem):
-    """none: each function gets its fixed default mode when its task begins, and nothing is ever adapted."""
+    """none: each function gets its fixed default mode when its task begins; it never adapts."""
 
     def task_requested(self, task: Task) -> None:
         """Set the default modes of the task's functions."""
@@ -21,7 +21,7 @@ class NoManager(ManagingSubsystem):
 
 
 class RandomManager(ManagingSubsystem):
-    """random: every period, each function of the task gets one of all its modes, with equal chance.
+    """random: every period, each function of the task gets one of its modes, with equal probability.
 
     maintain_motion is left alone; fd_unground and __DEFAULT__ are modes like others. Revision 2023 picks only on its
     timer, and sets the search to fd_unground as soon as the pipeline is detected; revision 1.5 picks at each task
@@ -34,7 +34,7 @@ class RandomManager(ManagingSubsystem):
         super().__init__(system)
         self.period_s = system.scenario.managers.random.adaptation_period_s
         self._stream = system.stream("random_manager/picks")
-        # Timers of nodes run since launch: the phase at t = 0 differs from run to run.
+        # Timers of nodes have been running since launch: the phase at t = 0 differs from run to run.
         self.starts_s = system.stream("random_manager/phase").uniform(0.0, self.period_s)
         self._functions: tuple[str, ...] = ()
 

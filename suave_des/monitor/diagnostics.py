@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # or looking a manager up would load the compiler
 
 
 class Kind(StrEnum):
-    """What a diagnostic is about; the values are the exemplar's message texts."""
+    """The kinds of diagnostics; the values are the exemplar's message texts."""
 
     QA_STATUS = "QA status"
     COMPONENT_STATUS = "Component status"
@@ -48,7 +48,7 @@ Subscriber = Callable[[Diagnostic], None]
 
 
 class DiagnosticsBus:
-    """Passes each diagnostic on at once to the subscribers to its kind, in the order of subscription."""
+    """Passes each diagnostic at once to the subscribers to its kind, in the order of subscription."""
 
     def __init__(self) -> None:
         self._subscribers: defaultdict[Kind, list[Subscriber]] = defaultdict(list)
@@ -59,10 +59,10 @@ class DiagnosticsBus:
             self._subscribers[kind].append(subscriber)
 
     def has_subscribers(self, kind: Kind) -> bool:
-        """Tell whether anybody subscribes to a kind of diagnostic."""
+        """Return whether anybody subscribes to a kind of diagnostic."""
         return bool(self._subscribers[kind])
 
     def publish(self, diagnostic: Diagnostic) -> None:
-        """Pass a diagnostic on to the subscribers to its kind."""
+        """Pass a diagnostic to the subscribers to its kind."""
         for subscriber in self._subscribers[diagnostic.kind]:
             subscriber(diagnostic)

@@ -21,7 +21,7 @@ Thresholds = tuple[float, ...]
 2 lies between it and the next, and so on; -1 stands for no value.
 """
 Crossings = tuple[list[float], list[int]]
-"""The times at which a measured value enters another region, and the regions' numbers."""
+"""The times at which a measured value enters a different region, and the regions' numbers."""
 
 
 def region_of(value: float, thresholds: Thresholds) -> int:
@@ -30,11 +30,11 @@ def region_of(value: float, thresholds: Thresholds) -> int:
 
 
 class Measured(Protocol):
-    """What a monitor measures of a quality attribute."""
+    """A monitor's measurements of a quality attribute."""
 
     @property
     def is_tabulated(self) -> bool:
-        """Whether it is known for the whole mission: then the times that are asked about may lie in the future."""
+        """Whether the values are known for the whole mission; if so, they may be looked up at future times."""
 
     @property
     def times_s(self) -> Sequence[float]:
@@ -45,13 +45,13 @@ class Measured(Protocol):
         """The values that were published, and those that will be if it is tabulated."""
 
     def count_until(self, t_s: float) -> int:
-        """Count the values that are published until mission time t."""
+        """Count the values published by mission time t."""
 
     def value(self, t_s: float) -> float | None:
-        """Look up the value that was published last at mission time t; none before the first."""
+        """Look up the value last published by mission time t; None before the first."""
 
     def region(self, t_s: float, thresholds: Thresholds) -> int:
-        """Find the region of the value that was published last at mission time t."""
+        """Find the region of the value last published by mission time t."""
 
     def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
         """Find the first time after mission time t at which the region changes, or may change if that is not known."""
@@ -71,15 +71,15 @@ class Measurements:
     phase_s: float
     period_s: float
     arrays: tuple[Array, Array] = field(repr=False, compare=False)
-    """Times and values once more, for computing with all of them at once."""
+    """Times and values as arrays, for vectorised computations."""
     _crossings: dict[Thresholds, Crossings] = field(default_factory=dict, repr=False, compare=False)
 
     def count_until(self, t_s: float) -> int:
-        """Count the values that are published until mission time t."""
+        """Count the values published by mission time t."""
         return bisect_right(self.times_s, t_s)
 
     def crossings(self, thresholds: Thresholds) -> Crossings:
-        """Find the measurements that are in another region than the one before; the first one counts."""
+        """Find the measurements whose region differs from the previous one's, including the first measurement."""
         crossings = self._crossings.get(thresholds)
         if crossings is None:
             indices, regions = _crossing_indices(self.arrays[1].tobytes(), thresholds)
@@ -87,19 +87,19 @@ class Measurements:
         return crossings
 
     def region(self, t_s: float, thresholds: Thresholds) -> int:
-        """Find the region of the value that was published last at mission time t."""
+        """Find the region of the value last published by mission time t."""
         times_s, regions = self.crossings(thresholds)
         passed = bisect_right(times_s, t_s)
         return regions[passed - 1] if passed else -1
 
     def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
-        """Find the time of the first value after mission time t in another region than the one before; or inf."""
+        """Find the time of the first value after mission time t that enters a different region; inf if there is none."""
         times_s, _ = self.crossings(thresholds)
         passed = bisect_right(times_s, t_s)
         return times_s[passed] if passed < len(times_s) else math.inf
 
     def value(self, t_s: float) -> float | None:
-        """Look up the value that was published last at mission time t; none before the first."""
+        """Look up the value last published by mission time t; None before the first."""
         published = self.count_until(t_s)
         return self.values[published - 1] if published else None
 
@@ -110,7 +110,7 @@ class Measurements:
 
 @dataclass(frozen=True, slots=True)
 class MonitorTiming:
-    """When a monitor measures.
+    """The times at which a monitor measures.
 
     Attributes:
         period_s: time from message to message.
@@ -162,7 +162,7 @@ def measure(
 
 
 def _changes(values: Array) -> tuple[IntArray, Array, tuple[float, ...]]:
-    """Find the values that differ from the one before, the first one too: indices, values, and these as numbers."""
+    """Find the values that differ from the previous one, including the first: indices, values, and these as numbers."""
     indices = np.flatnonzero(np.diff(values, prepend=np.nan))
     return indices, values[indices], tuple(values[indices].tolist())
 
@@ -181,7 +181,7 @@ def _sampled(signal: Signal, times_s: bytes) -> tuple[Array, tuple[IntArray, Arr
 
 @lru_cache(maxsize=64)
 def _crossing_indices(values: bytes, thresholds: Thresholds) -> tuple[list[int], list[int]]:
-    """Find the values that are in another region than the one before: indices, and the regions' numbers."""
+    """Find the values whose region differs from the previous one's: indices, and the regions' numbers."""
     measured = np.frombuffer(values)
     regions = np.searchsorted(thresholds, measured) + np.searchsorted(thresholds, measured, side="right")
     indices = np.flatnonzero(np.diff(regions, prepend=-1))
@@ -190,7 +190,7 @@ def _crossing_indices(values: bytes, thresholds: Thresholds) -> tuple[list[int],
 
 @dataclass(eq=False)
 class BatteryLevel:
-    """The battery's level, which falls linearly from 1 and is back at 1 at once at the recharge station.
+    """The battery's level, which falls linearly from 1 and is reset to 1 at the recharge station.
 
     It is computed on demand, from where the vehicle was at each message.
 
@@ -201,7 +201,7 @@ class BatteryLevel:
         noise: draws the error of one measurement; none if measurements are exact.
         is_lost: whether the message at a mission time is not published; none: all are.
         times_s, values: of what was published so far.
-        recharges: how often the vehicle came to the station so far.
+        recharges: number of visits to the station so far.
     """
 
     key: ClassVar[str] = "battery_level"
@@ -221,7 +221,7 @@ class BatteryLevel:
         self._next_s = self.timing.phase_s
 
     def count_until(self, t_s: float) -> int:
-        """Count the values that are published until mission time t, which must not lie in the future."""
+        """Count the values published by mission time t, which must not lie in the future."""
         while self._next_s <= t_s:
             if at_station := self.is_at_station(self._next_s):
                 self._full_at_s = self._next_s
@@ -235,7 +235,7 @@ class BatteryLevel:
         return bisect_right(self.times_s, t_s)
 
     def value(self, t_s: float) -> float | None:
-        """Look up the level that was published last at mission time t; none before the first."""
+        """Look up the level last published by mission time t; None before the first."""
         published = self.count_until(t_s)
         return self.values[published - 1] if published else None
 
@@ -248,12 +248,12 @@ class BatteryLevel:
         return max(0.0, 1.0 - (t_s - self._full_at_s) / self.discharge_time_s)
 
     def region(self, t_s: float, thresholds: Thresholds) -> int:
-        """Find the region of the level that was published last at mission time t."""
+        """Find the region of the level last published by mission time t."""
         published = self.count_until(t_s)
         return region_of(self.values[published - 1], thresholds) if published else -1
 
     def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
-        """Find the earliest time after t, which is now, at which the level can be in another region.
+        """Find the earliest time after t, which is now, at which the level can be in a different region.
 
         The level falls, or is back at 1 at once. In the region that 1 is in, only falling leads to another one; waiting
         until then saves a fifth of the CPU time of a mission of bt_extended.

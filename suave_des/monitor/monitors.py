@@ -39,7 +39,7 @@ def leak_monitor(env: simpy.Environment, bus: DiagnosticsBus, time_s: float, det
 
 
 class Publisher(Protocol):
-    """Where a monitor publishes."""
+    """Anything to which a monitor publishes."""
 
     def publish(self, diagnostic: Diagnostic) -> None:
         """Publish a diagnostic."""
@@ -62,9 +62,9 @@ class ScheduledEvent(NamedTuple):
 
     Attributes:
         thruster: its number, from 1.
-        fails: whether it fails; else it recovers.
-        time_s: when, as the revision counts it.
-        recoverable: whether f_maintain_motion can bring it back after this failure.
+        fails: whether it fails; otherwise it recovers.
+        time_s: its time, as the revision counts it.
+        recoverable: whether f_maintain_motion can recover it after this failure.
         number: of its entry in the scenario, from 0.
     """
 

@@ -30,10 +30,10 @@ class ThrusterFaults:
     Attributes:
         scenario: says which failures have no effect.
         chance: of the run.
-        vehicle: whose thrusters fail and recover.
+        vehicle: the vehicle whose thrusters fail and recover.
         log: adds an event to the mission's record.
         listeners: each is called after a change of a thruster's health.
-        unrecoverable: thrusters that maintain_motion cannot restore at present.
+        unrecoverable: thrusters that maintain_motion cannot currently recover.
     """
 
     scenario: Scenario
@@ -55,15 +55,15 @@ class ThrusterFaults:
         self.set_health(t_s, event.thruster, 0.0 if event.fails else 1.0)
 
     def set_health(self, t_s: float, thruster: int, health: float) -> None:
-        """Set the share of its thrust that a thruster gives."""
+        """Set a thruster's health."""
         self.vehicle.set_thruster_health(t_s, thruster, health)
         for listener in self.listeners:
             listener()
 
     def _is_without_effect(self, t_s: float, event: ScheduledEvent) -> bool:
-        """Tell whether a failure has no effect on the vehicle."""
+        """Decide whether a failure has no effect on the vehicle."""
         failures = self.scenario.revision.thruster_failures
         if t_s < failures.effective_from_s:
             return True
-        probability = failures.loss_probability  # one stream an event: an earlier loss does not move the next draw
+        probability = failures.loss_probability  # one stream per event: an earlier loss does not affect the next draw
         return probability > 0.0 and self.chance.stream(f"thruster_failures/{event.number}").random() < probability

@@ -1,4 +1,4 @@
-"""Which functions of a scenario have a node, and of which class those are that the exemplar does not have."""
+"""The functions of a scenario that have a node, and the classes of those that the exemplar does not have."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Hosts a managing subsystem in a mission: calls its hooks; what it raises fails its mission, and nothing else."""
+"""Hosts a managing subsystem in a mission: calls its hooks; an exception fails only its mission."""
 
 from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -16,11 +16,11 @@ from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus
 from suave_des.registry import is_built_in
 
 RAISED = (Exception, SystemExit)
-"""What a manager may raise: one that calls sys.exit must end neither a campaign nor, without an error, its mission."""
+"""Exceptions of a manager: sys.exit must neither end a campaign, nor end a mission without an error."""
 
 _T = TypeVar("_T")
 _MEASURED_SOMEWHERE = ("water_visibility", "battery_level")
-"""What shipped scenarios measure, though not each of them: a manager may serve all."""
+"""Attributes that some shipped scenario measures: a manager may be written for all of them."""
 _MAX_YIELDS_AT_ONE_TIME = 10_000
 """How often `adapt` may yield while mission time stands still."""
 
@@ -38,7 +38,7 @@ class ManagerHost:
         run: number of the run, for errors.
         system: the manager's view of the managed subsystem.
         bus: where the diagnostics come from that the manager subscribes to.
-        skips_idle_calls: whether calls are left out at all.
+        skips_idle_calls: whether calls are skipped at all.
 
     Raises:
         MissionError: the manager raised; here, or in any hook later.
@@ -52,9 +52,9 @@ class ManagerHost:
     bus: DiagnosticsBus
     skips_idle_calls: bool
     manager: ManagingSubsystem = field(init=False)
-    remarks: tuple[str, ...] = ()  # what its author should know
+    remarks: tuple[str, ...] = ()  # for its author
     _is_waiting: bool = False  # for an event
-    _idle_regions: set[tuple[int, ...]] = field(default_factory=set)  # of measured values: there, calls change nothing
+    _idle_regions: set[tuple[int, ...]] = field(default_factory=set)  # in which calls change nothing
 
     def __post_init__(self) -> None:
         manager_type = self.manager_type
@@ -64,7 +64,7 @@ class ManagerHost:
                 raise TypeError(f"{manager_type.__name__}.__init__ does not begin with super().__init__(system)")
             declared = self._declared() if "depends_on" in vars(manager_type) else None  # a derived class may add to it
         except InputError:
-            raise  # such as an ontology that cannot be used: it concerns every mission
+            raise  # such as an unusable ontology, which concerns every mission
         except RAISED as error:
             raise self.mission_error(error) from error
         if not is_built_in(self.name):
@@ -83,7 +83,7 @@ class ManagerHost:
             self._process = self.system.env.process(self._adapt_periodically(period_s))
 
     def _declared(self) -> Dependencies | None:
-        """Ask the manager what it depends on, if calls are to be left out, or its author is to be told of mistakes."""
+        """Read the manager's `depends_on`, if calls are to be skipped or its author is to be told of mistakes."""
         if not self.skips_idle_calls and is_built_in(self.name):
             return None
         declared = self.manager.depends_on
@@ -100,25 +100,25 @@ class ManagerHost:
         self._guarded(self.manager.mission_ended, metrics)
 
     def request(self, task: Task) -> None:
-        """Pass on to the manager a task that begins."""
+        """Pass a task that begins to the manager."""
         self._guarded(self.manager.task_requested, task)
         self.state_changed()
 
     def cancel(self, task: Task) -> None:
-        """Pass on to the manager a task that is over."""
+        """Pass a task that is over to the manager."""
         self.system.modes.end_task(task.functions)
         self._guarded(self.manager.task_cancelled, task)
         self.state_changed()
 
     def state_changed(self) -> None:
-        """Wake a manager that waits for an event: it is called at the next of its times."""
+        """Wake a manager that waits for an event: its next periodic call is made."""
         self._idle_regions.clear()
         if self._is_waiting:
             self._is_waiting = False
             self._process.interrupt()
 
     def mission_error(self, error: BaseException) -> SuaveDesError:
-        """Turn what a manager raised into the error that ends its mission."""
+        """Convert a manager's exception into the error that ends its mission."""
         if isinstance(error, MissionError):
             return error
         cause = str(error) if isinstance(error, SuaveDesError) else f"{type(error).__name__}: {error}"

@@ -1,4 +1,4 @@
-"""What the monitors of a mission measure, as the scenario describes it."""
+"""The measurements of a mission's monitors, as the scenario describes them."""
 
 from suave_des.chance import Chance
 from suave_des.monitor.measurements import BatteryLevel, Measurements, MonitorTiming, measure
@@ -13,7 +13,7 @@ _DELIVERY_S = 0.01
 def monitor_timing(
     scenario: Scenario, chance: Chance, monitor: str, period_s: float, time_step_s: float = 0.0
 ) -> MonitorTiming:
-    """Find when a monitor measures in a run: in step with the other timers, or with a phase that is drawn."""
+    """Find the times at which a monitor measures in a run: in step with the other timers, or with a random phase."""
     in_step = "monitors" in scenario.revision.timers_in_step
     return MonitorTiming(period_s, period_s + _DELIVERY_S if in_step else chance.phase(monitor, period_s), time_step_s)
 
@@ -36,7 +36,7 @@ def measure_signal(scenario: Scenario, chance: Chance, name: str, signal: Signal
 
 
 def measure_battery(scenario: Scenario, chance: Chance, vehicle: Vehicle) -> BatteryLevel | None:
-    """Make what measures the battery's level; none without a battery."""
+    """Make the measurements of the battery's level; None without a battery."""
     battery = scenario.battery
     if battery is None:
         return None

@@ -48,7 +48,7 @@ from suave_des.vehicle.guidance import SetPointSender
 
 @dataclass(frozen=True, slots=True)
 class RunSpec:
-    """Which mission of a scenario to run; see `Simulator.start`."""
+    """The mission of a scenario to run; see `Simulator.start`."""
 
     manager: str
     run: int
@@ -62,7 +62,7 @@ class MissionRun:
 
     Args:
         prepared: the scenario.
-        spec: which of its missions.
+        spec: the mission to run.
         track: to be filled with the vehicle's states.
     """
 
@@ -82,7 +82,7 @@ class MissionRun:
         self._vehicle = make_vehicle(prepared, chance, self._start, track, reasons=self._manager_type.needs_knowledge)
         self._faults = ThrusterFaults(scenario, chance, self._vehicle, self._recorder.log)
 
-        # What monitors measure.
+        # Measurements.
         described, tables = scenario.signals, prepared.loaded.tables
         self._true_signals = {name: chance.signal(name, described[name], tables) for name in sorted(described)}
         self._signals = {
@@ -121,12 +121,12 @@ class MissionRun:
 
     @property
     def task(self) -> domain.Task | None:
-        """The task that is carried out."""
+        """The current task."""
         return self._coordinator.task
 
     @property
     def found_s(self) -> float | None:
-        """When the search ended, as the revision counts it; none before."""
+        """Time at which the search ended, as the revision counts it; None before."""
         return self._coordinator.search_time_s
 
     @property
@@ -327,7 +327,7 @@ class MissionRun:
         self._host.start()
 
     def _start_monitors(self) -> None:
-        if self.bus.has_subscribers(Kind.QA_STATUS):  # to look values up, the measurements are enough
+        if self.bus.has_subscribers(Kind.QA_STATUS):  # for lookups, the measurements are enough
             for measurements in self._signals.values():
                 self.env.process(signal_monitor(self.env, self.bus, measurements))
             if self._battery is not None:

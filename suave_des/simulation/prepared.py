@@ -1,4 +1,4 @@
-"""What the missions of one scenario have in common."""
+"""The parts that all missions of one scenario share."""
 
 from collections.abc import Mapping
 from functools import cached_property, lru_cache
@@ -24,7 +24,7 @@ if TYPE_CHECKING:  # owlready2 is loaded only when it is needed
 
 
 class PreparedScenario:
-    """A scenario, with what does not change between its missions made once; see `Simulator` for the arguments."""
+    """A scenario with the parts that its missions share; see `Simulator` for the arguments."""
 
     def __init__(
         self,
@@ -55,7 +55,7 @@ class PreparedScenario:
         return open_knowledge(self.loaded)
 
     def learned(self, manager: str) -> Mapping[str, Any]:
-        """Give what a manager has learned: in training what it may change, else the content of its file, if it has one.
+        """Return a manager's training result: in training a mutable one, otherwise the content of its file, if any.
 
         Raises:
             InputError: the file cannot be read, or has something else in it.
@@ -81,7 +81,7 @@ class PreparedScenario:
 
 @lru_cache(maxsize=64)
 def vehicle_model(description: VehicleDescription) -> VehicleModel:
-    """Give a vehicle's constants; equal descriptions give the same object, by which its matrices are cached."""
+    """Return a vehicle's constants; equal descriptions give the same object, which is the key of cached matrices."""
     return VehicleModel(
         mass_kg=description.mass_kg,
         inertia_kg_m2=description.inertia_kg_m2,

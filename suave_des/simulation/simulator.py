@@ -40,14 +40,14 @@ class Simulator(PreparedScenario):
         record: bool = False,
         manager_type: type[ManagingSubsystem] | None = None,
     ) -> MissionRun:
-        """Make a mission, at t = 0; `give_back` is to be called when it is no longer needed.
+        """Make a mission, at t = 0; call `give_back` when it is no longer needed.
 
         Args:
             manager: name of the managing subsystem, or module:Class.
             run: number of the run in its campaign.
             seed: seed of the campaign.
             record: whether to keep events and trajectory.
-            manager_type: the manager's class; None: the one that its name leads to.
+            manager_type: the manager's class; None: the class with that name.
 
         Raises:
             MissionError, InputError: as `run`.
@@ -73,7 +73,7 @@ class Simulator(PreparedScenario):
             run: number of the run in its campaign; together with the seed it decides everything that is random.
             seed: seed of the campaign.
             record: whether to keep events and trajectory.
-            on_time: called each second of mission time with it and the time limit, in s.
+            on_time: called once per second of mission time with that time and the time limit, in s.
 
         Raises:
             MissionError: the manager raised; the error names it, the run and the mission time.

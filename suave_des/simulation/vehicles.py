@@ -1,4 +1,4 @@
-"""The vehicle that a scenario describes, where a mission puts it, and the current it is in."""
+"""The vehicle that a scenario describes, its position at the start, and the current."""
 
 from math import cos, sin
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from suave_des.vehicle.vehicle import CurrentWave, Point, Vehicle
 
 
 class StartPlace(NamedTuple):
-    """Where a mission begins.
+    """The place where a mission begins.
 
     Attributes:
         position_m: x and y of the vehicle, world frame.
@@ -26,7 +26,7 @@ class StartPlace(NamedTuple):
 
 
 def draw_start(chance: Chance) -> StartPlace:
-    """Draw where the vehicle is put, with what it has drifted before the mission."""
+    """Draw the start position, including the drift before the mission."""
     value = chance.value
     x_m, y_m = (value(f"start.{axis}_m") + value(f"calibration.drift_{axis}_m") for axis in "xy")
     return StartPlace((x_m, y_m), (x_m + value("calibration.origin_x_m"), y_m + value("calibration.origin_y_m")))
@@ -40,7 +40,7 @@ def make_vehicle(
     Args:
         prepared: the scenario.
         chance: of the run.
-        start: where the vehicle is put.
+        start: the start position.
         track: to be filled with the vehicle's states, a row for each time step.
         reasons: whether a reasoner runs on the simulator's computer, and slows it down.
     """

@@ -46,7 +46,7 @@ class Autopilot(NamedTuple):
 def kernel_parameters(model: VehicleModel, autopilot: Autopilot, z_limits_m: tuple[float, float]) -> Array:
     """Put the constants of vehicle and autopilot into the places that `kernel` names, in water at rest."""
     ap = autopilot
-    # An integral may ask for as much as the four horizontal thrusters together give along one axis, and no more.
+    # The integral is limited to the force that the four horizontal thrusters together give along one axis.
     integral_limit = 4.0 * model.thrust_limit_n * math.sqrt(0.5) / model.mass_kg
     forces = model.buoyancy_n - model.weight_n, model.buoyancy_n * model.centre_of_buoyancy_m, *model.quadratic_drag
     legs = model.thrust_limit_n, ap.position_gain_per_s, ap.vertical_position_gain_per_s, ap.jerk_m_per_s3

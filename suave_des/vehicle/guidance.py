@@ -19,7 +19,7 @@ from suave_des.compiling import Array
 from suave_des.vehicle.vehicle import ArrivalCheck, Vehicle
 
 QUEUED_WAYPOINTS: Final = 20
-"""Way-points that are queued at a time, besides the present one; with 10, missions take 7% more CPU time."""
+"""Number of way-points queued in addition to the current one; with 10, missions take 7% more CPU time."""
 
 
 class OneShotTimer(Protocol):
@@ -33,37 +33,37 @@ class OneShotTimer(Protocol):
         """Make the call at mission time t."""
 
     def set_now(self) -> None:
-        """Make the call when the present event is over, before any other."""
+        """Make the call when the current event is over, before any other event."""
 
     def cancel(self) -> None:
         """Drop the pending call."""
 
 
 class WaypointSource(Protocol):
-    """What guidance asks of a function that generates way-points."""
+    """The interface that guidance needs of a function that generates way-points."""
 
     def tick(self) -> None:
-        """React to a timer tick, before guidance does. By default: nothing."""
+        """React to a timer tick, before guidance does. Does nothing by default."""
         return
 
     def waypoints(self, count: int) -> Array:
-        """Give at most `count` way-points from the present one on: x, y, z in the first three columns, shape (n, >= 3).
+        """Return at most `count` way-points from the current one on, shape (n, >= 3); the first columns are x, y, z.
 
         None is left when the last one has been reached.
         """
 
     def completed(self) -> None:
-        """React to having no way-point left. By default: nothing."""
+        """React to the end of the way-points. Does nothing by default."""
         return
 
     def set_point_z_m(self) -> float:
-        """Give the z to send, which need not be the way-point's."""
+        """Return the z to send, which may differ from the way-point's."""
 
     def reached(self, count: int) -> None:
-        """Go on by `count` way-points: the present one, and those after it, have been reached."""
+        """Advance by `count` way-points, which have been reached, starting with the current one."""
 
     def not_reached(self) -> None:
-        """React to a way-point that was not reached in time, and will be sent again. By default: nothing."""
+        """React to a way-point that was not reached in time, and will be sent again. Does nothing by default."""
         return
 
 
@@ -72,11 +72,11 @@ class SetPointSender:
     """A node's connection to the autopilot.
 
     Attributes:
-        vehicle: whose autopilot gets the set-points.
-        now_s: gives the mission time.
-        frame_error_m: steady error of the node's frame in x, y and z: where the vehicle arrives less where it was sent.
+        vehicle: the vehicle whose autopilot receives the set-points.
+        now_s: returns the mission time.
+        frame_error_m: steady error of the node's frame in x, y and z: the position reached minus the one commanded.
         loss_probability: probability that a message is lost.
-        stream: decides which; not needed if none can be.
+        stream: random stream that decides which messages are lost; not needed if none can be.
     """
 
     vehicle: Vehicle
@@ -90,7 +90,7 @@ class SetPointSender:
         self._before_loss = self._draw()
 
     def send(self, x_m: float, y_m: float, z_m: float) -> None:
-        """Send a set-point, world frame; the sender does not learn whether it arrived."""
+        """Send a set-point in the world frame; the sender is not told whether it arrived."""
         if not self._is_lost():
             x_error_m, y_error_m, z_error_m = self.frame_error_m
             self.vehicle.command(self.now_s(), x_m + x_error_m, y_m + y_error_m, z_m + z_error_m)
@@ -98,7 +98,7 @@ class SetPointSender:
     def queue(
         self, waypoints: Array, z_m: float, check: ArrivalCheck, *, first: int, last: int, send: bool
     ) -> tuple[list[int], int]:
-        """Send and queue set-points, see `Vehicle.queue_waypoints`; none from one on whose message will be lost."""
+        """Send and queue set-points (see `Vehicle.queue_waypoints`), up to the first whose message will be lost."""
         if self.stream is not None and self.loss_probability > 0.0:
             send = send and not self._is_lost()
             waypoints = waypoints[: 1 + self._before_loss]
@@ -116,7 +116,7 @@ class SetPointSender:
         return is_lost
 
     def _draw(self) -> int:
-        """Draw how many messages arrive until one is lost: the geometric distribution, by inversion."""
+        """Draw the number of messages that arrive before one is lost, from the geometric distribution, by inversion."""
         if self.stream is None or self.loss_probability == 0.0:
             return 0
         return int(math.log(1.0 - self.stream.random()) / math.log(1.0 - self.loss_probability))
@@ -152,7 +152,7 @@ class Guidance:
         self.sender.vehicle.control_listeners.append(self._control_changed)
 
     def start_at(self, t_s: float, *, resumes: bool = False) -> None:
-        """Tick from mission time t on, and send the present way-point, unless the one that was sent last is resumed."""
+        """Start ticking at mission time t, and send the current way-point, unless the last one sent is resumed."""
         self._is_due, self._is_repeated = not resumes, self._is_repeated and resumes
         self._arrivals, self._act_at, self._is_planned = [], 0, False
         if t_s > self._timer.now_s:
@@ -161,7 +161,7 @@ class Guidance:
             self._act()
 
     def stop(self) -> None:
-        """Stop ticking, and cancel what is queued."""
+        """Stop ticking, and cancel the queued way-points."""
         self._timer.cancel()
         self._replanning.cancel()
         self.catch_up()
@@ -171,12 +171,12 @@ class Guidance:
             self._sent -= self._last_tick(check) + 1  # on resumption the first tick is 0 again
 
     def catch_up(self) -> None:
-        """Report to the function the way-points that were reached by now."""
+        """Report to the function which way-points have been reached by now."""
         if self._check is not None:
             self._count_arrivals(self._last_tick(self._check))
 
     def waypoints_changed(self) -> None:
-        """Plan again at the next tick, as the function's way-points have changed (call `catch_up` before they do)."""
+        """Plan again at the next tick after the function's way-points change (call `catch_up` before they do)."""
         check = self._check
         if check is not None and self._act_at > (tick := self._last_tick(check)):
             self._is_acting = True
@@ -187,7 +187,7 @@ class Guidance:
             self._set_timer(check, tick + 1)
 
     def _act(self) -> None:
-        """Do what is due at this tick; plan until the next one at which there is something to do."""
+        """Do what is due at this tick, and plan until the next tick with something to do."""
         check = self._check = self._check or self.make_check(self._timer.now_s)
         tick = self._act_at
         self._count_arrivals(tick)
@@ -201,7 +201,7 @@ class Guidance:
             self._plan(check, tick, first=tick + check.first_check_ticks if self._is_due else tick)
 
     def _plan(self, check: ArrivalCheck, tick: int, first: int) -> None:
-        """Send the present way-point, if that is due, and look ahead from a tick on."""
+        """Send the current way-point if it is due, and look ahead from a tick on."""
         waypoints = self.source.waypoints(1 + QUEUED_WAYPOINTS)
         if len(waypoints) == 0:
             self._check = None

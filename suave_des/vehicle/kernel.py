@@ -51,7 +51,7 @@ WAVE_X, WAVE_Y = 32, 33  # amplitude of the varying part of the current, east an
 WAVE_RATE, WAVE_PHASE = 34, 35  # its angle per row and at row 0, rad
 
 ARRIVED_M = 2.0
-"""ArduPilot's WPNAV_RADIUS: a leg is completed when its time is over and the vehicle is as near as this to its end."""
+"""ArduPilot's WPNAV_RADIUS: a leg is complete when its time is over and the vehicle is this near to its end."""
 
 Dynamics = tuple[float, Array, Array, Array, Array]
 """What moves the vehicle, besides its state:
@@ -66,7 +66,7 @@ Dynamics = tuple[float, Array, Array, Array, Array]
 
 @compiled
 def quarter_of_leg(length: float, jerk: float) -> float:
-    """Compute a quarter of the time of a leg from rest to rest, at a constant jerk that changes its sign twice."""
+    """Compute a quarter of the duration of a leg from rest to rest, at constant jerk with two sign changes."""
     return float((length / (2.0 * jerk)) ** (1.0 / 3.0))
 
 
@@ -111,7 +111,7 @@ def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
     h, set_point, prm, allocation, effectiveness = dynamics
     mass, ixx, iyy, izz = prm[MASS], prm[IXX], prm[IYY], prm[IZZ]
     heading_w, heading_z = set_point[HALF_HEADING_COS], set_point[HALF_HEADING_SIN]
-    # Number by number: to unpack a slice makes an array of it, which takes as long as a step.
+    # Read number by number: unpacking a slice would create an array, which takes as long as a step.
     x, y, z = track[first, 0], track[first, 1], track[first, 2]
     qw, qx, qy, qz = track[first, 3], track[first, 4], track[first, 5], track[first, 6]
     u, v, w = track[first, 7], track[first, 8], track[first, 9]
@@ -129,7 +129,7 @@ def advance(track: Array, first: int, last: int, dynamics: Dynamics) -> None:
         along_x, along_y, along_z = along_x / length, along_y / length, along_z / length
     quarter = quarter_of_leg(length, prm[JERK])
     top_speed = prm[JERK] * quarter * quarter
-    # To multiply takes a fraction of the time of a division.
+    # A multiplication takes a fraction of the time of a division.
     inverse_mass, inverse_ixx, inverse_iyy, inverse_izz = 1.0 / mass, 1.0 / ixx, 1.0 / iyy, 1.0 / izz
     drag_u, drag_v, drag_w = prm[DRAG] / mass, prm[DRAG + 1] / mass, prm[DRAG + 2] / mass
     drag_p, drag_q, drag_r = prm[DRAG + 3] / ixx, prm[DRAG + 4] / iyy, prm[DRAG + 5] / izz
@@ -285,13 +285,13 @@ def fly_waypoints(
         waypoints: x, y and z in the first three columns, m, shape (n, at least 3). The first one's set-point is given
             already.
         sent_as: what is added to a way-point's x and y in its set-point, and the set-points' z, m.
-        box: half the width and half the height of the box around a way-point in which it is reached, m.
+        box: half the width and half the height of the box around a way-point in which it counts as reached, m.
         timer: time of tick 0, time between ticks, and time between rows, s.
-        window: first tick to look at, last one for the first way-point, and fewest and most ticks from one to the next.
-        arrivals: shape (n,); the ticks that find way-points reached are written into it.
+        window: first tick to check, last one for the first way-point, and fewest and most ticks from one to the next.
+        arrivals: shape (n,); receives the ticks that find way-points reached.
 
     Returns:
-        How many way-points were reached, and the last row that is filled now. IntArray beyond the track do not count.
+        The number of way-points reached, and the last row that is now filled. Ticks beyond the track do not count.
     """
     half_width, half_height = box
     start_s, period_s, grid_s = timer

@@ -18,7 +18,7 @@ GRAVITY_M_PER_S2 = 9.80665
 
 @dataclass(frozen=True, slots=True)
 class Thruster:
-    """One thruster: where it is and which way it pushes the vehicle at positive command (a unit vector)."""
+    """One thruster: its position, and the direction of its force at positive command (a unit vector)."""
 
     position_m: tuple[float, float, float]
     direction: tuple[float, float, float]

@@ -1,4 +1,4 @@
-"""A vehicle in mission time: commanded and disturbed at events, read at any time, integrated only as far as needed."""
+"""A vehicle in mission time: events command and disturb it, it can be read at any time, and is integrated lazily."""
 
 import math
 from bisect import bisect_right
@@ -20,7 +20,7 @@ Point = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArrivalCheck:
-    """When it is checked whether the vehicle has reached a way-point, and what counts as reached.
+    """The times at which arrival at a way-point is checked, and the box in which a way-point counts as reached.
 
     Attributes:
         start_s: time of tick 0.
@@ -41,11 +41,11 @@ class ArrivalCheck:
     resend_again_ticks: int
 
     def time_s(self, tick: int) -> float:
-        """Give the time of a tick."""
+        """Return the time of a tick."""
         return self.start_s + tick * self.period_s
 
     def last_tick_until(self, t_s: float) -> int:
-        """Find the last tick until time t; one at t counts, as it comes before whatever else happens then."""
+        """Find the last tick up to time t, inclusive: a tick at t comes before anything else that happens then."""
         tick = math.floor((t_s - self.start_s) / self.period_s + 1e-9)
         return tick if self.time_s(tick) <= t_s else tick - 1
 
@@ -60,7 +60,7 @@ class _Queue(NamedTuple):
     sent_as_m: Point
 
     def sent_until(self, t_s: float) -> int:
-        """Count those that are sent until time t."""
+        """Count the set-points that have been sent by time t."""
         return bisect_right(self.ticks, self.check.last_tick_until(t_s))
 
 
@@ -69,7 +69,7 @@ class CurrentWave(NamedTuple):
 
     Attributes:
         amplitude_m_per_s: east and north.
-        period_s: time from one greatest velocity to the next.
+        period_s: time from one maximum of the velocity to the next.
         shift_s: added to mission time.
     """
 
@@ -78,7 +78,7 @@ class CurrentWave(NamedTuple):
     shift_s: float = 0.0
 
     def parameters(self) -> tuple[float, float, float, float]:
-        """Give what `kernel.advance` needs of it: east and north, angle per row of the track, and at row 0."""
+        """Return what `kernel.advance` needs: east and north, angle per row of the track, and angle at row 0."""
         rate = 2.0 * math.pi / self.period_s
         return *self.amplitude_m_per_s, rate * STEP_S, rate * self.shift_s
 
@@ -147,14 +147,14 @@ class Vehicle:
         self._dynamics = step_s, self._set_point, parameters, allocation, self._effectiveness
 
     def command(self, t_s: float, x_m: float, y_m: float, z_m: float) -> None:
-        """Give the autopilot a new position set-point; it replaces the one before."""
+        """Give the autopilot a new position set-point, which replaces the previous one."""
         self._cancel_after(t_s)
         self._set_point[:3] = x_m, y_m, z_m + self.altitude_error_m
         self._set_point[kernel.NUMBER] += 1.0
         self._notify(t_s)
 
     def set_thruster_health(self, t_s: float, thruster: int, health: float) -> None:
-        """Set the share of its thrust that thruster 1 .. n gives: 1 works, 0 is lost. The autopilot does not know."""
+        """Set the health of thrusters 1 .. n, from 1 (works) to 0 (dead). The autopilot is not informed."""
         if self._health[thruster - 1] != health:
             self._cancel_after(t_s)
             self._health[thruster - 1] = health
@@ -163,7 +163,7 @@ class Vehicle:
 
     @property
     def working_thrusters(self) -> int:
-        """How many thrusters give thrust."""
+        """Number of thrusters that give thrust."""
         return int(np.count_nonzero(self._health))
 
     def queue_waypoints(
@@ -176,12 +176,12 @@ class Vehicle:
 
         Args:
             t_s: mission time.
-            waypoints: where the vehicle is to go: x, y, z in the first three columns, m, shape (n, at least 3).
-            sent_as_m: what is added to a way-point's x and y in its set-point, and the set-points' z.
-            check: the ticks, and what counts as reached.
-            first: first tick to look at.
-            last: last tick to look at for the first way-point; ticks after the mission's end do not count.
-            send: whether to command the first way-point's set-point now; else it is commanded already.
+            waypoints: positions to reach: x, y, z in the first three columns, m, shape (n, at least 3).
+            sent_as_m: offset added to a way-point's x and y in its set-point, and the set-points' z.
+            check: the ticks, and the box in which a way-point counts as reached.
+            first: first tick to check.
+            last: last tick to check for the first way-point; ticks after the mission's end do not count.
+            send: whether to command the first way-point's set-point now; otherwise it is already commanded.
 
         Returns:
             The ticks at which way-points will be found reached if control does not change; and the tick at which the
@@ -210,7 +210,7 @@ class Vehicle:
         return arrivals, arrivals[-1] + check.resend_ticks if arrivals else last
 
     def cancel_waypoints(self, t_s: float, check: ArrivalCheck) -> None:
-        """Cancel the set-points after time t that were queued with a check, if there are any left."""
+        """Cancel the set-points after time t that were queued with a check, if any remain."""
         if self._queue is not None and self._queue.check is check:
             self._cancel_after(t_s)
             self._notify(t_s)
@@ -253,7 +253,7 @@ class Vehicle:
         set_point[kernel.NUMBER] += new
 
     def _cancel_after(self, t_s: float) -> None:
-        """Fill the track up to time t, and no further; from there on the set-point in force then is the only one."""
+        """Fill the track up to time t, and no further; from there on only the current set-point remains."""
         self.computed_row = self._row(t_s)
         queue, self._queue = self._queue, None
         if queue is not None:
@@ -273,5 +273,5 @@ def track_rows(duration_s: float) -> int:
 
 
 def row_at(t_s: float) -> int:
-    """Find the row of the track nearest to a mission time, halves to even, as everywhere that times become rows."""
+    """Find the row of the track nearest to a mission time; ties go to the even row, as in every such conversion."""
     return round(t_s / STEP_S)

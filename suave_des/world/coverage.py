@@ -9,7 +9,7 @@ from suave_des.compiling import Array, compiled
 
 CELL_M = 0.1
 _ROW_STEP = 4
-"""Each fourth row of the track counts: the area is at most 1% smaller than with each row, in a quarter of the time."""
+"""Only every fourth row of the track is used: the area is at most 1% smaller, in a quarter of the time."""
 _MAX_CELLS = 4_000_000
 """At most 4 MB: 40,000 m2 in cells of 0.1 m."""
 

@@ -21,7 +21,7 @@ def sinusoid(period_s: float, minimum: float, maximum: float, shift_s: float = 0
 
 @lru_cache(maxsize=64)
 def constant(value: float) -> Signal:
-    """Make a signal of one value."""
+    """Make a constant signal."""
     return lambda t_s: value
 
 
@@ -34,7 +34,7 @@ def step(time_s: float, before: float, after: float) -> Signal:
 def table(times_s: Sequence[float], values: Sequence[float], *, linear: bool = False) -> Signal:
     """Make a signal from values at given times, ascending.
 
-    Between two of them it is the value before, or on a straight line; before the first and after the last, their value.
+    Between two times it has the earlier value, or is interpolated linearly; outside, it has the nearest value.
     """
 
     def value(t_s: float) -> float:

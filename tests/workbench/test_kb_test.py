@@ -173,7 +173,7 @@ def test_rules_of_the_file_are_tested_and_results_are_written_as_junit_xml(tmp_p
             "- name: x\n  without: nothing\n  changes: {f_generate_search_path: stays -> stays}",
             "no enabled rule 'nothing'",
         ),
-        ("- name: x\n  without: S1a\n  decides: {f_generate_search_path: stays}", "need one another"),
+        ("- name: x\n  without: S1a\n  decides: {f_generate_search_path: stays}", "must be given together"),
         (
             '- name: x\n  given: {measurements: {water_visibility: "1 << 2"}}\n  contradiction: true',
             "'1 << 2' is not a region",
