@@ -20,7 +20,7 @@ class InputError(SuaveDesError):
         problem: what is wrong, with the offending value.
         file: that contains it, if there is one.
         place: where in the file: "line 12", a key path such as "signals.water_visibility.period_s", or both.
-        remedy: what would be right.
+        remedy: how to correct it.
     """
 
     def __init__(

@@ -92,7 +92,7 @@ class CampaignSpec:
         ontologies: files in place of the scenario's.
         modes_file: file in place of the scenario's.
         reasoner: in place of the scenario's.
-        rules: files of rules as text, besides the scenario's.
+        rules: files of rules as text, in addition to the scenario's.
         disabled_rules: names of rules to switch off, besides the scenario's.
         values: new values by key path of the scenario.
         manager_options: settings of managers, by manager and key.

@@ -51,7 +51,7 @@ class ResultFormat(StrEnum):
 
 @dataclass(frozen=True)
 class NewCampaign(OptionGroup):
-    """Options that hold for the whole of a campaign: one that goes on has them already."""
+    """Options that apply to a whole campaign; a resumed campaign has them already."""
 
     seed: SeedIfNew = None
     ensemble: Annotated[
@@ -138,8 +138,8 @@ def campaign(
     if resume is not None:
         check_no_use(
             {"SCENARIO": scenario, "--out": out, **new.given, **files.given},
-            "cannot be changed with --resume",
-            "leave it out, or start anew in another folder",
+            "with --resume: the settings of a campaign cannot be changed",
+            "remove it, or start a new campaign in another folder",
         )
     elif scenario is None or out is None:
         missing = "SCENARIO" if scenario is None else "--out DIR"

@@ -60,7 +60,7 @@ _ANNOTATIONS: Final = frozenset(
 
 
 class Terms(NamedTuple):
-    """What is read after an inference: the values of properties, and the members of classes; IRIs, sorted."""
+    """The terms to read after an inference: properties for their values, classes for their members; sorted IRIs."""
 
     properties: tuple[str, ...]
     classes: tuple[str, ...]
@@ -82,7 +82,7 @@ class Content:
 
     @property
     def enabled_rules(self) -> tuple[Rule, ...]:
-        """The rules that are in force."""
+        """The enabled rules."""
         return tuple(rule for rule in self.rules if rule.enabled)
 
     def head_properties(self) -> frozenset[str]:
@@ -94,7 +94,7 @@ class Content:
         return frozenset(name for rule in self.enabled_rules for name in rule.head_classes)
 
     def decision_terms(self) -> Terms:
-        """What decisions depend on, and what rules assert, with super-properties and inverses."""
+        """Terms on which decisions depend, and terms that rules assert, with super-properties and inverses."""
         wanted = set(self.head_properties()) | set(DECISION_PROPERTIES)
         both_ways = (OWL + "inverseOf", OWL + "equivalentProperty")
         edges = [(s, o) for s, p, o in self.triples if p in (RDFS + "subPropertyOf", *both_ways)]
@@ -104,7 +104,7 @@ class Content:
         return Terms(_named(wanted), tuple(sorted(self.head_classes())))
 
     def all_terms(self) -> Terms:
-        """Every property and class: any of them can be concluded by some axiom."""
+        """Every property and class: some axiom can conclude any of them."""
         kinds: dict[str, set[str]] = {}
         for subject, predicate, value in self.triples:
             if predicate == RDF_TYPE and isinstance(value, str):
@@ -210,7 +210,7 @@ def _override(triples: tuple[Triple, ...], values: Mapping[str, Decimal]) -> tup
 
 
 def _declares_builtin(triple: RdfTriple) -> bool:
-    """Whether Protégé declares a builtin here: Pellet does not know that declaration, and logs a warning."""
+    """Whether this is Protégé's declaration of a built-in, about which Pellet logs a warning."""
     return triple[1] == RDF.type and triple[2] == URIRef(SWRL + "Builtin") and str(triple[0]).startswith(SWRLB)
 
 

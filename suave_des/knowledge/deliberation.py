@@ -1,4 +1,4 @@
-"""Analyze and plan: what the managing subsystem asks of its knowledge base in each cycle of the MAPE-K loop."""
+"""Analyze and plan: the managing subsystem's queries to its knowledge base in each cycle of the MAPE-K loop."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ class Conclusion:
 
     @cached_property
     def changes(self) -> dict[str, str]:
-        """What happens to each function's grounding that changes or has no design left: a design, or NONE_LEFT."""
+        """New design of each function whose grounding changes, or NONE_LEFT if no design is left."""
         state = self.inference.state
         outcomes = {each.function: each.design or NONE_LEFT for each in self.plan.decisions}
         return {function: outcome for function, outcome in outcomes.items() if outcome != state.grounded(function)}
 
     @cached_property
     def statuses(self) -> frozenset[str]:
-        """What was inferred of objectives and groundings, in words."""
+        """Inferred statuses of objectives and groundings, as text."""
         return frozenset(_statuses(self.inference))
 
 
@@ -48,7 +48,7 @@ class Deliberation:
     """A knowledge base with a reasoner; analyzes states and plans on them.
 
     Both are pure functions of the state. Reasoners cache inferences, by state or by what the rules can tell of it;
-    metacontrol caches conclusions, by what they can tell of its own data. Nothing else needs a conclusion twice.
+    metacontrol caches conclusions, by its symbolic state.
 
         base = Ontology.load()
         deliberation = Deliberation(base, make_reasoner("pellet", base))
@@ -73,7 +73,7 @@ class Deliberation:
 
         Args:
             state: objectives, groundings, reported components and measured values.
-            improve_exceeded: whether an objective is also adapted when a measured value exceeds what its present
+            improve_exceeded: whether an objective is also adapted when a measured value exceeds what its current
                 function design expects (the exemplar's revision 2023 does so in code).
 
         Raises:
@@ -92,11 +92,11 @@ class Deliberation:
 
     @property
     def thresholds(self) -> tuple[float, ...] | None:
-        """The numbers that rules compare measured values with; None if they may do more than compare."""
+        """The numbers with which rules compare measured values; None if rules may do more than compare."""
         return self.regions.thresholds_as_floats if self.regions is not None and self.regions.is_sound else None
 
     def distinguished(self, measured: Collection[float]) -> Hashable:
-        """What the rules can tell of measured values: the bounds of their regions, or the values themselves."""
+        """What the rules can distinguish in measured values: the bounds of their regions, or the values themselves."""
         if self.regions is None or not all(map(isfinite, measured)):
             return tuple(measured)
         bounds = tuple(map(self.regions.around, measured))

@@ -63,7 +63,7 @@ StockPellet(ontology, options=[option]).infer(ontology.assertions(state))
 
 
 def archive_path(class_path: Sequence[str] | None = None, options: Sequence[str] = OPTIONS) -> Path | None:
-    """Where the archive for these jars and options belongs; None if switched off, or without a cache folder.
+    """Return the path of the archive for these jars and options; None if disabled, or without a cache folder.
 
     Java takes an archive only with the runtime, the jars (by path, size and time) and the options that it was made
     with: all that is in the name.
@@ -83,7 +83,7 @@ def archive_path(class_path: Sequence[str] | None = None, options: Sequence[str]
 
 
 def options_for(archive: Path | None) -> tuple[str, ...]:
-    """Options with which Java uses an archive, if there is one."""
+    """Return the options with which Java uses an archive, if there is one."""
     if archive is None or not archive.is_file():
         return ()
     with suppress(OSError):
@@ -113,11 +113,11 @@ def make_later(archive: Path | None, reasoner: str = "pellet") -> None:
 
 
 def make(archive: Path | None = None, reasoner: str = "pellet") -> Path | None:
-    """Make an archive for this environment; None if switched off.
+    """Make an archive for this environment; None if disabled.
 
     Args:
-        archive: where it belongs; None: where that of the Java in this process does.
-        reasoner: whose archive, "pellet" or "owlready2".
+        archive: its path; None: the path for the Java in this process.
+        reasoner: the reasoner that will use it, "pellet" or "owlready2".
 
     Raises:
         OSError: the cache folder cannot be written to.

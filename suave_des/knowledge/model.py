@@ -87,7 +87,7 @@ class Model:
             yield from group.values()
 
     def triples(self) -> Iterator[Triple]:
-        """What the ontologies assert that only states bring: of these individuals, and of components' status."""
+        """Assertions of the ontologies that only apply in states: about these individuals, and components' statuses."""
         for individual in self.individuals():
             yield from individual.own
         for initial in self.initial.values():
@@ -160,7 +160,7 @@ def _known(name: str, names: Mapping[str, str], what: str) -> None:
 
 
 def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Model, Content]:
-    """Find the model, and return the content without what belongs to states only.
+    """Find the model, and return the content without the triples that only states assert.
 
     Objectives, groundings and measurements that the ontologies describe already (an objective's hasNFR, a
     grounding's requiresO) are taken out, and come with the states that have them.
@@ -237,7 +237,7 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
 
 
 def assumption(name: str, sign: str) -> str:
-    """Say which comparison operator is assumed of a quality attribute type."""
+    """Describe which comparison operator is assumed for a quality attribute type."""
     return f"{name} has no qa_comparison_operator in the ontologies: {sign} is assumed, as in the revision's code"
 
 

@@ -24,7 +24,7 @@ from suave_des.resources import shipped_folder
 
 @dataclass(frozen=True, eq=False)
 class Ontology:
-    """Ontology files and files of rules, merged and checked. It never changes: what changes is a KnowledgeState.
+    """Ontology files and files of rules, merged and checked. It is immutable: only a KnowledgeState changes.
 
         ontology = Ontology.load(["suave.owl"], rules=["mine.swrl"])
         ontology.designs("f_generate_search_path")  # ('fd_spiral_high', 'fd_spiral_low', 'fd_spiral_medium')
@@ -66,7 +66,7 @@ class Ontology:
         Args:
             ontologies: files in RDF/XML.
             values: replaces the hasValue of a named QAvalue individual, such as qa_water_visibility_low.
-            rules: files of rules as text; each rule replaces those of its name that were read before.
+            rules: files of rules as text; each rule replaces earlier rules of the same name.
             disabled_rules: names of rules to disable.
             operators: qa_comparison_operator of quality attribute types that have none, by name.
 
@@ -99,15 +99,15 @@ class Ontology:
         )
 
     def with_rules(self, rules: Iterable[Rule]) -> Ontology:
-        """The same ontology with other rules, in force or not."""
+        """Return the same ontology with different rules, enabled or not."""
         return replace(self, content=replace(self.content, rules=tuple(rules)))
 
     def with_facts(self, facts: Iterable[Triple]) -> Ontology:
-        """The same ontology with further facts of individuals."""
+        """Return the same ontology with further facts about individuals."""
         return replace(self, content=replace(self.content, triples=(*self.content.triples, *facts)))
 
     def with_triples(self, triples: Iterable[Triple]) -> Ontology:
-        """The ontology with other triples: functions, designs, components and attributes are found in them again."""
+        """Return the ontology with different triples, in which the model is found again."""
         whole = replace(self.content, triples=(*triples, *self.model.triples()))
         model, content = build_model(whole, self.sources)
         return replace(self, content=content, model=model, names=Names(whole.triples))
@@ -119,7 +119,7 @@ class Ontology:
 
     @cached_property
     def facts(self) -> frozenset[Fact]:
-        """What the ontologies assert of individuals."""
+        """The facts that the ontologies assert about individuals."""
         return frozenset(facts_of(self.content.triples, self.names))
 
     @property

@@ -1,6 +1,6 @@
 """Read ontology files, and resolve their imports to local files. Nothing is ever fetched.
 
-Files are in RDF/XML, or by their endings in Turtle, N-Triples or JSON-LD.
+Files are in RDF/XML, or, according to their extension, in Turtle, N-Triples or JSON-LD.
 
 lxml reads the XML first: it stops at entities that expand too far, reads no other file, and knows line numbers. Simple
 internal entities, as Protégé writes them, are accepted.
@@ -147,7 +147,7 @@ _PLAIN: Final = re.compile(
 
 
 def _parse_xml(path: Path, content: bytes) -> etree._Element:
-    """Return the root element, once it is sure that nothing in the file reaches for others or expands too far."""
+    """Return the root element, after checking that no entity refers to other files or expands too far."""
     if re.match(rb"\s*<!doctype\s+html", content, re.IGNORECASE):
         raise KnowledgeError("this is a web page, not an ontology", file=path, place="line 1", remedy=_SAVE_AS)
     # lxml-stubs knows neither "internal" nor what a DOCTYPE has.
@@ -204,7 +204,7 @@ def without_log() -> Iterator[None]:
 
 @contextmanager
 def _literals_as_written() -> Iterator[None]:
-    """Keep rdflib from normalising literals: it would write the ill-formed decimal 1e3 as 1000."""
+    """Prevent rdflib from normalising literals: it would write the ill-formed decimal 1e3 as 1000."""
     before = rdflib.NORMALIZE_LITERALS
     rdflib.NORMALIZE_LITERALS = False
     try:
@@ -216,7 +216,7 @@ def _literals_as_written() -> Iterator[None]:
 
 @lru_cache(maxsize=4)  # what is imported is read again with each ontology that imports it
 def _parse_rdf(path: Path, content: bytes) -> Graph:
-    """Parse a file; the graph is shared by all who read the same content, and is not to be changed."""
+    """Parse a file; the graph is shared by all readers of the same content, and must not be changed."""
     graph = Graph()
     form, name = _FORMATS.get(path.suffix, ("xml", "RDF/XML"))
     if form == "json-ld" and re.search(rb'"@(context|import)"\s*:\s*(\[[^\]]*)?"', content):
@@ -292,7 +292,7 @@ def collect(given: Sequence[Path]) -> tuple[OntologyFile, ...]:
 
 
 def supplies(file: OntologyFile, iri: str, *, by_name: bool = True) -> bool:
-    """Whether a file supplies an imported ontology: by an IRI of its own, or else by name."""
+    """Whether a file supplies an imported ontology, according to its IRI, or else its name."""
     known = (*file.iris, file.base) if file.base else file.iris
     if _comparable(iri) in map(_comparable, known):
         return True
@@ -310,12 +310,12 @@ def _add(files: list[OntologyFile], new: OntologyFile) -> None:
 
 
 def _comparable(iri: str) -> str:
-    """An IRI without scheme and end mark: two that mean the same ontology are equal in this form."""
+    """Return an IRI without scheme and final mark: two IRIs of the same ontology are equal in this form."""
     return urldefrag(iri)[0].partition("://")[2].rstrip("/") or iri
 
 
 def _name(iri: str) -> str:
-    """The name of an ontology by its IRI: its last part without the ending of a file."""
+    """Return the name of an ontology from its IRI: the last part without the file extension."""
     return Path(local_name(_comparable(iri))).stem
 
 

@@ -41,7 +41,7 @@ def plan(ontology: Ontology, inference: Inference, *, improve_exceeded: bool = F
     Args:
         ontology: the ontology.
         inference: what the reasoner added to the state that was analyzed.
-        improve_exceeded: whether an objective is also adapted when a measured value exceeds what its present function
+        improve_exceeded: whether an objective is also adapted when a measured value exceeds what its current function
             design expects (the exemplar's revision 2023 does so in code).
 
     Raises:
@@ -57,7 +57,7 @@ def plan(ontology: Ontology, inference: Inference, *, improve_exceeded: bool = F
 
 
 def _exceeded(ontology: Ontology, state: KnowledgeState) -> Iterator[tuple[str, str]]:
-    """Functions whose present design expects less than is measured, each with the reason to adapt it."""
+    """Functions whose current design expects less than the measured value, each with the reason to adapt it."""
     measured = dict(state.measurements)
     for function, design in state.groundings:
         for name, value in sorted(ontology.expected(design).items()):
@@ -71,7 +71,7 @@ def calls(status: str) -> bool:
 
 
 def _call(objective: ObjectiveState, inference: Inference) -> str | None:
-    """Why an objective is adapted; None when it need not be."""
+    """Return why an objective is adapted; None if it need not be."""
     name = objective_name(objective.function)
     for status in map(str, inference.values(name, "o_status")):
         if calls(status):
@@ -96,7 +96,7 @@ def _decide(ontology: Ontology, inference: Inference, function: str, call: str) 
 
 
 def _objections(inference: Inference, design: str, function: str) -> Iterator[str]:
-    """Why a function design must not be chosen now, the first reason first."""
+    """Yield the reasons why a function design must not be chosen now."""
     objective = objective_name(function)
     if False in inference.values(design, "fd_realisability"):
         yield "not realisable"
@@ -138,7 +138,7 @@ def _expected(inference: Inference, design: str, attribute: str) -> list[Decimal
 
 
 def _operators(inference: Inference, attribute: str) -> list[str]:
-    """How a value of a quality attribute is worse than an expected one; usually one operator."""
+    """Return the operators by which a value of a quality attribute is worse than an expected one; usually one."""
     return [sign for sign in map(str, inference.values(attribute, "qa_comparison_operator")) if sign in _COMPARE]
 
 

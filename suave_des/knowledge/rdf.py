@@ -124,7 +124,7 @@ def canonical(value: Lit) -> Lit: ...
 @overload
 def canonical(value: str | Lit) -> str | Lit: ...
 def canonical(value: str | Lit) -> str | Lit:
-    """Return a number in one form for all that Pellet takes for the same value; anything else as it is.
+    """Return the same form for all numbers that Pellet treats as equal; other values are unchanged.
 
     A rule's 2.00 is meant to match a measured 2.0. Whole numbers of all datatypes are compared by value, and never
     match a decimal; neither of them matches a double.
@@ -145,7 +145,7 @@ def canonical(value: str | Lit) -> str | Lit:
 
 
 def for_pellet(value: Lit) -> Lit:
-    """Return a literal as Pellet is given it: each decimal number in one form, and always with a decimal place.
+    """Return a literal as Pellet receives it: each decimal number in one form, and always with a decimal place.
 
     Pellet compares the texts of decimals, and takes one without a decimal place for an integer. Stock owlready2 gives
     it these forms, too.

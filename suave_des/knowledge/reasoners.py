@@ -1,4 +1,4 @@
-"""Reasoners: what a state of the knowledge base entails. All of them run Pellet, and infer the same.
+"""Reasoners: the entailments of a state of the knowledge base. All of them run Pellet, and give the same inferences.
 
 An inference is a pure function of ontology and state, so it is cached.
 """
@@ -121,7 +121,7 @@ def make_reasoner(
             apart), "pellet" (kept running in this process) or "owlready2" (stock, the reference).
         ontology: the ontology.
         limit: of the time that Pellet may take for one state, or to load the ontologies; None: a minute.
-        terms: what an inference tells of; None: what decisions depend on, and what rules assert.
+        terms: the terms to read after an inference; None: what decisions depend on, and what rules assert.
 
     Raises:
         InputError: the name is unknown, or there is no usable Java.

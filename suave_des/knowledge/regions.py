@@ -99,14 +99,14 @@ def _ranked(state: KnowledgeState, where: list[tuple[str, int]]) -> tuple[tuple[
 
 
 def regions_of(ontology: Ontology) -> Regions:
-    """Find the regions of an ontology, or why its rules may distinguish values within them."""
+    """Find the regions of an ontology, and reasons why its rules may distinguish values within them."""
     carriers = _carriers(ontology)
     reasons = [*_of_rules(ontology, carriers), *_of_ontologies(ontology, carriers)]
     return Regions(tuple(sorted(set(_numbers(ontology)))), tuple(dict.fromkeys(reasons)))
 
 
 def _carriers(ontology: Ontology) -> frozenset[str]:
-    """Properties that can have a measured value: hasValue, and what holds wherever it does."""
+    """Properties that can have a measured value: hasValue, and properties that it implies."""
     found = {HAS_VALUE}
     pairs = [{s, o} for s, p, o in ontology.content.triples if p in _SAME_VALUES and isinstance(o, str)]
     while more := set[str]().union(*(pair for pair in pairs if pair & found)) - found:

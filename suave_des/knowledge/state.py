@@ -1,4 +1,4 @@
-"""The data of the MAPE-K loop: the knowledge state, what is inferred from it, and the plan.
+"""The data of the MAPE-K loop: the knowledge state, its inference, and the plan.
 
 Nothing here imports a reasoner, so that the rest of the simulation may use these types at no cost.
 """
@@ -45,7 +45,7 @@ def exact(number: Number) -> Decimal:
 
 
 class ObjectiveState(NamedTuple):
-    """An objective that the mission has now: the function that it needs, and its status as the loop recorded it."""
+    """A current objective of the mission: the required function, and its status as recorded by the loop."""
 
     function: str
     status: str | None = None
@@ -54,7 +54,7 @@ class ObjectiveState(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class KnowledgeState:
-    """All that changes in the knowledge base: hashable, sorted by name, and without anything inferred.
+    """The variable part of the knowledge base: hashable, sorted by name, and without inferences.
 
         KnowledgeState.of(
             [ObjectiveState("f_generate_search_path", UNGROUNDED)],
@@ -100,7 +100,7 @@ class KnowledgeState:
         )
 
     def __str__(self) -> str:
-        """As messages show it, on one line."""
+        """Return the form that messages show, on one line."""
         parts = [
             *(f"objective {each.function}" + (f" ({each.status})" if each.status else "") for each in self.objectives),
             *(f"{name} = {value}" for name, value in (*self.groundings, *self.components, *self.measurements)),
@@ -108,7 +108,7 @@ class KnowledgeState:
         return ", ".join(parts) or "the empty state"
 
     def grounded(self, function: str) -> str | None:
-        """The function design now in use for a function."""
+        """The function design in use for a function."""
         return next((design for name, design in self.groundings if name == function), None)
 
     def measured(self, attribute: str) -> tuple[Decimal, ...]:
@@ -189,15 +189,15 @@ class Inference:
         return self._index.get((subject, property_name), ())
 
     def subjects(self, property_name: str, value: Value) -> tuple[str, ...]:
-        """What has that value of a property, asserted or inferred, sorted by name."""
+        """Subjects with a value of a property, asserted or inferred, sorted by name."""
         return tuple(sorted(s for (s, p), values in self._index.items() if p == property_name and value in values))
 
     def objective_status(self, function: str) -> str | None:
-        """Status of a function's objective, asserted or inferred; None while all is well."""
+        """Status of a function's objective, asserted or inferred; None while it is met."""
         return self._one(objective_name(function), "o_status")
 
     def grounding_status(self, function: str) -> str | None:
-        """Status of a function's present grounding; None while all is well or there is none."""
+        """Status of a function's current grounding; None if it has no problem, or if there is no grounding."""
         design = self.state.grounded(function)
         return None if design is None else self._one(grounding_name(design), "fg_status")
 
@@ -212,7 +212,7 @@ class Inference:
 
 @dataclass(frozen=True, slots=True)
 class Rejection:
-    """A function design that the planner left out, and why."""
+    """A function design that the planner ruled out, and why."""
 
     design: str
     reason: str
@@ -220,13 +220,13 @@ class Rejection:
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """What the planner chose for one function.
+    """The planner's choice for one function.
 
     Attributes:
         function: whose objective is adapted.
-        design: the function design to ground; None when none is left, and the present one is kept.
+        design: the function design to ground; None if none is left, and the current one is kept.
         reason: why the objective is adapted and the design chosen.
-        rejected: the designs left out, by name.
+        rejected: the designs that were ruled out, by name.
     """
 
     function: str

@@ -42,7 +42,7 @@ class Knowledge(Protocol):
 
     @property
     def thresholds(self) -> tuple[float, ...] | None:
-        """The numbers that rules compare measured values with; None if they may do more than compare."""
+        """The numbers with which rules compare measured values; None if rules may do more than compare."""
 
     @property
     def expected_attributes(self) -> frozenset[str]:

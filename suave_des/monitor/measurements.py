@@ -1,6 +1,6 @@
-"""What monitors measure: a signal's messages as a table for the whole mission, the battery's level as it comes.
+"""Measurements of monitors: a signal's messages as a table for the whole mission, and the battery's level so far.
 
-To look a value up is to read the table; a monitor publishes it only when somebody subscribes (see `monitors`).
+Looking up a value reads the table; a monitor publishes the value only if somebody subscribes (see `monitors`).
 """
 
 import math
@@ -93,7 +93,7 @@ class Measurements:
         return regions[passed - 1] if passed else -1
 
     def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
-        """Find the time of the first value after mission time t that enters a different region; inf if there is none."""
+        """Find the time of the first value after mission time t that enters a different region, or inf."""
         times_s, _ = self.crossings(thresholds)
         passed = bisect_right(times_s, t_s)
         return times_s[passed] if passed < len(times_s) else math.inf

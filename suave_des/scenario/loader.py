@@ -122,7 +122,7 @@ class Replacements(TypedDict, total=False):
         ontologies: files to use in place of the scenario's.
         modes_file: file to use in place of the scenario's.
         reasoner: to use in place of the scenario's.
-        rules: files of rules as text, besides the scenario's.
+        rules: files of rules as text, in addition to the scenario's.
         disabled_rules: names of rules to switch off, besides the scenario's.
         values: new values by key path, as of `with_values`.
         manager_options: settings of managers, by manager and key, over the scenario's.

@@ -50,10 +50,10 @@ class Subject:
     Attributes:
         ontologies: files; without any, the shipped suave.owl.
         rules: files of rules as text.
-        disabled_rules: names of rules to switch off.
+        disabled_rules: names of rules to disable.
         values: replaces the hasValue of named QAvalue individuals.
-        shapes: files of SHACL shapes, besides the shipped ones.
-        modes: names of the modes by function; None leaves out what is checked against them.
+        shapes: files of SHACL shapes, in addition to the shipped ones.
+        modes: names of the modes by function; None skips the checks against them.
         needed: functions that the mission cannot do without.
         operators: qa_comparison_operator that the revision assumes of quality attribute types that have none, by name.
         time_limit_s: for Pellet.
@@ -73,7 +73,7 @@ class Subject:
 def check(subject: Subject) -> tuple[Finding, ...]:
     """Check a knowledge base.
 
-    Pellet is asked at the end, after an ERROR too, unless it keeps the knowledge base from being loaded.
+    Pellet is asked at the end, even after an ERROR, unless it prevents the knowledge base from being loaded.
 
     Returns:
         all findings, the worst first.
@@ -147,7 +147,7 @@ def _check_rules(content: Content, vocabulary: Vocabulary, sources: Mapping[Path
 
 
 def _replacing_rules(rules: Sequence[Rule], groups: Sequence[Sequence[Rule]]) -> Iterator[Finding]:
-    """Find the rules as text that replace another rule of their name, and say something else."""
+    """Find the rules as text that replace a different rule of the same name."""
     before = {rule.name: rule for rule in rules}
     for group in groups:
         for rule in group:
@@ -240,9 +240,9 @@ def _ask_pellet(subject: Subject, before: Sequence[Finding]) -> Iterator[Finding
 
 
 def combined(states: Sequence[KnowledgeState]) -> tuple[KnowledgeState, ...]:
-    """Join states that do not exclude one another: 45 in place of 186 for the shipped ontologies.
+    """Combine states that do not exclude one another: 45 instead of 186 for the shipped ontologies.
 
-    What contradicts itself does so in every state that contains it: Pellet's reasoning is monotonic.
+    A contradiction occurs in every state that contains it: Pellet's reasoning is monotonic.
     """
     joined: list[tuple[dict[str, str], dict[str, Decimal]]] = []
     for state in states:

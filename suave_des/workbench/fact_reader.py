@@ -45,7 +45,7 @@ class FactReader:
         """Read one fact.
 
         Raises:
-            InputError: it is no fact, or a name in it is unknown.
+            InputError: it is not a fact, or a name in it is unknown.
         """
         atom = _parsed(text)
         if not 1 <= len(atom.arguments) <= 2:

@@ -1,4 +1,4 @@
-"""What a check of a knowledge base found."""
+"""The findings of a check of a knowledge base."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from suave_des.knowledge.ontology_file import OntologyFile, place_of
 
 
 class Level(StrEnum):
-    """Severity: an ERROR does not do what it says, a WARN probably does not, an INFO is good to know."""
+    """Severity: an ERROR does not work as written, a WARN probably does not, an INFO is worth knowing."""
 
     ERROR = "ERROR"
     WARN = "WARN"
@@ -26,7 +26,7 @@ _NOUNS = {Level.ERROR: "error", Level.WARN: "warning", Level.INFO: "note"}
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that was found.
+    """One finding.
 
     Attributes:
         level: its severity.
@@ -36,7 +36,7 @@ class Finding:
         rule: name of the rule, if it is about one.
         column: in the line for rules as text, in the rule's own text (as `kb rules --format json` gives it) for rules
             of ontologies.
-        remedy: what would be right.
+        remedy: how to correct it.
     """
 
     level: Level
@@ -61,7 +61,7 @@ class Finding:
 
 
 def finding_from(error: InputError) -> Finding:
-    """Turn an error into a finding; its place is taken apart."""
+    """Convert an error into a finding, with the parts of its place."""
     place = error.place or ""
     line, column, rule = (re.search(pattern, place) for pattern in (r"line (\d+)", r"column (\d+)", r"^rule (.*)"))
     return Finding(

@@ -35,7 +35,7 @@ class KnowledgeBase:
 
     Attributes:
         base: the ontologies and rules.
-        settings: what the managing subsystem does besides what the rules say.
+        settings: what the managing subsystem does in addition to the rules.
         reasoner: name of the reasoner.
         limit: of the reasoner's time for one state.
 
@@ -68,10 +68,10 @@ class KnowledgeBase:
         Args:
             ontologies: files, or one; without any, those of the scenario.
             scenario: a scenario file, or the name of a shipped one: its ontologies, overridden values, measured
-                attributes, and what its revision does in code.
+                attributes, and the behaviour of its revision.
             reasoner: in place of the scenario's.
-            rules: files of rules as text, besides the scenario's.
-            disabled_rules: names of rules to switch off.
+            rules: files of rules as text, in addition to the scenario's.
+            disabled_rules: names of rules to disable.
             values: new values of the scenario by key path, as of `with_values`.
             time_limit_s: for each inference.
 
@@ -108,7 +108,7 @@ class KnowledgeBase:
         return Deliberation(self.base, make_reasoner(self.reasoner, self.base, self.limit, terms))
 
     def decide(self, state: KnowledgeState) -> Conclusion:
-        """Decide as a mission does: infer what decisions depend on and what rules assert, and plan on it.
+        """Decide as a mission does: infer the terms on which decisions depend and those that rules assert, and plan.
 
         Raises:
             KnowledgeError: the state contradicts the ontologies, or the reasoner takes too long.
@@ -180,9 +180,9 @@ class KnowledgeBase:
         )
 
     def policy(self, max_failed: int = 2, on_count: OnCount = lambda done, total: None) -> Policy:
-        """Decide every state, with at most so many components that report anything.
+        """Decide every state, with at most `max_failed` components that report a status.
 
-        `on_count` is called again and again with how many kinds of states of how many are decided.
+        `on_count` is called repeatedly with the number of kinds of states decided so far, and their total.
 
         Raises:
             InputError: there would be too many states.
@@ -193,7 +193,7 @@ class KnowledgeBase:
     def diff(
         self, other: KnowledgeBase, max_failed: int = 2, on_count: OnCount = lambda done, total: None
     ) -> PolicyDifference:
-        """Find the states that another knowledge base decides differently, over all that either of them tells apart.
+        """Find the states that another knowledge base decides differently, over all states that either distinguishes.
 
         Raises:
             InputError: there would be too many states.

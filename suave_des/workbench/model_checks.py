@@ -137,7 +137,7 @@ def designs_without_performance(content: Content, model: Model, sources: Sequenc
 
 
 def unused_individuals(content: Content, model: Model, sources: Sequence[OntologyFile]) -> Iterator[Finding]:
-    """Find the individuals that no fact and no rule mentions, and that have no meaning by themselves."""
+    """Find the individuals that no fact and no rule mentions, and that mean nothing by themselves."""
     mentioned = {value for _, predicate, value in content.triples if predicate != RDF_TYPE and isinstance(value, str)}
     mentioned |= {
         term.iri for rule in content.rules for atom in rule.atoms for term in atom.arguments if isinstance(term, Named)
@@ -194,7 +194,7 @@ def check_shapes(
 
 
 def _is_placeholder(node: Node | None, data: Graph) -> bool:
-    """Whether of an individual nothing but its class is said, and nothing refers to it: it takes part in nothing."""
+    """Whether an individual has nothing but a class, and nothing refers to it, so that it has no effect."""
     is_mentioned = any(predicate != RDF.type for predicate in data.predicates(node, None))
     return isinstance(node, URIRef) and not is_mentioned and (None, None, node) not in data
 
@@ -304,9 +304,9 @@ class _Possible:
 def dead_rules(content: Content, model: Model) -> list[tuple[Rule, Atom]]:
     """Find the enabled rules that fire in no state, each with an atom of its body that can never hold.
 
-    What no ontology asserts, no state adds and no rule that can fire concludes, cannot hold. Each property is
-    considered by itself, and individuals are not told apart. So a rule that is returned is dead, but not every dead
-    rule is returned.
+    An atom cannot hold if no ontology asserts it, no state adds it and no rule that can fire concludes it. Each
+    property is considered separately, and individuals are not distinguished. So every rule that is returned is dead,
+    but not every dead rule is returned.
     """
     possible = _Possible(content, model)
     waiting = list(content.enabled_rules)

@@ -1,4 +1,4 @@
-"""Ask Pellet what follows in situations, and which conjunctions of atoms hold in them."""
+"""Find what follows in situations, and which conjunctions of atoms hold in them, with Pellet."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ Body = tuple[Atom, ...]
 
 @dataclass(frozen=True)
 class Situation:
-    """What rules are tested in.
+    """A situation in which rules are tested.
 
     Attributes:
         state: the knowledge state.
-        facts: what is asserted besides, as triples.
+        facts: additional assertions, as triples.
         ranges: words for the region that the state stands for; empty for a single state.
     """
 
@@ -58,7 +58,7 @@ class Outcome:
 
     Attributes:
         conclusion: what is inferred and planned; None where the situation contradicts itself.
-        contradiction: what contradicts what.
+        contradiction: a description of the contradiction.
     """
 
     conclusion: Conclusion | None
@@ -88,7 +88,7 @@ class Outcome:
 class Prover:
     """One knowledge base in Pellet, which concludes what follows in situations.
 
-    Conjunctions of atoms can be asked for: each is the body of a rule of its own, whose head is of an individual and a
+    Conjunctions of atoms can be queried: each is the body of a separate rule, whose head has an individual and a
     property that nothing else mentions, so that it changes nothing.
 
     Attributes:
@@ -122,7 +122,7 @@ class Prover:
         Args:
             base: the ontologies and rules.
             limit: of Pellet's time for one situation.
-            bodies: conjunctions of atoms to be asked for; each must be safe, as the body of a rule is.
+            bodies: conjunctions of atoms to query; each must be safe, as the body of a rule is.
             improves_exceeded: as ManagingSettings has it.
 
         Raises:
@@ -182,7 +182,7 @@ class Prover:
             return frozenset()
 
     def may_hold(self, cases: Sequence[PolicyCase], wanted: frozenset[int]) -> Iterator[PolicyCase]:
-        """Leave out cases in which none of the wanted conjunctions can hold.
+        """Remove cases in which none of the wanted conjunctions can hold.
 
         What several states assert is taken together: what does not follow from all of it follows from no part of it.
         Where they contradict one another, they are divided; states in which different functions are grounded would, as

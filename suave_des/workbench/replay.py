@@ -1,4 +1,4 @@
-"""Replay recorded missions with one rule more, or one less: what would have been inferred and decided."""
+"""Replay recorded missions with one rule added or removed: what would have been inferred and decided."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class ReplayedCycle:
 
     Attributes:
         t_s: mission time.
-        state: what was reasoned about.
+        state: the state.
         firings: of the rule.
         decisions: those that would have been different.
         contradiction: for a state that would contradict itself, what contradicts what.
@@ -124,7 +124,7 @@ class MissionReplay:
 
 
 def _firing_text(firing: Firing) -> str:
-    """What is concluded with which individuals; numbers, which differ each time, are left out."""
+    """Describe conclusions and individuals, without numbers, which differ each time."""
     bound = ", ".join(f"?{name} = {value}" for name, value in firing.bindings if not isinstance(value, Decimal))
     known = "" if firing.is_new else " (known without it)"
     return f"{', '.join(map(str, firing.facts))}{known} with {bound or 'nothing bound'}"
@@ -140,11 +140,11 @@ class RuleChange:
     """The rule to try, and the knowledge base to try it on.
 
     Attributes:
-        text: the rule, as "name: body -> head"; it takes the place of those of its name. None: no rule is added.
-        disabled: in its place, the name of a rule to switch off.
+        text: the rule, as "name: body -> head"; it replaces those of the same name. None: no rule is added.
+        disabled: alternatively, the name of a rule to disable.
         ontologies: in place of those of the missions' scenario.
         scenario: file or name of a scenario in place of that of the missions.
-        rules: files of rules as text, besides the scenario's.
+        rules: files of rules as text, in addition to the scenario's.
         disabled_rules: names of rules to switch off with and without the change.
         reasoner: in place of the scenario's.
         limit_s: of the reasoner, for one state.
@@ -171,9 +171,9 @@ class _RecordedMission:
 
 
 def try_rule(folder: Path, change: RuleChange) -> Iterator[MissionReplay]:
-    """Try a rule, or the lack of one, on recorded missions, one after the other.
+    """Try adding or disabling a rule on recorded missions, one after the other.
 
-    Only the recorded states are reasoned about: what would have followed from another decision is not simulated.
+    Only the recorded states are evaluated: the consequences of different decisions are not simulated.
 
     Args:
         folder: output folder of a mission or of a campaign that recorded its knowledge, or a folder of such folders.
@@ -263,7 +263,7 @@ class _Comparison:
         return pellet_for(self.with_rule.base)
 
     def replay(self, record: KnowledgeRecord) -> ReplayedCycle | None:
-        """What the change does in a recorded reasoning cycle; None: nothing."""
+        """Return the effect of the change in a recorded reasoning cycle; None if it has none."""
         state = record.state
         recorded, _ = _decisions(self.before, state)
         then, contradiction = _decisions(self.after, state)

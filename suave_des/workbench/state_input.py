@@ -33,12 +33,12 @@ _KEYS: Final = tuple(_NOUNS)
 
 @dataclass(frozen=True)
 class ManagingSettings:
-    """What the managing subsystem does in code, besides what the rules say.
+    """Behaviour of the managing subsystem that is not in the rules.
 
     Attributes:
-        improves_exceeded: whether an objective is also adapted when a measured value exceeds what its present design
+        improves_exceeded: whether an objective is also adapted when a measured value exceeds what its current design
             expects (revision 2023).
-        always_improved: functions whose objective carries o_always_improve (revision 1.5).
+        always_improved: functions whose objective has o_always_improve (revision 1.5).
         measured: quality attribute types that the scenario measures.
     """
 
@@ -111,7 +111,7 @@ class StateBuilder:
         return {"components": base.components, "measurements": base.quality_attributes}.get(kind, base.functions)
 
     def _check_status(self, property_name: str, value: str) -> None:
-        """Refuse a status that is nearly one that a rule mentions: nothing would follow from it."""
+        """Reject a status that resembles one that a rule mentions, because nothing would follow from it."""
         known = {
             term.text
             for rule in self.base.rules
@@ -164,11 +164,11 @@ class StateBuilder:
                     raise document.error(error.problem, key_path, error.remedy) from None
 
     def add_at(self, words: Iterable[str], option: str = "--at") -> None:
-        """Add parts of a state, each named as is shortest.
+        """Add parts of a state, each in its shortest form.
 
         Args:
             words: each NAME=VALUE (a quality attribute, a component, or a function with its design), a YAML file of a
-                state, or FOLDER@TIME for what a mission recorded last until a time in s.
+                state, or FOLDER@TIME for the last state that a mission recorded up to a time in s.
             option: for messages.
 
         Raises:
@@ -199,7 +199,7 @@ class StateBuilder:
         raise InputError(problem, remedy=did_you_mean(name, [each for kind in kinds for each in self._known(kind)]))
 
     def add_state(self, state: KnowledgeState) -> None:
-        """Add all parts of a state; what monitors report of things that the ontologies do not have is left out.
+        """Add all parts of a state; reports about things that the ontologies do not have are ignored.
 
         Raises:
             InputError: the knowledge base lacks a function or a design.
@@ -269,10 +269,10 @@ def recorded_states(folder: Path, run: int | None = None) -> tuple[KnowledgeReco
 
 
 def recorded_state(records: Iterable[KnowledgeRecord], at_s: float) -> KnowledgeState:
-    """The state that was recorded last until a mission time.
+    """Return the last state recorded up to a mission time.
 
     Raises:
-        InputError: the first one came later.
+        InputError: the first state was recorded later.
     """
     known = list(records)
     before = [record for record in known if record.t_s <= at_s]

@@ -159,7 +159,7 @@ CASES: dict[str, tuple[Any, ...]] = {
         "disabled r: Component(?c) -> fd_realisability(fd_spiral_high, false)",
         {},
         "",
-        "never fires: it is switched off",
+        "never fires: it is disabled",
     ),
     "a value on the limit": (
         None,

@@ -31,7 +31,7 @@ one_at_a_time: Final = threading.RLock()
 
 
 def load_n_triples(text: str, *, explain: bool = False) -> Any:
-    """Load a Pellet knowledge base; to be called with the lock held."""
+    """Load a Pellet knowledge base; call this with the lock held."""
     model = jvm.java_class("com.hp.hpl.jena.rdf.model.ModelFactory").createDefaultModel()
     if "\\U" in text:
         text = _ESCAPE.sub(lambda found: chr(int(found[1], 16)) if found[1] else found[0], text)
@@ -46,7 +46,7 @@ def load_n_triples(text: str, *, explain: bool = False) -> Any:
 
 @contextmanager
 def _java_errors(ontology: Ontology) -> Iterator[None]:
-    """Convert what Java throws, where Pellet cannot use the ontologies at all, to an error for the user."""
+    """Convert Java's exceptions, if Pellet cannot use the ontologies at all, to an error for the user."""
     try:
         yield
     except jvm.JavaError as error:
@@ -151,7 +151,7 @@ class InProcessPellet:
         ]
 
     def _refuse_dropped_rules(self) -> None:
-        """Raise if Pellet logged that it leaves out a rule; warnings that name the rule come first."""
+        """Raise an error if Pellet logged that it drops a rule; warnings that name the rule come first."""
         warnings = sorted(jvm.take_warnings(), key=lambda warning: _RULE.search(warning) is None)
         for warning in warnings:
             named = _RULE.search(warning)
@@ -162,7 +162,7 @@ class InProcessPellet:
 
 
 class Trace(NamedTuple):
-    """What Pellet says a contradiction follows from.
+    """Pellet's trace of a contradiction.
 
     Attributes:
         message: the individual and the property that it names.
@@ -192,7 +192,7 @@ def trace_contradiction(text: str) -> Trace:
 
 
 def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> ContradictionError:
-    """Explain a contradiction: on what, by which rules, and from which assertions of the state."""
+    """Explain a contradiction: its subject, the rules involved, and the assertions of the state."""
     reason, axioms, numbers = trace_contradiction(ontology.content.n_triples() + "".join(map(n_triple, assertions)))
     rules = sorted(_rule_with_place(ontology, ontology.rules[number]) for number in numbers)
     facts = [
@@ -222,7 +222,7 @@ def _rule_with_place(ontology: Ontology, rule: Rule) -> str:
 
 
 def _dropped(rule: Rule, warning: str) -> KnowledgeError:
-    """The error for a rule that Pellet leaves out with nothing but a line in its log."""
+    """Make the error for a rule that Pellet drops with only a line in its log."""
     reason = warning.rpartition("): ")[2] if "): " in warning else warning
     return KnowledgeError(
         f"Pellet does not use rule {rule.name}: {_RULE.sub(rule.name, reason)}",

@@ -34,7 +34,7 @@ OPTIONS: Final = (
 
 @contextmanager
 def without_options_of_others() -> Iterator[None]:
-    """Hide variables that add options to every Java: it would print them, and might not start."""
+    """Hide environment variables that add options to every Java: it would print them, and might not start."""
     hidden = {name: os.environ.pop(name) for name in _OPTION_VARIABLES if name in os.environ}
     try:
         yield
@@ -43,7 +43,7 @@ def without_options_of_others() -> Iterator[None]:
 
 
 def launcher_environment(*options: str) -> dict[str, str]:
-    """The environment for a java command: with these options, and none that variables add to every Java."""
+    """Return the environment for a java command with these options only."""
     others = {name: value for name, value in os.environ.items() if name not in _OPTION_VARIABLES}
     quoted = ('"{}"'.format(option.replace("\\", r"\\")) if " " in option else option for option in options)
     return {**others, "JDK_JAVA_OPTIONS": " ".join(quoted)}
@@ -90,7 +90,7 @@ def java_library() -> Path:
 
 
 def jars() -> list[str]:
-    """owlready2's jars, without those that cost time at the start and that reasoning does not need.
+    """Return owlready2's jars, except those that reasoning does not need and that slow down the start.
 
     log4j takes 0.2 s to find out that there is nothing to log. Jena starts its SPARQL engine (ARQ) where it finds it.
     """

@@ -73,7 +73,7 @@ def _start(more: tuple[str, ...]) -> None:
 
 
 def make_archive_later() -> None:
-    """Shorten the next start of Java; to be called after the first inference."""
+    """Make the archive that shortens the next start of Java; call this after the first inference."""
     while _archives:
         java_archive.make_later(_archives.pop())
 

@@ -30,14 +30,14 @@ _abandoned: Final[list[str]] = []
 
 
 def times_abandoned() -> int:
-    """How often work was abandoned in this process: it may still run, and then the process cannot end as usual."""
+    """Count the abandoned jobs of this process: one may still be running, and then the process cannot end as usual."""
     return len(_abandoned)
 
 
 class TimeLimit:
-    """Does work in a thread of its own, and stops waiting for it after a time.
+    """Runs work in a separate thread, and stops waiting for it after a time limit.
 
-    Java code cannot be stopped from outside: the thread goes on until the process ends.
+    Java code cannot be stopped from outside: the thread continues until the process ends.
 
         TimeLimit(10.0).run(lambda: reasoner.infer(state), "reasoning on a state")
 
@@ -61,7 +61,7 @@ class TimeLimit:
 
         Args:
             work: what to do.
-            doing: what it is, for the message: "reasoning on the state ...".
+            doing: a description for the message: "reasoning on the state ...".
             rules: those that it takes into account, so that the message can name one that never comes to an end.
 
         Raises:
@@ -90,7 +90,7 @@ class TimeLimit:
             raise self.exceeded(doing, rules) from None
 
     def exceeded(self, doing: str, rules: Iterable[Rule] = ()) -> KnowledgeError:
-        """The error for work that took too long."""
+        """Make the error for work that took too long."""
         more = f", or allow more with {self._option}" if self._option else ""
         problem, remedy = (
             f"{doing}: not done after {self.seconds:g} s",
@@ -136,5 +136,5 @@ def _end_all() -> None:
 
 
 def reasoning_on(state: KnowledgeState) -> str:
-    """What a reasoner does with a state, for the message."""
+    """Describe a reasoner's work on a state, for the message."""
     return f"reasoning on the state {state}"

@@ -121,7 +121,7 @@ def _reason(world: owlready2.World) -> bool:
 
 
 def _remove_temporary_file(trace: TracebackType | None) -> None:
-    """Remove the file that owlready2 leaves behind when its reasoner fails or is interrupted, in whatever thread."""
+    """Remove the file that owlready2 leaves behind when its reasoner fails or is interrupted, in any thread."""
     while trace is not None:
         file = trace.tb_frame.f_locals.get("tmp")
         if trace.tb_frame.f_code.co_name == "sync_reasoner_pellet" and file is not None:
@@ -131,7 +131,7 @@ def _remove_temporary_file(trace: TracebackType | None) -> None:
 
 
 def _add_exactly(world: owlready2.World, ontology: owlready2.Ontology, triple: Triple) -> None:
-    """Assert a decimal as it was written: the loader would make a float of it, and write 1e-05, not a decimal."""
+    """Assert a decimal as written: the loader would convert it to a float, and write 1e-05, not a decimal."""
     subject, predicate, value = triple
     assert isinstance(value, Lit)
     subject_id, predicate_id, datatype_id = map(world._abbreviate, (subject, predicate, value.datatype))
@@ -139,14 +139,14 @@ def _add_exactly(world: owlready2.World, ontology: owlready2.Ontology, triple: T
 
 
 def _as_float(triple: Triple) -> Triple:
-    """The triple that owlready2 makes of such a decimal when Pellet returns it, rounded: it is no second value."""
+    """Return the triple to which owlready2 rounds such a decimal when Pellet returns it: it is not a second value."""
     subject, predicate, value = triple
     assert isinstance(value, Lit)
     return subject, predicate, Lit(str(float(value.text)), value.datatype)
 
 
 def _is_lossy(value: str | Lit) -> bool:
-    """Whether owlready2, which keeps numbers as floats, would write a decimal in another way than it was."""
+    """Whether owlready2, which stores numbers as floats, would write a decimal differently."""
     return (
         isinstance(value, Lit)
         and value.datatype == XSD + "decimal"

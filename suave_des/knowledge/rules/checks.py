@@ -1,4 +1,4 @@
-"""Checks of rules: all that Pellet drops or ignores silently, and what no reasoner could use.
+"""Checks of rules: mistakes that Pellet silently drops or ignores, or that no reasoner could use.
 
 Which mistakes Pellet ignores was found by giving it each of them (owlready2 0.51's Pellet).
 """
@@ -53,7 +53,7 @@ class RuleProblem:
     Attributes:
         message: what is wrong.
         place: where in the rule's file (rules as text), or in the rule's own text (rules of ontologies).
-        remedy: what would be right.
+        remedy: how to correct it.
         is_fatal: whether the rule cannot work; otherwise it is only suspicious.
     """
 
@@ -64,7 +64,7 @@ class RuleProblem:
 
 
 def check_rule(rule: Rule, vocabulary: Vocabulary) -> list[RuleProblem]:
-    """Find all that is wrong with one rule, in the order of its text."""
+    """Find all problems of one rule, in the order of its text."""
     problems = list(_check_variables(rule))
     for number, atom in enumerate(rule.atoms):
         problems += _check_atom(atom, vocabulary, is_head=number >= len(rule.body))
@@ -86,7 +86,7 @@ def first_error(rule: Rule, problems: Iterable[RuleProblem]) -> RuleError | None
 def check_property_use(triples: Iterable[Triple], rules: Iterable[Rule]) -> None:
     """Check that rules use each property as it is declared.
 
-    Where one does not, Pellet leaves out every rule with that property, and names the wrong ones.
+    Otherwise Pellet drops every rule with that property, and names the wrong ones.
 
     Raises:
         KnowledgeError: with the file and the rule.
@@ -129,7 +129,7 @@ def _check_atom(atom: Atom, vocabulary: Vocabulary, *, is_head: bool) -> Iterato
 
 
 def _check_predicate(atom: Atom, name: str, vocabulary: Vocabulary) -> RuleProblem | None:
-    """Check that a class or property is declared, and as what it is used as."""
+    """Check that a class or property is declared, and used as declared."""
     declared = vocabulary.kinds.get(atom.predicate, frozenset())
     wanted = _DECLARED_AS[atom.kind]
     if wanted in declared:
@@ -158,7 +158,7 @@ def _a(kind: str) -> str:
 def _check_argument(
     atom: Atom, number: int, term: Term, vocabulary: Vocabulary, *, takes_value: bool, is_head: bool
 ) -> Iterator[RuleProblem]:
-    """Check that an argument is an individual or a value, as is needed, and can be one of that property."""
+    """Check that an argument is an individual or a value, as required, and possible for that property."""
     name, place = local_name(atom.predicate), atom.place(number)
     if isinstance(term, Lit) and not takes_value:
         yield RuleProblem(f"{name}: {literal_text(term)} is a value, but an individual is needed", place)
@@ -188,7 +188,7 @@ def _check_argument(
 
 
 def _check_comparisons(rule: Rule, vocabulary: Vocabulary) -> Iterator[RuleProblem]:
-    """Find comparisons that no value satisfies, by themselves or together: the rule then never fires."""
+    """Find comparisons that no value satisfies, alone or together, so that the rule never fires."""
     holders = {
         atom.arguments[1].name: atom.predicate
         for atom in rule.body
@@ -252,7 +252,7 @@ def _uses(atoms: Iterable[Atom]) -> Iterator[tuple[Atom, int, str]]:
 
 
 def _check_variables(rule: Rule) -> Iterator[RuleProblem]:
-    """Find variables that nothing binds, and variables that stand for an individual and for a value at once."""
+    """Find unbound variables, and variables that stand for both an individual and a value."""
     individuals: dict[str, Place] = {}
     values: dict[str, Place] = {}
     for atom, number, name in _uses(rule.atoms):
@@ -289,7 +289,7 @@ def _computed(builtins: Iterable[Atom], bound: set[str]) -> set[str]:
 
 
 def recursing_rules(rules: Iterable[Rule]) -> list[Rule]:
-    """Find rules that compute values from what, by whatever rules, follows from the values that they compute."""
+    """Find rules whose computed values feed back, through any rules, into their own computation."""
     enabled = [rule for rule in rules if rule.enabled]
     follows: dict[str, set[str]] = {}  # properties and classes that a rule concludes from one
     for rule in enabled:

@@ -84,7 +84,7 @@ def read_rule(text: str, vocabulary: Vocabulary, file: Path) -> Rule:
     Args:
         text: "name: body -> head".
         vocabulary: of the ontologies.
-        file: what messages call the text.
+        file: the name of the text in messages.
 
     Raises:
         RuleError: it is not one rule, or cannot be used.

@@ -1,4 +1,4 @@
-"""What names in rules mean: the vocabulary of an ontology, and the lookup of the names of a parsed rule."""
+"""Names in rules: the vocabulary of an ontology, and the lookup of a parsed rule's names."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ def _iri(name: str, place: Place | None, vocabulary: Vocabulary, file: Path, kin
 
 
 def _kind(predicate: str, arguments: tuple[Term, ...], vocabulary: Vocabulary) -> AtomKind:
-    """What an atom uses its name as: as it is declared where that is possible, else as its arguments suggest."""
+    """Return the kind of an atom's name: as declared if possible, otherwise as its arguments suggest."""
     if predicate in (SAME, DIFFERENT):
         return "same" if predicate == SAME else "different"
     if predicate.startswith(SWRLB):

@@ -109,7 +109,7 @@ class ParsedRules:
 
 
 def parse_rules(text: str, file: Path | str | None = None) -> ParsedRules:
-    """Parse all rules of a text; after an error parsing goes on with the next rule that begins a line.
+    """Parse all rules of a text; after an error, parsing continues with the next rule that begins a line.
 
     parse_rules("Low: hasValue(?q, ?v) ^ lessThan(?v, 0.25) -> Role(?q)").rules[0].name  # "Low"
     """
@@ -161,7 +161,7 @@ def _parser() -> tuple[Lark, _Builder]:
 
 
 def _error(text: str, at: int, accepted: set[str], file: Path | str | None) -> RuleError:
-    """Say what was found in place of what."""
+    """Describe the token that was found, and those that were expected."""
     place = str(Place(text.count("\n", 0, at) + 1, at - text.rfind("\n", 0, at)))
     if text.startswith('"', at) and "STRING" in accepted:
         return RuleError("this text has no closing quote on its line", file=file, place=place)

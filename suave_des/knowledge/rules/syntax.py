@@ -40,7 +40,7 @@ class Place(NamedTuple):
     column: int
 
     def __str__(self) -> str:
-        """As error messages show it."""
+        """Return the form that error messages show."""
         return f"line {self.line}, column {self.column}"
 
 
@@ -97,7 +97,7 @@ class ParsedRule:
         name: its name.
         body: atoms that must hold.
         head: atoms that then hold.
-        enabled: whether it is in force.
+        enabled: whether it is enabled.
         place: where it begins.
     """
 

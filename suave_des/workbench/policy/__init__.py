@@ -1,1 +1,1 @@
-"""The policy: what is decided in every state; as cases, as tables and as a picture."""
+"""The policy, the decision in every state: as cases, as tables and as a picture."""

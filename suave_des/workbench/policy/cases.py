@@ -1,4 +1,4 @@
-"""The policy: what is decided in every state, over ranges of measured values, component reports and groundings."""
+"""The policy: the decision in every state, over ranges of measured values, component reports and groundings."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ OnCount = Callable[[int, int], object]
 
 @dataclass(frozen=True)
 class PolicyCase:
-    """One kind of state, and what is decided in it.
+    """One kind of state, and the decisions in it.
 
     Attributes:
         ranges: of each attribute's measured value, in the policy's order.
@@ -92,7 +92,7 @@ class Policy:
         alike: groups of interchangeable components.
         without_effect: measured attributes that no rule and no design refers to.
         computing: rules that compute with numbers; if there are any, the ranges are samples and prove nothing.
-        max_failed: at most so many components report anything.
+        max_failed: maximum number of components that report a status.
     """
 
     attributes: tuple[str, ...]
@@ -120,7 +120,7 @@ class Policy:
 
     @cached_property
     def functions(self) -> tuple[str, ...]:
-        """Functions that a state asks for."""
+        """Functions that have an objective in a state."""
         return tuple(sorted({function for case in self.cases for function in case.asked}))
 
 
@@ -138,9 +138,9 @@ def make_policy(
         base: the ontologies.
         settings: which attributes are measured, and what the managing subsystem does in code.
         infer: analyzes a state and plans on it.
-        max_failed: at most so many components report anything.
+        max_failed: maximum number of components that report a status.
         space: what to tell apart; None: what can have an effect.
-        on_count: called again and again with how many kinds of states of how many are decided.
+        on_count: called repeatedly with the number of kinds of states decided so far, and their total.
 
     Raises:
         InputError: max_failed is negative, or there would be too many states.
@@ -233,7 +233,7 @@ def _decide(case: PolicyCase, infer: Callable[[KnowledgeState], Conclusion]) -> 
 
 
 def _with_flip_flops(cases: list[PolicyCase]) -> list[PolicyCase]:
-    """Mark the cases whose decisions lead back to their own groundings by way of others, while all else is constant."""
+    """Mark the cases whose decisions lead through other groundings back to their own, all else being constant."""
     found = {(case.asked, case.state.groundings): case for case in cases}
     flipping: dict[object, tuple[str, ...]] = {}
     for start in found:
@@ -257,5 +257,5 @@ def _with_flip_flops(cases: list[PolicyCase]) -> list[PolicyCase]:
 
 
 def no_proof(computing: Sequence[str]) -> str:
-    """Say that a policy is not a proof, because of rules that compute."""
+    """Warn that a policy is not a proof, because of rules that compute."""
     return f"not a proof, as measured values are samples for rules that compute: {', '.join(computing)}"

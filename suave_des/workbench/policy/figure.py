@@ -1,4 +1,4 @@
-"""The policy as a picture: which design is chosen where, over one or two measured values."""
+"""The policy as a picture: the chosen design over one or two measured values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The policy as tables: what each function's choice depends on, and all cases as rows of a CSV file."""
+"""The policy as tables: each function's choice over the values that it depends on, and all cases as CSV rows."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class TableRow:
 
     Attributes:
         components: what components report, as text; empty where that has no effect.
-        groundings: present design by function, where it has an effect.
+        groundings: current design by function, where it has an effect.
         outcomes: for each column.
     """
 

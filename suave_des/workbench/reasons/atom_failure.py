@@ -1,4 +1,4 @@
-"""Say why an atom of a rule does not hold: the value found, the value needed, and what would help."""
+"""Describe why an atom of a rule does not hold: the value found, the value needed, and a remedy."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def _unequal(values: list[str | Lit], wanted: str | Lit) -> str:
 
 
 def _help(base: Ontology, atom: Atom) -> str:
-    """What would help, where nothing is known of a property or class."""
+    """Return a remedy if nothing is known of a property or class."""
     if _only_said_to_exist(base, atom.predicate):
         name = local_name(atom.predicate)
         return f"; an axiom says that there is some {name}, but not which, and rules see known individuals only"

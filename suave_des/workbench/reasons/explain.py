@@ -28,13 +28,13 @@ _FORMS: Final = (
 
 @dataclass(frozen=True)
 class Candidate:
-    """What the planner made of a function design.
+    """The planner's verdict on a function design.
 
     Attributes:
         design: its name.
         verdict: "chosen", "left out" or "not the best".
         reason: why.
-        because: how the facts follow for which it is left out.
+        because: derivations of the facts for which it is ruled out.
     """
 
     design: str
@@ -50,7 +50,7 @@ class DecisionExplanation:
     Attributes:
         function: which function.
         answer: in one sentence.
-        because: how the facts follow that call for adaptation.
+        because: derivations of the facts that require adaptation.
         candidates: all designs of the function, by name; none when there is nothing to decide.
     """
 
@@ -228,7 +228,7 @@ class _Explainer:
         return Candidate(design, "not the best", f"performance {own} < {best} of {decision.design}")
 
     def _objection(self, function: str, design: str) -> Iterator[Derivation]:
-        """How the facts follow on which a design was left out, where the reasoner found them."""
+        """Derivations of the inferred facts for which a design was ruled out."""
         for fact in (
             Fact(design, "fd_realisability", False),
             Fact(design, "fd_error_log", objective_name(function)),

@@ -47,7 +47,7 @@ class TestedKnowledge:
         scenario: name or path.
         ontologies: files in place of the scenario's.
         rules: files of rules besides the scenario's.
-        disabled_rules: names of rules to switch off.
+        disabled_rules: names of rules to disable.
     """
 
     scenario: str = "seams2023"
