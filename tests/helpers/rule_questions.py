@@ -134,8 +134,8 @@ CASES: dict[str, tuple[Any, ...]] = {
         "r: Component(?a) ^ Component(?b) ^ differentFrom(?a, ?b) -> fd_realisability(fd_spiral_high, false)",
         {},
         "",
-        "differentFrom(?a, ?b) does not hold: that two names mean different things must be asserted: OWL does not "
-        "assume it",
+        "differentFrom(?a, ?b) does not hold: OWL does not assume that different names mean different individuals: "
+        "assert it",
     ),
     "a variable of the head that the body does not bind": (
         "r: Component(?c) -> requiredBy(?c, ?fd)",
