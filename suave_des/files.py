@@ -117,7 +117,7 @@ def json_text(content: Mapping[str, Any]) -> str:
 def check_output_folder(
     folder: Path, family: str, *, overwrite: bool, left_over: Callable[[str], bool] = lambda name: False
 ) -> None:
-    """See that results can go into a folder, without changing anything.
+    """Check that results can go into a folder, without changing anything.
 
     Args:
         folder: where they are to go.
@@ -150,7 +150,7 @@ def check_output_folder(
 
 
 def check_output_file(file: Path, *, overwrite: bool) -> None:
-    """See that a file can be written, without changing anything.
+    """Check that a file can be written, without changing anything.
 
     Raises:
         InputError: it is a folder, its folder does not exist or cannot be written, or it exists and `overwrite` is

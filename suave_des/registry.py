@@ -57,7 +57,7 @@ def is_built_in(name: str) -> bool:
 
 
 def takes_argument(name: str) -> bool:
-    """Whether what stands before the colon of a name is no module, as in fixed:MODE."""
+    """Whether the part of a name before the colon is not a module, as in fixed:MODE."""
     return name.partition(":")[0] in _FAMILIES
 
 
@@ -77,7 +77,7 @@ def name_of(manager: ManagerLike) -> str:
         name_of(Metacontrol)  # "metacontrol"
 
     Raises:
-        InputError: it is no manager, or a class that cannot be found by its name.
+        InputError: it is not a manager, or a class that cannot be found by its name.
     """
     if isinstance(manager, str):
         return manager
@@ -122,7 +122,7 @@ def _member(family: str, argument: str) -> type[ManagingSubsystem]:
 
 
 def _check_hooks(name: str, kind: type[ManagingSubsystem]) -> None:
-    """See that each hook that a class has can be called as hooks are called.
+    """Check that each hook that a class has can be called as hooks are called.
 
     Raises:
         InputError: one takes other arguments; or none is there, but something that resembles one.

@@ -1,1 +1,1 @@
-"""Campaigns: many missions, their executors and result files. `run_campaign` is all that most users need."""
+"""Campaigns: many missions, their executors and result files. Most users need only `run_campaign`."""

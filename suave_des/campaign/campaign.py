@@ -1,4 +1,4 @@
-"""Campaigns, for programs: many missions of one scenario under several managers, kept as they finish."""
+"""Campaigns, for programs: many missions of one scenario under several managers, saved as they finish."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ __all__ = ["CampaignInterrupted", "CampaignOptions", "CampaignResult", "Progress
 
 
 class CampaignOptions(Replacements, total=False):
-    """Options of a campaign by name, as described at CampaignSpec; None or left out: as in the campaign file."""
+    """Options of a campaign by name, see CampaignSpec; None or missing ones are taken from the campaign file."""
 
     sweep: Mapping[str, Any] | None
     perturbations: Mapping[str, Any] | None
@@ -76,7 +76,7 @@ def run_campaign(
     """Run `runs` missions of a scenario under each manager, at each point of the sweep if there is one.
 
     The result is the same for any number of workers, and however often the campaign was interrupted and resumed. A
-    mission that fails (its manager raises, it takes too long, it ends its worker process again and again) has no row;
+    mission that fails (its manager raises, it takes too long, its worker process dies repeatedly) has no row;
     the others are kept.
 
     Example:
@@ -147,15 +147,15 @@ def resume_campaign(
     managers: Collection[str] = (),
     confirmed: bool = False,
 ) -> CampaignResult:
-    """Go on with a campaign where it stopped; its specification is in its folder.
+    """Resume a campaign where it stopped; its specification is in its folder.
 
     Missions that failed for reasons that may not recur (time-out, a worker that was killed) are run again.
 
     Args:
         folder: the campaign's output folder.
-        workers: as of run_campaign; it may be another number.
-        runs: more runs than were asked for at first; left out: as many.
-        until_ci: the metric asked for at first with a smaller half-width; left out: as at first.
+        workers: as in run_campaign; the number may differ.
+        runs: a greater number of runs; by default the original number.
+        until_ci: the original metric with a smaller half-width; by default the original one.
         on_progress: called when missions are done.
         scheduler: as of run_campaign; it may be another, or none.
         managers: those of the campaign's that are not installed; their code is run only if they are named here.
@@ -195,7 +195,7 @@ def _check_new(folder: Path, *, overwrite: bool) -> None:
 
 
 def _is_of_campaign(name: str) -> bool:
-    """Whether a file is a campaign's own; without a store it is what is left of one that was killed as it began."""
+    """Whether a file belongs to a campaign; without a store, it was left by one that was killed at its start."""
     return name in (LOCK_FILE, SUAVE_FOLDER, *FILES) or name.startswith((STORE_FILE, NEW_STORE_FILE))
 
 
@@ -212,7 +212,7 @@ class _Campaign:
     Args:
         spec: what to run.
         file: the campaign file, if the specification names one.
-        stack: what is started is stopped at its end.
+        stack: stops at its end whatever the campaign starts.
         loaded: the scenario; None: it is read.
     """
 
@@ -244,7 +244,7 @@ class _Campaign:
         return self._stack.enter_context(LocalWorkers(self.spec.managers, workers))
 
     def _executor(self) -> Executor:
-        """Return what runs the missions; a cluster is contacted only when all else is checked."""
+        """Return the executor; a cluster is contacted only when everything else is checked."""
         if self.spec.scheduler is None:
             return self._local
         from suave_des.campaign.executors.dask_cluster import connected
@@ -256,7 +256,7 @@ class _Campaign:
         return ProgressTracker(self.variation.sweep.points, spec.managers, spec.runs, spec.until)
 
     def run(self, on_progress: OnProgress | None, *, resumed: bool) -> CampaignResult:
-        """Run what is not done yet, and write the files."""
+        """Run the missions that are not done yet, and write the files."""
         executor, folder = self._executor(), self.spec.out
         with ExitStack() as stack:
             if folder is not None:

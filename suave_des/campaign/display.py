@@ -81,7 +81,7 @@ class _Display(RichProgress):
         (self._task,) = self.tasks
 
     def show(self, progress: Progress) -> None:
-        """Take what is known; called for each mission or chunk."""
+        """Take the current progress; called for each mission or chunk."""
         now = time.monotonic()
         if progress.done != self._done:
             self._done, self._done_s = progress.done, now
@@ -93,7 +93,7 @@ class _Display(RichProgress):
             self.look()
 
     def look(self) -> None:
-        """Bring what is shown up to date."""
+        """Update the display."""
         if (progress := self.progress) is None:
             return
         self._groups = progress.groups()
@@ -159,7 +159,7 @@ class _Display(RichProgress):
 
 @contextmanager
 def _as_lines(display: _Display, console: Console) -> Iterator[None]:
-    """Write a line every so often, from a thread, so that they come also while a mission takes long."""
+    """Write lines periodically, from a thread, so that they also appear during a long mission."""
     over, has_written = threading.Event(), threading.Event()
 
     def write() -> None:
@@ -212,7 +212,7 @@ def estimated(mean: float | None, half_width: float | None) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Return a time that people read: 8 s, 2 min 5 s, 3 h 20 min."""
+    """Return a human-readable duration: 8 s, 2 min 5 s, 3 h 20 min."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"

@@ -1,8 +1,8 @@
-"""Ensembles: parameter sets that fit the real runs equally well, and what of a campaign's conclusions survives them.
+"""Ensembles: parameter sets that fit the real runs equally well, to test whether conclusions hold under all of them.
 
-What is not known of the real vehicle and its software is not noise: it is the same in every mission of theirs. A
+Unknown parameters of the real vehicle and its software are not noise: they are the same in all its missions. A
 campaign with an ensemble gives each run one of its members, the same under all managers, so that a difference between
-managers can be looked at member by member.
+managers can be analysed member by member.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Ensemble:
     members: tuple[tuple[float, ...], ...]
 
     def member(self, run: int) -> int:
-        """Return the number, from 1, of the member that a run uses; one after the other, and then again."""
+        """Return the number, from 1, of the member that a run uses: they are used in turn."""
         return (run - 1) % len(self.members) + 1
 
     def values(self, member: int) -> dict[str, float]:
@@ -79,7 +79,7 @@ def read_ensemble(name: str | Path, beside: Path | None = None) -> tuple[Ensembl
 
     Args:
         name: of a file, or of a shipped one, such as seams2023. Its columns are named by the key paths of the scenario;
-            columns `member` and `loss` are for readers.
+            columns `member` and `loss` are only for information.
         beside: folder of the file that names it; none: the current one.
 
     Returns:
@@ -125,8 +125,8 @@ def with_ensemble(loaded: LoadedScenario, variation: Variation, ensemble: Ensemb
 
     Args:
         loaded: the scenario.
-        variation: what else differs between missions.
-        ensemble: parameter sets of which each run has one.
+        variation: the other differences between missions.
+        ensemble: parameter sets, of which each run uses one.
         path: its file.
 
     Raises:
@@ -199,7 +199,7 @@ class MemberDifferences:
 
     @property
     def range(self) -> tuple[float, float] | None:
-        """Where the differences of 95 in 100 parameter sets lie; none for a single member.
+        """Range in which the differences of 95 in 100 parameter sets lie; None for a single member.
 
         It is the mean ± Student's t times the standard deviation of the members' means. The few runs of each member
         make it wider than the parameters do; with more of them it becomes narrower, down to that.

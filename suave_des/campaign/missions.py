@@ -1,4 +1,4 @@
-"""The missions of a campaign: which there are, what they have in common, and what each leaves behind."""
+"""The missions of a campaign: their keys, the job that they share, and their outcomes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from suave_des.scenario.loader import LoadedScenario
 
 
 class MissionKey(NamedTuple):
-    """Which mission of a campaign; missions and their rows are in the order of their keys.
+    """The key of a mission in a campaign; missions and their rows are in the order of their keys.
 
     Attributes:
         point: number of the sweep's point, from 0; 0 without a sweep.
@@ -44,7 +44,7 @@ def plan(
     *,
     run_by_run: bool = False,
 ) -> Iterator[MissionKey]:
-    """Yield the missions that are still to be run, in order.
+    """Yield the missions that have yet to be run, in order.
 
     Args:
         points: number of points of the sweep.
@@ -74,7 +74,7 @@ _cells: Callable[[MissionMetrics], Row] = attrgetter(*COLUMNS)
 
 
 def row_of(metrics: MissionMetrics) -> Row:
-    """Return the cells of runs.csv, with numbers rounded as in the file, from which all other figures follow."""
+    """Return the cells of runs.csv, rounded as in the file, from which all statistics are computed."""
     return tuple(rounded(cell) if isinstance(cell, float) else cell for cell in _cells(metrics))
 
 
@@ -90,7 +90,7 @@ class MissionFailure(NamedTuple):
         manager: name of the managing subsystem.
         run: number of the run.
         time_s: mission time at which it happened; None if that is not known.
-        cause: what the manager raised, or what else ended the mission.
+        cause: the manager's exception, or another reason why the mission ended.
         lasting: whether the mission itself failed; a time-out or a worker that was killed may not happen again, so a
             resumed campaign runs such a mission once more.
         point: of the sweep, from 0.
@@ -111,12 +111,12 @@ class MissionFailure(NamedTuple):
 
 
 class Remark(NamedTuple):
-    """Something about a manager that users should know; it comes among the outcomes, and is none.
+    """A remark about a manager for users; it is delivered among the outcomes.
 
     Attributes:
         manager: name of the managing subsystem.
         text: what.
-        times: how often; 0: that does not matter.
+        times: number of occurrences; 0 if irrelevant.
     """
 
     manager: str
@@ -134,11 +134,11 @@ Finished = tuple[MissionKey, MissionOutcome]
 
 @dataclass(frozen=True)
 class JobSpec:
-    """All that a worker needs besides the keys of the missions; it is sent by value.
+    """Everything that a worker needs apart from the missions' keys; it is sent by value.
 
     Attributes:
         loaded: the scenario with its files.
-        variation: what differs between missions besides manager and run.
+        variation: differences between missions apart from manager and run.
         managers: names, in the campaign's order.
         seed: the campaign's.
         time_out_s: wall-clock time that a mission may take.
@@ -153,7 +153,7 @@ class JobSpec:
     record_knowledge: bool = False
 
     def failed(self, key: MissionKey, cause: str) -> Finished:
-        """Return the outcome of a mission that was ended from outside."""
+        """Return the outcome of a mission whose process was ended."""
         return key, MissionFailure(self.managers[key.manager], key.run, None, cause, lasting=False, point=key.point)
 
     def timed_out(self, key: MissionKey) -> Finished:
@@ -180,4 +180,4 @@ class Executor(Protocol):
 
 
 class WorkerError(SuaveDesError):
-    """Missions cannot be run, because the processes that should run them end."""
+    """Missions cannot be run, because the processes that should run them die."""

@@ -1,4 +1,4 @@
-"""How a user's own managers and functions come to other processes and machines: by their files, or by value."""
+"""Sending users' managers and functions to other processes and machines: as files, or by value."""
 
 from __future__ import annotations
 

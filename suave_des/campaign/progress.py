@@ -1,4 +1,4 @@
-"""How far a campaign is: what is done, each manager's mean so far, and when a manager needs no more runs.
+"""Progress of a campaign: missions done, each manager's mean so far, and when a manager needs no more runs.
 
 Whether to stop early is decided in the order of the runs, so always at the same run.
 """
@@ -21,7 +21,7 @@ GROUPS_SHOWN = 8
 
 @dataclass(frozen=True, slots=True)
 class GroupProgress:
-    """How far one manager is, at one point of a sweep.
+    """Progress of one manager at one point of a sweep.
 
     Attributes:
         point: number of the sweep's point, from 0; 0 without a sweep.
@@ -47,19 +47,19 @@ class GroupProgress:
 
     @property
     def is_complete(self) -> bool:
-        """Whether no more missions are to come."""
+        """Whether all missions are done."""
         return self.done == self.runs
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a campaign is, in missions.
+    """Progress of a campaign, in missions.
 
     Attributes:
         done: missions that are done, failed ones among them.
         failed: missions that failed.
         total: missions that are to be done; it decreases when a manager is stopped early.
-        before: of those done, how many were done when the campaign was resumed.
+        before: number of those that were done when the campaign was resumed.
         metric: column of runs.csv of which groups() gives the mean.
         groups: returns the progress of each manager at each point, at most GROUPS_SHOWN, at the time of the call.
     """
@@ -74,7 +74,7 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class PairProgress:
-    """How well the difference of two managers is known, at one point of a sweep.
+    """Precision of the difference of two managers at one point of a sweep.
 
     Attributes:
         point: number of the sweep's point, from 0.
@@ -95,10 +95,10 @@ OnProgress = Callable[[Progress], None]
 
 
 class PairTracker:
-    """Follows the difference of two managers run by run, in the order of the runs, and says when it is known.
+    """Tracks the difference of two managers in the order of the runs, until it is known precisely enough.
 
-    It looks after every PAIR_STEP runs only: whoever looks after each stops too often just when the spread happens to
-    look small.
+    It checks only after every PAIR_STEP runs: checking after each run would stop too often when the spread happens to
+    be small.
 
     Args:
         half_width: wanted.
@@ -120,7 +120,7 @@ class PairTracker:
             value: of the metric.
 
         Returns:
-            The run after which no more are needed, as soon as that is known.
+            The run after which no more are needed; None until that is known.
         """
         if self.is_narrow or run < self._next:
             return None
@@ -141,7 +141,7 @@ class PairTracker:
         return self.differences.n >= FEWEST_PAIRS and half_width is not None and half_width < self._half_width
 
     def progress(self, point: int) -> PairProgress:
-        """Return how well the difference is known."""
+        """Return the precision of the difference."""
         known = self.differences
         return PairProgress(point, known.n, known.mean if known.n else None, known.half_width, self.is_narrow)
 
@@ -212,7 +212,7 @@ class GroupTracker:
         return half_width is not None and half_width < self._half_width
 
     def progress(self, point: int, manager: str) -> GroupProgress:
-        """Return how far the group is."""
+        """Return the group's progress."""
         known = self.values
         mean = known.mean if known.n else None
         return GroupProgress(
@@ -268,7 +268,7 @@ class ProgressTracker:
                     self._complete[group] = complete
 
     def _follow_pair(self, point: int, manager: int, run: int, outcome: MissionOutcome) -> None:
-        """Take an outcome into the difference of its point, and end all managers there when that is known."""
+        """Add an outcome to the difference of its point; end all managers there when it is precise enough."""
         assert self._until is not None
         if manager not in self._sides or point in self._last_runs:
             return
@@ -285,22 +285,22 @@ class ProgressTracker:
             self._count(self._under_way[group])
 
     def _count(self, tracker: GroupTracker, sign: int = 1) -> None:
-        """Add what a group has to the whole campaign's figures; with -1 take it from them."""
+        """Add a group's counts to those of the campaign; with -1, subtract them."""
         self.done += sign * tracker.done
         self.failed += sign * tracker.failed
         self.total += sign * tracker.runs
 
     @property
     def needs_pairs(self) -> bool:
-        """Whether the difference of two managers is followed."""
+        """Whether the difference of two managers is tracked."""
         return bool(self._sides)
 
     def pairs(self) -> tuple[PairProgress, ...]:
-        """Return how well the difference is known at each point that was begun; empty unless one is followed."""
+        """Return the precision of the difference at each point begun so far; empty unless a difference is tracked."""
         return tuple(pair.progress(point) for point, pair in sorted(self._pairs.items()))
 
     def add_earlier(self, finished: Iterable[Finished]) -> None:
-        """Count outcomes that were there when the campaign was resumed."""
+        """Count the outcomes that existed when the campaign was resumed."""
         self.add(finished)
         self._before = self.done
 
@@ -320,7 +320,7 @@ class ProgressTracker:
         return group in self._complete or run > self._last_runs.get(group[0], run)
 
     def progress(self) -> Progress:
-        """Return how far the campaign is."""
+        """Return the campaign's progress."""
         return Progress(self.done, self.failed, self.total, self._before, self._metric, self._groups)
 
     def _groups(self) -> tuple[GroupProgress, ...]:

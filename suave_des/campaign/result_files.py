@@ -1,4 +1,4 @@
-"""Writes the result files of a campaign: our own, and those of the exemplar, so that its users' scripts read ours."""
+"""Writes the result files of a campaign: those of suave-des, and those that the exemplar's scripts read."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ SUAVE_FOLDER = "suave"
 
 
 def write_results(result: CampaignResult, inputs: Mapping[str, str], identity: str) -> None:
-    """Write a campaign's files into its folder, in place of those of an earlier use.
+    """Write a campaign's files into its folder, replacing those of an earlier campaign.
 
     Args:
-        result: what the campaign gave.
+        result: the campaign's result.
         inputs: SHA-256 of each input file, by its name as shown to the user.
         identity: of the campaign, as its store has it.
 

@@ -1,4 +1,4 @@
-"""What a campaign gave, summarised from its store, so that few rows are in memory."""
+"""The result of a campaign, summarised from its store, so that few rows are in memory."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ SUMMARY_COLUMNS = (
 
 @dataclass(frozen=True)
 class CampaignResult:
-    """What a campaign gave.
+    """The result of a campaign.
 
     Attributes:
-        spec: what was asked for.
+        spec: the specification.
         loaded: the scenario.
-        variation: what differs between missions besides manager and run.
+        variation: differences between missions apart from manager and run.
         planned: number of missions that were to be run; those of a manager that was stopped early up to there.
         done: number of missions that have a row.
         stops: where each manager ends, if managers were to be stopped early; otherwise empty.
@@ -81,7 +81,7 @@ class CampaignResult:
 
     @property
     def folder(self) -> Path | None:
-        """Where the files are; None if there are none."""
+        """The folder of the files; None if there are none."""
         return self.spec.out
 
     @property
@@ -101,7 +101,7 @@ class CampaignResult:
 
     @property
     def rows(self) -> tuple[Row, ...]:
-        """All of stream(), in memory."""
+        """All rows of stream(), in memory."""
         return tuple(self.stream())
 
     def frame(self) -> pandas.DataFrame:
@@ -114,7 +114,7 @@ class CampaignResult:
         return self._frame(self.stream())
 
     def frames(self, size: int) -> Iterator[pandas.DataFrame]:
-        """Yield the same in pieces of `size` rows, read as they are requested."""
+        """Yield the same in chunks of `size` rows, read as they are requested."""
         rows = self.stream()
         while piece := tuple(islice(rows, size)):
             yield self._frame(piece)
@@ -219,12 +219,12 @@ def gather(
     """Summarise the outcomes of a campaign's missions.
 
     Args:
-        spec: what was asked for.
+        spec: the specification.
         loaded: the scenario.
-        variation: what differs between missions besides manager and run.
+        variation: differences between missions apart from manager and run.
         outcomes: reads the outcomes that were kept.
-        tracker: knows which of them count, as it was given all of them.
-        remarks: what users should know about managers.
+        tracker: knows which of them count.
+        remarks: remarks about managers for users.
     """
     failures: list[MissionFailure] = []
     summary: list[Row] = []

@@ -1,4 +1,4 @@
-"""Missions one by one: outside campaigns, of a campaign again, and those that managers learn from."""
+"""Single missions: outside campaigns, repeated from a campaign, and for training."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def run_mission(
     on_time: Callable[[float, float], None] | None = None,
     **replacements: Unpack[Replacements],
 ) -> MissionResult:
-    """Run one mission and keep its events and trajectory: the one that a campaign with this seed has as this run.
+    """Run one mission and keep its events and trajectory; it equals this run of a campaign with this seed.
 
     Example:
         mission = run_mission("seams2023", "metacontrol", run=1, seed=8)
@@ -124,7 +124,7 @@ def train(
     on_mission: Callable[[MissionMetrics], None] = lambda metrics: None,
     **replacements: Unpack[Replacements],
 ) -> Learned:
-    """Train a manager, and write what it has learned.
+    """Train a manager, and write the training result.
 
     Example:
         train("seams2023", "learner:Learner", 500, "policy.json")
@@ -135,7 +135,7 @@ def train(
         missions: how many: runs 1 to that.
         out: file to write.
         seed: of everything that is random.
-        start: file of an earlier training, to go on from; None: with nothing.
+        start: file of an earlier training to continue from; None: start from nothing.
         overwrite: whether the file may exist.
         on_mission: called with the metrics of each mission.
         replacements: as of load_scenario.
@@ -172,7 +172,7 @@ class OpenedCampaign:
     """A campaign whose missions can be run again.
 
     Attributes:
-        spec: what it was asked to do.
+        spec: its specification.
         loaded: its scenario.
         variation: what differs between its missions besides manager and run.
     """
@@ -222,7 +222,7 @@ def opened_campaign(folder: Path, named: Collection[str] = ()) -> Iterator[Opene
         named: managers that the user has named: their code may run, see `check_trusted`.
 
     Raises:
-        InputError: there is no campaign in the folder, what it was made of is not there any more, or it names managers
+        InputError: there is no campaign in the folder, its inputs no longer exist, or it names managers
             that are neither installed nor named.
     """
     path = (folder / STORE_FILE).absolute()

@@ -1,4 +1,4 @@
-"""What a campaign is asked to do: its specification, campaign files, and the checks of both."""
+"""The specification of a campaign, campaign files, and the checks of both."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ _NOT_STORED = ("out", "workers", "scheduler", "overwrite", "confirmed")
 
 @dataclass(frozen=True)
 class CampaignSpec:
-    """What a campaign is asked to do. Make one with `of`, which knows what was left to the campaign file.
+    """The specification of a campaign. Make one with `of`, which leaves missing values to the campaign file.
 
         spec = CampaignSpec.of("seams2023", managers=["none", "metacontrol"], runs=100, out="results")
 
@@ -86,14 +86,14 @@ class CampaignSpec:
             Each parameter is a column of runs.csv.
         perturbations: distributions by key path of the scenario: each run draws its own value, the same under all
             managers and at all points. Each is a column of runs.csv.
-        runs_per_draw: how many consecutive runs share what is drawn.
+        runs_per_draw: number of consecutive runs that share a draw.
         ensemble: CSV file of parameter sets that fit the real runs equally well, or name of a shipped one: each run has
             one of them, the same under all managers; see docs/guides/ensembles.md.
         ontologies: files in place of the scenario's.
         modes_file: file in place of the scenario's.
         reasoner: in place of the scenario's.
         rules: files of rules as text, in addition to the scenario's.
-        disabled_rules: names of rules to switch off, besides the scenario's.
+        disabled_rules: names of rules to disable, in addition to the scenario's.
         values: new values by key path of the scenario.
         manager_options: settings of managers, by manager and key.
         suave_format: whether the exemplar's own results file is written, too.
@@ -156,7 +156,7 @@ class CampaignSpec:
         return cls(str(scenario), **given, from_file=left_out, folder=str(Path.cwd()))
 
     def with_file(self, file: CampaignFile | None) -> CampaignSpec:
-        """Return the same with what a campaign file decides; None: with the defaults."""
+        """Return the specification completed by a campaign file; None: by the defaults."""
         settings = _DEFAULTS if file is None else file.settings
         spec = replace(self, **{name: getattr(settings, name) for name in self.from_file})
         if spec.until_ci is None or "runs" not in spec.from_file or (file is not None and file.sets("runs")):
@@ -197,7 +197,7 @@ class CampaignSpec:
         return cls(**{**parts, **changed, "from_file": left_out})
 
     def check(self) -> None:
-        """See that the values make sense, without reading anything.
+        """Check that the values make sense, without reading anything.
 
         Raises:
             InputError: no, unknown or repeated managers, a scheduler besides workers, or a number out of range.
@@ -226,7 +226,7 @@ class CampaignSpec:
 
 
 def check_range(what: str, number: int, least: int, greatest: int) -> None:
-    """See that a number lies between two others.
+    """Check that a number lies between two others.
 
     Raises:
         InputError: it does not.
@@ -236,7 +236,7 @@ def check_range(what: str, number: int, least: int, greatest: int) -> None:
 
 
 def check_seed(seed: int) -> None:
-    """See that a seed fits into result files.
+    """Check that a seed fits into result files.
 
     Raises:
         InputError: it does not.
@@ -245,7 +245,7 @@ def check_seed(seed: int) -> None:
 
 
 def check_workers(workers: int) -> None:
-    """See that so many processes make sense on this machine.
+    """Check that the number of processes makes sense on this machine.
 
     Raises:
         InputError: they do not.
@@ -292,7 +292,7 @@ def read_campaign_file(name: str | Path) -> CampaignFile | None:
     """Read a campaign file; None if the file is something else, such as a scenario.
 
     Raises:
-        InputError: it cannot be read, is of another version, or has a value that cannot be right.
+        InputError: it cannot be read, is of another version, or has an impossible value.
     """
     files = Files()
     layer = files.yaml(find(name, "scenarios"))

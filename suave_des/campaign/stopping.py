@@ -1,4 +1,4 @@
-"""When a campaign ends early: an interval is narrow enough, it would take very long, or a manager always fails."""
+"""Early ends of a campaign: an interval is narrow enough, it would take very long, or a manager always fails."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class UntilCi:
         return one if self.pair is None else {**one, "pair": list(self.pair)}
 
     def check(self, managers: Sequence[str]) -> None:
-        """See that the managers of the difference are among those of the campaign.
+        """Check that the managers of the difference are among those of the campaign.
 
         Raises:
             InputError: one is not.
@@ -102,7 +102,7 @@ def _wrong(text: str, what: str, remedy: str) -> InputError:
 
 
 def check_size(job: JobSpec, total: int, workers: int) -> None:
-    """See that a very large campaign is meant.
+    """Check that a very large campaign is intended.
 
     Args:
         job: what its missions are run from.
@@ -137,7 +137,7 @@ def _duration_text(seconds: float) -> str:
 
 
 class FirstFailures:
-    """Notices that a manager fails in the same way in all its first missions: it would in all others."""
+    """Detects that a manager fails in the same way in all its first missions, and so would in all others."""
 
     def __init__(self, managers: Sequence[str]) -> None:
         self._managers = managers

@@ -1,7 +1,7 @@
-"""Where outcomes are kept while a campaign runs, so that nothing that is done is lost: an SQLite database.
+"""The store of a running campaign's outcomes, so that no finished mission is lost: an SQLite database.
 
-SQLite and not Parquet, because a transaction is either whole or not there after a kill, appending costs no file of its
-own, damage is noticed, and it comes with Python. Each outcome carries a checksum besides.
+SQLite rather than Parquet, because transactions are atomic even after a kill, appending needs no new
+file, damage is noticed, and it comes with Python. In addition, each outcome carries a checksum.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _ALL = "SELECT * FROM outcomes ORDER BY point, manager, run"
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold a folder for this process; the system releases it when the process ends, however that comes.
+    """Lock a folder for this process; the system releases the lock when the process ends, for whatever reason.
 
     Raises:
         InputError: another campaign holds it, or it cannot be locked.
@@ -79,7 +79,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def _check_no_links(folder: Path) -> None:
-    """See that what is written to in place is no link: a folder that came from elsewhere could have one to any file.
+    """Check that files to be written in place are not links: a folder from elsewhere could link to any file.
 
     Raises:
         InputError: it is.
@@ -90,7 +90,7 @@ def _check_no_links(folder: Path) -> None:
 
 
 class StoreError(SuaveDesError):
-    """Outcomes cannot be kept any more; those that were kept before are."""
+    """Outcomes can no longer be kept; earlier ones are safe."""
 
 
 class Store:
@@ -179,7 +179,7 @@ class Store:
             self.commit()
 
     def commit(self) -> None:
-        """Make safe what was appended."""
+        """Make appended outcomes durable."""
         if self.path is not None:
             self._check_still_there(self.path)
         with _user_errors(self.path):
@@ -197,7 +197,7 @@ class Store:
             raise StoreError(f"{path} was removed while the campaign ran; its content is lost, so start a new campaign")
 
     def forget_passing_failures(self) -> None:
-        """Remove failures that may not happen again."""
+        """Remove failures that may not recur."""
         with _user_errors(self.path):
             self._db.execute("DELETE FROM outcomes WHERE kind = ?", (_PASSING,))
 
@@ -242,7 +242,7 @@ class Store:
 
 
 def make_store(path: Path, about: Mapping[str, Any]) -> None:
-    """Make the database of a new campaign, in place of an earlier one: complete, or not at all.
+    """Make the database of a new campaign, replacing an earlier one; atomic.
 
     Args:
         path: its file.

@@ -1,4 +1,4 @@
-"""What differs between the missions of a campaign besides manager and run: a sweep, and what each run draws.
+"""Differences between a campaign's missions apart from manager and run: a sweep, and each run's draws.
 
 The points of a sweep follow from the campaign's seed and their number, so that any worker finds the same.
 """
@@ -55,8 +55,8 @@ class Sweep:
     Points are counted from 0; what is named last changes fastest.
 
     Attributes:
-        grid: values by key path; each is combined with each.
-        zipped: values by key path, equally many of each: the first go together, the second, and so on.
+        grid: values by key path; all combinations are used.
+        zipped: values by key path, of equal number: the first values together, then the second, and so on.
         sample: a sampled design, or none.
         seed: the campaign's, for the sampled design.
     """
@@ -90,7 +90,7 @@ class Sweep:
         return values
 
     def each_value(self) -> Iterator[int]:
-        """Yield points that have, between them, each value of the grid and each row of the zip."""
+        """Yield points that together have each value of the grid and each row of the zip."""
         sizes = self._sizes()
         for place, size in enumerate(sizes):
             stride = math.prod(sizes[place + 1 :])
@@ -120,7 +120,7 @@ class Sweep:
 
 
 def plain(given: Any, name: str = "sweep") -> Any:
-    """Return what a caller gave for a sweep as a file would have it: arrays, ranges, series and the like as lists.
+    """Convert a caller's sweep to the form of a file: arrays, ranges, series and the like become lists.
 
     Example:
         >>> plain({"thruster_events.0.time_s": range(20, 50, 10)})
@@ -148,13 +148,13 @@ def cell_of(value: Any) -> str | int | float | bool | None:
 
 @dataclass(frozen=True)
 class Variation:
-    """What differs between a campaign's missions.
+    """Differences between a campaign's missions.
 
     Attributes:
         sweep: what differs between points.
         drawn: names of what each run draws, by the key path in the scenario.
         paths: key path in the scenario of each parameter that is swept, by its name as given.
-        runs_per_draw: how many consecutive runs share what is drawn.
+        runs_per_draw: number of consecutive runs that share a draw.
         ensemble: parameter sets of which each run has one; none: all have the scenario's.
     """
 
@@ -198,13 +198,13 @@ def vary(
     runs_per_draw: int,
     seed: int,
 ) -> tuple[LoadedScenario, Variation]:
-    """Put distributions into a scenario for what is perturbed; return it with what varies in it.
+    """Put the distributions of perturbations into a scenario; return it with the variation.
 
     Args:
         loaded: the scenario.
         sweep: values by key path; or a mapping with grid, zip and sample.
         perturbations: distribution by key path.
-        runs_per_draw: how many consecutive runs share what is drawn.
+        runs_per_draw: number of consecutive runs that share a draw.
         seed: the campaign's.
 
     Raises:
@@ -347,7 +347,7 @@ def _check_each_once(perturbed: Mapping[str, str], swept: Mapping[str, str]) -> 
 
 
 def _check_drawn(loaded: LoadedScenario, perturbed: Mapping[str, str]) -> None:
-    """See that a run draws one value for each: of latencies and noise, each use draws its own."""
+    """Check that each is drawn once per run, unlike latencies and noise, which are drawn at each use."""
     if not perturbed:
         return
     from suave_des.simulation.simulator import Simulator  # with it comes the compiler, which takes a while
@@ -364,7 +364,7 @@ def _check_drawn(loaded: LoadedScenario, perturbed: Mapping[str, str]) -> None:
 
 
 def _check_points(loaded: LoadedScenario, variation: Variation, place: str) -> None:
-    """See that the scenario allows the points: all, or of very many those that have each value at least once."""
+    """Check that the scenario allows the points: all, or of very many those that have each value at least once."""
     sweep = variation.sweep
     points = set(range(0, sweep.points, max(1, sweep.points // _CHECKED_POINTS)))
     points.update(islice(sweep.each_value(), _CHECKED_POINTS))

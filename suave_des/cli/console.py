@@ -105,7 +105,7 @@ def progress(label: str, *, quiet: bool) -> AbstractContextManager[OnProgress | 
 
 @contextmanager
 def mission_status(scenario: str, console: Console) -> Iterator[Callable[[float, float], None] | None]:
-    """Show the mission time reached until the mission ends; yields None where the console is no terminal.
+    """Show the mission time reached until the mission ends; yields None if the console is not a terminal.
 
     Args:
         scenario: its name, as given.
@@ -174,7 +174,7 @@ def print_timeline(console: Console, result: MissionResult) -> None:
     heading = f"\n{'time, s':>8}  {'source':<{sources}}  {'event':<{names}}  detail"
     console.print(Text(title, "bold"), soft_wrap=True)
     console.print(Text(heading, "italic"), soft_wrap=True)
-    # Where the console is no terminal an event is one line, for tools that search.
+    # If the console is not a terminal, each event is one line, for tools that search.
     width = max(console.width, _LEAST_WIDTH) if console.is_terminal or "COLUMNS" in os.environ else None
     for event in result.events:
         console.print(_event_line(event, sources, names, width), soft_wrap=True)

@@ -258,7 +258,7 @@ def exec_manager(command: str) -> type[ManagingSubsystem]:
     """Make the class of the manager `exec:COMMAND`.
 
     Raises:
-        InputError: the command is no list of words.
+        InputError: the command is not a list of words.
     """
     try:
         words = shlex.split(command)

@@ -116,7 +116,7 @@ class Mission:
             self.check_mode(function, mode)
 
     def check_mode(self, function: str, mode: str) -> None:
-        """See that a mode can be requested.
+        """Check that a mode can be requested.
 
         Raises:
             InputError: there is no such function or mode.
@@ -200,7 +200,7 @@ class Mission:
         return self._result
 
     def close(self) -> None:
-        """Give the mission's memory back to its Simulator, for the next mission; it cannot go on after that."""
+        """Give the mission's memory back to its Simulator, for the next mission; this one cannot continue."""
         self._simulator.give_back(self._run)
 
     def __enter__(self) -> Self:

@@ -44,7 +44,7 @@ class Adapter:
         self._without_design: frozenset[str] = frozenset()  # functions, as far as that is recorded
 
     def is_in_force(self, plan: Plan) -> bool:
-        """Tell whether carrying a plan out would neither change a mode nor record anything."""
+        """Return whether carrying a plan out would neither change a mode nor record anything."""
         current_mode = self._system.modes.current_mode
         for decision in plan.decisions:
             if decision.design is not None and current_mode(decision.function) != decision.design:

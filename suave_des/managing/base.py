@@ -49,7 +49,7 @@ class Knowledge(Protocol):
         """The quality attributes of which some function design expects a value."""
 
     def distinguished(self, measured: Collection[float]) -> Hashable:
-        """Give what the rules can tell of measured values: where it is equal, conclusions are."""
+        """Return what the rules can distinguish in measured values: if it is equal, so are the conclusions."""
 
     def analyze(self, state: KnowledgeState) -> Inference:
         """Infer what the rules say about a state."""

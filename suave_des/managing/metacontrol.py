@@ -200,7 +200,7 @@ class Metacontrol(ManagingSubsystem):
         return known, tuple(self.measurements), values
 
     def _changes_nothing(self, conclusion: Conclusion) -> bool:
-        """Tell whether executing a plan would change nothing."""
+        """Return whether executing a plan would change nothing."""
         adds_statuses = self.system.recorded and conclusion.statuses - self._recorded_statuses
         if adds_statuses or RECOVERED in self.components.values():
             return False

@@ -80,7 +80,7 @@ class PyTreesManager(FunctionsManager):
 
 
 def _is_ticked_leaf(behaviour: Behaviour) -> bool:
-    """Tell whether a behaviour was ticked, and has no children."""
+    """Return whether a behaviour was ticked, and has no children."""
     return not behaviour.children and behaviour.status != Status.INVALID
 
 

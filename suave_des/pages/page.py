@@ -61,7 +61,7 @@ def page(name: str, title: str, content: Any, styles: Sequence[str], scripts: Se
 
 
 def check_page_file(file: Path) -> None:
-    """See that a page can be written; an earlier page of that name is replaced.
+    """Check that a page can be written; an earlier page of that name is replaced.
 
     Raises:
         InputError: the path is a folder, or its folder does not exist or cannot be written.

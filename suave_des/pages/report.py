@@ -111,7 +111,7 @@ class ReportContent:
     """All that a report shows of results.
 
     Attributes:
-        conclusion: what follows, in one sentence.
+        conclusion: in one sentence.
         notes: what a reader should know of the data.
         sections: tables by metric.
         needed: how many runs an interval needs; None without a comparison.
@@ -176,7 +176,7 @@ def plotly_script() -> str:
 
 
 def check_page_size(text: str, limit_bytes: int) -> None:
-    """See that a page can be sent by mail.
+    """Check that a page can be sent by mail.
 
     Raises:
         InputError: it is too large.

@@ -66,7 +66,7 @@ def draw_distributions(groups: Sequence[Group]) -> style.Picture:
 
 
 def _limit_of_lost(groups: Sequence[Group]) -> float | None:
-    """Return when missions ended that never found the pipeline; None if all found it."""
+    """Return the end of missions that never found the pipeline; None if all found it."""
     return time_limit_s(groups) if any((group.values("pipeline_found") < 1.0).any() for group in groups) else None
 
 
@@ -179,7 +179,7 @@ def draw_convergence(groups: Sequence[Group]) -> style.Picture:
 
 
 def running_means(values: NDArray[np.float64]) -> tuple[NDArray[np.int_], NDArray[np.float64], NDArray[np.float64]]:
-    """Return numbers of values, the means of so many first values, and half the 95% intervals of these.
+    """Return sample sizes n, the means of the first n values, and half their 95% intervals.
 
     Of many values only some numbers are there, the first and the last among them, as dense at the beginning as a
     figure over all shows them.
@@ -240,7 +240,7 @@ def _draw_detections(above: Axes, below: Axes, number: int, group: Group) -> Non
 
 
 def draw_reactions(groups: Sequence[Group]) -> style.Picture:
-    """Draw how many adaptations missions have, and how long reactions take, a curve for each group."""
+    """Draw the number of adaptations per mission, and the reaction times, with a curve for each group."""
     figure = style.Picture(
         figsize=(style.WIDTH_IN, 2.5 + _legend_height(list(map(_label, groups)))), layout="constrained"
     )
@@ -293,7 +293,7 @@ def _legend(figure: style.Picture, handles: Sequence[Artist], labels: Sequence[s
 
 
 def _columns(labels: Sequence[str]) -> int:
-    """Return in how many columns a legend fits into the figure's width."""
+    """Return the number of columns with which a legend fits the figure's width."""
     most = len(labels) if len(labels) <= 4 else 3
     widths_in = [_HANDLE_IN + _text_width_in(label) for label in labels]
     for columns in range(most, 1, -1):

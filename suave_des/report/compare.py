@@ -25,7 +25,7 @@ from suave_des.report.statistics import Estimated, Sample, SearchTimes, Tested
 
 @dataclass(frozen=True)
 class Choices:
-    """What is to be compared, and how.
+    """What to compare, and how.
 
     Attributes:
         managers: names of managers; empty: all.
@@ -100,7 +100,7 @@ class Difference:
         p_holm: its p, adjusted for all tests of this comparison.
         variance_ratio: by how much pairing divides the variance of the difference; None if not paired.
         runs_needed: for a given interval; None without a spread to estimate it from.
-        conclusion: what follows, in one sentence.
+        conclusion: in one sentence.
     """
 
     first: str
@@ -123,18 +123,18 @@ class Difference:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What a comparison found.
+    """The result of a comparison.
 
         comparison = compare_folders([Path("before"), Path("after")])
         print(comparison.conclusion)
         comparison.difference_frame()
 
     Attributes:
-        conclusion: what follows, in one sentence.
+        conclusion: in one sentence.
         summaries: by metric, then group.
         differences: by metric, then pair.
-        notes: what one should know of the data.
-        metrics: what is compared.
+        notes: caveats about the data.
+        metrics: the compared metrics.
     """
 
     conclusion: str
@@ -172,7 +172,7 @@ class Comparison:
         return markdown_text(self)
 
     def metric(self, name: str) -> ComparedMetric:
-        """Return what is known of a metric: its title, unit, and which values are better."""
+        """Return a metric's description: its title, unit, and which values are better."""
         return next(each for each in self.metrics if each.name == name)
 
     def of_metric(self, name: str) -> tuple[list[Summary], list[Difference]]:
@@ -188,7 +188,7 @@ def compare_folders(paths: Sequence[Path], choices: Choices | None = None) -> Co
 
     Args:
         paths: folders of `suave-des campaign` or `reproduce`, folders of the exemplar's own CSV files, or CSV files.
-        choices: what is to be compared, and how.
+        choices: what to compare, and how.
 
     Raises:
         InputError: results cannot be read, a name is not in them, or an extra is not installed.
@@ -280,7 +280,7 @@ def _difference(
 
 
 def _with_sizes(found: Difference, x: Sample, y: Sample, half_width: float) -> Difference:
-    """Add what pairing gains, and how many runs an interval needs."""
+    """Add the gain from pairing, and the number of runs that an interval needs."""
     if min(len(x), len(y)) < 2 or half_width <= 0.0:
         return found
     apart = float(x.var(ddof=1) + y.var(ddof=1))

@@ -17,7 +17,7 @@ _RUNS_HEADINGS = ("difference", "for ±", "paired", "not paired", "variance rati
 
 
 def csv_text(comparison: Comparison) -> str:
-    """Write all figures as one table: a row for each group and metric, then one for each pair and metric."""
+    """Write all statistics as one table: a row for each group and metric, then one for each pair and metric."""
     import pandas
 
     summaries, differences = comparison.summary_frame(), comparison.difference_frame()
@@ -29,7 +29,7 @@ def csv_text(comparison: Comparison) -> str:
 
 
 def plain_text(comparison: Comparison, width: int = 95) -> str:
-    """Write what follows, the tables, and how it was compared, for a terminal of that width."""
+    """Write the conclusions, the tables, and the methods, for a terminal of that width."""
     parts = [_folded(comparison.conclusion, width)]
     for metric in comparison.metrics:
         summaries, differences = comparison.of_metric(metric.name)
@@ -77,7 +77,7 @@ def json_text(comparison: Comparison) -> str:
 
 
 def markdown_text(comparison: Comparison) -> str:
-    """Write the tables and what follows from them, for a page."""
+    """Write the tables and the conclusions, for a page."""
     parts = [_markdown(comparison.conclusion)]
     for metric in comparison.metrics:
         summaries, differences = comparison.of_metric(metric.name)
@@ -157,7 +157,7 @@ def summary_table(metric: ComparedMetric, summaries: Sequence[Summary]) -> Table
 
 
 def search_table(summaries: Sequence[Summary]) -> Table | None:
-    """Return search times with missions that never found the pipeline as censored; None for other metrics."""
+    """Return search times in which missions that never found the pipeline are censored; None for other metrics."""
     horizons_s = {each.search.horizon_s for each in summaries if each.search is not None}
     if not horizons_s:
         return None
@@ -166,13 +166,13 @@ def search_table(summaries: Sequence[Summary]) -> Table | None:
 
 
 def difference_table(metric: ComparedMetric, differences: Sequence[Difference], *, has_effects: bool = True) -> Table:
-    """Return the difference of each pair; that of shares has no effect size besides."""
+    """Return the difference of each pair; for shares, without an effect size."""
     width = 6 if metric.name == FOUND or not has_effects else len(_DIFFERENCE_HEADINGS)
     return _DIFFERENCE_HEADINGS[:width], [_difference_cells(each, metric)[:width] for each in differences]
 
 
 def runs_table(comparison: Comparison) -> Table:
-    """Return how many runs an interval needs, of each pair and metric."""
+    """Return the number of runs that an interval needs, for each pair and metric."""
     rows = (_runs_cells(each, comparison.metric(each.metric)) for each in comparison.differences if each.runs_needed)
     return _RUNS_HEADINGS, list(rows)
 
@@ -255,7 +255,7 @@ def interval_cell(interval: Interval | None, metric: ComparedMetric) -> str:
 
 
 def p_cell(p: float | None) -> str:
-    """Write a p-value with two digits that say something."""
+    """Write a p-value with two significant digits."""
     if p is None:
         return ""
     if p < 1e-300:  # next to the least that a float can hold
@@ -264,12 +264,12 @@ def p_cell(p: float | None) -> str:
 
 
 def remarks(comparison: Comparison) -> list[str]:
-    """Say how it was compared, why so, and what to know of the data."""
+    """Describe how missions were compared and why, and caveats about the data."""
     return [*_methods(comparison), *(f"Note: {note}." for note in comparison.notes)]
 
 
 def _methods(comparison: Comparison) -> list[str]:
-    """Say which differences are paired and why, and by what they are tested and estimated."""
+    """Describe which differences are paired and why, and how they are tested and estimated."""
     tested = [each for each in comparison.differences if each.tested is not None]
     whys: dict[str, dict[str, None]] = {}
     for each in tested:

@@ -1,4 +1,4 @@
-"""What is known of each metric that is compared: its unit, which values are better, and how one speaks of them."""
+"""Descriptions of the compared metrics: unit, which values are better, and phrases for sentences."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SEARCH_TIME, FOUND = "search_time_s", "pipeline_found"
 
 @dataclass(frozen=True, slots=True)
 class ComparedMetric:
-    """A metric, and how one speaks of it.
+    """A metric, with phrases for sentences about it.
 
     Attributes:
         name: column of runs.csv.
@@ -28,7 +28,7 @@ class ComparedMetric:
         unit: of its values; empty for numbers without one.
         better: 1 if more is better, -1 if less is, 0 if neither.
         less: a sentence about who has less: "finds the pipeline {} sooner than"; likewise more.
-        most: what the one with the best mean does: "finds the pipeline soonest"; empty if none is better.
+        most: phrase for the best mean: "finds the pipeline soonest"; empty if none is better.
         half_width: of the intervals for which the number of runs is given, if none is asked for; 0: 5% of the mean.
         decimals: of its values in tables; likewise interval_decimals.
     """
@@ -56,7 +56,7 @@ class ComparedMetric:
         return f"{value:.{self.decimals}f} {self.unit}".strip()
 
     def default_half_width(self, x: Sample, y: Sample) -> float:
-        """Return the interval for which the number of runs is given, if none is asked for."""
+        """Return the default half-width for which the number of runs is estimated."""
         return self.half_width or 0.05 * max(abs(float(x.mean())), abs(float(y.mean())))
 
 

@@ -1,4 +1,4 @@
-"""What follows from a comparison, in sentences."""
+"""The conclusions of a comparison, in sentences."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def conclusion(found: Difference, metric: ComparedMetric) -> str:
-    """Say what follows from one difference."""
+    """Write the conclusion from one difference."""
     if found.difference is None or found.tested is None or found.p_holm is None:
         return f"{found.first} and {found.second} cannot be compared in {metric.title}: one of them has no value."
     evidence = f"{interval_text(found, metric)}{_basis(found)}, {p_text(found.p_holm)}"
@@ -31,7 +31,7 @@ def conclusion(found: Difference, metric: ComparedMetric) -> str:
 
 
 def difference_claim(found: Difference, metric: ComparedMetric) -> str:
-    """Say who has more or less than whom, the better one first."""
+    """Write which manager has more or less, the better one first."""
     assert found.difference is not None
     value = found.difference.value
     first, second = found.first, found.second
@@ -50,7 +50,7 @@ def overall_conclusion(
     means: Mapping[tuple[str, str], float],
     groups: Sequence[str],
 ) -> str:
-    """Say in one sentence what follows for the first metric: who is best, by how much, and whether that is shown."""
+    """Write the conclusion for the first metric: which manager is best, by how much, and whether it is significant."""
     known = {name: means[name, metric.name] for name in groups if (name, metric.name) in means}
     own = [each for each in differences if each.metric == metric.name and each.difference is not None]
     if len(groups) < 2:

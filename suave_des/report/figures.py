@@ -1,4 +1,4 @@
-"""Draw what is in folders of results: missions, a campaign, or the results of a sweep."""
+"""Draw the contents of results folders: missions, a campaign, or a sweep."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ KINDS = (AUTO, *MISSION_KINDS, *CAMPAIGN_KINDS, SWEEP, PATHS)
 
 
 def draw_folder(folder: Path, out: Path) -> None:
-    """Draw what is in a folder of results, and write the picture; see draw_results."""
+    """Draw the contents of a results folder, and write the picture; see draw_results."""
     draw_results([folder], out)
 
 
@@ -62,7 +62,7 @@ def draw_results(
     parameters: Sequence[str] = (),
     completed: Callable[[Path, MissionRecord], MissionRecord] | None = None,
 ) -> None:
-    """Draw what is in folders of results, and write the picture.
+    """Draw the contents of results folders, and write the picture.
 
     Args:
         folders: of missions (trajectory.csv), or of campaigns (runs.csv) and files like these.
@@ -81,7 +81,7 @@ def draw_results(
 
 
 def check_picture(out: Path) -> None:
-    """See that a name is a picture's.
+    """Check that a name is a picture's.
 
     Raises:
         InputError: it has another ending.
@@ -92,7 +92,7 @@ def check_picture(out: Path) -> None:
 
 
 def write_picture(figure: Figure, out: Path, *, bbox_inches: str | None = None) -> None:
-    """Write a figure, whole or not at all, and without the time at which it is written.
+    """Write a figure atomically, and without the time of writing.
 
     Args:
         figure: to write.

@@ -42,9 +42,9 @@ class CampaignFrame(pandas.DataFrame):
         """Compare the managers, as `suave-des compare` does, in place of pandas' comparison cell by cell.
 
         Args:
-            managers: names of those that are wanted; empty: all.
+            managers: names of the managers to include; empty: all.
             metrics: columns; empty: search time, distance, share that found the pipeline, reaction time.
-            by: swept parameters whose values are compared, too.
+            by: swept parameters whose values are also compared.
             against: the one that all others are compared with; None: each with each.
             half_widths: METRIC:HALF_WIDTH of intervals for which the number of runs is to be given.
             unpaired: whether runs are taken as independent though they share their random numbers.

@@ -38,7 +38,7 @@ class Group:
         return self.frame[metric].to_numpy(float)
 
     def known_values(self, metric: str) -> NDArray[np.float64]:
-        """Return the values of a metric that there are."""
+        """Return the values of a metric without missing ones."""
         values = self.values(metric)
         return values[~np.isnan(values)]
 
@@ -66,8 +66,8 @@ def grouped(missions: Missions, managers: Sequence[str] = (), by: Sequence[str] 
 
     Args:
         missions: of all sources.
-        managers: names of those that are wanted; empty: all.
-        by: swept parameters of which each value makes a group of its own.
+        managers: names of the managers to include; empty: all.
+        by: swept parameters each of whose values is a separate group.
 
     Returns:
         The groups in the order of their first missions, and notes for the reader.
@@ -112,7 +112,7 @@ def _names(keys: Sequence[tuple[object, ...]], by: Sequence[str]) -> list[str]:
 
 
 def _printable(name: str) -> str:
-    """Return a name from a file without what a terminal would take for commands."""
+    """Return a name from a file without terminal control characters."""
     return name if name.isprintable() else repr(name)[1:-1]
 
 

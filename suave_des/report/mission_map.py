@@ -1,4 +1,4 @@
-"""Maps: of a mission, with what happened where, and altitude over time; of many missions, their ways."""
+"""Maps: a mission with its events, and altitude over time; the paths of many missions."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _LETTER_ROW_SHARE = 0.075
 
 @dataclass(frozen=True, slots=True)
 class _Mark:
-    """Something that happened, to be marked on the map and over time."""
+    """An event, to be marked on the map and over time."""
 
     letter: str
     t_s: float
@@ -105,7 +105,7 @@ def _marks(record: MissionRecord) -> Iterator[_Mark]:
 
 
 def _way_look(colours: dict[str, str], mode: str) -> dict[str, Any]:
-    """Return the look of a stretch of the way: in print without colours, the widths tell the search altitudes apart."""
+    """Return the style of a stretch of the path: line widths distinguish the search altitudes without colours."""
     dashed = mode not in style.MODE_COLOURS and mode not in _IDLE_MODES
     return {
         "color": colours.get(mode, style.GREY),
@@ -115,7 +115,7 @@ def _way_look(colours: dict[str, str], mode: str) -> dict[str, Any]:
 
 
 def _milestones(events: pandas.DataFrame) -> Iterator[tuple[float, str, str]]:
-    """Time, words and colour of what is worth a mark: the detection, failures, and recoveries of what had failed."""
+    """Return time, label and colour of marked events: the detection, failures, and recoveries from these."""
     failed: set[str] = set()
     for t_s, event, detail in zip(events["t_s"], events["event"], events["detail"], strict=True):
         component, _, status = detail.partition(" ")
@@ -133,7 +133,7 @@ def _milestones(events: pandas.DataFrame) -> Iterator[tuple[float, str, str]]:
 
 
 def _draw_way(axes: Axes, record: MissionRecord, colours: dict[str, str], across: str, up: str) -> None:
-    """The vehicle's way, each stretch in its mode's colour and joined to the next."""
+    """Draw the vehicle's path, each stretch in its mode's colour and joined to the next."""
     way = record.trajectory
     modes = way["mode"].tolist()
     first = 0
@@ -145,7 +145,7 @@ def _draw_way(axes: Axes, record: MissionRecord, colours: dict[str, str], across
 
 
 def _draw_plan(axes: Axes, record: MissionRecord, colours: dict[str, str]) -> None:
-    """Draw what both maps show."""
+    """Draw the parts that both maps share."""
     _draw_pipeline(axes, record)
     _draw_way(axes, record, colours, "x_m", "y_m")
     start = record.trajectory.iloc[0]
@@ -211,7 +211,7 @@ def _draw_zoom(axes: Axes, record: MissionRecord, colours: dict[str, str], marks
 
 
 def _search_frame(record: MissionRecord) -> Bbox:
-    """Where the vehicle was until the pipeline was found, and the point of it that was seen, with a margin."""
+    """Return the frame around the vehicle's path until detection and the detected point, with a margin."""
     search = _search(record)
     if record.metrics["pipeline_found"]:
         seen = [record.metrics["detection_x_m"], record.metrics["detection_y_m"]]
@@ -220,7 +220,7 @@ def _search_frame(record: MissionRecord) -> Bbox:
 
 
 def _search(record: MissionRecord) -> NDArray[np.float64]:
-    """Return the vehicle's way until it found the pipeline, or the mission ended; shape (n, 2)."""
+    """Return the vehicle's path until it found the pipeline, or the mission ended; shape (n, 2)."""
     way = record.trajectory
     return np.asarray(way.loc[way["t_s"] <= record.metrics["search_time_s"], ["x_m", "y_m"]], dtype=float)
 

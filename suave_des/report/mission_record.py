@@ -114,7 +114,7 @@ def _table(path: Path, columns: tuple[str, ...], optional: tuple[str, ...] = ())
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A time for which something holds: a mode, a failure, a task."""
+    """A span of time in which something holds: a mode, a failure, a task."""
 
     begin_s: float
     end_s: float
@@ -129,7 +129,7 @@ class Adaptation:
         t_s: when it took effect.
         function: whose mode changed.
         before: its mode before; likewise after.
-        cause: what brought it about, in words.
+        cause: its cause, in words.
     """
 
     t_s: float
@@ -143,11 +143,11 @@ _LATEST_REACTION_S = 5.0
 """What was reported earlier is not taken as the cause of an adaptation."""
 _RECHARGED, _ROUNDING = 0.3, 0.01
 _TASK_END_S = 3.0
-"""A function whose task has ended is switched off within this time, which is no adaptation."""
+"""A function whose task has ended is deactivated within this time; this does not count as an adaptation."""
 
 
 def mode_spans(record: MissionRecord) -> dict[str, list[Span]]:
-    """Return by function when it had which mode."""
+    """Return the spans of each function's modes."""
     changes: dict[str, list[tuple[float, str]]] = {}
     for t_s, detail in details(record, "mode_set"):
         function, _, mode = detail.partition(" = ")
@@ -159,7 +159,7 @@ def mode_spans(record: MissionRecord) -> dict[str, list[Span]]:
 
 
 def failure_spans(record: MissionRecord) -> dict[str, list[Span]]:
-    """Return by component, of those that failed, from when to when."""
+    """Return the spans of failures, by failed component."""
     spans: dict[str, list[Span]] = {}
     end_s = record.end_s
     for t_s, detail in details(record, "component_status"):
@@ -174,7 +174,7 @@ def failure_spans(record: MissionRecord) -> dict[str, list[Span]]:
 
 
 def task_spans(record: MissionRecord) -> list[Span]:
-    """Return when which task was under way."""
+    """Return the spans of the tasks."""
     open_s: dict[str, float] = {}
     spans = []
     for t_s, event, detail in zip(*(record.events[name] for name in ("t_s", "event", "detail")), strict=True):
@@ -220,7 +220,7 @@ def _with_cause(found: Adaptation, record: MissionRecord) -> Adaptation:
 
 
 def _battery_cause(found: Adaptation, record: MissionRecord) -> str:
-    """Say that the battery made a function go on or off, if it did."""
+    """Return the battery as the cause of a function's activation or deactivation, if it is."""
     level = battery_level(record)
     if level is None or found.function == MAINTAIN_MOTION or _UNGROUND not in (found.before, found.after):
         return ""

@@ -197,7 +197,7 @@ def _figures(manager: str, metric: str, known: Estimate, ours: Estimate) -> Iter
 
 
 def _sizes(estimates: Estimates) -> str:
-    """State how many missions there are of each manager."""
+    """Describe the number of missions of each manager."""
     sizes = {manager: found.n for (manager, _), found in estimates.items()}
     if len(set(sizes.values())) == 1:
         return f"{next(iter(sizes.values()))} missions for each manager"

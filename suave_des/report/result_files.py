@@ -1,4 +1,4 @@
-"""Gather the missions that are to be compared, from folders of results, single files or a data frame."""
+"""Gather the missions to compare, from results folders, single files or a data frame."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ _RUNS_FILE, _STORE_FILE, _MANIFEST_FILE = "runs.csv", "campaign.sqlite", "manife
 
 @dataclass(frozen=True)
 class Missions:
-    """Missions to be compared, a row for each.
+    """Missions to compare, a row for each.
 
     Attributes:
         frame: with `source`, `manager`, `scenario`, the columns of report.runs.COLUMNS, and those of a sweep.
         swept: columns that a sweep varies: they differ between missions of one manager, seed and run.
-        notes: what a reader of the comparison should know of the files.
+        notes: caveats about the files for readers of the comparison.
     """
 
     frame: pandas.DataFrame
@@ -107,7 +107,7 @@ def _read_source(path: Path) -> Missions:
 
 
 def check_one_campaign(folder: Path) -> None:
-    """See that the result files of a folder are of the campaign whose missions are kept in it, as far as both say so.
+    """Check that the result files of a folder are of the campaign whose missions are kept in it, as far as both say so.
 
     Raises:
         InputError: they are of another campaign.
@@ -214,7 +214,7 @@ def _varying(frame: pandas.DataFrame, columns: Iterable[str]) -> tuple[str, ...]
 
 
 def _check_once(missions: Missions, path: Path | None) -> None:
-    """See that no mission is there twice.
+    """Check that no mission is there twice.
 
     Raises:
         InputError: one is.

@@ -90,7 +90,7 @@ class Runs:
         managers: in the order of their first missions, each with the line of that.
         scenarios: names of scenarios that the file gives, each with its first line.
         sha256: of the file's bytes, in hex.
-        averages: lines of rows that are no missions, but averages of them, and were left out.
+        averages: lines of rows that are averages rather than missions, and were skipped.
         lines: of the missions.
     """
 
@@ -304,7 +304,7 @@ class _Cells:
         return text if np.isnan(self._as_numbers(column)).any() else pandas.to_numeric(text)
 
     def _as_numbers(self, column: str) -> NDArray[np.float64]:
-        """Convert a column, once; what is no number is nan."""
+        """Convert a column, once; anything but a number becomes nan."""
         if column not in self._converted:
             self._converted[column] = _numbers(self.text[column])
         return self._converted[column]

@@ -106,7 +106,7 @@ def _draw_altitude(axes: Axes, record: MissionRecord, changes: Sequence[Adaptati
 
 
 def _altitude_asked_for(record: MissionRecord) -> tuple[list[float], list[float]]:
-    """Return when which altitude above the sea bed was asked for, nan where none was."""
+    """Return the requested altitude above the sea bed over time, nan where there was none."""
     follow_m = record.scenario.get("revision", {}).get("follow", {}).get("altitude_m", np.nan)
     asked: dict[str, float] = {}
     times_s, altitudes_m = [0.0], [np.nan]

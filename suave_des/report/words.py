@@ -1,4 +1,4 @@
-"""What figures call things: words and units in place of names from files."""
+"""Labels in figures: words and units instead of names from files."""
 
 from __future__ import annotations
 

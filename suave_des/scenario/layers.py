@@ -21,7 +21,7 @@ _REMOVABLE_IN: tuple[KeyPath, ...] = (("signals",), ("knowledge", "values"))
 
 
 def merge(base: Layer, over: Layer) -> Layer:
-    """Lay one layer over another: mappings merge, everything else replaces."""
+    """Merge one layer over another: mappings are merged, all other values replaced."""
     replaced: set[KeyPath] = set()
     data = _merge(base.data, over.data, (), replaced)
     kept = {
@@ -93,7 +93,7 @@ class Files:
         self.note(path, sha256_of(path, _ONTOLOGY_LIMIT_BYTES))
 
     def note(self, path: Path, sha256: str) -> None:
-        """Keep the hash of a file that was read."""
+        """Store the hash of a file that was read."""
         self.inputs[_shown_name(path)] = sha256
 
 
@@ -162,7 +162,7 @@ def _check_chain(layer: Layer, key_path: KeyPath, chain: tuple[Path, ...]) -> No
 
 
 def _with_whole_part(files: Files, layer: Layer, part: _NamedPart, depth: int, *, inherited: bool) -> Layer:
-    """The layer with its revision or vehicle written out; what differs from an inherited one is left as it is."""
+    """Return the layer with its revision or vehicle in full; differences from an inherited one stay as they are."""
     key = part.key
     if key not in layer.data:
         return layer
@@ -211,7 +211,7 @@ def _part_layer(
 
 
 def _parts(data: dict[str, Any], path: str) -> list[str]:
-    """The keys of a key path; names of managers may have points in them, and their settings need not be there yet."""
+    """The keys of a key path; names of managers may contain dots, and their settings may be missing."""
     first, _, rest = path.partition(".")
     if first != "managers" or ":" not in rest:
         return path.split(".")

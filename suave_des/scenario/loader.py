@@ -88,7 +88,7 @@ class LoadedScenario:
         """Yield name and place of each file that a manager's class declares.
 
         Raises:
-            InputError: a file is not there, or what the class declares is no list of names.
+            InputError: a file does not exist, or the class does not declare a list of names.
         """
         names = kind.input_files(self.manager_settings(manager))
         if isinstance(names, str) or not all(isinstance(name, str) for name in names):
@@ -116,14 +116,14 @@ class LoadedScenario:
 
 
 class Replacements(TypedDict, total=False):
-    """What replaces a scenario's own files and settings, or is added to them.
+    """Replacements of a scenario's own files and settings, and additions to them.
 
     Attributes:
         ontologies: files to use in place of the scenario's.
         modes_file: file to use in place of the scenario's.
         reasoner: to use in place of the scenario's.
         rules: files of rules as text, in addition to the scenario's.
-        disabled_rules: names of rules to switch off, besides the scenario's.
+        disabled_rules: names of rules to disable, in addition to the scenario's.
         values: new values by key path, as of `with_values`.
         manager_options: settings of managers, by manager and key, over the scenario's.
     """
@@ -146,7 +146,7 @@ def load_scenario(name: str | Path | LoadedScenario, **replacements: Unpack[Repl
 
     Args:
         name: path of a scenario file, or name of a shipped one with or without ".yaml"; a loaded scenario comes back
-            as it is, and nothing may replace its files any more.
+            unchanged, and its files cannot be replaced.
         replacements: ontologies, modes_file and reasoner to use in place of the scenario's; rules (files of rules as
             text) and disabled_rules (names of rules to switch off) besides the scenario's; values by key path and
             settings of managers over all that.
@@ -349,7 +349,7 @@ def _named_files(scenario: Scenario) -> tuple[object, ...]:
 
 
 def value_at(loaded: LoadedScenario, path: str) -> Any:
-    """Give the value at a key path, as plain data.
+    """Return the value at a key path, as plain data.
 
     Raises:
         InputError: the path leads nowhere.

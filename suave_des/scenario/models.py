@@ -1,4 +1,4 @@
-"""The validated description of a mission: everything that decides a result but manager, run and seed."""
+"""The validated description of a mission: everything that determines its result except manager, run and seed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The System Modes file: which modes each function has, and what each of them sets on its lifecycle node."""
+"""The System Modes file: the modes of each function, and the parameters that they set on its lifecycle node."""
 
 from __future__ import annotations
 
@@ -54,11 +54,11 @@ class ModeTable:
         return function in self.table
 
     def get(self, function: str, mode: str) -> Mode | None:
-        """Give one mode of a function; None if there is no such function, or it has no such mode."""
+        """Return one mode of a function; None if there is no such function, or it has no such mode."""
         return self.table.get(function, {}).get(mode)
 
     def modes(self, function: str) -> tuple[str, ...]:
-        """Give the names of a function's modes, __DEFAULT__ among them.
+        """Return the names of a function's modes, __DEFAULT__ among them.
 
         Raises:
             InputError: there is no such function.
@@ -66,7 +66,7 @@ class ModeTable:
         return tuple(self._function(function))
 
     def mode(self, function: str, mode: str) -> Mode:
-        """Give one mode of a function.
+        """Return one mode of a function.
 
         Raises:
             InputError: there is no such function, or it has no such mode.
@@ -142,7 +142,7 @@ def read_modes(path: Path | str) -> ModeTable:
     """Read a System Modes YAML file.
 
     A function is an entry `type: system` whose parts are nodes; a system of systems only groups functions and
-    is passed over. A function without a mode __DEFAULT__ gets one that is inactive, as its node is at first.
+    is ignored. A function without a mode __DEFAULT__ gets one that is inactive, as its node is at first.
 
     Raises:
         InputError: with file and line: what cannot be read, an entry or mode of another form, an unknown part,
@@ -152,7 +152,7 @@ def read_modes(path: Path | str) -> ModeTable:
 
 
 def modes_of(document: YamlDocument) -> ModeTable:
-    """The table of a System Modes file that is read already; raises as read_modes does."""
+    """Make the table of a System Modes file that has already been read; raises as read_modes does."""
     keys: dict[str, str] = {}
     for key in document.data:
         name = key.removeprefix("/")

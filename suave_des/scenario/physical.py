@@ -1,4 +1,4 @@
-"""The physical part of a scenario: the vehicle, where it starts, pipeline, water, battery, and what fails.
+"""The physical part of a scenario: the vehicle, its start, pipeline, water, battery, and failures.
 
 Values of vehicles with their sources: scenarios/vehicles.
 """

@@ -62,7 +62,7 @@ def validated(layer: Layer, model: type[AnyModel]) -> AnyModel:
 
 
 def input_error(error: ValidationError, layer: Layer, model: Any) -> InputError:
-    """The first thing wrong, the user's own file before its base, as one error that counts the others.
+    """Return the first problem, of the user's own file before its base, as one error that counts the others.
 
     Args:
         error: what pydantic raised for layer.data.
@@ -131,7 +131,7 @@ def _nearest_to_user(detail: ErrorDetails, path: KeyPath, layer: Layer) -> KeyPa
 
 
 def _texts(detail: ErrorDetails, models: Models) -> tuple[str, str]:
-    """What is wrong, and what would be right."""
+    """Return the problem and the remedy."""
     kind, loc, value, context = detail["type"], detail["loc"], detail["input"], detail.get("ctx", {})
     match kind:
         case "extra_forbidden":

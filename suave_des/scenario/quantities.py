@@ -1,6 +1,6 @@
 """Numbers with bounds, and distributions that may replace them: each run draws its own value.
 
-Bounds are generous; a value beyond them can only be a slip, or in another unit: 10 km around the origin where the
+Bounds are generous; a value beyond them can only be a slip, or in a different unit: 10 km around the origin where the
 pipeline is 60 m away, a current three times that of the strongest tides, a heading of once round either way, so that
 degrees are noticed.
 """

@@ -1,4 +1,4 @@
-"""What differs between the exemplar's revisions, as data; values with their sources: scenarios/revisions."""
+"""Differences between the exemplar's revisions, as data; the values, with their sources, are in scenarios/revisions."""
 
 from __future__ import annotations
 

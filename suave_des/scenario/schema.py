@@ -1,4 +1,4 @@
-"""JSON Schema of what a scenario file may contain, for editors and other tools, and the meaning of each key."""
+"""JSON Schema of scenario files, for editors and other tools, and the meaning of each key."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Kinds of signal over mission time that a scenario can give, for any quality attribute, and their CSV tables."""
+"""Kinds of signal over mission time for any quality attribute, and their CSV tables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""YAML files read as plain data, with the line of every key, and nothing in them that could run or explode.
+"""YAML files read as plain data, with the line of every key; no tag can run code, and no alias can explode.
 
 Scalars follow the YAML 1.2 core schema, not PyYAML's 1.1: `1e3` is a number, `010` is ten, `1:30` and
 `2023-02-04` are text. No constructor of PyYAML is involved, so no tag can build an object.
@@ -56,7 +56,7 @@ class Layer:
         return key_path in self.places
 
     def key_path(self, place: str) -> KeyPath:
-        """Split a place such as "sweep.grid.start.x_m" into keys that are there; these may have points in them."""
+        """Split a place such as "sweep.grid.start.x_m" into existing keys, which may contain dots."""
         path: list[str | int] = []
         here: Any = self.data
         while place and isinstance(here, Mapping):
@@ -176,7 +176,7 @@ def _line(node: yaml.Node) -> int:
 
 
 class _TooMuchError(yaml.MarkedYAMLError):
-    """A file that is well-formed but nested or long beyond any honest use."""
+    """A file that is well-formed but unreasonably nested or long."""
 
     def __init__(self, mark: Any, *, deep: bool) -> None:
         limit = f"is nested more than {DEPTH_LIMIT} deep" if deep else f"expands to more than {NODE_LIMIT:,} values"

@@ -59,7 +59,7 @@ def compare_axioms(one: Ontology, other: Ontology) -> AxiomDifference:
 
 
 def axioms_of(base: Ontology) -> Iterator[str]:
-    """Give every axiom, fact and rule as text."""
+    """Write every axiom, fact and rule as text."""
     for triple in (*base.content.triples, *base.model.triples()):
         yield _triple(base, triple)
     yield from _structure(base)

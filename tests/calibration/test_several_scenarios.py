@@ -189,7 +189,7 @@ def test_a_wrong_shared_file_says_where_what_and_in_which_scenario(tmp_path: Pat
 def test_a_parameter_that_a_campaign_sweeps_cannot_be_free(tmp_path: Path) -> None:
     file = tmp_path / "free.yaml"
     file.write_text("free: [{path: start.y_m, lower: 2, upper: 3}]")
-    with pytest.raises(InputError, match=r"start\.y_m is free, and the conditions of planta_exp1"):
+    with pytest.raises(InputError, match=r"start\.y_m is free, but the conditions of planta_exp1"):
         read_problem(file, read_cases(BOTH), 10, 1)
 
 

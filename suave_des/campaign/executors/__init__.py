@@ -1,1 +1,1 @@
-"""Where missions run: in this process, in worker processes on this machine, or on the workers of a Dask cluster."""
+"""Executors of missions: this process, worker processes on this machine, or the workers of a Dask cluster."""

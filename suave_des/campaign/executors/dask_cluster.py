@@ -1,6 +1,6 @@
 """The workers of a Dask cluster as an executor: this side of it. What runs on the workers is in dask_worker.py.
 
-Everything goes by value, and as plain bytes and numbers: the scheduler needs Dask alone. Workers need suave-des of this
+Everything is sent by value, as plain bytes and numbers: the scheduler needs only Dask. Workers need suave-des of this
 very version.
 """
 
@@ -51,7 +51,7 @@ _logger = logging.getLogger("suave_des")
 
 
 def check_scheduler(scheduler: str, workers: int) -> None:
-    """See that a text can be a scheduler's address, and that no workers are wanted besides its own.
+    """Check that a text can be a scheduler's address, and that no local workers are requested as well.
 
     Raises:
         InputError: it cannot, or there are.
@@ -114,7 +114,7 @@ def _client(distributed: Any, scheduler: str) -> Any:
 
 @contextmanager
 def _quiet(distributed: Any) -> Iterator[None]:
-    """Keep Dask's logs and warnings off the terminal: what matters is reported in our own words."""
+    """Keep Dask's logs and warnings off the terminal: relevant problems are reported as errors of suave-des."""
 
     def drop(record: logging.LogRecord) -> bool:
         return False
@@ -135,7 +135,7 @@ def _quiet(distributed: Any) -> Iterator[None]:
 
 
 def _check_workers(client: Any) -> None:
-    """See that workers have all that decides results, and first of all the Python that what is sent depends on."""
+    """Check that workers have all that decides results, and first of all the Python that what is sent depends on."""
     found = client.get_versions()
     here = found["client"]["packages"]
     for address, there in sorted(found["workers"].items()):
@@ -266,7 +266,7 @@ class DaskCluster:
         return max(1, min(fair, enough, _LARGEST_CHUNK))
 
     def _wait(self) -> list[Any]:
-        """Return futures that have ended; none after a while, so that new workers and a lost scheduler are noticed."""
+        """Return futures that have ended, possibly none, so that new workers and a lost scheduler are noticed."""
         ended = []
         with suppress(Empty):
             ended.append(self._ended.get(timeout=_POLL_PERIOD_S))
@@ -277,7 +277,7 @@ class DaskCluster:
         return ended
 
     def _poll(self) -> None:
-        """See how many workers there are, from time to time."""
+        """Check how many workers there are, from time to time."""
         if self._client.status != "running":
             raise self._lost()
         if time.monotonic() < self._polled_s + _POLL_PERIOD_S:

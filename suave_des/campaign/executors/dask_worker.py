@@ -1,4 +1,4 @@
-"""What a worker of a Dask cluster needs to run missions, by value, and what it does with it."""
+"""The input of a Dask worker, sent by value, and the functions that run missions from it."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _MODULES = "modules"
 
 @lru_cache(maxsize=1)
 def needs() -> dict[str, str]:
-    """Return what decides results besides a job, by name: the same on each machine that works on a campaign."""
+    """Return what determines results apart from the job, by name; it must be equal on all machines of a campaign."""
     total = hashlib.sha256()
     folder = Path(suave_des.__file__).parent
     for path in sorted(folder.rglob("*.py")):
@@ -189,7 +189,7 @@ def run(token: str, here: Mapping[str, str], parcel: bytes, chunk: bytes) -> byt
 
 
 def misfit(where: str, here: Mapping[str, str], there: Mapping[str, str]) -> InputError:
-    """Return the error that machines differ in what decides results."""
+    """Return the error that machines differ in something that determines results."""
     name = next(name for name in here if there.get(name) != here[name])
     return InputError(
         f"{name} is {there.get(name, 'missing')} on {where}, and {here[name]} here, which could change results",

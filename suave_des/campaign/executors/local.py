@@ -1,4 +1,4 @@
-"""Where missions run on this machine: in this process, or in worker processes that are replaced when they end."""
+"""Executors on this machine: this process, or worker processes that are replaced when they die."""
 
 from __future__ import annotations
 
@@ -67,8 +67,8 @@ class InProcess:
 class LocalWorkers:
     """Runs chunks of missions in worker processes; an Executor, and a context at whose end they are stopped.
 
-    Workers are spawned, never forked: a forked child would hang on the Java machine of its parent. One that ends
-    before its work is done (killed, out of memory, a Java machine that crashed) is replaced, and its missions are run
+    Workers are spawned, never forked: a forked child would hang on its parent's Java virtual machine. One that dies
+    before its work is done (killed, out of memory, a crash of Java) is replaced, and its missions are run
     again one by one. A mission during which that happens _ATTEMPTS times has failed; so has one that its own time-out
     does not end.
 
@@ -103,7 +103,7 @@ class LocalWorkers:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Stop the workers; at once, unless a manager of the user's may have files to close."""
+        """Stop the workers: at once, unless a user's manager may have files to close."""
         for worker in self._workers:
             worker.stop(wait=self._is_done and not self._may_be_killed)
         for worker in self._workers:
@@ -148,11 +148,11 @@ class LocalWorkers:
             raise WorkerError(f"{problem} (raise the limit, see ulimit -a, or give --workers 1)") from None
 
     def _prepare(self, worker: _Worker) -> None:
-        """Give a worker what all missions have in common; when it has that, its chunk is due earlier than before."""
+        """Send a worker the part that all missions share; after that, its chunk is due earlier."""
         worker.prepare(self._job, self._definitions, lambda: self._ended.put(None))
 
     def _hand_out(self) -> None:
-        """Give every worker its share, as long as there is something to do."""
+        """Give every worker its share while there are missions to run."""
         for share in range(1, _AHEAD + 1):
             for worker in self._workers:
                 if len(worker.tasks) < share:
@@ -175,7 +175,7 @@ class LocalWorkers:
         return None
 
     def _replace(self, worker: _Worker) -> Iterator[list[Finished]]:
-        """Put a new worker in the place of one that ended; of its chunks, the first was under way."""
+        """Replace a worker that died; the first of its chunks was running."""
         worker.stop(wait=False)
         status = worker.join()
         if self._needs_script and status == _RUNS_THE_SCRIPT:
@@ -218,7 +218,7 @@ class _Task:
 
 
 class _Worker:
-    """One worker process, and what it was given, oldest first."""
+    """One worker process, and its chunks, oldest first."""
 
     def __init__(self, *, needs_script: bool) -> None:
         self.tasks: dict[Future[list[Finished]], _Task] = {}
@@ -232,7 +232,7 @@ class _Worker:
         context.close_writer()
 
     def prepare(self, job: JobSpec, definitions: bytes | None, when_ready: Callable[[], None]) -> None:
-        """Give it what all its missions have in common; the first thing to do."""
+        """Send it the part that all its missions share; call this first."""
 
         def is_ready(_: object) -> None:
             self.since_s, self._start_s = time.monotonic(), 0.0
@@ -244,7 +244,7 @@ class _Worker:
             self._pool.submit(_prepare, job).add_done_callback(is_ready)
 
     def give(self, task: _Task) -> Future[list[Finished]]:
-        """Give it a chunk of missions, to be run when those before are done."""
+        """Give it a chunk of missions, to be run after the earlier ones."""
         if not self.tasks:
             self.since_s = time.monotonic()
         try:
@@ -256,13 +256,13 @@ class _Worker:
         return future
 
     def due_s(self, time_out_s: float) -> float:
-        """Return the time at which its oldest chunk has to be done."""
+        """Return the time by which its oldest chunk must be done."""
         if self.is_overdue:  # it is killed, which its pool will notice
             return self.since_s + _MARGIN_S
         return self.since_s + self._start_s + time_out_s * len(next(iter(self.tasks.values())).chunk) + _MARGIN_S
 
     def stop(self, *, wait: bool) -> None:
-        """Have the process end: at once, or when it has done what it was given."""
+        """Stop the process: at once, or when it has finished its chunks."""
         if wait:
             self._pool.shutdown(wait=False, cancel_futures=True)
         else:
@@ -291,7 +291,7 @@ class _Context(SpawnContext):
         return self._results
 
     def close_writer(self) -> None:
-        """Leave the process alone to write results: if it dies in the middle of one, the pool reads an end of file.
+        """Let only the worker write results: if it dies in the middle of one, the pool reads an end of file.
 
         As long as this process could write, too, the pool would wait for the other half.
         """
@@ -304,7 +304,7 @@ class _Context(SpawnContext):
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Hold Ctrl-C and kill back while a worker starts: it inherits that, so that they reach this process alone."""
+    """Block Ctrl-C and kill while a worker starts: it inherits this, so that they reach only this process."""
     with _without_current_folder():
         resource_tracker.ensure_running()  # or the first worker's start starts it, which lets them through again
         with signals_deferred():
@@ -317,7 +317,7 @@ def _interrupts_held() -> Iterator[None]:
 
 @contextmanager
 def _without_current_folder() -> Iterator[None]:
-    """Have processes that start meanwhile import nothing from the current folder while Python starts in them.
+    """Prevent processes that start meanwhile from importing anything from the current folder while Python starts.
 
     A file such as signal.py or types.py there would be taken for Python's own module of that name.
     """
@@ -357,7 +357,7 @@ def _end_with_parent() -> None:
 
 
 def _import() -> None:
-    """Import what missions need, with the compiler, before the job is there."""
+    """Import everything that missions need, including the compiler, before the job arrives."""
     import suave_des.campaign.executors.mission_runner  # noqa: F401
 
 

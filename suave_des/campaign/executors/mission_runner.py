@@ -1,4 +1,4 @@
-"""Runs the missions of a campaign, in whatever process they are to run, each within its time limit."""
+"""Runs the missions of a campaign in any process, each within its time limit."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class MissionRunner:
     """Runs missions of one job in this process.
 
     Args:
-        job: the scenario and what else decides a mission.
+        job: the scenario and everything else that determines a mission.
         exit_after_s: in a thread other than the main one, end the process when a mission is this much over its time
             and cannot be interrupted; None: wait for it.
     """
@@ -90,7 +90,7 @@ class MissionRunner:
     def _differs(self, key: MissionKey, outcome: MissionOutcome, limit: _Limit) -> bool:
         """Whether a manager's first mission in this process gives another outcome when it is run again.
 
-        It is after its 2nd, 4th, 16th, 64th mission and so on: what a class keeps from mission to mission shows, and
+        The first mission is repeated after the 2nd, 4th, 16th, 64th and so on: state kept by a class is noticed, and
         little time is lost.
         """
         first, number = self._first.setdefault(key.manager, (key, outcome)), self._number.get(key.manager, 0) + 1
@@ -131,13 +131,13 @@ class MissionRunner:
         return mission_line(self._job.managers[key.manager], key.point, key.run, result.knowledge, swept)
 
     def _go_to(self, point: int) -> None:
-        """Forget the simulators of the point before: missions come point by point."""
+        """Discard the simulators of the previous point: missions come point by point."""
         self._point = point
         self._simulators: dict[int | None, Simulator] = {}
         self._swept = tuple(map(cell_of, self._job.variation.sweep.values(point).values()))
 
     def _simulator(self, member: int | None) -> Simulator:
-        """Return the simulator of the present point, with a member of the ensemble."""
+        """Return the simulator of the current point, with a member of the ensemble."""
         if member not in self._simulators:
             variation = self._job.variation
             loaded = variation.scenario(self._job.loaded, self._point, member)

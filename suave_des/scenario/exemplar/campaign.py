@@ -102,11 +102,11 @@ def campaign_text(
         configuration: with the runner's parameters.
         loaded: the imported scenario.
         scenario: how the campaign file names it.
-        options: what is to become of the parameters.
-        notes: gets a line for each key without a counterpart.
+        options: of the import.
+        notes: receives a line for each key without a counterpart.
 
     Raises:
-        InputError: a value cannot be right, or there is nothing to run.
+        InputError: a value is impossible, or there is nothing to run.
     """
     runner = configuration.runner
     known = (*NODES[RUNNER], *_Runner.model_fields)
@@ -142,7 +142,7 @@ def campaign_text(
 
 
 def _said(key: str, value: Any, runner: Mapping[str, Parameter]) -> tuple[Any, str]:
-    """A value with a comment: where it stands, or that it is the runner's default."""
+    """A value with a comment: its source, or that it is the runner's default."""
     return value, _source(runner[key]) if key in runner else f"default of {RUNNER}.{key}"
 
 
@@ -158,9 +158,9 @@ def _drawn_anew(perturbations: Sequence[_Perturbation], interval: tuple[int, str
 def _conditions(
     perturbations: Sequence[_Perturbation], settings: _Runner, runs: int, seed: int, notes: list[str]
 ) -> Iterator[str]:
-    """The very values that the exemplar's runner draws, as lines of a campaign file.
+    """The exact values that the exemplar's runner draws, as lines of a campaign file.
 
-    Every `random_interval` runs it draws all of _DRAWN_IN_ORDER, from an empty interval, too; alike for all managers.
+    Every `random_interval` runs it draws all of _DRAWN_IN_ORDER, even from empty intervals; the same for all managers.
     """
     stream = random.Random(seed)
     blocks = -(-runs // settings.random_interval)
@@ -237,7 +237,7 @@ def _experiments(
 def _perturbations(
     runner: Mapping[str, Parameter], settings: _Runner, loaded: LoadedScenario, notes: list[str]
 ) -> Iterator[_Perturbation]:
-    """What is drawn at random: a value with its interval added."""
+    """The random draws: a value with its interval added."""
     for key, path in NODES[RUNNER].items():
         given: tuple[float, float] | None = getattr(settings, key + _INTERVAL)
         if given is None:

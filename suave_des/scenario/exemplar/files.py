@@ -1,4 +1,4 @@
-"""What is in the exemplar's configuration files (ROS 2 parameters), and which key of a scenario each parameter is.
+"""The exemplar's configuration files (ROS 2 parameters), and the scenario key of each parameter.
 
 Source of the names: the exemplar's repository kas-lab/suave, revisions 2023 to 1.5.
 """
@@ -132,7 +132,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class ImportOptions:
-    """What an import is to give.
+    """Options of an import.
 
     Attributes:
         base: scenario to build on; None: the shipped one of the files' revision.
@@ -276,7 +276,7 @@ def _parameters(document: YamlDocument, entry: str, content: Any, notes: list[st
 
 
 def unknown_key(parameter: Parameter, known: Iterable[str]) -> str:
-    """The note about a parameter that a scenario or campaign has no use for; `known` are those that have one."""
+    """Make the note about a parameter without a counterpart; `known` are those that have one."""
     return f"{parameter.place}: not taken over: unknown key ({did_you_mean(parameter.key, known)})"
 
 

@@ -1,4 +1,4 @@
-"""Import of the exemplar's own configuration: a scenario of ours, and a campaign where a campaign is configured."""
+"""Import of the exemplar's own configuration as a scenario, and as a campaign if one is configured."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ class Imported:
 
     Attributes:
         base: name or path of the scenario that the imported one builds on.
-        why: why that one.
+        why: the reason for this base.
         scenario: text of the scenario file.
-        campaign: text of the campaign file; none if the configuration has no campaign, or none was asked for.
-        notes: what has no counterpart or was changed, a line each.
+        campaign: text of the campaign file; None if the configuration has no campaign, or none was requested.
+        notes: a line for each parameter that has no counterpart or was changed.
     """
 
     base: str
@@ -53,8 +53,8 @@ def import_config(files: Sequence[Path], out: Path, options: ImportOptions) -> I
 
     Args:
         files: the exemplar's files, in any order; any revision's.
-        out: where the scenario will be, which decides how it names other files.
-        options: what to build on, and what else to import.
+        out: path of the scenario to be, which determines how it names other files.
+        options: the base, and other options of the import.
 
     Raises:
         InputError: a file cannot be read or is none of these, two contradict one another, they fit several revisions,
@@ -107,7 +107,7 @@ def _with_kind_of_signal(settings: Settings, base: Layer) -> Settings:
 
 
 def _fitting_release(asked: Release | None, base: Layer) -> Release:
-    """The release asked for, which the base has to be of; else the base's, or the one that is most like it."""
+    """Return the requested release, which the base must be of; otherwise the base's, or the most similar one."""
     of_base = str(base.data.get("revision", {}).get("name"))
     if asked is None:
         return RELEASES.get(of_base, RELEASES["1.5"])
@@ -121,7 +121,7 @@ def _fitting_release(asked: Release | None, base: Layer) -> Release:
 
 
 def _revision_lines(release: Release) -> Iterator[str]:
-    """What the code of a release does otherwise than the base's."""
+    """Values of a release whose code differs from that of the base."""
     if release.changes:
         yield "revision:"
         yield f"  name: {flow(release.name)}"
@@ -158,7 +158,7 @@ def _layer(settings: Settings, configuration: Configuration, release: Release, o
 
 
 def _in_their_terms(error: InputError, settings: Settings) -> InputError:
-    """The same error with node and key in place of our key path, if it is about a value from the user's files."""
+    """Return the same error with node and key instead of the key path, if it is about a value from the user's files."""
     line, _, keys = (error.place or "").partition(", ")
     for path, setting in settings.items():
         parameter = setting.parameter
@@ -173,7 +173,7 @@ def _in_their_terms(error: InputError, settings: Settings) -> InputError:
 def _campaign(
     configuration: Configuration, loaded: LoadedScenario, out: Path, options: ImportOptions, notes: list[str]
 ) -> str | None:
-    """Text of the campaign file, if a campaign is configured and asked for; else a note for each of its parameters."""
+    """Return the text of the campaign file if one is configured and requested; otherwise note its parameters."""
     if options.campaign is None:
         notes += [
             f"{parameter.place}: no counterpart: a scenario has none; --campaign FILE writes a campaign file"
@@ -190,7 +190,7 @@ def _campaign(
 
 
 def _not_needed(configuration: Configuration) -> str | None:
-    """The one note about all parameters that say nothing about a mission here."""
+    """Make one note about all parameters that are irrelevant here."""
     keys = [
         f"{each.keys} ({each.source})"
         for each in configuration.parameters

@@ -1,4 +1,4 @@
-"""What the exemplar's files say about a mission, as each of its releases reads them, and what its nodes do without.
+"""Settings of a mission in the exemplar's files, as each release reads them, and the defaults of its nodes.
 
 Sources: the exemplar's repository kas-lab/suave, at the releases of these names; `2023` made the published runs. What
 the code of 1.2 to 1.4 does otherwise was not read for this project: there these releases count as 1.5.
@@ -33,7 +33,7 @@ class Setting:
     Attributes:
         value: plain data.
         comment: where it comes from.
-        parameter: that gives it; None: nothing does, and it is the default of the exemplar's node.
+        parameter: its source; None: it is the default of the exemplar's node.
     """
 
     value: Any
@@ -51,7 +51,7 @@ def settings_of(configuration: Configuration, release: Release, notes: list[str]
     Args:
         configuration: the files.
         release: that reads them.
-        notes: gets a line for each parameter that is not taken over.
+        notes: receives a line for each parameter that is not imported.
 
     Raises:
         InputError: two parameters contradict one another.
@@ -80,7 +80,7 @@ def settings_of(configuration: Configuration, release: Release, notes: list[str]
 
 
 def _unread(parameter: Parameter, release: Release) -> str | None:
-    """Why the code of a release does not read a parameter; None if it does."""
+    """Return why the code of a release does not read a parameter; None if it does."""
     kind, key, revision = parameter.kind, parameter.key, f"revision {release.name}"
     if NODES[kind][key] == "managers.random.adaptation_period_s" and key != release.period_key:
         default = f"without it, random adapts every {RANDOM_PERIOD_S:g} s"
@@ -95,7 +95,7 @@ def _unread(parameter: Parameter, release: Release) -> str | None:
 
 
 def _differ(one: Parameter, other: Parameter) -> bool:
-    """Whether two values differ by more than the blanks in thruster events."""
+    """Whether two values differ by more than spaces in thruster events."""
     values = [
         ["".join(each.split()) if isinstance(each, str) else each for each in value]
         if isinstance(value, list)
@@ -165,7 +165,7 @@ class Release:
 
     @property
     def traits(self) -> Mapping[str, str]:
-        """What may differ between releases, in words."""
+        """Traits that may differ between releases, in words."""
         battery = {"none": "no mission", "configured": "some missions", "all": "every mission"}
         counted_from = {"after_previous": "the one before", "after_start": "the start"}
         return {
@@ -230,7 +230,7 @@ def release_of(nodes: Collection[str], name: str | None) -> tuple[Release, str]:
 
 
 def _differences(names: Sequence[str]) -> str:
-    """What differs between releases, trait by trait."""
+    """Differences between releases, trait by trait."""
     texts = []
     for trait in RELEASES[names[0]].traits:
         having: dict[str, list[str]] = {}
@@ -247,7 +247,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def defaults_of(release: Release, *, battery: bool) -> dict[str, tuple[str, Any]]:
-    """Return what the exemplar's nodes do without a parameter, by the scenario's key path: its name and default.
+    """Return the defaults of the exemplar's nodes, by the scenario's key path: parameter name and value.
 
     Args:
         release: of the exemplar.

@@ -136,7 +136,7 @@ def make_policy(
 
     Args:
         base: the ontologies.
-        settings: which attributes are measured, and what the managing subsystem does in code.
+        settings: measured attributes, and behaviour of the managing subsystem that is not in the rules.
         infer: analyzes a state and plans on it.
         max_failed: maximum number of components that report a status.
         space: what to tell apart; None: what can have an effect.
@@ -176,7 +176,7 @@ def make_policy(
 def kinds_of_states(
     base: Ontology, settings: ManagingSettings, max_failed: int, space: PolicySpace
 ) -> Iterator[list[PolicyCase]]:
-    """Give every kind of state, undecided, in groups that differ in what is asked for and grounded only.
+    """Yield every kind of state, undecided, in groups that differ only in objectives and groundings.
 
     Raises:
         InputError: there would be too many states.

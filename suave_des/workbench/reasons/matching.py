@@ -63,7 +63,7 @@ def unified(terms: Sequence[Term], values: Iterable[str | Lit | None], binding: 
 
 
 def shown_bindings(binding: Binding, names: Names) -> tuple[tuple[str, Value], ...]:
-    """Give what variables stand for as people write it, by the names of the variables in their order."""
+    """Return variable bindings as people write them, by the names of the variables in their order."""
     return tuple((name, value_of(binding[name], names)) for name in sorted(binding))
 
 

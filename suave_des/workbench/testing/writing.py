@@ -86,7 +86,7 @@ def _scalar(value: Any) -> str:
 
 
 def mission_states(folder: Path, bench: KnowledgeBase, run: int | None = None) -> Iterator[NamedState]:
-    """Give the states of a recorded mission, one of those that the rules cannot tell apart.
+    """Return the states of a recorded mission, one for each kind that the rules can tell apart.
 
     Raises:
         InputError: there is no recorded mission.
