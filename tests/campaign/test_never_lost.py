@@ -39,6 +39,17 @@ def undisturbed(scenario: Path, runs: int, folder: Path) -> bytes:
     return (folder / "runs.csv").read_bytes()
 
 
+LONG = 400
+"""Runs of each manager in a campaign that has to be killed while it goes on."""
+
+
+@pytest.fixture(scope="module")
+def undisturbed_long(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    folder = tmp_path_factory.mktemp("long")
+    (folder / "short.yaml").write_text(chaos.SHORT)
+    return undisturbed(folder / "short.yaml", LONG, folder / "whole")
+
+
 def stopped_after(missions: int):
     """What stops a campaign by Ctrl-C when so many missions are done."""
 
@@ -103,9 +114,10 @@ def test_resuming_what_is_done_changes_nothing(scenario: Path, tmp_path: Path) -
     assert (tmp_path / "out" / "runs.csv").read_bytes() == whole
 
 
-def test_killed_at_random_moments_the_bytes_are_the_same(scenario: Path, tmp_path: Path) -> None:
-    runs, out = 400, tmp_path / "out"
-    whole = undisturbed(scenario, runs, tmp_path / "whole")
+def test_killed_at_random_moments_the_bytes_are_the_same(
+    scenario: Path, undisturbed_long: bytes, tmp_path: Path
+) -> None:
+    runs, out = LONG, tmp_path / "out"
 
     def run(resumes: bool, told: Callable[[object], None]) -> None:
         if resumes:
@@ -117,17 +129,17 @@ def test_killed_at_random_moments_the_bytes_are_the_same(scenario: Path, tmp_pat
     assert done == sorted(done)
     assert len({count for count in done if 0 < count < 2 * runs}) >= 2  # or the moments showed nothing
     resume_campaign(out)
-    assert (out / "runs.csv").read_bytes() == whole
+    assert (out / "runs.csv").read_bytes() == undisturbed_long
     assert sorted(path.name for path in out.iterdir()) == [
         *("campaign.sqlite", "manifest.json", "runs.csv", "summary.csv"),
     ]
 
 
-@pytest.mark.parametrize(("kills", "runs"), [(1, 600), pytest.param(4, 3000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("kills", "runs"), [(1, LONG), pytest.param(4, 3000, marks=pytest.mark.slow)])
 def test_killed_with_its_workers_or_without_the_bytes_are_the_same(
-    scenario: Path, tmp_path: Path, kills: int, runs: int
+    scenario: Path, undisturbed_long: bytes, tmp_path: Path, kills: int, runs: int
 ) -> None:
-    whole = undisturbed(scenario, runs, tmp_path / "whole")
+    whole = undisturbed_long if runs == LONG else undisturbed(scenario, runs, tmp_path / "whole")
     asked = [str(scenario), "--managers", ",".join(MANAGERS), "--runs", str(runs), "--workers", "2"]
     done = chaos.survive(kills, random.Random(7), tmp_path, asked, longest_s=0.3)
     assert done == sorted(done)
@@ -271,14 +283,16 @@ class TestDisk:
         assert seen[0].done > 10
         assert (tmp_path / "out" / "runs.csv").read_bytes() == whole
 
-    def test_that_fills_up_as_the_system_tells_it(self, scenario: Path, tmp_path: Path) -> None:
+    def test_that_fills_up_as_the_system_tells_it(
+        self, scenario: Path, undisturbed_long: bytes, tmp_path: Path
+    ) -> None:
         """Files may not grow beyond 40 kB: the system refuses to write, as it does on a full disk."""
         code = (
             "import resource, signal, sys\n"
             "resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))\n"
             "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
             "from suave_des.cli.main import main\n"
-            f"main(['campaign', {str(scenario)!r}, '--managers', 'none,random', '--runs', '400', '--workers', '1',"
+            f"main(['campaign', {str(scenario)!r}, '--managers', 'none,random', '--runs', '{LONG}', '--workers', '1',"
             " '--quiet', '--out', 'out'])\n"
         )
         ended = subprocess.run(
@@ -293,7 +307,7 @@ class TestDisk:
         assert ended.stderr.count("\n") == 1
         assert "--resume out runs the rest" in ended.stderr
         resume_campaign(tmp_path / "out", 1)
-        assert (tmp_path / "out" / "runs.csv").read_bytes() == undisturbed(scenario, 400, tmp_path / "whole")
+        assert (tmp_path / "out" / "runs.csv").read_bytes() == undisturbed_long
 
     def test_a_folder_that_is_removed_meanwhile(
         self, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -145,6 +145,7 @@ def test_after_a_failure_the_next_mission_begins_with_a_new_program() -> None:
     assert frame["run"].tolist() == [2, 3]
 
 
+@pytest.mark.usefixtures("quick_workers")
 def test_programs_end_with_the_campaign() -> None:
     note = "open('pid', 'w').write(str(os.getpid()))\n"
     run_campaign("seams2023", [program(note + EVERY_PERIOD)], runs=2, workers=2)

@@ -41,6 +41,13 @@ def both(missions, tmp_path_factory):
     return file
 
 
+@pytest.fixture(scope="module")
+def opened_one(one, browser):
+    """A paused replay, for those who move through its time."""
+    with opened(browser, one) as found:
+        yield found
+
+
 def place(found, pane=0):
     return found.value(f"Object.values(document.querySelectorAll('.pane')[{pane}].dataset).map(Number)")
 
@@ -92,24 +99,27 @@ def test_playing_moves_the_vehicle_until_it_is_paused(one, browser):
         assert mission_time(found) == pytest.approx(paused, abs=0.2)
 
 
-def test_scrubbing_shows_the_vehicle_where_it_was_then(one, missions, browser):
+def scrub_to(found, time_s):
+    found.page.evaluate(
+        f"(s => {{ s.value = {time_s}; s.dispatchEvent(new Event('input')); }})(document.querySelector('#scrub'))"
+    )
+    found.wait_until(f"document.body.dataset.time === '{time_s}.00'")
+
+
+def test_scrubbing_shows_the_vehicle_where_it_was_then(opened_one, missions):
     track = missions["metacontrol"].record.trajectory
     index = track["t_s"].tolist().index(50.0)
-    with opened(browser, one) as found:
-        found.page.evaluate(
-            "(s => { s.value = 50; s.dispatchEvent(new Event('input')); })(document.querySelector('#scrub'))"
-        )
-        found.wait_until("document.body.dataset.time === '50.00'")
-        assert place(found) == pytest.approx([track[name][index] for name in ("x_m", "y_m", "z_m")], abs=2e-3)
+    scrub_to(opened_one, 50)
+    assert place(opened_one) == pytest.approx([track[name][index] for name in ("x_m", "y_m", "z_m")], abs=2e-3)
 
 
 @pytest.mark.parametrize(
     ("key", "expected_s"), [("ArrowRight", 101.0), ("Shift+ArrowLeft", 90.0), ("End", 300.0), ("Home", 0.0)]
 )
-def test_keys_move_through_time(key, expected_s, one, browser):
-    with opened(browser, one, hash_="#t=100") as found:
-        found.page.keyboard.press(key)
-        found.wait_until(f"Math.abs(Number(document.body.dataset.time) - {expected_s}) < 0.5")
+def test_keys_move_through_time(key, expected_s, opened_one):
+    scrub_to(opened_one, 100)
+    opened_one.page.keyboard.press(key)
+    opened_one.wait_until(f"Math.abs(Number(document.body.dataset.time) - {expected_s}) < 0.5")
 
 
 def test_the_space_bar_plays_and_pauses_even_after_a_click_on_the_button(one, browser):

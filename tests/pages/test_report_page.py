@@ -31,6 +31,13 @@ def report(campaign):
     return file
 
 
+@pytest.fixture(scope="module")
+def opened_report(report, browser):
+    """The report in a window of its own, for those who only look at it or choose a mission: drawing it takes seconds."""
+    with opened(browser, report) as found:
+        yield ready(found)
+
+
 def ready(found):
     found.wait_until("document.body.dataset.ready === 'true'")
     return found
@@ -53,22 +60,19 @@ def test_it_opens_without_complaint_or_request_and_fits_the_window(theme, size, 
             assert drawn > 3, chart
 
 
-def test_it_says_first_what_follows_and_last_how_it_was_made(report, browser):
-    with opened(browser, report) as found:
-        ready(found)
-        assert "none" in found.page.text_content("#conclusion")
-        assert "bt" in found.page.text_content("#conclusion")
-        assert "SHA-256" in found.page.text_content("#how")
-        assert found.page.text_content("#count") == "16 missions"
+def test_it_says_first_what_follows_and_last_how_it_was_made(opened_report):
+    page = opened_report.page
+    assert "none" in page.text_content("#conclusion")
+    assert "bt" in page.text_content("#conclusion")
+    assert "SHA-256" in page.text_content("#how")
+    assert page.text_content("#count") == "16 missions"
 
 
-def test_it_says_for_which_runs_it_has_ways_and_how_to_have_others(report, browser):
-    with opened(browser, report) as found:
-        ready(found)
-        for caption in ("where-title", "runs-title"):
-            told = found.page.text_content(f"#{caption}")
-            assert "3 runs of each manager" in told
-            assert "--paths N" in told
+def test_it_says_for_which_runs_it_has_ways_and_how_to_have_others(opened_report):
+    for caption in ("where-title", "runs-title"):
+        told = opened_report.page.text_content(f"#{caption}")
+        assert "3 runs of each manager" in told
+        assert "--paths N" in told
 
 
 def test_managers_metrics_and_runs_can_be_chosen(report, browser):
@@ -84,16 +88,15 @@ def test_managers_metrics_and_runs_can_be_chosen(report, browser):
         assert found.page.text_content("#count") != "8 missions"
 
 
-def test_a_click_on_a_mission_shows_its_numbers_and_way(report, campaign, browser):
+def test_a_click_on_a_mission_shows_its_numbers_and_way(opened_report, campaign):
     rows = pandas.read_csv(campaign / "runs.csv")
     row = rows[(rows.manager == "bt") & (rows.run == 2)].iloc[0]
-    with opened(browser, report) as found:
-        ready(found)
-        found.page.evaluate("document.getElementById('runs').emit('plotly_click', {points: [{customdata: 9}]})")
-        shown = found.page.text_content("#run-table tr[aria-selected=true]")
-        assert f"{row.search_time_s:g}" in shown
-        assert found.page.input_value("#run-number") == "2"
-        assert "--run 2 --managers bt" in found.page.text_content("#run-command")
+    page = opened_report.page
+    page.evaluate("document.getElementById('runs').emit('plotly_click', {points: [{customdata: 9}]})")
+    shown = page.text_content("#run-table tr[aria-selected=true]")
+    assert f"{row.search_time_s:g}" in shown
+    assert page.input_value("#run-number") == "2"
+    assert "--run 2 --managers bt" in page.text_content("#run-command")
 
 
 def test_names_are_text_never_markup(campaign, tmp_path, browser):

@@ -158,6 +158,7 @@ class TestFiles:
         files = texts(dataclasses.replace(good, samples=(cell,)), {})
         assert json.loads(files[JSON_FILE])["cells"][0]["std_ratio"] is None
 
+    @pytest.mark.usefixtures("few_resamples")
     def test_figures_are_pictures_and_repeat(self, good, published, like_published):
         for draw in (distributions_png, detections_png):
             picture = draw(good, published, like_published)
