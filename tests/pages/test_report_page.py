@@ -33,7 +33,7 @@ def report(campaign):
 
 @pytest.fixture(scope="module")
 def opened_report(report, browser):
-    """The report in a window of its own, for those who only look at it or choose a mission: drawing it takes seconds."""
+    """The report in a window of its own, for those who only look or choose a mission: drawing takes seconds."""
     with opened(browser, report) as found:
         yield ready(found)
 
