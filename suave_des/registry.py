@@ -15,6 +15,7 @@ from weakref import WeakSet
 
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.managing.base import ManagingSubsystem
+from suave_des.monitor.diagnostics import Kind
 
 if TYPE_CHECKING:
     from suave_des.managed.own import OwnFunction
@@ -49,6 +50,9 @@ _HOOKS = {
     "diagnostic": "(self, diagnostic)",
     "adapt": "(self)",
 }
+_CLASS_METHODS = {"check": "(cls, loaded)", "input_files": "(cls, settings)"}
+"""What is asked of a class, before there is a mission."""
+_LETS_TIME_PASS = "adapt may let time pass: with yield self.system.env.timeout(seconds)"
 
 
 def is_built_in(name: str) -> bool:
@@ -122,30 +126,44 @@ def _member(family: str, argument: str) -> type[ManagingSubsystem]:
 
 
 def _check_hooks(name: str, kind: type[ManagingSubsystem]) -> None:
-    """Check that each hook that a class has can be called as hooks are called.
+    """Check that each hook that a class has can be called as hooks are called, and its subscriptions.
 
     Raises:
-        InputError: one takes other arguments; or none is there, but something that resembles one.
+        InputError: one takes other arguments, or would only make a generator or coroutine; none is there, but something
+            that resembles one; or the class subscribes to what is no kind of diagnostics.
     """
     if kind in _checked:
         return
-    for hook, form in _HOOKS.items():
+    for hook, form in (_HOOKS | _CLASS_METHODS).items():
         function = getattr(kind, hook)
-        arguments = [object()] * (form.count(",") + 1)
+        arguments = [object()] * (form.count(",") + form.startswith("(self"))
         if not callable(function):
             raise InputError(f"manager {name!r}: {hook} is not a method", remedy=f"write def {hook}{form}")
         try:
             inspect.signature(function).bind(*arguments)
         except TypeError as error:
             problem = f"manager {name!r}: {hook}{inspect.signature(function)} cannot be called as a hook: {error}"
-            raise InputError(problem, remedy=f"write def {hook}{form}") from None
+            decorator = "@classmethod " if hook in _CLASS_METHODS else ""
+            raise InputError(problem, remedy=f"write {decorator}def {hook}{form}") from None
         except ValueError:  # no signature: compiled
             continue
+        if inspect.iscoroutinefunction(function) or inspect.isasyncgenfunction(function):
+            remedy = f"write def {hook}{form}; {_LETS_TIME_PASS}"
+            raise InputError(f"manager {name!r}: {hook} is async, and nothing would run it", remedy=remedy)
+        if inspect.isgeneratorfunction(function) and hook not in ("adapt", "input_files"):
+            problem = f"manager {name!r}: {hook} yields, and nothing would run it"
+            raise InputError(problem, remedy=f"return from {hook} at once; {_LETS_TIME_PASS}")
     own = {each for base in kind.__mro__ if base is not object and base is not ManagingSubsystem for each in vars(base)}
     if not own & _HOOKS.keys():
         resembling = {each: near for each in own for near in get_close_matches(each, _HOOKS, n=1, cutoff=0.75)}
         for each, hook in sorted(resembling.items()):
             raise InputError(f"manager {name!r} has no hook, but {each}", remedy=f"did you mean {hook}{_HOOKS[hook]}?")
+    subscribed = kind.subscribes_to
+    unknown = () if isinstance(subscribed, property) else [each for each in subscribed if each not in list(Kind)]
+    if unknown:  # of a text, its letters are
+        remedy = f"give a tuple of some of {', '.join(f'Kind.{known.name}' for known in Kind)}"
+        what = f"is {str(subscribed)!r}" if isinstance(subscribed, str) else f"has {shown(unknown[0])}"
+        raise InputError(f"manager {name!r}: subscribes_to {what}", remedy=remedy)
     _checked.add(kind)
 
 

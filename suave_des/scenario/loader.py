@@ -23,6 +23,9 @@ MANAGER_GROUP = "suave_des.managers"
 """Entry point group in which packages register their managers."""
 
 
+_FILE_NAMES = "return a list of file names as text"
+
+
 class _DeclaresFiles(Protocol):
     """A manager's class."""
 
@@ -90,10 +93,20 @@ class LoadedScenario:
         Raises:
             InputError: a file does not exist, or the class does not declare a list of names.
         """
-        names = kind.input_files(self.manager_settings(manager))
+        settings = self.manager_settings(manager)
+        try:
+            names = kind.input_files(settings)
+            names = names if isinstance(names, str) else tuple(names)
+        except InputError:
+            raise
+        except Exception as error:
+            problem = f"manager {manager}: input_files raised {type(error).__name__}: {error}"
+            is_missing = isinstance(error, KeyError) and error.args and error.args[0] not in settings
+            remedy = f"give the setting, as in --manager-option {error.args[0]}=..." if is_missing else _FILE_NAMES
+            raise InputError(problem, remedy=remedy) from error
         if isinstance(names, str) or not all(isinstance(name, str) for name in names):
             problem = f"manager {manager}: input_files gave {shown(names)}"
-            raise InputError(problem, remedy="return a list of file names as text")
+            raise InputError(problem, remedy=_FILE_NAMES)
         for name in names:
             yield name, self.manager_file(manager, name)
 

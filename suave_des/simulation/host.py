@@ -2,8 +2,8 @@
 
 from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass, field
-from math import inf
-from typing import Any, TypeVar
+from math import inf, isnan
+from typing import Any, SupportsFloat, TypeVar
 
 import simpy
 
@@ -21,6 +21,7 @@ RAISED = (Exception, SystemExit)
 _T = TypeVar("_T")
 _MEASURED_SOMEWHERE = ("water_visibility", "battery_level")
 """Attributes that some shipped scenario measures: a manager may be written for all of them."""
+_MAY_RETURN = "it may return None, or yield events, such as system.env.timeout(1.0)"
 _MAX_YIELDS_AT_ONE_TIME = 10_000
 """How often `adapt` may yield while mission time stands still."""
 
@@ -78,8 +79,10 @@ class ManagerHost:
             self.bus.subscribe(self._diagnostic, self.manager.subscribes_to)
         period_s = self.manager.period_s
         if period_s is not None:
-            if not period_s > 0.0:
-                raise self.mission_error(ValueError(f"period_s is {period_s}; it must be above 0, or None"))
+            if not (isinstance(period_s, SupportsFloat) and period_s > 0.0):
+                raise self.mission_error(ValueError(f"period_s is {period_s!r}; it must be a number above 0, or None"))
+            if not isinstance(starts_s := self.manager.starts_s, SupportsFloat) or isnan(starts_s):
+                raise self.mission_error(ValueError(f"starts_s is {starts_s!r}; it must be a number"))
             self._process = self.system.env.process(self._adapt_periodically(period_s))
 
     def _declared(self) -> Dependencies | None:
@@ -136,6 +139,8 @@ class ManagerHost:
             requests = modes.requests
             adaptation = self._guarded(self.manager.adapt)
             if adaptation is not None:
+                if not isinstance(adaptation, Generator):
+                    raise self.mission_error(TypeError(f"adapt returned {adaptation!r}; {_MAY_RETURN}"))
                 yield from self._guarded_process(adaptation)
             if adaptation is not None or modes.requests > requests:
                 self._idle_regions.clear()

@@ -153,6 +153,47 @@ class Loops(ManagingSubsystem):
     def adapt(self):
         while True:
             yield self.system.env.timeout(0.0)
+
+class Waits(ManagingSubsystem):
+    def diagnostic(self, diagnostic):
+        yield self.system.env.timeout(1.0)
+
+class Async(ManagingSubsystem):
+    async def task_requested(self, task):
+        pass
+
+class AsyncAdapt(Loops):
+    async def adapt(self):
+        pass
+
+class Returns(Loops):
+    def adapt(self):
+        return "fd_spiral_low"
+
+class TextPeriod(Loops):
+    def __init__(self, system):
+        super().__init__(system)
+        self.period_s = "2"
+
+class NoStart(Loops):
+    def __init__(self, system):
+        super().__init__(system)
+        self.starts_s = float("nan")
+
+class NoKind(ManagingSubsystem):
+    subscribes_to = ("visibility",)
+
+class OneKind(ManagingSubsystem):
+    subscribes_to = "Pose"
+
+class NoClassMethod(ManagingSubsystem):
+    def check(self, loaded):
+        pass
+
+class NeedsSetting(ManagingSubsystem):
+    @classmethod
+    def input_files(cls, settings):
+        return [settings["table"]]
 """
 
 
@@ -164,6 +205,16 @@ class Loops(ManagingSubsystem):
         ("Misspelt", 2, "did you mean task_requested(self, task)?"),
         ("NoMethod", 2, "adapt is not a method"),
         ("Loops", 3, "no mission time passed"),
+        ("Waits", 2, "diagnostic yields, and nothing would run it"),
+        ("Async", 2, "task_requested is async"),
+        ("AsyncAdapt", 2, "adapt is async"),
+        ("Returns", 3, "adapt returned 'fd_spiral_low'; it may return None"),
+        ("TextPeriod", 3, "period_s is '2'; it must be a number above 0"),
+        ("NoStart", 3, "starts_s is nan"),
+        ("NoKind", 2, "subscribes_to has 'visibility'"),
+        ("OneKind", 2, "subscribes_to is 'Pose'"),
+        ("NoClassMethod", 2, "write @classmethod def check(cls, loaded)"),
+        ("NeedsSetting", 2, "--manager-option table=..."),
     ],
 )
 def test_mistakes_in_a_class_are_told_early(tmp_path: Path, name: str, status: int, words: str) -> None:
