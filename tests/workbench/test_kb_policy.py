@@ -22,6 +22,7 @@ from suave_des.workbench.policy.space import (
 from suave_des.workbench.policy.table import function_table
 from suave_des.workbench.ranges import ValueRange, ranges_between, values_in
 from suave_des.workbench.state_input import ManagingSettings
+from tests.helpers.knowledge_states import FEWER_NUMBERS
 
 MOTION, SEARCH = "f_maintain_motion", "f_generate_search_path"
 
@@ -246,11 +247,11 @@ class TestDiff:
     def test_nothing_differs_from_itself(self, bench):
         assert bench.diff(bench, max_failed=0).differing == ()
 
-    def test_a_moved_threshold_differs_between_old_and_new_only(self, bench, tmp_path):
+    def test_a_moved_threshold_differs_between_old_and_new_only(self, small_bench, tmp_path):
         file = rules_file(
             tmp_path, f'QAWaterVisibility: {VISIBLE} ^ lessThan(?v, 3) -> fg_status(?fg, "IN_ERROR_NFR")\n'
         )
-        difference = bench.diff(KnowledgeBase.load(rules=[file]), max_failed=0)
+        difference = small_bench.diff(KnowledgeBase.load(rules=[file], values=FEWER_NUMBERS), max_failed=0)
         high = [pair for pair in difference.differing if pair.one.state.grounded(SEARCH) == "fd_spiral_high"]
         assert {str(pair.one.ranges[0]) for pair in high} == {"3", "3 < . < 3.25"}
         assert {(pair.one.outcome(SEARCH), pair.other.outcome(SEARCH)) for pair in high} == {
