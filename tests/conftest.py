@@ -18,9 +18,9 @@ from hypothesis import HealthCheck, settings
 
 from suave_des.caches import private_cache
 from suave_des.knowledge.java_archive import archive_path
-from tests.helpers.quick_workers import _warm_process, quick_workers
+from tests.helpers.quick_workers import _warm_process, quick_campaigns, quick_workers
 
-__all__ = ["_warm_process", "quick_workers"]
+__all__ = ["_warm_process", "quick_campaigns", "quick_workers"]
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("repeatable")

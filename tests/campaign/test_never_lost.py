@@ -135,6 +135,7 @@ def test_killed_at_random_moments_the_bytes_are_the_same(
     ]
 
 
+@pytest.mark.usefixtures("quick_campaigns")
 @pytest.mark.parametrize(("kills", "runs"), [(1, LONG), pytest.param(4, 3000, marks=pytest.mark.slow)])
 def test_killed_with_its_workers_or_without_the_bytes_are_the_same(
     scenario: Path, undisturbed_long: bytes, tmp_path: Path, kills: int, runs: int
@@ -218,6 +219,7 @@ class TestRefusals:
         with pytest.raises(InputError, match=r"not empty: .*--resume .* continues it, --overwrite replaces it"):
             run_campaign(scenario, MANAGERS, 20, 1, out=tmp_path / "out")
 
+    @pytest.mark.usefixtures("quick_campaigns")
     def test_two_campaigns_on_one_folder(self, scenario: Path, tmp_path: Path) -> None:
         process = chaos.start([str(scenario), "--managers", "none", "--runs", "100000", "--out", "out"], tmp_path)
         try:

@@ -39,6 +39,7 @@ def wait_for(path: Path, size: int = 0) -> None:
         time.sleep(0.002)
 
 
+@pytest.mark.usefixtures("quick_campaigns")
 @pytest.mark.parametrize(("number", "workers"), [*zip(STATUS, (1, 2), strict=True)])
 def test_what_is_done_is_kept(number: signal.Signals, workers: int, scenario: Path, tmp_path: Path) -> None:
     asked = [str(scenario), "--managers", "none", "--runs", str(RUNS), "--workers", str(workers), "--out", "out"]
@@ -59,6 +60,7 @@ def test_what_is_done_is_kept(number: signal.Signals, workers: int, scenario: Pa
     assert not any(Path(f"/proc/{child}").exists() for child in children)
 
 
+@pytest.mark.usefixtures("quick_campaigns")
 @pytest.mark.parametrize(
     ("number", "moment"),
     [(signal.SIGINT, "lock"), (signal.SIGTERM, "store"), (signal.SIGINT, "later"), (signal.SIGTERM, "later")],
@@ -78,6 +80,7 @@ def test_no_empty_folder_is_left(number: signal.Signals, moment: str, scenario: 
         assert err == "suave-des: interrupted\n"
 
 
+@pytest.mark.usefixtures("quick_campaigns")
 def test_workers_leave_ctrl_c_to_the_campaign(scenario: Path, tmp_path: Path) -> None:
     """A terminal sends it to all processes of a command; each would say so in many lines."""
     process = chaos.start(
