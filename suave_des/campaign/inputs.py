@@ -176,7 +176,7 @@ def check_trusted(managers: Iterable[str], named: Iterable[str], folder: Path, *
         raise InputError(
             f"the campaign would run the code of {', '.join(unknown)}, which this folder refers to",
             file=folder,
-            remedy=f"if you trust them, give --managers {','.join(unknown)}or --yes",
+            remedy=f"if you trust them, give --managers {','.join(unknown)} or --yes",
         )
 
 

@@ -269,7 +269,7 @@ def _sweep(given: Mapping[str, Any], seed: int) -> tuple[Sweep, dict[str, str]]:
     if not forms:
         return Sweep(grid=_columns("sweep", given), seed=seed), {name: f"sweep.{name}" for name in given}
     if others := [name for name in given if name not in _FORMS]:
-        raise _wrong(f"sweep.{others[0]}", f"stands beside {forms[0]}", "put it under grid, zip or sample")
+        raise _wrong(f"sweep.{others[0]}", f"cannot stand beside {forms[0]}", "put it under grid, zip or sample")
     zipped = _columns("sweep.zip", given.get("zip", {}))
     lengths = {name: len(values) for name, values in zipped.items()}
     if len(set(lengths.values())) > 1:

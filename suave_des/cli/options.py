@@ -208,7 +208,7 @@ def manager_options(words: Sequence[str] | None, managers: Sequence[str]) -> dic
                 f"give the manager too, for instance {managers[0]}.{word}" if managers else "name the managers, too"
             )
             raise InputError(
-                f"{shown(word)} belongs to no manager that you wrote", place="--manager-option", remedy=remedy
+                f"{shown(word)} applies only to managers that are not built in", place="--manager-option", remedy=remedy
             )
         for target in targets:
             settings.setdefault(target, {})[key] = value

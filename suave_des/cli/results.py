@@ -209,7 +209,7 @@ def replay(
 
     folders = folders or []
     if bool(folders) == (scenario is not None):
-        problem = "both DIR and --scenario are given" if folders else "give something to play"
+        problem = "both DIR and --scenario are given" if folders else "there is nothing to play"
         raise InputError(problem, remedy="give DIR, the --out folder of run or campaign, or --scenario NAME")
     if folders:
         check_no_use({"--seed": seed, **files.given}, "with DIR, whose missions have their own")

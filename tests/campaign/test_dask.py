@@ -140,7 +140,7 @@ def test_the_hook_that_watches_workers_would_tell(
 
 def test_managers_that_end_or_block_their_worker_cost_their_own_missions_only(small_cluster: Cluster) -> None:
     causes = {
-        "DiesInSome": "the cluster's worker died with it, 1 times (killed, out of memory, or stuck?)",
+        "DiesInSome": "the cluster's worker died while running it, 1 times (killed, out of memory, or stuck?)",
         "HangsInSome": "not done after 3 s (time-out)",
         "RaisesInHalf": "ValueError: I do not know what to do",
     }

@@ -152,7 +152,7 @@ class TestReceivedFolder:
 
     def test_its_managers_are_not_imported_unasked(self, received: Path, settable: str) -> None:
         done = command_here(*RESUME, cwd=received)
-        assert done.returncode == 2 and f"name it: --managers {settable}" in done.stderr
+        assert done.returncode == 2 and f"give --managers {settable}" in done.stderr
         assert not (received / "imported").exists()
 
     @pytest.mark.parametrize("how", ["named", "confirmed"])

@@ -153,7 +153,7 @@ class TestRefusals:
         [
             (
                 "base: seams2023.yaml\nmission: {time_limit_s: 61}\n",
-                r"scenario.mission.time_limit_s was 60.0, and is 61",
+                r"scenario.mission.time_limit_s was 60.0, and is now 61",
             ),
             ("base: release15.yaml\nmission: {time_limit_s: 60}\n", r"scenario\.\S+ was "),
         ],
@@ -189,7 +189,7 @@ class TestRefusals:
     def test_another_version(self, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         interrupted(scenario, tmp_path / "out")
         monkeypatch.setattr("suave_des.campaign.inputs.__version__", "99.0")
-        with pytest.raises(InputError, match=r"versions.suave-des was '[0-9.]+', and is '99.0' now"):
+        with pytest.raises(InputError, match=r"versions.suave-des was '[0-9.]+', and is now '99.0'"):
             resume_campaign(tmp_path / "out")
 
     def test_another_code_of_a_manager(self, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -207,7 +207,7 @@ class TestRefusals:
 
     def test_fewer_runs(self, scenario: Path, tmp_path: Path) -> None:
         interrupted(scenario, tmp_path / "out")
-        with pytest.raises(InputError, match=r"runs was 20, and is 10 now"):
+        with pytest.raises(InputError, match=r"runs was 20, and is now 10"):
             resume_campaign(tmp_path / "out", runs=10)
 
     def test_a_folder_without_a_campaign(self, tmp_path: Path) -> None:
@@ -246,7 +246,9 @@ class TestDamage:
         content = bytearray(path.read_bytes())
         content[len(content) // 3 :] = b"\xff" * (len(content) - len(content) // 3)
         path.write_bytes(content)
-        with pytest.raises(InputError, match=r"campaign.sqlite: is damaged: [\s\S]*start anew with --overwrite"):
+        with pytest.raises(
+            InputError, match=r"campaign.sqlite: is damaged: [\s\S]*start a new campaign with --overwrite"
+        ):
             resume_campaign(tmp_path / "out")
 
     def test_of_one_digit(self, scenario: Path, tmp_path: Path) -> None:
@@ -320,7 +322,7 @@ class TestDisk:
             if progress.done == 7:
                 shutil.rmtree(tmp_path / "out")
 
-        with pytest.raises(StoreError, match=r"was removed while the campaign ran; .* start anew$"):
+        with pytest.raises(StoreError, match=r"was removed while the campaign ran; .* start a new campaign$"):
             run_campaign(scenario, MANAGERS, 20, 1, out=tmp_path / "out", on_progress=remove)
 
 

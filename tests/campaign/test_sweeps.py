@@ -171,7 +171,7 @@ def test_a_changed_sweep_cannot_be_resumed(tmp_path: Path) -> None:
         ),
         (HEAD + "sweep:\n  modes_file: [a.yaml]\n", "files were read with the scenario"),
         (HEAD + "sweep:\n  default_modes.f_generate_search_path: [fd_low]\n", "has no mode 'fd_low'"),
-        (HEAD + "sweep:\n  grid: {}\n  start.x_m: [1]\n", "line 8, sweep.start.x_m: is beside grid"),
+        (HEAD + "sweep:\n  grid: {}\n  start.x_m: [1]\n", "line 8, sweep.start.x_m: cannot stand beside grid"),
         (HEAD + "sweep:\n  zip: {start.x_m: [1], start.y_m: [1, 2]}\n", "start.x_m has 1, start.y_m has 2"),
         (HEAD + "sweep:\n  sample: {method: sobol, points: 6, ranges: {start.x_m: [1, 2]}}\n", "give 4 or 8"),
         (HEAD + "sweep:\n  sample: {method: sobol, points: 8}\n", "sweep.sample: has no ranges"),
@@ -182,7 +182,10 @@ def test_a_changed_sweep_cannot_be_resumed(tmp_path: Path) -> None:
         (HEAD + "runs_per_draw: 0\n", "line 6, runs_per_draw: 0 is out of range"),
         (HEAD + "perturbations:\n  start.x_m: 3\n", "line 7, perturbations.start.x_m: expected a distribution, got 3"),
         (HEAD + f"perturbations:\n  start.q_m: {UNIFORM % (1, 2)}\n", "did you mean 'z_m'?"),
-        (HEAD + f"perturbations:\n  latencies.mode_change_s: {UNIFORM % (1, 2)}\n", "is not drawn once in a run"),
+        (
+            HEAD + f"perturbations:\n  latencies.mode_change_s: {UNIFORM % (1, 2)}\n",
+            "is drawn at each use, not once per run",
+        ),
         (HEAD + f"perturbations:\n  mission.time_limit_s: {UNIFORM % (1, 2)}\n", "cannot have such a distribution"),
         (
             HEAD + f"perturbations:\n  start.x_m: {UNIFORM % (1, 2)}\nsweep:\n  start.x_m: [1]\n",

@@ -204,9 +204,9 @@ class TestResuming:
     @pytest.mark.parametrize(
         ("before", "now", "words"),
         [
-            ("initial_y_m:0.002", "initial_y_m:0.003", r"until_ci.half_width was 0.002, and is 0.003 now"),
-            ("initial_y_m:0.002", "initial_x_m:0.002", r"until_ci.metric was 'initial_y_m', and is 'initial_x_m' now"),
-            (None, "initial_y_m:0.002", r"until_ci was .*, and is .* now"),
+            ("initial_y_m:0.002", "initial_y_m:0.003", r"until_ci.half_width was 0.002, and is now 0.003"),
+            ("initial_y_m:0.002", "initial_x_m:0.002", r"until_ci.metric was 'initial_y_m', and is now 'initial_x_m'"),
+            (None, "initial_y_m:0.002", r"until_ci was .*, and is now .*"),
         ],
     )
     def test_with_another_limit_is_refused(

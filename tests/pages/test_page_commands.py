@@ -83,7 +83,7 @@ def test_two_missions_are_written_side_by_side(mission, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        ((), "give something to play"),
+        ((), "there is nothing to play"),
         (("gone",), "no such folder"),
         (("{mission}", "--seed", "3"), "--seed cannot be used with DIR"),
         (("{mission}", "--scenario", "seams2023"), "both DIR and --scenario"),

@@ -243,7 +243,7 @@ def test_a_rule_as_text_that_takes_the_place_of_another_is_told(tmp_path: Path) 
     assert finding.message.endswith("tomasys.owl")
     same = 'S1a: FunctionGrounding(?fg) ^ fg_status(?fg, "IN_ERROR_COMPONENT") ^ solvesO(?fg, ?o)'
     findings = found(tmp_path, f'{same} -> o_status(?o, "IN_ERROR_COMPONENT")')
-    assert not [one for one in findings if "takes the place" in one.message]
+    assert not [one for one in findings if "replaces the rule of this name" in one.message]
 
 
 def test_a_design_whose_name_is_nearly_that_of_a_mode(tmp_path: Path) -> None:

@@ -334,7 +334,7 @@ def _coverage_lines(coverage: Coverage) -> Iterator[str]:
     unreachable = [each for each in coverage.rules if each.unreachable]
     if unreachable:
         words = f"of {coverage.states} kinds of states of this model, with at most {coverage.max_failed} components"
-        yield f"in no state ({words} reporting); facts in a test may"
+        yield f"not reached in any state ({words} reporting), but facts in a test may reach it"
         yield from (f"  {line}" for line in _unreachable(unreachable))
     if coverage.proposed:
         count = len(coverage.proposed)
