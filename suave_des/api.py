@@ -59,7 +59,7 @@ def run_campaign(
             itself need `if __name__ == "__main__":` around the call, as workers import the script; those of a notebook
             need nothing.
         out: folder for runs.csv, summary.csv and manifest.json, from which the campaign can be resumed. None: no files.
-        progress: whether to show progress; left out: in a notebook and on a terminal.
+        progress: whether to show progress; by default in a notebook and on a terminal.
         options: see suave_des.campaign.spec.CampaignSpec, such as sweep, perturbations, until_ci and rules. The values
             of a sweep may be a list, an array or a range.
 
@@ -87,7 +87,7 @@ def stream_campaign(
     progress: bool | None = None,
     **options: Unpack[CampaignOptions],
 ) -> Iterator[CampaignFrame]:
-    """Yield the same in data frames of `chunk_rows` rows, in order, for more rows than memory has room for.
+    """Yield the same in data frames of `chunk_rows` rows, in order, for more rows than fit into memory.
 
     The campaign runs at once; its rows are kept on disk, in a temporary file without `out`, and read as they are
     requested. Each piece has the types and attrs of the whole.
@@ -116,20 +116,20 @@ def resume_campaign(
     confirmed: bool = False,
     progress: bool | None = None,
 ) -> CampaignFrame:
-    """Go on with the campaign in a folder where it stopped, and return its rows as run_campaign does.
+    """Resume the campaign in a folder where it stopped, and return its rows as run_campaign does.
 
     Args:
         folder: its output folder.
-        workers: processes; it may be another number.
-        runs: more runs than at first; left out: as many.
-        until_ci: the metric given at first with a smaller half-width; left out: as at first.
+        workers: processes; the number may differ.
+        runs: a greater number of runs; by default the original number.
+        until_ci: the original metric with a smaller half-width; by default the original one.
         scheduler: address of a Dask scheduler whose workers run the missions, instead of processes here.
         managers: those of the campaign's that are not installed; their code is run only if they are named here.
         confirmed: whether to run the code of all managers that the folder names.
-        progress: whether to show progress; left out: in a notebook and on a terminal.
+        progress: whether to show progress; by default in a notebook and on a terminal.
 
     Raises:
-        InputError: there is no campaign, or something that decides results has changed; the difference is named.
+        InputError: there is no campaign, or something that determines results has changed; the error names it.
         WorkerError, StoreError: as run_campaign.
     """
     result, attrs = _with_progress(

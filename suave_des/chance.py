@@ -1,4 +1,4 @@
-"""Everything that is random in one mission: each use has a stream of its own, named after the scenario's key."""
+"""Everything that is random in one mission: each use has its own stream, named after the scenario's key."""
 
 import math
 from collections.abc import Callable, Mapping

@@ -29,7 +29,7 @@ def until(env: simpy.Environment, t_s: float) -> simpy.Timeout:
 
 
 def exactly_at(env: simpy.Environment, t_s: float) -> simpy.Event:
-    """An event at mission time t itself; a delay that is added to the present time may miss it by rounding."""
+    """An event at mission time t itself; a delay added to the current time may miss it by rounding."""
     event = simpy.Event(env)
     event._ok, event._value = True, None
     heappush(env._queue, (t_s, simpy.events.NORMAL, next(env._eid), event))
@@ -51,7 +51,7 @@ def advance(env: simpy.Environment, t_s: float) -> None:
 
 
 class Alarm:
-    """Calls a function at a mission time; setting it anew replaces the call that was pending.
+    """Calls a function at a mission time; setting it again replaces the pending call.
 
     Args:
         env: the mission's clock.
@@ -74,7 +74,7 @@ class Alarm:
         event.callbacks.append(self._ring)
 
     def set_now(self) -> None:
-        """Call the function now, when the present event is over and before any other, as SimPy does with interrupts."""
+        """Call the function now, when the current event is over and before any other, as SimPy does with interrupts."""
         self._pending = event = simpy.Event(self._env)
         event.callbacks = [self._ring]
         event._ok, event._value = True, None

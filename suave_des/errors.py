@@ -1,4 +1,4 @@
-"""Errors for the user: each names the place, what is wrong, and what would be right."""
+"""Errors for the user: each names the place, the problem, and the remedy."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class SuaveDesError(Exception):
 
 
 class InputError(SuaveDesError):
-    """Something that the user gave cannot be used; the command line ends with exit status 2.
+    """An invalid input from the user; the command line ends with exit status 2.
 
     Args:
         problem: what is wrong, with the offending value.
@@ -40,12 +40,12 @@ class InputError(SuaveDesError):
         super().__init__(f"{message} ({remedy})" if remedy else message)
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Survive the trip from a worker process to its parent with all parts."""
+        """Preserve all parts when pickled between processes."""
         return (_rebuild, (type(self), self.problem, self.file, self.place, self.remedy))
 
 
 def _short(name: str | None) -> str | None:
-    """A file name, cut where it would hide the message; no name that can exist is longer."""
+    """Return a file name, truncated if it would hide the message; no valid name is longer."""
     return name if name is None or len(name) <= _NAME_LIMIT else f"{name[:_NAME_LIMIT]}..."
 
 
@@ -101,7 +101,7 @@ def shown(value: object, limit: int = 60) -> str:
 
 
 def did_you_mean(word: object, known: Iterable[str], what: str = "known") -> str:
-    """Give the remedy for a misspelt word: the nearest known one, and the list of all."""
+    """Return the remedy for a misspelt word: the nearest known one, and the list of all."""
     names = list(known)
     near = difflib.get_close_matches(str(word), names, n=1, cutoff=0.6)
     listing = f"{what}: {', '.join(names)}" if names else f"{what}: none"

@@ -1,4 +1,4 @@
-"""Managers, and functions of one's own, by name: built in, registered by another package, or given as module:Class."""
+"""Managers and user-defined functions by name: built in, registered by another package, or given as module:Class."""
 
 from __future__ import annotations
 
@@ -173,7 +173,7 @@ def registered_functions() -> tuple[str, ...]:
 
 
 def function_class(function: str, name: str) -> type[OwnFunction]:
-    """The class of a function of one's own.
+    """Find the class of a user-defined function.
 
     Args:
         function: name of the function, for errors.

@@ -1,4 +1,4 @@
-"""Managers in other processes and languages: `exec:COMMAND` speaks JSON lines with a program over its stdin and stdout.
+"""Managers in other processes and languages: `exec:COMMAND` exchanges JSON lines with a program by stdin and stdout.
 
 Each message is a line, and gets a line as its answer; mission time stands still until then. The program is started once
 in each process that runs missions, and serves one mission after the other. The messages: docs/guides/other-programs.md
@@ -54,7 +54,7 @@ def messages_schema() -> dict[str, Any]:
 
 
 class ProgramError(Exception):
-    """A program that ends, does not answer, or answers something else than the protocol says."""
+    """A program that exits, does not answer, or violates the protocol."""
 
 
 class _Program:
@@ -136,7 +136,7 @@ def end_programs() -> None:
 
 
 class ExecManager(ManagingSubsystem):
-    """exec:COMMAND: a program that gets messages of what happens, and answers with modes."""
+    """exec:COMMAND: a program that receives a message for each event, and answers with modes."""
 
     command: ClassVar[str]
 
@@ -185,7 +185,7 @@ class ExecManager(ManagingSubsystem):
             self._thresholds = {name: tuple(sorted(map(float, each))) for name, each in edges.items()}
 
     def mission_started(self) -> None:
-        """Carry out what the program answered to this message, which it got with the settings."""
+        """Send the program this message with the settings, and carry out its answer."""
         self._carry_out(self._begin)
 
     def mission_ended(self, metrics: MissionMetrics) -> None:
@@ -208,7 +208,7 @@ class ExecManager(ManagingSubsystem):
             self._carry_out(self._ask("diagnostic", kind=kind, key=diagnostic.key, value=diagnostic.value))
 
     def adapt(self) -> None:
-        """Have the program adapt, with all that is measured."""
+        """Let the program adapt, with all current measurements."""
         measured = self.system.measured
         self._carry_out(self._ask("adapt", measured={name: measured(name) for name in self.system.measurements}))
 

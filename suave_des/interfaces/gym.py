@@ -32,9 +32,9 @@ SEED_LIMIT: Final = 2**31
 
 @dataclass(frozen=True)
 class Reward:
-    """The reward of a step: a weighted sum of what happened in it.
+    """The reward of a step: a weighted sum over its events.
 
-    The default pays a metre of pipeline what a tenth of a minute of search costs; a mission then gives about -10 to 60.
+    By default a metre of pipeline earns what 10 s of search cost; a mission then gives about -10 to 60.
 
     Attributes:
         inspected_per_m: for each metre that was inspected.
@@ -50,7 +50,7 @@ class Reward:
 
 
 class _Observing(CallerManages):
-    """Keeps which thrusters work."""
+    """Keeps track of which thrusters work."""
 
     subscribes_to: ClassVar[Collection[Kind]] = (Kind.COMPONENT_STATUS,)
     _NUMBERS: ClassVar = {thruster_name(number): number - 1 for number in range(1, THRUSTERS + 1)}
@@ -66,7 +66,7 @@ class _Observing(CallerManages):
 
 
 class _Episodes:
-    """Missions one after the other, as numbers: what the environment and its vector form have in common."""
+    """Successive missions as numbers: the part that the environment and its vector form share."""
 
     def __init__(
         self,
@@ -118,7 +118,7 @@ class _Episodes:
 
 
 def _choices(modes: Sequence[str]) -> tuple[str, ...]:
-    """Modes to choose from: those that are named, and ground the function."""
+    """Modes to choose from: named ones that ground the function."""
     return tuple(mode for mode in modes if mode not in (UNGROUND_MODE, DEFAULT_MODE))
 
 
@@ -138,7 +138,7 @@ class _Episode:
         self._task_changed()
 
     def step(self, action: Sequence[int]) -> tuple[float, bool]:
-        """Request modes, and let a period pass; return the reward, and whether the mission is over."""
+        """Request modes, and advance by a period; return the reward, and whether the mission is over."""
         run = self._run
         if action != self._requested:
             self._request(action)
@@ -192,7 +192,7 @@ class _Episode:
         return float(reward)
 
     def observation(self) -> Observation:
-        """What monitors have measured, and what is known of the mission."""
+        """Return the monitors' measurements and the state of the mission."""
         of, measured = self._of, self._system.measured
         values = [NOT_MEASURED if (value := measured(name)) is None else value for name in of.attributes]
         values += self._works
@@ -213,14 +213,14 @@ class _Episode:
 
 
 class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
-    """SUAVE's mission; an episode is a mission, a step is one period of adaptation.
+    """SUAVE's mission; an episode is a mission, a step is one adaptation period.
 
     Observation: a vector of float32, named by `observation_names`: the values that monitors measured last, -1 before
     the first; for each thruster 1 unless it was reported as failed; whether the pipeline is inspected; the distance
     inspected in m; mission time as a share of the limit; for each function with a choice, the index of the mode that
     was requested last, or -1.
 
-    Action: for each function in `mode_names` the index of a mode. That of a function which the present task does not
+    Action: for each function in `mode_names` the index of a mode. That of a function that the current task does not
     need has no effect. A function with one mode has it as long as it is needed.
 
     An episode terminates with the mission: at the time limit, which belongs to the task, or at the end of the path. It
@@ -277,7 +277,7 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         return self._episode.observation(), {"seed": drawn, **self._episode.info()}
 
     def step(self, action: Sequence[int] | NDArray[np.int64]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Request the modes of an action, and let a period pass."""
+        """Request the modes of an action, and advance by a period."""
         episode = self._episode
         if episode is None:
             raise InputError("there is no mission", remedy="call reset first")
@@ -346,7 +346,7 @@ class PipelineInspectionVector(VectorEnv[Observation, NDArray[np.int64], NDArray
     def step(
         self, actions: NDArray[np.int64]
     ) -> tuple[Observation, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
-        """Request the modes of all actions, and let a period pass in each mission."""
+        """Request the modes of all actions, and advance each mission by a period."""
         rewards, over, infos = np.zeros(self.num_envs), np.zeros(self.num_envs, np.bool_), dict[str, Any]()
         rows = np.asarray(actions)
         if rows.shape != (self.num_envs, len(self._of.choices)) or rows.dtype.kind not in "iu":

@@ -24,7 +24,7 @@ CALLER = "caller"
 
 
 class CallerManages(NoManager):
-    """Leaves adaptation to who advances the mission; a task begins with the default modes of its functions."""
+    """Leaves adaptation to the caller; a task begins with the default modes of its functions."""
 
     subscribes_to: ClassVar[Collection[Kind]] = ()
 
@@ -85,14 +85,14 @@ class Mission:
         self._run.bus.subscribe(self._take, (Kind.COMPONENT_STATUS,))
 
     def advance(self, until: float | None = None) -> None:
-        """Let mission time pass.
+        """Advance mission time.
 
         Args:
             until: mission time in s, which comes before whatever happens at that very time; None: the mission's end,
                 beyond which it does not go in any case.
 
         Raises:
-            InputError: that time has passed already.
+            InputError: that time has already passed.
             MissionError: the manager raised.
         """
         until_s = inf if until is None else float(until)
@@ -105,7 +105,7 @@ class Mission:
             self._run.advance(until_s)
 
     def change_mode(self, function: str, mode: str) -> None:
-        """Request a mode of a function; its effect comes after the scenario's latency.
+        """Request a mode of a function, which takes effect after the scenario's latency.
 
         Raises:
             InputError: there is no such function or mode, or the mission has a manager.
@@ -140,7 +140,7 @@ class Mission:
 
     @property
     def task(self) -> Task | None:
-        """The task that is carried out, with the functions that it needs."""
+        """The current task, with the functions that it needs."""
         return self._run.task
 
     @property
@@ -150,7 +150,7 @@ class Mission:
 
     @property
     def functions(self) -> tuple[str, ...]:
-        """The functions that are needed now: those of the task, and those that are needed all the time."""
+        """The functions that are currently needed: those of the task, and those of the whole mission."""
         task = self.task
         return (*self._run.system.lasting_functions, *(task.functions if task else ()))
 
@@ -161,7 +161,7 @@ class Mission:
         return {function: manager.available_modes(function) for function in manager.nodes}
 
     def current_mode(self, function: str) -> str | None:
-        """The mode of a function that was requested last; none before the first request."""
+        """The last requested mode of a function; None before the first request."""
         return self._run.modes.current_mode(function)
 
     @property
@@ -170,13 +170,13 @@ class Mission:
         return tuple(self._run.system.measurements)
 
     def measured(self, attribute: str, default: float | None = None) -> float | None:
-        """The value of a quality attribute that was published last; `default` before the first."""
+        """The last published value of a quality attribute; `default` before the first."""
         value = self._run.system.measured(attribute)
         return default if value is None else value
 
     @property
     def components(self) -> Mapping[str, str]:
-        """The statuses of components that were reported last, FALSE or RECOVERED."""
+        """The last reported statuses of components, FALSE or RECOVERED."""
         return dict(self._components)
 
     @property
@@ -186,7 +186,7 @@ class Mission:
 
     @property
     def distance_inspected_m(self) -> float:
-        """The distance inspected so far, as it was published last."""
+        """The last published distance inspected."""
         return self._run.system.distance_inspected_m()
 
     def metrics(self) -> MissionMetrics:
@@ -194,7 +194,7 @@ class Mission:
         return self._run.metrics()
 
     def result(self) -> MissionResult:
-        """Go to the end, and return the metrics with the record, if one was kept."""
+        """Run to the end, and return the metrics with the record, if one was kept."""
         if self._result is None:
             self._result = self._run.result()
         return self._result

@@ -34,7 +34,7 @@ class Session:
     Args:
         simulator: of the scenario.
         run, seed: of the first mission.
-        real_time_factor: seconds of mission time that pass in a second; 0: time passes only when a client says so.
+        real_time_factor: seconds of mission time per second; 0: time advances only when a client requests it.
     """
 
     def __init__(self, simulator: Simulator, run: int = 1, seed: int = 1, real_time_factor: float = 0.0) -> None:
@@ -50,7 +50,7 @@ class Session:
 
         Raises:
             LookupError: there is no such path.
-            InputError: the content cannot be used.
+            InputError: the content is invalid.
         """
         with self._lock:  # several clients are served one after the other
             self._catch_up()
@@ -180,7 +180,7 @@ def _seconds(value: Any) -> float:
 
 
 class _Handler(BaseHTTPRequestHandler):
-    """Reads requests and writes answers; what they mean is the session's business."""
+    """Reads requests and writes answers; the session interprets them."""
 
     server: Server
     protocol_version = "HTTP/1.1"
@@ -238,8 +238,8 @@ class Server(ThreadingHTTPServer):
     """Serves a session at an address until it is shut down.
 
     Args:
-        session: what answers.
-        host: address to listen at; 127.0.0.1 is reached from this machine alone.
+        session: answers the requests.
+        host: address to listen on; 127.0.0.1 is reachable only from this machine.
         port: 0: any that is free.
 
     Raises:

@@ -1,4 +1,4 @@
-"""What a managing subsystem is: one class with a few hooks, and what it can see and do.
+"""The managing subsystem: a base class with a few hooks, and its view of the managed subsystem.
 
 The built-in managers use nothing that one of your own cannot. Give yours on the command line as `package.module:Class`,
 or register it by name as an entry point of the group `suave_des.managers`.
@@ -65,23 +65,23 @@ class ManagedSystem:
     Attributes:
         env: the mission's clock; `env.timeout(s)` is an event to wait for.
         scenario: the mission's scenario.
-        settings: the scenario's entry under managers: for this manager.
+        settings: the scenario's entry for this manager, under `managers:`.
         modes: the mode manager.
-        lasting_functions: functions that are needed all the time and belong to no task.
+        lasting_functions: functions that are needed throughout the mission and belong to no task.
         stream: makes a named random stream of this run, the same for every manager.
         log: adds an event and its detail to the mission's record.
-        knowledge: gives the knowledge base with its reasoner, opened on the first call.
-        record_state: adds a state of knowledge that is reasoned about to the mission's record.
+        knowledge: returns the knowledge base with its reasoner, opened on the first call.
+        record_state: adds a knowledge state that is reasoned about to the mission's record.
         state_changed: call this when something that `adapt` depends on has changed outside a hook.
         record_reasoning_time: adds the mission time, s, that reasoning took before an adaptation; a further metric.
-        measurements: what monitors have measured, by quality attribute; see `measured`.
+        measurements: the monitors' measurements, by quality attribute; see `measured`.
         recorded: whether the mission is recorded.
-        pose: gives the vehicle's pose now.
-        distance_inspected_m: gives the distance inspected so far, as it was published last.
-        true_signal: gives the true value over mission time (s) of a quality attribute that has a signal, for references
+        pose: returns the vehicle's current pose.
+        distance_inspected_m: returns the last published distance inspected.
+        true_signal: returns the true value over mission time (s) of a quality attribute with a signal, for references
             such as `oracle`: no real manager could know it.
-        files: where the manager's input files are here, by their names as given; see `file`.
-        learned: what the manager has learned. In `suave-des train` a dict that is kept from mission to mission; else
+        files: paths of the manager's input files on this machine, by their names as given; see `file`.
+        learned: the training result. In `suave-des train` a dict that is kept from mission to mission; otherwise
             the content of the file that the setting `learned` names, which cannot be changed, empty without one.
         training: whether the mission is one of `suave-des train`.
     """
@@ -112,7 +112,7 @@ class ManagedSystem:
         return float(self.env.now)
 
     def measured(self, attribute: str, since_s: float = 0.0) -> float | None:
-        """Look up the value of a quality attribute, such as water_visibility, published last, not before `since_s`.
+        """Look up the last published value of a quality attribute, such as water_visibility, not before `since_s`.
 
         None if there is none; a repetition of the value before is not a publication.
         """
@@ -128,11 +128,11 @@ class ManagedSystem:
         return period_s if in_step else self.stream("metacontrol/phase").uniform(0.0, period_s)
 
     def change_mode(self, function: str, mode: str, latency_s: float | None = None) -> bool:
-        """Request a mode of a function; the effect comes later. False if there is no such mode.
+        """Request a mode of a function, which takes effect later. Return False if there is no such mode.
 
         Args:
             function, mode: names, as in the modes file.
-            latency_s: time to the effect, for references such as `oracle`; None: as the scenario says.
+            latency_s: time until it takes effect, for references such as `oracle`; None: the scenario's latency.
         """
         return self.modes.change_mode(function, mode, latency_s)
 
@@ -152,13 +152,13 @@ class ManagedSystem:
 
 
 class ManagingSubsystem:
-    """Base of all managers. Override the hooks you need; each is called at the mission time at which the thing happens.
+    """Base of all managers. Override the hooks that you need; each is called at the mission time of its event.
 
     A hook must not block: to let mission time pass, `adapt` may be a generator that yields events of `system.env`.
 
     Attributes:
-        system: what can be seen and done.
-        period_s: time between calls of `adapt`; none: never called.
+        system: the manager's view of the managed subsystem.
+        period_s: time between calls of `adapt`; None: never called.
         starts_s: mission time of the first call of `adapt`.
         needs_knowledge: whether missions need the knowledge base, so that it is checked before the first one, and a
             reasoner runs beside the simulator, which slows it down (`calibration.reasoning_slowdown`).
@@ -236,7 +236,7 @@ class ManagingSubsystem:
         """Called for each diagnostic of a subscribed kind: a component's status, or a changed measured value."""
 
     def adapt(self) -> AdaptationProcess | None:
-        """Adapt, once every `period_s`; a call that would come while an earlier one still runs is left out."""
+        """Adapt, once every `period_s`; a call that would come while an earlier one still runs is skipped."""
         return None
 
 
@@ -252,10 +252,10 @@ class FunctionsManager(ManagingSubsystem):
         self.functions = system.lasting_functions
 
     def task_requested(self, task: Task) -> None:
-        """From now on adapt the task's functions, too."""
+        """Start adapting the task's functions."""
         self.functions += task.functions
 
     def task_cancelled(self, task: Task) -> None:
-        """Set the task's functions to fd_unground, and leave them alone."""
+        """Set the task's functions to fd_unground, and stop adapting them."""
         self.functions = tuple(name for name in self.functions if name not in task.functions)
         super().task_cancelled(task)

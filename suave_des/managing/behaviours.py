@@ -76,7 +76,7 @@ class Condition(Behaviour):
 
 @dataclass(eq=False)
 class SetMode(Behaviour):
-    """Requests a mode of a function; succeeds, whatever comes of it."""
+    """Requests a mode of a function; always succeeds."""
 
     request: Callable[[], object] = bool
     symbol = "!"

@@ -1,4 +1,4 @@
-"""Missions with their whole record, for a page: read from folders, run again for a campaign, or run anew."""
+"""Missions with their whole record, for a page: read from folders, repeated from a campaign, or newly run."""
 
 from __future__ import annotations
 

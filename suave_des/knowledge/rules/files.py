@@ -1,4 +1,4 @@
-"""Files of rules as text, besides the rules of the ontologies."""
+"""Files of rules as text, in addition to the rules of the ontologies."""
 
 from __future__ import annotations
 
