@@ -172,7 +172,7 @@ def draw_convergence(groups: Sequence[Group]) -> style.Picture:
         axes.set(xlabel="number of runs", ylabel=f"mean {title}")
         axes.set_xlim(left=1.0)
         axes.set_ylim(bottom=0.0)
-        axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
+        axes.xaxis.set_major_locator(MaxNLocator(6, integer=True, min_n_ticks=1))
         axes.xaxis.set_major_formatter("{x:,.0f}")
     _legend(figure, [*figure.axes[0].lines, Patch(color=style.GREY, alpha=0.3)], labels)
     return figure
@@ -214,7 +214,7 @@ def draw_detections(groups: Sequence[Group]) -> style.Picture:
     for number, (part, group) in enumerate(zip(parts, groups, strict=False)):
         above, below = part.subplots(2, 1, sharex=True, height_ratios=(1.0, 3.0))
         _draw_detections(above, below, number, group)
-        above.set_title(f"{_label(group)}", fontsize=8)
+        above.set_title(_label(group, 26), fontsize=8)
         below.set(xlim=ends, ylim=(0.0, top_s), xlabel="x of the point seen first (m)")
         if number % columns == 0:
             below.set_ylabel("search time (s)")
@@ -284,16 +284,16 @@ def _handles(groups: Sequence[Group]) -> list[Artist]:
     return [Line2D([], [], marker=style.marker(number), ms=3.5, **style.line(number)) for number in range(len(groups))]
 
 
-def _label(group: Group) -> str:
-    return style.text(f"{group.name} (n = {len(group.frame):,})")
+def _label(group: Group, width: int = 40) -> str:
+    return style.text(style.folded(f"{group.name} (n = {len(group.frame):,})", width))
 
 
 def _legend(figure: style.Picture, handles: Sequence[Artist], labels: Sequence[str]) -> None:
-    figure.legend(handles, labels, loc="outside upper right", ncols=_columns(labels), handlelength=2.8)
+    figure.legend(handles, labels, loc="outside upper right", ncols=legend_columns(labels), handlelength=2.8)
 
 
-def _columns(labels: Sequence[str]) -> int:
-    """Return the number of columns with which a legend fits the figure's width."""
+def legend_columns(labels: Sequence[str]) -> int:
+    """Return the number of columns with which a legend fits the width of a figure."""
     most = len(labels) if len(labels) <= 4 else 3
     widths_in = [_HANDLE_IN + _text_width_in(label) for label in labels]
     for columns in range(most, 1, -1):
@@ -304,8 +304,9 @@ def _columns(labels: Sequence[str]) -> int:
 
 def _text_width_in(label: str) -> float:
     font = FontProperties(size=matplotlib.rcParams["legend.fontsize"])
-    return float(TextPath((0.0, 0.0), label, prop=font).get_extents().x1) / 72.0
+    return max(float(TextPath((0.0, 0.0), part, prop=font).get_extents().x1) for part in label.split("\n")) / 72.0
 
 
 def _legend_height(labels: Sequence[str]) -> float:
-    return _LEGEND_LINE_IN * math.ceil(len(labels) / _columns(labels))
+    rows = math.ceil(len(labels) / legend_columns(labels))
+    return _LEGEND_LINE_IN * rows * max(label.count("\n") + 1 for label in labels)

@@ -41,6 +41,8 @@ CAMPAIGN_KINDS: Mapping[str, Callable[[Sequence[Group]], Figure]] = {
     "reactions": campaign_figures.draw_reactions,
 }
 """Figures of a campaign's missions by their names."""
+_OF_SINGLE_MISSIONS = ("detections", "reactions")
+"""Those of which means over the points of a sweep would show what no mission did."""
 MISSION_KINDS: Mapping[str, Callable[[MissionRecord], Figure]] = {
     "map": mission_map.draw,
     "timeline": timeline_figure.draw_timeline,
@@ -164,4 +166,4 @@ def _of_missions(missions: Missions, kind: str, parameters: Sequence[str]) -> Fi
     name = "distributions" if kind == AUTO else kind
     if name not in CAMPAIGN_KINDS:
         raise InputError(f"the figure {name} is of a mission", place="kind", remedy=did_you_mean(name, CAMPAIGN_KINDS))
-    return CAMPAIGN_KINDS[name](grouped(missions)[0])
+    return CAMPAIGN_KINDS[name](grouped(missions, averages=name not in _OF_SINGLE_MISSIONS)[0])

@@ -61,13 +61,16 @@ def time_limit_s(groups: Sequence[Group]) -> float:
     return math.floor(limit_s) or limit_s
 
 
-def grouped(missions: Missions, managers: Sequence[str] = (), by: Sequence[str] = ()) -> tuple[list[Group], list[str]]:
+def grouped(
+    missions: Missions, managers: Sequence[str] = (), by: Sequence[str] = (), *, averages: bool = True
+) -> tuple[list[Group], list[str]]:
     """Group missions by manager, source and the chosen parameters of a sweep.
 
     Args:
         missions: of all sources.
         managers: names of the managers to include; empty: all.
         by: swept parameters each of whose values is a separate group.
+        averages: whether a run's values are averaged over the other swept parameters.
 
     Returns:
         The groups in the order of their first missions, and notes for the reader.
@@ -93,7 +96,7 @@ def grouped(missions: Missions, managers: Sequence[str] = (), by: Sequence[str] 
     if len(found) > _MOST_GROUPS:
         problem = f"{len(found)} groups are too many to compare with each other"
         raise InputError(problem, remedy=f"choose {_MOST_GROUPS} or fewer with managers and by")
-    averaged = [name for name in missions.swept if name not in by]
+    averaged = [name for name in missions.swept if averages and name not in by]
     names = _names([key for key, _ in found], by)
     groups = [_group(name, part, averaged) for name, (_, part) in zip(names, found, strict=True)]
     return groups, list(_notes(groups, averaged, frame))

@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.estimates import estimate
 from suave_des.report import style
+from suave_des.report.campaign_figures import legend_columns
 from suave_des.report.compared_metrics import PAPER_METRICS
 from suave_des.report.result_files import Missions
 from suave_des.report.words import key_words, value_words
@@ -43,6 +44,10 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
         if name not in missions.swept:
             remedy = did_you_mean(name, missions.swept, "swept are")
             raise InputError(f"{shown(name)} is not what a sweep varies here", place="parameters", remedy=remedy)
+    for source, part in missions.frame.groupby("source", sort=False):
+        if fixed := [name for name in parameters if part[name].isna().all()]:
+            problem = f"{source} does not vary {', '.join(fixed)}"
+            raise InputError(problem, place="parameters", remedy="leave it out, or choose what all of the sweeps vary")
     if len(parameters) > _MOST_PARAMETERS:
         problem = f"{len(parameters)} parameters do not fit into one figure: {', '.join(parameters)}"
         raise InputError(problem, place="parameters", remedy=f"choose {_MOST_PARAMETERS} or fewer of them")
@@ -71,7 +76,8 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
     for axes in panels.ravel():
         axes.set_visible(bool(axes.has_data()))
     handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper right", ncols=3 if columns > 1 else 2, handlelength=2.8)
+    ncols = min(3 if columns > 1 else 2, legend_columns(labels))
+    figure.legend(handles, labels, loc="outside upper right", ncols=ncols, handlelength=2.8)
     return figure
 
 
@@ -124,7 +130,7 @@ def _draw_means(axes: Axes, frame: pandas.DataFrame, metric: str, beside: float,
         middles,
         means,
         yerr=(means - low, high - means),
-        label=style.text(label),
+        label=style.text(style.folded(label)),
         marker=style.marker(number),
         ms=3.2,
         capsize=2,

@@ -9,14 +9,15 @@ from pathlib import Path
 import pandas
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from suave_des.campaign.campaign import run_campaign
 from suave_des.campaign.single import run_mission
 from suave_des.errors import InputError
 from suave_des.estimates import estimate
-from suave_des.report import mission_map
+from suave_des.report import mission_map, style
 from suave_des.report.campaign_figures import draw_detections, draw_distributions, draw_rainclouds
-from suave_des.report.figures import CAMPAIGN_KINDS, draw_folder, draw_results, write_picture
+from suave_des.report.figures import CAMPAIGN_KINDS, draw_folder, draw_frame, draw_results, write_picture
 from suave_des.report.grouping import grouped
 from suave_des.report.mission_record import (
     MissionRecord,
@@ -290,3 +291,37 @@ class TestBattery:
 )
 def test_keys_become_words_with_units(key: str, words: str) -> None:
     assert key_words(key).replace("\N{NO-BREAK SPACE}", " ") == words
+
+
+LONG = "a_module_with_quite_a_long_name_for_a_paper:AClassThatHasAnEvenLongerName" + "ForItsManager" * 5
+
+
+@pytest.mark.parametrize("kind", sorted(CAMPAIGN_KINDS))
+def test_a_long_name_is_shown_whole(kind: str, campaign: Path, tmp_path: Path) -> None:
+    frame = read_missions([campaign]).frame
+    frame = frame.assign(manager=frame["manager"].astype(str) + LONG)
+    with style.publication():
+        figure = CAMPAIGN_KINDS[kind](grouped(missions_of(frame))[0])
+        figure.savefig(tmp_path / "figure.png", dpi=figure.dpi)
+        width_px = figure.bbox.width
+        texts = [each for each in figure.findobj(Text) if LONG[:8] in each.get_text()]
+        boxes = [each.get_window_extent() for each in texts]
+    assert boxes and all(box.x0 >= 0.0 and box.x1 <= width_px for box in boxes)
+
+
+def test_the_number_of_missions_stays_in_one_piece() -> None:
+    assert "(n = 1,000)" in style.folded(f"{LONG} (n = 1,000)") and "\n" in style.folded(LONG)
+
+
+def test_a_campaign_without_the_swept_parameter_is_told(campaign: Path, tmp_path: Path) -> None:
+    run_campaign("seams2023", managers=["none"], runs=1, sweep={"start.y_m": [2.0, 2.5]}, out=tmp_path / "swept")
+    with pytest.raises(InputError, match=r"does not vary start\.y_m"):
+        draw_results([campaign, tmp_path / "swept"], tmp_path / "figure.png")
+
+
+def test_the_detections_of_a_sweep_are_those_of_its_missions(tmp_path: Path) -> None:
+    swept = {"mission.time_limit_s": [10.0, 300.0]}
+    run_campaign("seams2023", managers=["none"], runs=2, sweep=swept, out=tmp_path / "swept")
+    with style.publication():
+        figure = draw_frame(read_missions([tmp_path / "swept"]).frame, "detections")
+    assert "not found: 50%" in [each.get_text() for each in figure.findobj(Text)]
