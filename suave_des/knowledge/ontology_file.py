@@ -42,6 +42,14 @@ _BASE: Final = "{http://www.w3.org/XML/1998/namespace}base"
 _SAVE_AS: Final = "an OWL ontology in RDF/XML is expected, as Protégé saves it"
 #: Characters that no IRI may contain (RFC 3987) and that would break the N-Triples given to a reasoner.
 _NOT_IN_IRI: Final = frozenset('<>"{}|\\^`') | {chr(code) for code in range(0x21)}
+_OTHER_NOTATIONS: Final = (
+    (rb"@(prefix|base)\b|(prefix|base)\s+(\S*:\s*)?<", "Turtle", "give the file the ending .ttl"),
+    (rb"(prefix|ontology)\s*\(", "OWL in functional syntax", "save it in Protégé as RDF/XML"),
+    (rb"(prefix|ontology):", "OWL in Manchester syntax", "save it in Protégé as RDF/XML"),
+    (rb"[{\[]", "JSON", "give the file the ending .jsonld if it is JSON-LD"),
+    (rb"\x1f\x8b", "compressed by gzip", "unpack it: gunzip FILE"),
+)
+"""How files begin that are no XML: pattern, what they are, and what to do."""
 _FORMATS: Final = {".ttl": ("turtle", "Turtle"), ".nt": ("nt", "N-Triples"), ".jsonld": ("json-ld", "JSON-LD")}
 _ENDINGS: Final = (".owl", ".rdf", ".xml", *_FORMATS)
 #: The shipped tomasys.owl also holds the terms that the exemplar keeps in mros.owl.
@@ -165,6 +173,9 @@ def _parse_xml(path: Path, content: bytes) -> etree._Element:
         if "amplification" in reason:
             problem = "the entities in this file expand to far more than its size"
             raise KnowledgeError(problem, file=path, remedy="write their values out") from error
+        for begins, notation, what_to_do in _OTHER_NOTATIONS:
+            if re.match(rb"(\s|#.*\n)*(" + begins + rb")", content, re.IGNORECASE):
+                raise KnowledgeError(f"this is {notation}", file=path, remedy=what_to_do) from error
         if external is None:
             raise KnowledgeError(f"not well-formed XML: {reason}", file=path, place=place, remedy=_SAVE_AS) from error
         raise _external_entity(path, external.group().split()[-2].decode(errors="replace"), content) from error

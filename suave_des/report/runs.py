@@ -213,10 +213,18 @@ def choose_names(wanted: str | None, managers: Iterable[str], source: str) -> tu
     return tuple(names)
 
 
+_SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars"}
+"""What programs separate columns by, besides commas."""
+
+
 def _layout(path: Path, header: Sequence[str], further: Sequence[str]) -> _Layout:
     for column in header:
         if header.count(column) > 1:
             raise line_error(path, 1, f"has column {shown(column)} twice", "name each column once")
+    apart = next((mark for mark in _SEPARATORS if len(header) == 1 and mark in header[0]), None)
+    if apart is not None:
+        problem = f"has its columns separated by {_SEPARATORS[apart]}"
+        raise line_error(path, 1, problem, "separate them by commas, and write numbers with a decimal point")
     nearest = max(_LAYOUTS, key=lambda layout: len(set(layout[:3]) & set(header)))
     for column in (needed := (*nearest[:3], *further)):
         if column not in header:

@@ -5,10 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, TypeAdapter, ValidationError
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    TypeAdapter,
+    ValidationError,
+    model_validator,
+)
 
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown
 from suave_des.scenario.problems import input_error
@@ -101,6 +111,14 @@ class _Parameters(BaseModel):
     __pydantic_extra__: dict[str, Annotated[ParameterValue, PlainValidator(_value)]]
 
     spiral_altitude: Length | None = None
+
+    @model_validator(mode="after")
+    def _misspelt(self) -> Self:
+        known = type(self).model_fields.keys() - self.model_fields_set
+        for name in self.model_extra or {}:
+            if near := get_close_matches(name, known, n=1, cutoff=0.85):
+                raise wrong(f"nothing reads {shown(name)}", f"did you mean {near[0]}?")
+        return self
 
 
 class _NodeMode(Strict):

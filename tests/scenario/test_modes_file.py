@@ -199,6 +199,12 @@ def test_asking_for_an_unknown_mode_or_function_names_the_nearest(write):
             "expected a mapping of keys to values, got 1",
             "key: value",
         ),
+        (
+            changed("spiral_altitude: 3.0", "spiral_altitud: 3.0"),
+            "line ",
+            "nothing reads 'spiral_altitud'",
+            "did you mean spiral_altitude?",
+        ),
         (changed("type: node", "type: nod"), "line 12, ", "type 'nod' is not known", "did you mean 'node'?"),
         (changed("    type: node\n", ""), "line 11, ", "type is missing", "add type: system, node"),
         (

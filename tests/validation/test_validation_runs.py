@@ -65,6 +65,8 @@ def test_blank_lines_and_a_byte_order_mark_do_no_harm(write):
         ("", 1, "has no column 'manager'"),
         ("manager,search_time_s\nnone,1\n", 1, "has no column 'distance_inspected_m'"),
         (f"{OWN},manager\nnone,1,2,none\n", 1, "has column 'manager' twice"),
+        (OWN.replace(",", ";") + "\nnone;1;2\n", 1, "has its columns separated by semicolons"),
+        (OWN.replace(",", "\t") + "\nnone\t1\t2\n", 1, "has its columns separated by tabs"),
         (f"{OWN}\n", 1, "has no mission"),
         (f"{OWN}\nnone,120,3\nnone,soon,3\n", 3, "search_time_s: expected a finite number, got 'soon'"),
         (f"{OWN}\nnone,120,\n", 2, "distance_inspected_m: expected a finite number, at least 0, got ''"),
