@@ -193,6 +193,11 @@ def remove_results(folder: Path, names: Collection[str]) -> None:
             (folder / name).unlink(missing_ok=True)
 
 
+def _utf8(text: str) -> bytes:
+    """Encode text as UTF-8; a path's bytes that are no UTF-8 are written as escapes, which JSON reads back."""
+    return text.encode(errors="backslashreplace")
+
+
 def write_files(folder: Path, files: Mapping[str, str | bytes | Iterable[str]], *, stale: Collection[str] = ()) -> None:
     """Write files under temporary names, and rename them when all are complete.
 
@@ -211,9 +216,9 @@ def write_files(folder: Path, files: Mapping[str, str | bytes | Iterable[str]], 
                 temporary.unlink(missing_ok=True)
                 with temporary.open("xb") as file:  # x: a link of that name is not followed
                     if isinstance(content, str | bytes):
-                        file.write(content if isinstance(content, bytes) else content.encode())
+                        file.write(content if isinstance(content, bytes) else _utf8(content))
                     else:
-                        file.writelines(piece.encode() for piece in content)
+                        file.writelines(map(_utf8, content))
             for final, temporary in written.items():
                 temporary.replace(final)
             for name in set(stale) - set(files):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import errno
 import gc
 import os
 import signal
@@ -111,6 +112,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         with signals_raised():
             status = _command_line().main(arguments, prog_name="suave-des", standalone_mode=False) or 0
+            if sys.stdout is not None:
+                sys.stdout.flush()  # what cannot be written is told here, not while Python ends
             if was_interrupted() and status == 128 + signal.SIGINT:  # typer's for any signal before the command began
                 status = exit_status()
     except SuaveDesError as error:
@@ -120,6 +123,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
             _leave(_report("interrupted", exit_status()), by_force=False)
         if not isinstance(error, Exception):
             raise
+        if isinstance(error, OSError) and error.errno in (
+            errno.ENOSPC,
+            errno.EDQUOT,
+        ):  # results have errors of their own
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # else Python would try again when it ends
+            _leave(_report(f"the output cannot be written: {error.strerror}", BAD_INPUT), by_force=False)
         # A wrong option or argument: a class that is private to typer, and was click's in earlier versions of it.
         if not hasattr(error, "format_message"):
             raise

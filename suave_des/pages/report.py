@@ -181,7 +181,7 @@ def check_page_size(text: str, limit_bytes: int) -> None:
     Raises:
         InputError: it is too large.
     """
-    size = len(text.encode())
+    size = len(text.encode(errors="backslashreplace"))  # as it is written
     if size > limit_bytes:
         problem = f"the page would have {size / 1e6:.1f} MB, more than {limit_bytes / 1e6:g}"
         raise InputError(problem, remedy="give fewer runs with --paths, or fewer folders")

@@ -247,3 +247,27 @@ class TestLimits:
             main(["kb", "check", option, str(tmp_path / "pipe")])
         assert ended.value.code == 2
         assert "is not a regular file" in "".join(capsys.readouterr())
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full, which Linux has")
+@pytest.mark.parametrize("command", [["--help"], ["kb", "rules"], ONE_MISSION])
+def test_output_to_a_full_disk_is_told_in_one_line(command: list[str], tmp_path: Path) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run([*COMMAND, *command], cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "the output cannot be written: No space left on device" in done.stderr
+
+
+def test_a_folder_whose_name_is_no_utf_8_gets_results_and_a_report(tmp_path: Path) -> None:
+    out = tmp_path / os.fsdecode(b"L\xe4ufe")
+    try:
+        out.mkdir()
+    except OSError:
+        pytest.skip("this file system has names in UTF-8 only")
+    out.rmdir()
+    for command in ([*CAMPAIGN[:-1], out], ["campaign", "--resume", out, "--runs", "3"], ["report", out]):
+        done = subprocess.run(
+            [*COMMAND, *command], cwd=tmp_path, capture_output=True, check=False
+        )  # says the name: bytes
+        assert done.returncode == 0, done.stderr
+    assert (out / "report.html").is_file()
