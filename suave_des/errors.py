@@ -100,6 +100,11 @@ def shown(value: object, limit: int = 60) -> str:
     return text if len(text) <= limit else text[: limit - 3] + "..."
 
 
+def number_of(number: int, noun: str) -> str:
+    """Write a number with its noun: "1 mission", "2 missions"."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
 def did_you_mean(word: object, known: Iterable[str], what: str = "known") -> str:
     """Return the remedy for a misspelt word: the nearest known one, and the list of all."""
     names = list(known)

@@ -18,7 +18,7 @@ from pathlib import Path
 from statistics import fmean, stdev
 from typing import TYPE_CHECKING
 
-from suave_des.errors import InputError, line_error, shown
+from suave_des.errors import InputError, line_error, number_of, shown
 from suave_des.estimates import estimate, t_quantile
 from suave_des.files import decode, read_bytes
 from suave_des.resources import find
@@ -102,7 +102,7 @@ def read_ensemble(name: str | Path, beside: Path | None = None) -> tuple[Ensembl
     if repeated := next((each for each in header if header.count(each) > 1), None):
         raise line_error(path, 1, f"has column {shown(repeated)} twice", "name each parameter once")
     if len(rows) < 2:
-        raise line_error(path, 1, f"has {len(rows)} members", "an ensemble has two or more")
+        raise line_error(path, 1, f"has {number_of(len(rows), 'member')}", "an ensemble has two or more")
     members = tuple(tuple(_number(path, line, header, row, place) for place in places) for line, row in rows)
     ensemble = Ensemble(path.stem, tuple(header[place] for place in places), members)
     return ensemble, path, hashlib.sha256(content).hexdigest()
@@ -110,7 +110,9 @@ def read_ensemble(name: str | Path, beside: Path | None = None) -> tuple[Ensembl
 
 def _number(path: Path, line: int, header: Sequence[str], row: Sequence[str], place: int) -> float:
     if len(row) != len(header):
-        raise line_error(path, line, f"has {len(row)} values, but the header has {len(header)}", "give each column one")
+        raise line_error(
+            path, line, f"has {number_of(len(row), 'value')}, but the header has {len(header)}", "give each column one"
+        )
     try:
         number = float(row[place])
     except ValueError:

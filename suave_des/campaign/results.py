@@ -186,7 +186,7 @@ class CampaignResult:
 
     def kept(self) -> str:
         """Say how many missions are done, and where they are."""
-        kept = f"{self.done} of {self.planned} missions are done"
+        kept = f"{self.done} of {self.planned} missions {'is' if self.done == 1 else 'are'} done"
         if self.folder is None:
             return kept
         return f"{kept}, and kept in {self.folder}; suave-des campaign --resume {self.folder} runs the rest"

@@ -25,7 +25,7 @@ from suave_des.cli.options import (
     command_line,
     grouped_options,
 )
-from suave_des.errors import InputError
+from suave_des.errors import InputError, number_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -192,7 +192,8 @@ def campaign(
     print_summary(console, result)
     print_stops(console, result)
     print_differences(console, result)
-    console.print(f"{result.done} missions are in {result.folder}/runs.csv", soft_wrap=True)
+    kept = f"{number_of(result.done, 'mission')} {'is' if result.done == 1 else 'are'}"
+    console.print(f"{kept} in {result.folder}/runs.csv", soft_wrap=True)
     exit_telling_failures(result)
 
 

@@ -21,6 +21,7 @@ from suave_des.estimates import t_quantile
 from suave_des.report import style
 from suave_des.report.compared_metrics import PAPER_METRICS
 from suave_des.report.grouping import Group, time_limit_s
+from suave_des.report.words import folded
 
 _ROW_IN = 0.62
 """Height of a row of a figure that has one for each manager."""
@@ -166,7 +167,9 @@ def draw_convergence(groups: Sequence[Group]) -> style.Picture:
             frame = group.frame.sort_values("run", kind="stable")
             n, means, halves = running_means(frame[metric].dropna().to_numpy(float))
             look = style.line(number)
-            axes.plot(n, means, label=_label(group), **look)
+            (line,) = axes.plot(n, means, label=_label(group), **look)
+            if len(n) == 1:
+                line.set(marker=style.marker(number), ms=5, clip_on=False)
             low, high = means - halves, means + halves
             axes.fill_between(n, low, high, where=n >= _FEWEST_FOR_INTERVAL, color=look["color"], alpha=0.18, lw=0)
         axes.set(xlabel="number of runs", ylabel=f"mean {title}")
@@ -210,7 +213,7 @@ def draw_detections(groups: Sequence[Group]) -> style.Picture:
     ends = (
         [float(known["detection_x_m"].min()) - 0.7, float(known["detection_x_m"].max()) + 0.7] if len(known) else [0, 1]
     )
-    top_s = max(float(group.known_values("search_time_s").max()) for group in groups) * 1.05
+    top_s = max(float(group.known_values("search_time_s").max()) for group in groups) * 1.2
     for number, (part, group) in enumerate(zip(parts, groups, strict=False)):
         above, below = part.subplots(2, 1, sharex=True, height_ratios=(1.0, 3.0))
         _draw_detections(above, below, number, group)
@@ -236,7 +239,7 @@ def _draw_detections(above: Axes, below: Axes, number: int, group: Group) -> Non
     areas = np.maximum(counts.to_numpy(float) / n * _LARGEST_AREA, 1.5)
     below.scatter(places[:, 0], places[:, 1], s=areas, color=colour, alpha=0.6, lw=0)
     lost = 1.0 - len(frame) / n
-    below.text(0.03, 0.97, f"not found: {lost:.0%}", transform=below.transAxes, va="top", fontsize=7.5)
+    below.set_title(f"not found: {lost:.0%}", fontsize=7.5, fontweight="normal", pad=3)  # above all bubbles
 
 
 def draw_reactions(groups: Sequence[Group]) -> style.Picture:
@@ -285,7 +288,7 @@ def _handles(groups: Sequence[Group]) -> list[Artist]:
 
 
 def _label(group: Group, width: int = 40) -> str:
-    return style.text(style.folded(f"{group.name} (n = {len(group.frame):,})", width))
+    return style.text(folded(f"{group.name} (n = {len(group.frame):,})", width))
 
 
 def _legend(figure: style.Picture, handles: Sequence[Artist], labels: Sequence[str]) -> None:

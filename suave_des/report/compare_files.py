@@ -6,13 +6,17 @@ import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from textwrap import fill
 
+from suave_des.errors import number_of
 from suave_des.estimates import Interval
 from suave_des.report.compare import Comparison, Difference, Summary
 from suave_des.report.compared_metrics import FOUND, PAPER_METRICS, ComparedMetric
 from suave_des.report.statistics import Tested
+from suave_des.report.words import folded
 
 _SUMMARY_HEADINGS = ("manager", "n", "mean", "95% interval", "std", "median", "quartiles")
 _DIFFERENCE_HEADINGS = ("difference", "n", "mean", "95% interval", "p", "p (Holm)", "effect")
+_LEAST_NAME = 20
+"""A column of names is not made narrower than this."""
 _RUNS_HEADINGS = ("difference", "for ±", "paired", "not paired", "variance ratio")
 
 
@@ -33,19 +37,19 @@ def plain_text(comparison: Comparison, width: int = 95) -> str:
     parts = [_folded(comparison.conclusion, width)]
     for metric in comparison.metrics:
         summaries, differences = comparison.of_metric(metric.name)
-        parts.append(f"{metric.heading}\n{_aligned(summary_table(metric, summaries))}")
+        parts.append(f"{metric.heading}\n{_aligned(summary_table(metric, summaries), width)}")
         if censored := search_table(summaries):
             title = f"{metric.heading}, missions that never found it as censored (Kaplan-Meier)"
-            parts.append(f"{title}\n{_aligned(censored)}")
+            parts.append(f"{title}\n{_aligned(censored, width)}")
         if differences:
-            table = _aligned(difference_table(metric, differences))
-            if max(map(len, table.splitlines())) > width:
-                table = _aligned(difference_table(metric, differences, has_effects=False))
-            parts.append(table)
+            table = difference_table(metric, differences)
+            if sum(_widths(table)) > width:
+                table = difference_table(metric, differences, has_effects=False)
+            parts.append(_aligned(table, width))
             parts.append("\n".join(_folded(f"- {each.conclusion}", width) for each in differences))
     needed = runs_table(comparison)
     if needed[1]:
-        parts.append(f"runs of each manager that an interval of the difference needs\n{_aligned(needed)}")
+        parts.append(f"runs of each manager that an interval of the difference needs\n{_aligned(needed, width)}")
     parts.append("\n".join(_folded(line, width) for line in remarks(comparison)))
     return "\n\n".join(parts) + "\n"
 
@@ -54,15 +58,26 @@ def _folded(text: str, width: int) -> str:
     return fill(text, width, subsequent_indent="  " if text.startswith("- ") else "", break_on_hyphens=False)
 
 
-def _aligned(table: Table) -> str:
-    """Write a table with its first column aligned to the left, and the others to the right."""
+def _widths(table: Table) -> list[int]:
+    """Return the width of each column, with the blanks that part all but the first from the one before."""
     headings, rows = table
-    widths = [max(map(len, column)) for column in zip(headings, *rows, strict=True)]
-    lines = []
-    for first, *others in (headings, *rows):
-        cells = [first.ljust(widths[0]), *map(str.rjust, others, widths[1:])]
-        lines.append("  ".join(cells).rstrip())
-    return "\n".join(lines)
+    first, *others = (max(map(len, column)) for column in zip(headings, *rows, strict=True))
+    return [first, *(2 + each for each in others)]
+
+
+def _aligned(table: Table, width: int) -> str:
+    """Write a table with its first column, broken into lines where it is too long, aligned to the left, and the others
+    to the right."""
+    headings, rows = table
+    longest, *widths = _widths(table)
+    room = max(width - sum(widths), _LEAST_NAME)
+    names = [folded(first, longest if longest <= room else room - 2).split("\n") for first, *_ in (headings, *rows)]
+    left = max(len(line.strip()) + 2 * (place > 0) for lines in names for place, line in enumerate(lines))
+    written = []
+    for (first, *more), (_, *cells) in zip(names, (headings, *rows), strict=True):
+        written.append(f"{first.strip():<{left}}{''.join(map(str.rjust, cells, widths))}".rstrip())
+        written += (f"  {line.strip()}" for line in more)
+    return "\n".join(written)
 
 
 def json_text(comparison: Comparison) -> str:
@@ -192,7 +207,7 @@ def _search_cells(each: Summary) -> Cells:
         return each.group, "", "", "", ""
     mean = search.restricted_mean_s
     low, high = search.median_interval_s
-    interval = f"{_seconds(low)} to {_seconds(high)}"
+    interval = _seconds(low) + ("" if low is None else f" to {_seconds(high)}")
     return (
         each.group,
         f"{mean.value:.2f}",
@@ -302,8 +317,8 @@ def _listed(names: Iterable[str], most: int = 4) -> str:
 def _sizes(comparison: Comparison) -> str:
     sizes = {each.group: each.n for each in comparison.of_metric(comparison.metrics[0].name)[0]}
     if len(set(sizes.values())) == 1:
-        return f"{next(iter(sizes.values()))} missions for each manager."
-    return "; ".join(f"{name}: {n} missions" for name, n in sizes.items()) + "."
+        return f"{number_of(next(iter(sizes.values())), 'mission')} for each manager."
+    return "; ".join(f"{name}: {number_of(n, 'mission')}" for name, n in sizes.items()) + "."
 
 
 def _capital(text: str) -> str:

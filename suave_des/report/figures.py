@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from textwrap import fill
 
 import pandas
 from matplotlib.figure import Figure
@@ -17,6 +18,7 @@ from suave_des.report.mission_record import MissionRecord, read_mission
 from suave_des.report.paper import published_runs
 from suave_des.report.result_files import Missions, missions_of, read_missions
 from suave_des.report.sweep_figures import draw_sweep
+from suave_des.report.words import key_words
 
 ENDINGS = (".png", ".pdf", ".svg")
 _UNDATED = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
@@ -41,8 +43,9 @@ CAMPAIGN_KINDS: Mapping[str, Callable[[Sequence[Group]], Figure]] = {
     "reactions": campaign_figures.draw_reactions,
 }
 """Figures of a campaign's missions by their names."""
-_OF_SINGLE_MISSIONS = ("detections", "reactions")
-"""Those of which means over the points of a sweep would show what no mission did."""
+_OF_MEANS = "convergence"
+"""What shows means, with their intervals: of runs, as all points of a sweep share a run's random numbers. The others
+show missions, and means over the points would be what no mission did."""
 MISSION_KINDS: Mapping[str, Callable[[MissionRecord], Figure]] = {
     "map": mission_map.draw,
     "timeline": timeline_figure.draw_timeline,
@@ -166,4 +169,11 @@ def _of_missions(missions: Missions, kind: str, parameters: Sequence[str]) -> Fi
     name = "distributions" if kind == AUTO else kind
     if name not in CAMPAIGN_KINDS:
         raise InputError(f"the figure {name} is of a mission", place="kind", remedy=did_you_mean(name, CAMPAIGN_KINDS))
-    return CAMPAIGN_KINDS[name](grouped(missions, averages=name not in _OF_SINGLE_MISSIONS)[0])
+    groups = grouped(missions, averages=name == _OF_MEANS)[0]
+    figure = CAMPAIGN_KINDS[name](groups)
+    if missions.swept:
+        shown_are = "missions at" if all(group.is_of_missions for group in groups) else "means of each run over"
+        swept = ", ".join(key_words(parameter) for parameter in missions.swept)
+        width = int(16 * figure.get_figwidth())
+        figure.supxlabel(fill(f"{shown_are} all points of the sweep: {swept}", width), fontsize=7.5, color="#555555")
+    return figure

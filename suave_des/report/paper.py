@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from suave_des.errors import InputError
+from suave_des.errors import InputError, number_of
 from suave_des.estimates import Estimate, Interval, estimate, interval_columns
 from suave_des.report.compared_metrics import PAPER_METRICS
 from suave_des.report.result_files import PAPER_ORDER
@@ -200,8 +200,8 @@ def _sizes(estimates: Estimates) -> str:
     """Describe the number of missions of each manager."""
     sizes = {manager: found.n for (manager, _), found in estimates.items()}
     if len(set(sizes.values())) == 1:
-        return f"{next(iter(sizes.values()))} missions for each manager"
-    return ", ".join(f"{n} {'mission' if n == 1 else 'missions'} of {manager}" for manager, n in sizes.items())
+        return f"{number_of(next(iter(sizes.values())), 'mission')} for each manager"
+    return ", ".join(f"{number_of(n, 'mission')} of {manager}" for manager, n in sizes.items())
 
 
 def _rounded(value: object) -> object:

@@ -199,9 +199,10 @@ def _unfinished(folder: Path) -> Iterator[str]:
         return
     if left_out:
         how = f"suave-des campaign --resume {folder} runs the rest"
-        yield f"{folder} is not finished: {left_out} of {planned} missions are missing; {how}"
+        are = "is" if left_out == 1 else "are"
+        yield f"{folder} is not finished: {left_out} of {planned} missions {are} missing; {how}"
     if failed:
-        yield f"{folder}: {failed} of {planned} missions failed and are missing"
+        yield f"{folder}: {failed} of {planned} missions failed and {'is' if failed == 1 else 'are'} missing"
 
 
 def _varying(frame: pandas.DataFrame, columns: Iterable[str]) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ import numpy as np
 import pandas
 from numpy.typing import NDArray
 
-from suave_des.errors import InputError, did_you_mean, line_error, shown
+from suave_des.errors import InputError, did_you_mean, line_error, number_of, shown
 from suave_des.files import decode, read_bytes
 from suave_des.metrics.result import MissionMetrics
 from suave_des.report.compared_metrics import PAPER_METRICS
@@ -171,7 +171,7 @@ def read_runs(
                     averages.append(reader.line_num)
                     continue
                 if len(cells) != len(header):
-                    problem = f"has {len(cells)} values, but the header has {len(header)}"
+                    problem = f"has {number_of(len(cells), 'value')}, but the header has {len(header)}"
                     raise line_error(path, reader.line_num, problem, "give each column a value, if only an empty one")
                 rows.append(tuple(map(str.strip, chosen(cells))))
                 lines.append(reader.line_num)

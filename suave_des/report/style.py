@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -35,9 +34,6 @@ MODE_COLOURS = {
 MODE_WIDTHS = {"fd_spiral_low": 0.8, "fd_spiral_medium": 1.4, "fd_spiral_high": 2.0, "fd_follow_pipeline": 1.2}
 """Widths of lines, in points: the higher the search, the wider, so that they differ in print without colours, too."""
 OTHER_MODES = (VERMILION, "#6A3D9A", "#B8860B")
-
-_BREAKS = re.compile(r"(?<=[:_./-])|(?<= )(?=[^\s=\d])|(?<=[^\W\d_A-ZÀ-Þ])(?=[A-ZÀ-Þ])")
-"""Where a name may be broken: after a separator or space, but not in "(n = 20)", and before a capital within a word."""
 
 _SETTINGS: Any = {
     "font.family": "sans-serif",
@@ -84,16 +80,6 @@ def hatch(number: int) -> str:
 def text(name: str) -> str:
     """Return a name as matplotlib is to show it: without formulas in it, and not hidden for a leading underscore."""
     return (f" {name}" if name.startswith("_") else name).replace("$", r"\$")
-
-
-def folded(name: str, width: int = 40) -> str:
-    """Break a long name of a manager into lines, so that it leaves room for the figure."""
-    lines = [""]
-    for piece in _BREAKS.split(name):
-        if lines[-1] and len(lines[-1]) + len(piece) > width:
-            lines.append("")
-        lines[-1] += piece
-    return "\n".join(lines)
 
 
 class Picture(Figure):

@@ -16,7 +16,7 @@ from suave_des.report import style
 from suave_des.report.campaign_figures import legend_columns
 from suave_des.report.compared_metrics import PAPER_METRICS
 from suave_des.report.result_files import Missions
-from suave_des.report.words import key_words, value_words
+from suave_des.report.words import folded, key_words, value_words
 
 _MOST_PARAMETERS, _COLUMNS = 9, 3
 _MOST_VALUES = 16
@@ -130,7 +130,7 @@ def _draw_means(axes: Axes, frame: pandas.DataFrame, metric: str, beside: float,
         middles,
         means,
         yerr=(means - low, high - means),
-        label=style.text(style.folded(label)),
+        label=style.text(folded(label)),
         marker=style.marker(number),
         ms=3.2,
         capsize=2,

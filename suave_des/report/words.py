@@ -44,6 +44,9 @@ _OTHER_MODES = {
 }
 _OFF = ("fd_unground", "inactive")
 
+_BREAKS = re.compile(r"(?<=[:_./-])|(?<= )(?=[^\s=\d])|(?<=[^\W\d_A-ZÀ-Þ])(?=[A-ZÀ-Þ])")
+"""Where a name may be broken: after a separator or space, but not in "(n = 20)", and before a capital within a word."""
+
 
 def key_words(key: str) -> str:
     """Return what a key of a scenario is called in a figure, with its unit.
@@ -99,3 +102,13 @@ def plain(name: str) -> str:
     """Return a name from a file as words, without what LaTeX or a terminal would take for commands."""
     text = name.removeprefix("fd_").strip("_").replace("_", " ") or name
     return text if text.isprintable() else repr(text)[1:-1]
+
+
+def folded(name: str, width: int = 40) -> str:
+    """Break a long name of a manager into lines, so that it leaves room for the figure or table beside it."""
+    lines = [""]
+    for piece in _BREAKS.split(name):
+        if lines[-1] and len(lines[-1]) + len(piece) > width:
+            lines.append("")
+        lines[-1] += piece
+    return "\n".join(lines)

@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from suave_des.errors import line_error, shown
+from suave_des.errors import line_error, number_of, shown
 from suave_des.files import decode, read_bytes
 from suave_des.scenario.quantities import (
     LARGEST,
@@ -146,7 +146,7 @@ def read_table(path: Path) -> tuple[SignalTable, str]:
                 continue
             if len(row) != len(header):
                 remedy = f"each line has two, separated by a comma: {_COLUMNS}"
-                raise line_error(path, rows.line_num, f"has {len(row)} values", remedy)
+                raise line_error(path, rows.line_num, f"has {number_of(len(row), 'value')}", remedy)
             cells = dict(zip(header, row, strict=True))
             time_s, value = (_number(path, rows.line_num, column, cells[column]) for column in _LARGEST)
             if table and time_s <= table[-1][0]:

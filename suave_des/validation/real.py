@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from suave_des.campaign.spec import read_campaign_file
 from suave_des.campaign.variation import Variation, vary
-from suave_des.errors import InputError
+from suave_des.errors import InputError, number_of
 from suave_des.registry import manager_class
 from suave_des.report.runs import Runs, choose_names, read_runs
 from suave_des.resources import shipped_folder
@@ -192,7 +192,8 @@ def _in_order(files: Sequence[Runs], frame: pandas.DataFrame, conditions: Condit
     if numbers is None:
         counts = frame["manager"].value_counts(sort=False)
         manager, count = next((name, count) for name, count in counts.items() if count % len(conditions))
-        problem = f"has {count} missions of manager {manager}, which {len(conditions)} conditions do not share evenly"
+        own = f"{number_of(count, 'mission')} of manager {manager}"
+        problem = f"has {own}, which {len(conditions)} conditions do not share evenly"
         raise InputError(problem, file=", ".join(str(file.path) for file in files), remedy=_REMEDY)
     return numbers
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 import rdflib
 from rdflib.term import Node
 
-from suave_des.errors import InputError
+from suave_des.errors import InputError, number_of
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import RDF_TYPE, Lit, Triple, facts_of, is_fact, local_name, term_of
 from suave_des.knowledge.rules.writer import literal_text
@@ -148,7 +148,8 @@ class PolicyDifference:
 
     def lines(self) -> Iterator[str]:
         """The difference as `kb diff` prints it."""
-        yield f"{self.states} of {self.compared} states are decided differently"
+        are = "is" if self.states == 1 else "are"
+        yield f"{self.states} of {self.compared} states {are} decided differently"
         if self.reported:
             yield f"{self.states_reported} more have other statuses, but the same decisions"
         if self.computing:
@@ -164,7 +165,7 @@ class PolicyDifference:
         for heading, pairs in groups.items():
             yield heading
             for ranges, states in _joined(pairs):
-                yield f"  {'; '.join(map(str, ranges))}: {states} states"
+                yield f"  {'; '.join(map(str, ranges))}: {number_of(states, 'state')}"
             yield f"  for instance {pairs[0].one.state}"
 
 
@@ -300,7 +301,7 @@ def compare_missions(
     runs = before.index.intersection(after.index)
     if len(runs) < missions.runs:
         raise InputError(
-            f"{missions.runs - len(runs)} of {missions.runs} missions fail",
+            f"{missions.runs - len(runs)} of {missions.runs} missions failed",
             remedy="suave-des campaign with the same files says why",
         )
     return _compared(before.loc[runs], after.loc[runs])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from suave_des.errors import InputError
+from suave_des.errors import InputError, number_of
 from suave_des.knowledge.ontology_file import OntologyFile, place_of
 
 
@@ -105,7 +105,7 @@ def folded(findings: Sequence[Finding], folder: Path) -> tuple[Finding, ...]:
 
     kept = [one for one in findings if not is_folded(one)]
     if notes := len(findings) - len(kept):
-        message = f"{notes} note{'s' if notes > 1 else ''} on the shipped ontologies, most on rules for other models"
+        message = f"{number_of(notes, 'note')} on the shipped ontologies, most on rules for other models"
         kept.append(Finding(Level.INFO, message, remedy="--verbose shows them"))
     return tuple(kept)
 
@@ -113,7 +113,7 @@ def folded(findings: Sequence[Finding], folder: Path) -> tuple[Finding, ...]:
 def summary(findings: Sequence[Finding]) -> str:
     """Count the findings of each level: "1 error, 0 warnings, 14 notes"."""
     counts = {noun: sum(one.level is level for one in findings) for level, noun in _NOUNS.items()}
-    return ", ".join(f"{count} {noun}{'' if count == 1 else 's'}" for noun, count in counts.items())
+    return ", ".join(number_of(count, noun) for noun, count in counts.items())
 
 
 def relative_path(path: Path | str) -> str:

@@ -96,6 +96,11 @@ class TestHelp:
         assert command("--version").out == f"suave-des {__version__}\n"
 
 
+def test_one_mission_is_not_called_missions(command) -> None:
+    ended = command("campaign", "seams2023", "--managers", "none", "--runs", "1", "--workers", "1", *OUT)
+    assert ended.out.endswith("\n1 mission is in out/runs.csv\n")
+
+
 class TestResume:
     def test_does_what_is_left_and_may_add_runs(self, command, tmp_path: Path) -> None:
         command("campaign", "seams2023", "--managers", "none", "--runs", "2", "--workers", "1", *OUT)

@@ -15,7 +15,7 @@ from suave_des import api
 from suave_des.campaign.campaign import run_campaign
 from suave_des.errors import InputError
 from suave_des.report.compare import Choices, Comparison, Difference, Summary, compare_folders, compare_frame
-from suave_des.report.compare_files import latex_text
+from suave_des.report.compare_files import latex_text, plain_text
 from suave_des.report.paper import published_runs
 
 MANAGERS = ("none", "random", "metacontrol")
@@ -291,3 +291,13 @@ def test_the_frame_of_a_campaign_is_compared_and_drawn() -> None:
     assert [(each.first, each.second, each.n) for each in comparison.differences] == [("none", "bt", (3,))]
     assert str(comparison).startswith(comparison.conclusion[:60])
     assert len(frame.figure().axes) == 2
+
+
+def test_tables_with_long_names_of_managers_fit_the_width_and_show_the_names_whole() -> None:
+    long = ["a_module_with_a_long_name:AndAClassWithAnEvenLongerName", "another_module_of_a_thesis:AnotherLongManager"]
+    frame = runs(**{"none": [100.0, 120.0, 140.0], long[0]: [90.0, 95.0, 130.0], long[1]: [80.0, 85.0, 120.0]})
+    for width in (80, 95):
+        text = plain_text(compare_frame(frame), width)
+        assert max(map(len, text.splitlines())) <= width
+        joined = "".join(line.split("  ")[0] or line.strip() for line in text.splitlines())
+        assert all(name in joined for name in long)

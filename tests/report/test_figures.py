@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pandas
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -30,7 +31,7 @@ from suave_des.report.paper import published_runs
 from suave_des.report.result_files import missions_of, read_missions
 from suave_des.report.sweep_figures import draw_sweep
 from suave_des.report.timeline_figure import draw_timeline
-from suave_des.report.words import key_words
+from suave_des.report.words import folded, key_words
 
 
 @pytest.fixture(scope="module")
@@ -310,7 +311,7 @@ def test_a_long_name_is_shown_whole(kind: str, campaign: Path, tmp_path: Path) -
 
 
 def test_the_number_of_missions_stays_in_one_piece() -> None:
-    assert "(n = 1,000)" in style.folded(f"{LONG} (n = 1,000)") and "\n" in style.folded(LONG)
+    assert "(n = 1,000)" in folded(f"{LONG} (n = 1,000)") and "\n" in folded(LONG)
 
 
 def test_a_campaign_without_the_swept_parameter_is_told(campaign: Path, tmp_path: Path) -> None:
@@ -319,9 +320,50 @@ def test_a_campaign_without_the_swept_parameter_is_told(campaign: Path, tmp_path
         draw_results([campaign, tmp_path / "swept"], tmp_path / "figure.png")
 
 
-def test_the_detections_of_a_sweep_are_those_of_its_missions(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def two_limits(tmp_path_factory: pytest.TempPathFactory) -> pandas.DataFrame:
+    """Two runs at each of two points of a sweep: with and without the time to find the pipeline."""
+    folder = tmp_path_factory.mktemp("swept") / "out"
     swept = {"mission.time_limit_s": [10.0, 300.0]}
-    run_campaign("seams2023", managers=["none"], runs=2, sweep=swept, out=tmp_path / "swept")
+    run_campaign("seams2023", managers=["none"], runs=2, sweep=swept, out=folder)
+    return read_missions([folder]).frame
+
+
+def texts_of(figure: Figure) -> list[str]:
+    return [" ".join(each.get_text().split()) for each in figure.findobj(Text)]
+
+
+def test_the_detections_of_a_sweep_are_those_of_its_missions(two_limits: pandas.DataFrame) -> None:
     with style.publication():
-        figure = draw_frame(read_missions([tmp_path / "swept"]).frame, "detections")
-    assert "not found: 50%" in [each.get_text() for each in figure.findobj(Text)]
+        figure = draw_frame(two_limits, "detections")
+    assert "not found: 50%" in texts_of(figure)
+
+
+@pytest.mark.parametrize("kind", ["distributions", "raincloud", "detections", "reactions"])
+def test_what_shows_missions_of_a_sweep_shows_all_of_them_and_says_so(kind: str, two_limits: pandas.DataFrame) -> None:
+    texts = texts_of(draw_frame(two_limits, kind))
+    assert "none (n = 4)" in texts
+    assert any(text.startswith("missions at all points of the sweep: mission: time limit") for text in texts)
+
+
+def test_the_convergence_of_a_sweep_says_that_it_is_of_means_of_runs(two_limits: pandas.DataFrame) -> None:
+    texts = texts_of(draw_frame(two_limits, "convergence"))
+    assert "none (n = 2)" in texts
+    assert any(text.startswith("means of each run over all points of the sweep: mission:") for text in texts)
+
+
+def test_the_convergence_of_a_single_run_is_a_mark(campaign: Path) -> None:
+    frame = read_missions([campaign]).frame
+    for runs, marked in ((1, True), (2, False)):
+        line = draw_frame(frame[frame["run"] <= runs], "convergence").axes[0].lines[0]
+        assert (line.get_marker() not in ("None", None)) is marked
+
+
+def test_no_bubble_of_detections_hides_the_share_of_those_not_found(campaign: Path, tmp_path: Path) -> None:
+    frame = read_missions([campaign]).frame
+    figure = draw_frame(frame[(frame["run"] == 1) & (frame["manager"] == "none")], "detections")
+    figure.savefig(tmp_path / "figure.png", dpi=figure.dpi)
+    below = figure.findobj(lambda artist: isinstance(artist, Axes))[-1]
+    words = next(each for each in figure.findobj(Text) if each.get_text().startswith("not found"))
+    bubble = below.collections[0].get_window_extent()
+    assert words.get_window_extent().y0 >= below.get_window_extent().y1 >= bubble.y1

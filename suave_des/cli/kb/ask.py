@@ -26,7 +26,7 @@ from suave_des.cli.kb.options import (
     state_lines,
 )
 from suave_des.cli.options import grouped_options
-from suave_des.errors import InputError
+from suave_des.errors import InputError, number_of
 from suave_des.interrupts import ends_at_once
 
 if TYPE_CHECKING:
@@ -188,7 +188,8 @@ def _policy_summary(found: Policy) -> Iterator[str]:
     from suave_des.workbench.policy.cases import no_proof
 
     kinds, most = len(found.cases), found.max_failed
-    yield f"{found.states} states in {kinds} equivalence classes, with at most {most} components reporting"
+    counts = f"{number_of(found.states, 'state')} in {kinds} equivalence class{'' if kinds == 1 else 'es'}"
+    yield f"{counts}, with at most {number_of(most, 'component')} reporting"
     for group in found.alike:
         if len(group) > 1:
             yield f"interchangeable (only their number matters): {', '.join(group)}"
@@ -197,7 +198,7 @@ def _policy_summary(found: Policy) -> Iterator[str]:
     if found.computing:
         yield no_proof(found.computing)
     for mark, states in found.marks.items():
-        yield f"{mark}: {states} states"
+        yield f"{mark}: {number_of(states, 'state')}"
         cases = () if mark == NONE_LEFT else found.marked(mark)
         for case in cases[:_EXAMPLES]:
             yield f"  {case.state}" + (f": {case.problem}" if case.problem else "")

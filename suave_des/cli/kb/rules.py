@@ -11,6 +11,7 @@ import typer
 
 from suave_des.cli.kb.options import AsFormat, Format, Replayed, Sources, TimeLimitS, print_json
 from suave_des.cli.options import Modes, grouped_options
+from suave_des.errors import number_of
 
 if TYPE_CHECKING:
     from suave_des.knowledge.ontology import Ontology
@@ -211,5 +212,5 @@ def try_(
         contradictions = sum(any(each.contradiction for each in one) for one in moments)
         print(
             f"{len(missions)} missions: fires in {firing}, different decisions in {sum(map(bool, changed))} "
-            f"({sum(changed)} decisions), contradictions in {contradictions}"
+            f"({number_of(sum(changed), 'decision')}), contradictions in {contradictions}"
         )

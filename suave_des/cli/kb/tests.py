@@ -17,7 +17,7 @@ from rich.text import Text
 from suave_des.cli.console import output, plain_table, print_table
 from suave_des.cli.kb.options import MaxFailed, TimeLimitS
 from suave_des.cli.options import KnowledgeFiles, grouped_options
-from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.errors import InputError, did_you_mean, number_of, shown
 
 if TYPE_CHECKING:
     from suave_des.knowledge.ontology import Ontology
@@ -298,7 +298,7 @@ def _print_summary(console: Console, results: Sequence[TestResult], duration_s: 
     passed = len(results) - failed
     states = sum(len(result.test.situations) for result in results)
     counts = [f"{failed} failed"] * bool(failed) + [f"{passed} passed"] * bool(passed)
-    line = f" {', '.join(counts)}, {states} states, in {duration_s:.2f} s "
+    line = f" {', '.join(counts)}, {number_of(states, 'state')}, in {duration_s:.2f} s "
     width = min(console.width, _WIDTH)
     console.print(Text(line.center(width, "="), "bold red" if failed else "bold green"), soft_wrap=True)
 
@@ -333,8 +333,9 @@ def _coverage_lines(coverage: Coverage) -> Iterator[str]:
         yield from (f"  {goal}" for goal in missing)
     unreachable = [each for each in coverage.rules if each.unreachable]
     if unreachable:
-        words = f"of {coverage.states} kinds of states of this model, with at most {coverage.max_failed} components"
-        yield f"not reached in any state ({words} reporting), but facts in a test may reach it"
+        components = number_of(coverage.max_failed, "component")
+        words = f"of {coverage.states} kinds of states of this model, with at most {components} reporting"
+        yield f"not reached in any state ({words}), but facts in a test may reach it"
         yield from (f"  {line}" for line in _unreachable(unreachable))
     if coverage.proposed:
         count = len(coverage.proposed)
@@ -363,9 +364,12 @@ def print_mutation(console: Console, report: MutationReport) -> None:
         console.print(Text(f"  {verdict.mutant}\n    {verdict.reason}\n    at {verdict.state}"), soft_wrap=True)
     count = len(report.verdicts)
     each_ms = 1000 * report.duration_s / count if count else 0.0
-    console.print(Text(f"{count} mutants in {report.duration_s:.1f} s, {each_ms:.0f} ms each"), soft_wrap=True)
+    console.print(
+        Text(f"{number_of(count, 'mutant')} in {report.duration_s:.1f} s, {each_ms:.0f} ms each"), soft_wrap=True
+    )
     if report.states:
-        words = f"equivalent: {report.states} kinds of states, with at most {report.max_failed} components reporting"
+        components = number_of(report.max_failed, "component")
+        words = f"equivalent: {report.states} kinds of states, with at most {components} reporting"
         console.print(Text(f"{words}, or the schema says so"), soft_wrap=True)
 
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, Field, TypeAdapter, ValidationError
 
-from suave_des.errors import InputError, KeyPath, did_you_mean, shown
+from suave_des.errors import InputError, KeyPath, did_you_mean, number_of, shown
 from suave_des.scenario.exemplar.files import (
     NODES,
     NOT_NEEDED,
@@ -170,7 +170,7 @@ def _conditions(
         return iter(())
     if rest := runs % settings.random_interval:
         notes.append(
-            f"--runner-seed: the last of {blocks} conditions has {rest} runs in the exemplar, and"
+            f"--runner-seed: the last of {blocks} conditions has {number_of(rest, 'run')} in the exemplar, and"
             f" {settings.random_interval} here, like the others"
         )
     lines = [
