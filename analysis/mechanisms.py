@@ -67,8 +67,9 @@ CHANGES = (
     ),
     Change("the same (8)", "", {"calibration.heading_frequency_rad_per_s": 8.0}),
     Change(
-        "failures without effect: before 30 s, and 15% (all have one)",
-        "none in 2025: five of five with a failure at 24.8 s, and six of 25 with later ones, go on as if whole",
+        "first failure without effect: before 30 s, and later 25% (all have one)",
+        "none in 2025: five of five with failures at 24.8 s, and six of 25 with later ones, go on as if the second alone"
+        " had happened",
         {f"{FAILURES}.effective_from_s": 0.0, f"{FAILURES}.loss_probability": 0.0},
     ),
     Change(

@@ -91,7 +91,7 @@ def _decide(ontology: Ontology, inference: Inference, function: str, call: str) 
         kept = f"{present} is kept" if present else "it stays ungrounded"
         return Decision(function, None, f"{call}: no function design is left, {kept}", rejected)
     best = min(left, key=lambda design: (-left[design], design))
-    reason = f"{call}: highest performance, {_show(left[best])}, of {len(left)} left among {len(designs)}"
+    reason = f"{call}: highest performance ({_show(left[best])}) among {len(left)} eligible of {len(designs)} designs"
     return Decision(function, best, reason, rejected)
 
 

@@ -65,14 +65,12 @@ class ScheduledEvent(NamedTuple):
         fails: whether it fails; otherwise it recovers.
         time_s: its time, as the revision counts it.
         recoverable: whether f_maintain_motion can recover it after this failure.
-        number: of its entry in the scenario, from 0.
     """
 
     thruster: int
     fails: bool
     time_s: float
     recoverable: bool = True
-    number: int = 0
 
 
 def thruster_monitor(

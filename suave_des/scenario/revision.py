@@ -111,12 +111,12 @@ class MonitorsRevision(Strict):
 
 
 class ThrusterFailureRevision(Strict):
-    """Whether a thruster failure, which the monitor publishes in any case, affects the vehicle."""
+    """Whether a mission's first thruster failure, which is published in any case, affects the vehicle. Later ones do."""
 
     effective_from_s: NotNegative = 0.0
-    """A failure before this mission time has no effect."""
+    """Before this mission time, the first failure has no effect."""
     loss_probability: Annotated[Real, Within(0.0, 1.0)] = 0.0
-    """Probability that a later failure has no effect, independently for each."""
+    """Probability that the first failure has no effect after that time."""
 
 
 class SetPointRevision(Strict):

@@ -18,8 +18,8 @@ def schedule(scenario: Scenario, chance: Chance) -> list[ScheduledEvent]:
         for number, event in enumerate(scenario.thruster_events)
     ]
     return [
-        ScheduledEvent(event.thruster, event.event == "failure", time_s, event.recoverable, number)
-        for number, (event, time_s) in enumerate(zip(scenario.thruster_events, times_s, strict=True))
+        ScheduledEvent(event.thruster, event.event == "failure", time_s, event.recoverable)
+        for event, time_s in zip(scenario.thruster_events, times_s, strict=True)
     ]
 
 
@@ -28,7 +28,7 @@ class ThrusterFaults:
     """Applies thruster events to the vehicle of a mission.
 
     Attributes:
-        scenario: says which failures have no effect.
+        scenario: says whether the first failure may have no effect.
         chance: of the run.
         vehicle: the vehicle whose thrusters fail and recover.
         log: adds an event to the mission's record.
@@ -42,10 +42,13 @@ class ThrusterFaults:
     log: Log
     listeners: list[Callable[[], None]] = field(default_factory=list, init=False)
     unrecoverable: set[int] = field(default_factory=set, init=False)
+    _had_failure: bool = field(default=False, init=False)
 
     def apply(self, t_s: float, event: ScheduledEvent) -> None:
         """Apply one of the scenario's events at mission time t."""
-        if event.fails and self._is_without_effect(t_s, event):
+        is_first_failure = event.fails and not self._had_failure
+        self._had_failure |= event.fails
+        if is_first_failure and self._is_lost(t_s):
             self.log("thruster_monitor", "failure_without_effect", thruster_name(event.thruster))
             return
         if event.fails and not event.recoverable:
@@ -60,10 +63,10 @@ class ThrusterFaults:
         for listener in self.listeners:
             listener()
 
-    def _is_without_effect(self, t_s: float, event: ScheduledEvent) -> bool:
-        """Decide whether a failure has no effect on the vehicle."""
+    def _is_lost(self, t_s: float) -> bool:
+        """Decide whether the mission's first failure, at mission time t, has no effect on the vehicle."""
         failures = self.scenario.revision.thruster_failures
         if t_s < failures.effective_from_s:
             return True
-        probability = failures.loss_probability  # one stream per event: an earlier loss does not affect the next draw
-        return probability > 0.0 and self.chance.stream(f"thruster_failures/{event.number}").random() < probability
+        probability = failures.loss_probability
+        return probability > 0.0 and self.chance.stream("thruster_failures").random() < probability

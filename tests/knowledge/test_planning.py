@@ -53,7 +53,7 @@ def test_each_design_left_out_has_its_numbers(kb: Ontology, pellet: Reasoner) ->
         ("fd_spiral_high", "water_visibility 1.80 measured < 3.25 expected"),
         ("fd_spiral_medium", "water_visibility 1.80 measured < 2.25 expected"),
     ]
-    assert decision.reason == "o_status IN_ERROR_NFR: highest performance, 0.25, of 1 left among 3"
+    assert decision.reason == "o_status IN_ERROR_NFR: highest performance (0.25) among 1 eligible of 3 designs"
 
 
 def test_numbers_that_look_alike_are_shown_with_more_digits(kb: Ontology, pellet: Reasoner) -> None:

@@ -215,13 +215,24 @@ def test_a_failure_too_early_to_take_effect_is_published_all_the_same(simulator)
     assert without_effect.trajectory[-1].x_m == whole.trajectory[-1].x_m != failed.trajectory[-1].x_m
 
 
-def test_share_of_failures_without_effect(simulator) -> None:
+def test_only_a_missions_first_failure_may_have_no_effect(simulator) -> None:
     failures = {"effective_from_s": 0.0, "loss_probability": 0.25}
-    failing = [{"thruster": n, "event": "failure", "time_s": 1.0} for n in range(1, 7)]
-    short = simulator(thruster_events=failing, mission={"time_limit_s": 20.0}, revision={"thruster_failures": failures})
-    lost = [len(events(short.run("none", run, 1, record=True), "failure_without_effect")) for run in range(1, 101)]
-    assert 120 <= sum(lost) <= 180  # of 600, each on its own; mean 150, standard deviation 10.6
-    assert len(set(lost)) > 2
+    failing = [{"thruster": n, "event": "failure", "time_s": 1.0} for n in (3, 1)]
+    short = simulator(thruster_events=failing, mission={"time_limit_s": 5.0}, revision={"thruster_failures": failures})
+    missions = [short.run("none", run, 1, record=True) for run in range(1, 401)]
+    assert not any(events(each, "failure_without_effect", "c_thruster_1") for each in missions)
+    lost = sum(len(events(each, "failure_without_effect", "c_thruster_3")) for each in missions)
+    assert 65 <= lost <= 135  # mean 100, standard deviation 8.7
+
+
+def test_a_failure_after_one_without_effect_takes_effect(simulator) -> None:
+    def way(*thrusters: int) -> list[tuple[float, float]]:
+        events = [{"thruster": n, "event": "failure", "time_s": 10.0} for n in thrusters]
+        changes = {**NO_ERRORS, "revision": {"thruster_failures": {"effective_from_s": 30.0}}}
+        made = simulator("planta_exp1", **changes, thruster_events=events, mission={"time_limit_s": 80.0})
+        return [(each.x_m, each.y_m) for each in made.run("none", 1, 1, record=True).trajectory]
+
+    assert way() == way(1) != way(1, 3)
 
 
 @SCENARIOS
