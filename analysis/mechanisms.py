@@ -68,7 +68,7 @@ CHANGES = (
     Change("the same (8)", "", {"calibration.heading_frequency_rad_per_s": 8.0}),
     Change(
         "first failure without effect: before 30 s, and later 25% (all have one)",
-        "none in 2025: five of five with failures at 24.8 s, and six of 25 with later ones, go on as if the second alone"
+        "none in 2025: five of five with failures at 24.8 s, and six of 25 with later ones, go on as if only the second"
         " had happened",
         {f"{FAILURES}.effective_from_s": 0.0, f"{FAILURES}.loss_probability": 0.0},
     ),

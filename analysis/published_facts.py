@@ -1,7 +1,8 @@
-"""What the published runs themselves show of a reasoner: how fast missions follow, and when the search ends.
+"""What the published runs themselves show: how fast missions follow, when the search ends, and which failures are lost.
 
-Two mechanisms rest on these figures (docs/background/fidelity.md): the reasoner slows the simulator down, and the
-search begins some time after its first activation. Writes speeds.csv and search_times.csv.
+Three mechanisms rest on these figures (docs/background/fidelity.md): the reasoner slows the simulator down, the search
+begins some time after its first activation, and a mission's first failure may be without effect. Writes speeds.csv,
+search_times.csv, and failures.csv, which has simulated missions too.
 
     python analysis/published_facts.py [--out DIR]
 """
@@ -13,11 +14,17 @@ from pathlib import Path
 
 import pandas
 
+from suave_des import load_scenario, with_values
 from suave_des.resources import find
+from suave_des.simulation.simulator import Simulator
 
 SLOW_M_PER_S = 0.26
 """Missions without a dead thruster mostly follow at 0.27 to 0.28 m/s."""
 RUNS = {2023: "seams2023_runs.csv", 2025: "planta_exp1_runs.csv"}
+
+DEAD = {"both": (1, 3), "first": (1,), "second": (3,), "neither": ()}
+"""The thrusters that fail in 2025, one second apart; and which of them are dead if the other failure is lost."""
+MISSIONS = 12
 
 
 def read(year: int) -> pandas.DataFrame:
@@ -50,14 +57,42 @@ def search_times() -> pandas.DataFrame:
     return medians.assign(metacontrol_later_s=later_s).rename_axis(columns=None).reset_index()
 
 
+def failures() -> pandas.DataFrame:
+    """Compare none's missions under each condition of 2025 with simulated ones in which some thrusters are dead.
+
+    Returns:
+        A row for each condition and set of dead thrusters, "real" for the published missions: medians of search time,
+        s, and speed of following, m/s.
+    """
+    runs, loaded, rows = read(2025).query("manager == 'none'"), load_scenario("planta_exp1"), []
+    for condition, real in runs.groupby("condition"):
+        start_y_m, time_s = real[["nominal_y_m", "failure_time_s"]].iloc[0]
+        rows.append({"condition": condition, "dead": "real", **_medians(real)})
+        for dead, thrusters in DEAD.items():
+            events = [{"thruster": thruster, "event": "failure", "time_s": time_s} for thruster in thrusters]
+            effective = {"effective_from_s": 0.0, "loss_probability": 0.0}
+            values = {"thruster_events": events, "start.y_m": start_y_m, "revision.thruster_failures": effective}
+            simulator = Simulator(with_values(loaded, values))
+            missions = pandas.DataFrame(simulator.run("none", run, seed=1).metrics for run in range(1, MISSIONS + 1))
+            followed_s = simulator.loaded.scenario.mission.time_limit_s - missions["search_time_s"]
+            missions["speed_m_per_s"] = missions["distance_inspected_m"] / followed_s
+            rows.append({"condition": condition, "dead": dead, **_medians(missions)})
+    return pandas.DataFrame(rows)
+
+
+def _medians(missions: pandas.DataFrame) -> dict[str, float]:
+    return missions[["search_time_s", "speed_m_per_s"]].median().round(3).to_dict()
+
+
 def main() -> None:
     """Compute both tables, print and write them."""
     parser = argparse.ArgumentParser(description="What the published runs show of a reasoner.")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "published_facts")
     folder = parser.parse_args().out
     folder.mkdir(parents=True, exist_ok=True)
-    for name, table in {"speeds.csv": speeds(), "search_times.csv": search_times()}.items():
-        table.to_csv(folder / name, index=False, lineterminator="\n")
+    for study in (speeds, search_times, failures):
+        table = study()
+        table.to_csv(folder / f"{study.__name__}.csv", index=False, lineterminator="\n")
         print(table.to_string(index=False), end="\n\n")
 
 

@@ -143,7 +143,7 @@ def test_without_what_is_taken_out_missions_differ_more_from_the_real_ones(study
     assert 0.0 < shipped["distance_2025"] < 0.7 * changed["distance_2025"]
 
 
-@pytest.mark.parametrize("table", ["speeds", "search_times"])
+@pytest.mark.parametrize("table", ["speeds", "search_times", "failures"])
 def test_the_committed_facts_are_those_of_the_published_runs(study, table):
     before = pandas.read_csv(FOLDER / "published_facts" / f"{table}.csv")
     pandas.testing.assert_frame_equal(getattr(study("published_facts"), table)(), before)
