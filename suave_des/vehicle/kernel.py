@@ -35,10 +35,7 @@ DRAG = 6  # six coefficients of -c |nu| nu, N s^2/m^2 and N m s^2
 THRUST_LIMIT = 12  # of each thruster, N
 POSITION_GAIN, POSITION_GAIN_Z = 13, 14  # velocity for a position error, 1/s
 JERK = 15  # of a leg, m/s^3
-VELOCITY_GAIN, VELOCITY_INTEGRAL_GAIN = (
-    16,
-    17,
-)  # acceleration for a horizontal velocity error, 1/s, and its integral, 1/s^2
+VELOCITY_GAIN, VELOCITY_INTEGRAL_GAIN = 16, 17  # acceleration for a horizontal velocity error, 1/s; its integral, 1/s^2
 VELOCITY_GAIN_Z, VELOCITY_INTEGRAL_GAIN_Z = 18, 19  # the same for a vertical one
 INTEGRAL_LIMIT = 20  # of each velocity integral, m/s^2
 ROLL_GAIN, ROLL_RATE_GAIN = 21, 22  # angular acceleration for a roll error, 1/s^2, and for its rate, 1/s
