@@ -111,7 +111,7 @@ class MonitorsRevision(Strict):
 
 
 class ThrusterFailureRevision(Strict):
-    """Whether a mission's first thruster failure, which is published in any case, affects the vehicle. Later ones do."""
+    """Whether a mission's first thruster failure, published in any case, affects the vehicle. Later ones always do."""
 
     effective_from_s: NotNegative = 0.0
     """Before this mission time, the first failure has no effect."""
