@@ -56,7 +56,7 @@ def overall_conclusion(
     if len(groups) < 2:
         return f"There is only {groups[0]}, so there is nothing to compare it with."
     if not own or len(known) < 2:
-        return f"No two of them have a {metric.title} to compare."
+        return f"No two of them have a {metric.title} that could be compared."
     if not metric.better:
         return " ".join(each.conclusion or conclusion(each, metric) for each in own[:1])
     best = max(known, key=lambda name: metric.better * known[name])
@@ -73,8 +73,10 @@ def overall_conclusion(
         amount = metric.amount(abs(each.difference.value))
         parts.append(f"{amount}{words} {_other(each, best)} ({interval_text(each, metric)}{_basis(each)})")
     sentence = f"{best} {metric.most}: {_listed(parts)}"
-    ps = max(each.p_holm or 0.0 for each in shown)
-    sentence += f"; {p_text(ps)} after Holm's correction" + (", the greatest of them" if len(shown) > 1 else "")
+    largest = p_text(max(each.p_holm or 0.0 for each in shown))
+    if len(shown) > 1:
+        largest = f"all {largest}" if "<" in largest else f"largest {largest}"
+    sentence += f"; {largest} after Holm's correction"
     if open_ones:
         sentence += f"; no difference is shown to {_listed(open_ones)}"
     return f"{sentence}."

@@ -157,8 +157,8 @@ const otherWays = 'more with suave-des report --paths N';
 function sayWhichWays() {
   const n = runsWithWay.length;
   byId('runs-title').textContent = n
-    ? `Each mission; click one to look at it. Paths and timelines are here for ${n} run${n > 1 ? 's' : ''} of each manager (${otherWays})`
-    : `Each mission; click one to look at it. ${ways.note}`;
+    ? `Each mission; click one to view it. Paths and timelines are here for ${n} run${n > 1 ? 's' : ''} of each manager (${otherWays})`
+    : `Each mission; click one to view it. ${ways.note}`;
   byId('where-title').textContent = `Paths of ${n} run${n > 1 ? 's' : ''} of each manager, from above (${otherWays})`;
 }
 
@@ -256,7 +256,7 @@ function drawTimeOf(way) {
     show('run-time', [], {});
     const empty = byId('run-time').querySelector('.empty');
     const with_ = [...new Set(ways.paths.filter((each) => each.group === state.group).map((each) => each.run))];
-    if (empty) empty.textContent = with_.length ? `this page has the way and timeline of runs ${with_.join(', ')}; ${otherWays}, and the command above shows any run` : ways.note;
+    if (empty) empty.textContent = with_.length ? `this page has the paths and timelines of runs ${with_.join(', ')}; ${otherWays}, and the command above shows any run` : ways.note;
     return;
   }
   const modeColour = themeMode();
@@ -328,13 +328,13 @@ function writeText() {
     ...section.tables.flatMap(([title, table]) => [title ? element('h3', {}, title) : null, tableOf(table)]),
     section.conclusions.length ? element('ul', {}, ...section.conclusions.map((each) => element('li', {}, each))) : null)));
   if (results.needed) {
-    byId('tables').append(element('details', { class: 'block' }, element('summary', {}, 'Runs that an interval needs'), tableOf(results.needed)));
+    byId('tables').append(element('details', { class: 'block' }, element('summary', {}, 'Runs needed for an interval'), tableOf(results.needed)));
   }
   byId('tables').append(element('details', { class: 'block' }, element('summary', {}, 'How it was compared'),
     element('ul', {}, ...results.remarks.map((each) => element('li', {}, each)))));
   byId('how').append(element('h2', {}, 'How it was made'), ...made.map((each) => element('details', { class: 'block', open: '' },
     element('summary', {}, each.folder),
-    each.facts.length ? element('dl', {}, ...each.facts.flatMap(([name, value]) => [element('dt', {}, name), element('dd', {}, value)])) : element('p', {}, 'No manifest.json tells how these were made.'),
+    each.facts.length ? element('dl', {}, ...each.facts.flatMap(([name, value]) => [element('dt', {}, name), element('dd', {}, value)])) : element('p', {}, 'There is no manifest.json that says how these were made.'),
     each.command ? element('div', {}, element('p', {}, 'To repeat it:'), element('pre', {}, element('code', {}, each.command))) : null,
     listed('Files that went into it (SHA-256)', each.inputs), listed('Versions', each.versions))));
   byId('made-by').textContent = `suave-des ${DATA.version}`;
@@ -360,7 +360,7 @@ function makeTools() {
   };
   select(byId('metric'), METRICS.map((name) => [name, titles[name]]), (value) => { state.metric = value; });
   select(byId('found'), [], (value) => { state.found = value; });
-  select(byId('reference'), groups.map((name, number) => [number, `less ${name}`]), (value) => { state.reference = Number(value); });
+  select(byId('reference'), groups.map((name, number) => [number, `difference to ${name}`]), (value) => { state.reference = Number(value); });
   for (const name of drawn.swept) {
     const values = [...new Set(columns[name])];
     if (values.length > 40) continue;
