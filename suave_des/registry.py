@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from difflib import get_close_matches
 from functools import cache
 from importlib.metadata import entry_points
@@ -158,6 +159,11 @@ def _check_hooks(name: str, kind: type[ManagingSubsystem]) -> None:
         resembling = {each: near for each in own for near in get_close_matches(each, _HOOKS, n=1, cutoff=0.75)}
         for each, hook in sorted(resembling.items()):
             raise InputError(f"manager {name!r} has no hook, but {each}", remedy=f"did you mean {hook}{_HOOKS[hook]}?")
+    for each, hook in _misspelt_hooks(kind):
+        problem = f"manager {name!r}: nothing calls {each}, which is no hook"
+        raise InputError(
+            problem, remedy=f"did you mean {hook}{_HOOKS[hook]}? a method that others call needs another name"
+        )
     subscribed = kind.subscribes_to
     unknown = () if isinstance(subscribed, property) else [each for each in subscribed if each not in list(Kind)]
     if unknown:  # of a text, its letters are
@@ -165,6 +171,29 @@ def _check_hooks(name: str, kind: type[ManagingSubsystem]) -> None:
         what = f"is {str(subscribed)!r}" if isinstance(subscribed, str) else f"has {shown(unknown[0])}"
         raise InputError(f"manager {name!r}: subscribes_to {what}", remedy=remedy)
     _checked.add(kind)
+
+
+def _misspelt_hooks(kind: type) -> Iterator[tuple[str, str]]:
+    """Yield methods that are hardly anything but misspelt hooks, each with the hook.
+
+    Such a method is very near to a hook that its class lacks, overrides nothing, and is not named again in its module.
+    """
+    classes = kind.__mro__[: kind.__mro__.index(ManagingSubsystem)]
+    for base in (each for each in classes if not each.__module__.startswith("suave_des.")):
+        for each in sorted(name for name, member in vars(base).items() if inspect.isfunction(member)):
+            near = get_close_matches(each, _HOOKS, n=1, cutoff=0.8)
+            inherits = any(hasattr(parent, each) for parent in base.__bases__)
+            if near and near[0] not in vars(base) and not inherits and not _is_named_elsewhere(each, base):
+                yield each, near[0]
+
+
+def _is_named_elsewhere(method: str, kind: type) -> bool:
+    """Whether a method's name stands anywhere in its module but in its definition; True if the source is not known."""
+    try:
+        source = inspect.getsource(sys.modules[kind.__module__])
+    except (OSError, TypeError, KeyError):
+        return True
+    return re.search(rf"(?<!def )\b{re.escape(method)}\b", source) is not None
 
 
 def registered_functions() -> tuple[str, ...]:

@@ -42,6 +42,10 @@ from suave_des.registry import ManagerLike, name_of
 from suave_des.scenario.loader import LoadedScenario, Replacements
 
 __all__ = ["CampaignInterrupted", "CampaignOptions", "CampaignResult", "Progress", "resume_campaign", "run_campaign"]
+_MORE_MANAGERS = (
+    "for other managers, run a second campaign with the same seed into another folder:"
+    " suave-des compare {} FOLDER pairs their runs by number"
+)
 
 
 class CampaignOptions(Replacements, total=False):
@@ -171,7 +175,8 @@ def resume_campaign(
     spec = replace(spec, out=folder, workers=workers, scheduler=scheduler)
     if unknown := [name for name in managers if name not in spec.managers]:
         problem = f"the campaign has no manager {unknown[0]!r}, and cannot be given new ones"
-        raise InputError(problem, file=folder, remedy=did_you_mean(unknown[0], spec.managers, "its managers"))
+        remedy = f"{did_you_mean(unknown[0], spec.managers, 'its managers')}; {_MORE_MANAGERS.format(folder)}"
+        raise InputError(problem, file=folder, remedy=remedy)
     check_trusted(spec.managers, managers, folder, confirmed=confirmed)
     with ExitStack() as stack:
         try:
@@ -190,7 +195,7 @@ def _check_new(folder: Path, *, overwrite: bool) -> None:
         raise InputError(
             "the output folder is not empty: it has a campaign in it",
             file=folder,
-            remedy=f"--resume {folder} continues it, --overwrite replaces it",
+            remedy=f"--resume {folder} continues it, --overwrite replaces it; {_MORE_MANAGERS.format(folder)}",
         )
 
 

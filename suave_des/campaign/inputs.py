@@ -93,9 +93,21 @@ def check_inputs(
     found |= _modules(managers)
     for each in [loaded] if variation is None else scenarios_of(loaded, variation):
         for manager in managers:
-            manager_class(manager).check(each)
+            _ask(manager, each)
         found |= declared_files([each], managers)
     return {**loaded.inputs, **files.inputs, **{name: sha256_of(path, _LIMIT_BYTES) for name, path in found.items()}}
+
+
+def _ask(manager: str, loaded: LoadedScenario) -> None:
+    """Have a manager check that it can work with a scenario."""
+    try:
+        manager_class(manager).check(loaded)
+    except InputError:
+        raise
+    except Exception as error:  # whatever a manager's own code raises
+        problem = f"manager {manager}: check raised {type(error).__name__}: {error}"
+        remedy = "a manager that cannot work with a scenario raises suave_des.errors.InputError"
+        raise InputError(problem, remedy=remedy) from error
 
 
 def _modules(managers: Iterable[str]) -> Iterator[tuple[str, Path]]:

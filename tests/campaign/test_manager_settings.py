@@ -138,6 +138,15 @@ class TestDeclaredFiles:
         assert done.returncode == 2 and "files_sha256.table.txt was" in done.stderr
 
 
+def test_a_check_that_raises_is_bad_input(folder: Path) -> None:
+    text = "\nclass Picky(NoManager):\n    @classmethod\n    def check(cls, loaded):\n        return loaded.no_such\n"
+    with (folder / f"settable_{folder.name}.py").open("a") as module:
+        module.write(text)
+    name = f"settable_{folder.name}:Picky"
+    with pytest.raises(InputError, match=f"manager {name}: check raised AttributeError: .*no_such"):
+        run_campaign("seams2023", [name], runs=1)
+
+
 class TestReceivedFolder:
     @pytest.fixture
     def received(self, folder: Path, settable: str) -> Path:
@@ -162,6 +171,7 @@ class TestReceivedFolder:
         assert (received / "imported").exists()
         assert "manager_code_sha256" in done.stderr  # the code is another one than the campaign began with
 
-    def test_a_manager_that_it_does_not_have_cannot_be_added(self, received: Path) -> None:
+    def test_a_manager_that_it_does_not_have_cannot_be_added_but_compared(self, received: Path) -> None:
         done = command_here(*RESUME, "--managers", "bt", cwd=received)
         assert done.returncode == 2 and "the campaign has no manager 'bt'" in done.stderr
+        assert "with the same seed into another folder: suave-des compare out FOLDER pairs" in done.stderr

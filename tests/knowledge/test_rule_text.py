@@ -84,6 +84,12 @@ def full(name: str) -> str:
         (r'A: B(?x) -> c(?x, "\ud800")', "line 1, column 19", "no file can hold"),
         ("A: foo:B(?x) -> C(?x)", "line 1, column 4", "unknown prefix foo:"),
         ("A: B(?x) -> mors:C(?x)", "line 1, column 13", "did you mean mros?"),
+        (
+            "A: B(?x) -> sqwrl:select(?x)",
+            "line 1, column 13",
+            "Pellet has no built-ins of the prefix sqwrl: (known are",
+        ),
+        ("A: B(?x) ^ swrlm:sqrt(?y, 4) -> C(?x)", "line 1, column 12", "of swrlb: abs, add, anyURI, "),
         ("A: B(<no iri>) -> C(?x)", "line 1, column 6", "expected an argument"),
         ("A: B(2x) -> C(?x)", "line 1, column 6", "expected an argument"),
         (f"A: B({'9' * 500}) -> C(?x)", "line 1, column 6", "too many digits"),

@@ -91,3 +91,52 @@ def test_ctrl_c_while_a_manager_is_imported_is_ctrl_c(tmp_path: Path, monkeypatc
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(KeyboardInterrupt):
         manager_class("stopped_while_made:Manager")
+
+
+DERIVED = """
+from suave_des.managing.metacontrol import Metacontrol
+
+class Mine(Metacontrol):
+    {}
+"""
+
+
+def derived(method: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """A manager derived from one that has hooks, with another method."""
+    module = f"derived_{tmp_path.name}"
+    (tmp_path / f"{module}.py").write_text(DERIVED.format(method))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    return f"{module}:Mine"
+
+
+@pytest.mark.parametrize(
+    ("method", "words"),
+    [
+        ("def adpat(self): pass", "nothing calls adpat, which is no hook .did you mean adapt.self.?"),
+        (
+            "def task_request(self, task): pass",
+            "nothing calls task_request, .* .did you mean task_requested.self, task.",
+        ),
+        ("def diagnostics(self, diagnostic): pass", "did you mean diagnostic.self, diagnostic."),
+    ],
+)
+def test_a_misspelt_hook_of_a_manager_that_inherits_hooks_is_bad_input(
+    method: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(InputError, match=words):
+        manager_class(derived(method, tmp_path, monkeypatch))
+
+
+@pytest.mark.parametrize(
+    "methods",
+    [
+        "def adapt(self): self.adapts()\n    def adapts(self): pass",
+        "def adapted(self): pass\n    def task_requested(self, task): self.adapted()",
+        "def adapt(self): pass\n    def adapt_(self): pass",
+        "def plan_ahead(self): pass",
+        "adapts = 3",
+    ],
+)
+def test_an_ordinary_method_is_no_misspelt_hook(methods: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert manager_class(derived(methods, tmp_path, monkeypatch)).__name__ == "Mine"

@@ -301,3 +301,10 @@ def test_tables_with_long_names_of_managers_fit_the_width_and_show_the_names_who
         assert max(map(len, text.splitlines())) <= width
         joined = "".join(line.split("  ")[0] or line.strip() for line in text.splitlines())
         assert all(name in joined for name in long)
+
+
+def test_managers_in_two_folders_are_paired_by_run_number(campaign: Path, tmp_path: Path) -> None:
+    run_campaign("seams2023", ["random"], 5, 1, out=tmp_path / "second")
+    found = compare_folders([campaign, tmp_path / "second"])
+    assert difference(found, "none", "random").pairing.is_paired
+    assert difference(found, "none", "random").n == (5,)

@@ -228,7 +228,8 @@ def _check_comparisons(rule: Rule, vocabulary: Vocabulary) -> Iterator[RuleProbl
 def _check_builtin(atom: Atom, name: str, *, is_head: bool) -> Iterator[RuleProblem]:
     counts = BUILTINS.get(atom.predicate)
     if counts is None:
-        suggestion = nearest(name, map(local_name, BUILTINS))
+        known = f"known: {', '.join(sorted(map(local_name, BUILTINS)))}"
+        suggestion = nearest(name, map(local_name, BUILTINS)) or known
         yield RuleProblem(f"there is no builtin {name} in Pellet", atom.place(), suggestion)
         return
     if is_head:

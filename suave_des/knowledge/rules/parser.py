@@ -24,8 +24,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 from suave_des.errors import nearest
-from suave_des.knowledge.rdf import MROS, OWL, RDF, RDFS, SUAVE, SWRL, SWRLA, SWRLB, TOMASYS, XSD, Lit
-from suave_des.knowledge.rules.syntax import Atom, Named, ParsedRule, Place, RuleError, Term, Variable
+from suave_des.knowledge.rdf import MROS, OWL, RDF, RDFS, SUAVE, SWRL, SWRLA, SWRLB, TOMASYS, XSD, Lit, local_name
+from suave_des.knowledge.rules.syntax import BUILTINS, Atom, Named, ParsedRule, Place, RuleError, Term, Variable
 
 if TYPE_CHECKING:
     from lark import Lark, Token
@@ -45,6 +45,8 @@ PREFIXES: Final[Mapping[str, str]] = MappingProxyType(
         "xsd": XSD,
     }
 )
+#: Prefixes of further built-ins, which Protégé's SWRLTab has and Pellet has not.
+_FOREIGN_BUILTINS: Final = ("sqwrl", "swrlm", "swrlx", "temporal")
 MAX_DIGITS: Final = 400
 _WORD: Final = r"[^\W\d][\w.-]*(?<![.-])"
 #: Where a rule's name is expected, lark's contextual lexer reads a word alone; elsewhere "my:seen" is a prefixed name.
@@ -236,6 +238,9 @@ class _Builder:
         if token.type == "IRI":
             return self._place(token), self._iri(token, f"{token} is not an absolute IRI")
         prefix, _, local = token.partition(":")
+        if prefix in _FOREIGN_BUILTINS and prefix not in self._prefixes:
+            known = f"known are those of swrlb: {', '.join(sorted(map(local_name, BUILTINS)))}"
+            raise self._wrong(token, f"Pellet has no built-ins of the prefix {prefix}:", known)
         if prefix not in self._prefixes:
             remedy = f"declare it: prefix {prefix}: <...>; known: {', '.join(sorted(self._prefixes))}"
             raise self._wrong(token, f"unknown prefix {prefix}:", nearest(prefix, self._prefixes) or remedy)
