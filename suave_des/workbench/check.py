@@ -32,6 +32,7 @@ from suave_des.workbench.model_checks import (
     check_shapes,
     dead_rules,
     designs_without_performance,
+    no_estimate,
     undefined_names,
     unmeasured_rules,
     unused_individuals,
@@ -166,8 +167,7 @@ def _dead_rules(
     known = {id(rule) for rule, *_ in dead}
     for rule, atom, attribute in unmeasured_rules(content, model):
         if id(rule) not in known:
-            message = f"no function design has an estimate of {attribute}, so no grounding has a value of it"
-            dead.append((rule, atom, message, f"add a hasQAestimation of type {attribute} to a design"))
+            dead.append((rule, atom, *no_estimate(attribute)))
     for rule, atom, message, remedy in dead:
         level = Level.WARN if rule.file.resolve() in given else Level.INFO
         yield _about(rule, sources, level, f"can never fire: {message}", remedy or None, atom.place())

@@ -126,6 +126,7 @@ class PolicyDifference:
         differing: kinds of states that they decide differently.
         reported: kinds in which they decide alike, but infer different statuses.
         only_one: function designs that only the first has; likewise only_other.
+        without_designs: (A or B, function) for each function that has designs in the other one only.
         computing: rules that compute with numbers; if there are any, the ranges are samples and prove nothing.
     """
 
@@ -134,6 +135,7 @@ class PolicyDifference:
     reported: tuple[CasePair, ...] = field(repr=False)
     only_one: tuple[str, ...]
     only_other: tuple[str, ...]
+    without_designs: tuple[tuple[str, str], ...]
     computing: tuple[str, ...]
 
     @property
@@ -157,6 +159,8 @@ class PolicyDifference:
         for which, designs in (("A", self.only_one), ("B", self.only_other)):
             if designs:
                 yield f"only {which} has {', '.join(designs)}"
+        for which, function in self.without_designs:
+            yield f"{function} has no design in {which}"
         groups: dict[str, list[CasePair]] = {}
         for pair in self.differing:
             for name in pair.functions or pair.one.asked:
@@ -188,6 +192,12 @@ def compare_policies(one: Policy, other: Policy) -> PolicyDifference:
         reported=tuple(pair for pair in alike if pair.one.statuses != pair.other.statuses),
         only_one=tuple(sorted(designs[0] - designs[1])),
         only_other=tuple(sorted(designs[1] - designs[0])),
+        without_designs=tuple(
+            (which, function)
+            for which, policy in (("A", one), ("B", other))
+            for function in policy.functions
+            if not any(function in dict(case.state.groundings) for case in policy.cases)
+        ),
         computing=tuple(sorted({*one.computing, *other.computing})),
     )
 

@@ -322,6 +322,12 @@ def dead_rules(content: Content, model: Model) -> list[tuple[Rule, Atom]]:
     return [(rule, next(atom for atom in rule.body if not possible.allows(atom))) for rule in waiting]
 
 
+def no_estimate(attribute: str) -> tuple[str, str]:
+    """Say why no grounding has a value of an attribute, and what would give it one."""
+    problem = f"no function design has an estimate of {attribute}, so no grounding has a value of it"
+    return problem, f"add a hasQAestimation of type {attribute} to a design"
+
+
 def unmeasured_rules(content: Content, model: Model) -> list[tuple[Rule, Atom, str]]:
     """Find the enabled rules that need a grounding's value (hasQAvalue) of an attribute of which no grounding has one.
 

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import random
+import re
 from dataclasses import replace
 from decimal import Decimal
 
@@ -275,6 +276,19 @@ class TestDiff:
         _, text, _ = command("diff", edited(""), file, "--max-failed", "0")
         assert f"{SEARCH}, now ungrounded: A fd_spiral_low, B none left\n  1.25 <= . < 2.25: 6 states\n" in text
         assert "none left, none left" not in text
+
+    def test_a_function_without_designs_on_one_side_is_decided_differently(self, command, edited):
+        same, without = edited(""), edited("", "without.owl")
+        designs = r'(?s)<owl:NamedIndividual rdf:about="[^"]*#fd_spiral_(?:low|medium|high)">.*?</owl:NamedIndividual>'
+        without.write_text(re.sub(designs, "", without.read_text()))
+        for files, which, texts in (
+            ((same, without), "B", "A fd_spiral_low, B none left"),
+            ((without, same), "A", "A none left, B fd_spiral_low"),
+        ):
+            _, text, _ = command("diff", *files, "--max-failed", "0")
+            assert f"{SEARCH} has no design in {which}\n" in text
+            assert f"{SEARCH}, now ungrounded: {texts}\n" in text
+            assert not text.startswith("0 of") and " 0 of" not in text
 
     def test_components_that_only_one_side_has_are_still_alike(self, bench):
         mine = PolicySpace.of(bench.base, bench.settings)

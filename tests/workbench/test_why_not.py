@@ -87,3 +87,16 @@ def test_a_rule_fires_where_pellet_says_so(bench, prover, design, statuses, visi
     questions = RuleQuestions(bench.base)
     answers = {rule.name: questions.of(rule, state).fires for rule in bench.base.rules}
     assert answers == {rule.name: number in holding for number, rule in enumerate(bench.base.rules)}
+
+
+def test_a_measured_attribute_that_no_design_estimates_is_told_as_kb_check_tells_it(bench, tmp_path):
+    rules = tmp_path / "mine.swrl"
+    rules.write_text(
+        "low: hasQAvalue(?g, ?q) ^ isQAtype(?q, battery_level) ^ hasValue(?q, ?v) ^ lessThan(?v, 0.3) -> Role(?g)"
+    )
+    base, _ = open_without_unusable(load_scenario("seams2023", rules=[rules]))
+    found = str(RuleQuestions(base).why_not("low", bench.state(measurements={"battery_level": 0.1})))
+    assert (
+        "no function design has an estimate of battery_level, so no grounding has a value of it; add a hasQA" in found
+    )
+    assert "--at" not in found

@@ -189,7 +189,7 @@ def kinds_of_states(
         )
     between = ranges_between(space.numbers)
     combinations = list(component_reports(space.alike, space.statuses, max_failed))
-    tasks = list(_tasks(base))
+    tasks = list(_tasks(base, space))
     for ranges in itertools.product(between, repeat=len(space.attributes)):
         for values in values_in(ranges):
             known = {name: value for name, value in zip(space.attributes, values, strict=True) if value is not None}
@@ -209,12 +209,12 @@ def kinds_of_states(
 def _number_of_kinds(base: Ontology, max_failed: int, space: PolicySpace) -> int:
     measured: int = len(ranges_between(space.numbers)) ** len(space.attributes)
     reports = sum(1 for _ in component_reports(space.alike, space.statuses, max_failed))
-    return measured * reports * sum(1 for _ in _tasks(base))
+    return measured * reports * sum(1 for _ in _tasks(base, space))
 
 
-def _tasks(base: Ontology) -> Iterator[tuple[tuple[str, ...], dict[str, str]]]:
+def _tasks(base: Ontology, space: PolicySpace) -> Iterator[tuple[tuple[str, ...], dict[str, str]]]:
     """Functions asked for together, as the mission's tasks do, with each way to ground them."""
-    solvable = [name for name in base.functions if base.designs(name)]
+    solvable = [name for name in base.functions if base.designs(name) or name in space.functions]
     lasting = [name for name in LASTING if name in solvable]
     tasks = [(*lasting, name) for name in solvable if name not in lasting] or [tuple(lasting)]
     for task in tasks:

@@ -191,18 +191,21 @@ class PolicySpace:
         numbers: ends of the ranges, ascending.
         alike: groups of interchangeable components.
         statuses: that components can report.
+        functions: that have a design, if only in one of two knowledge bases; without one there is nothing to ask for.
     """
 
     attributes: tuple[str, ...]
     numbers: tuple[Decimal, ...]
     alike: tuple[tuple[str, ...], ...]
     statuses: tuple[str, ...]
+    functions: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, base: Ontology, settings: ManagingSettings) -> PolicySpace:
         """What can have an effect in these ontologies."""
         attributes = tuple(name for name in measured_attributes(base, settings) if has_effect(base, name))
-        return cls(attributes, numbers_in(base), interchangeable_components(base), component_statuses(base))
+        functions = tuple(name for name in base.functions if base.designs(name))
+        return cls(attributes, numbers_in(base), interchangeable_components(base), component_statuses(base), functions)
 
     def common(self, other: PolicySpace) -> PolicySpace:
         """What has an effect in either; components are alike only if they are so in both that have them."""
@@ -218,6 +221,7 @@ class PolicySpace:
             tuple(sorted({*self.numbers, *other.numbers})),
             (*map(tuple, groups.values()), *filter(None, only_there)),
             tuple(sorted({*self.statuses, *other.statuses})),
+            tuple(sorted({*self.functions, *other.functions})),
         )
 
 

@@ -14,7 +14,7 @@ from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.knowledge.content import with_rules
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.limit import TimeLimit
-from suave_des.knowledge.rdf import RDF_TYPE, Lit, Triple, facts_of, value_of
+from suave_des.knowledge.rdf import RDF_TYPE, TOMASYS, Lit, Triple, facts_of, value_of
 from suave_des.knowledge.rules.checks import RuleProblem, check_rule
 from suave_des.knowledge.rules.files import RulesFile
 from suave_des.knowledge.rules.syntax import Atom, Rule, RuleError
@@ -22,6 +22,7 @@ from suave_des.knowledge.rules.writer import write_atom
 from suave_des.knowledge.state import ContradictionError, Fact, KnowledgeState, Value, value_text
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario_knowledge import open_base
+from suave_des.workbench.model_checks import no_estimate, unmeasured_rules
 from suave_des.workbench.prover import Prover, Situation
 from suave_des.workbench.reasons.atom_failure import describe_failure
 from suave_des.workbench.reasons.matching import (
@@ -164,7 +165,10 @@ class RuleQuestions:
         if not match.failing:
             return WhyNot(rule.name, self._fires(rule, match.binding, facts), True, bindings=bindings)
         first = rule.body[match.failing[0]]
-        reason = describe_failure(self._usable, first, match.binding, facts)
+        if first.predicate == TOMASYS + "hasQAvalue" and id(rule) in self._unmeasured:
+            reason = "; ".join(no_estimate(self._unmeasured[id(rule)]))
+        else:
+            reason = describe_failure(self._usable, first, match.binding, facts)
         others = len(match.failing) - 1
         more = f" ({others} more {'atom fails' if others == 1 else 'atoms fail'})" if others else ""
         chain = self._concluder(rule, first, match.binding, facts)
@@ -181,6 +185,11 @@ class RuleQuestions:
     def _usable(self) -> Ontology:
         """The knowledge base without the rules that Pellet would drop."""
         return self.base.with_rules(rule for rule in self.base.rules if not rule.enabled or not self._problems(rule))
+
+    @cached_property
+    def _unmeasured(self) -> dict[int, str]:
+        """Attributes of which no grounding can have a value, by the identities of the rules that need one."""
+        return {id(rule): attribute for rule, _, attribute in unmeasured_rules(self.base.content, self.base.model)}
 
     def _problems(self, rule: Rule) -> list[RuleProblem]:
         return [problem for problem in check_rule(rule, self.base.vocabulary) if problem.is_fatal]
