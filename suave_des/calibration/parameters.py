@@ -35,7 +35,7 @@ class FreeEntry(Strict):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        ordered(self.lower, self.upper)
+        ordered(self.lower, self.upper, "lower", "upper")
         return self
 
 

@@ -187,10 +187,11 @@ def _event_line(event: Event, sources: int, names: int, width: int | None) -> Te
     source, name = event.source.replace("_", " "), event.event.replace("_", " ")
     time_text = f"{event.t_s:8.2f}  "
     begin = f"{time_text}{source:<{sources}}  {name:<{names}}  "
-    line = f"{begin}{event.detail}"
+    detail = " ".join(event.detail.splitlines())  # one of a manager's own may have several
+    line = f"{begin}{detail}"
     if width is not None and len(line) > width:
         indent = " " * (len(time_text) + 2)
-        detail = fill(event.detail, width, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)
+        detail = fill(detail, width, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)
         line = f"{begin.rstrip()}\n{detail}"
     text = Text(line, no_wrap=True)
     text.stylize(_STYLES.get(event.event, ""), len(time_text))

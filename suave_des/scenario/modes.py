@@ -20,9 +20,10 @@ from pydantic import (
     model_validator,
 )
 
+from suave_des.domain import SEA_BED_Z_M, SURFACE_Z_M
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown
 from suave_des.scenario.problems import input_error
-from suave_des.scenario.quantities import Length, Strict, wrong
+from suave_des.scenario.quantities import Real, Strict, Within, wrong
 from suave_des.scenario.yamlfile import YamlDocument, read_yaml
 
 DEFAULT_MODE = "__DEFAULT__"
@@ -104,13 +105,16 @@ def _value(value: Any) -> ParameterValue:
     return float(value)
 
 
+_Altitude = Annotated[Real, Within(gt=0, le=SURFACE_Z_M - SEA_BED_Z_M, unit="m, the depth of the water")]
+
+
 class _Parameters(BaseModel):
     """Parameters of a node's mode; those that the managed subsystem computes with have a type."""
 
     model_config = ConfigDict(extra="allow", allow_inf_nan=False)
     __pydantic_extra__: dict[str, Annotated[ParameterValue, PlainValidator(_value)]]
 
-    spiral_altitude: Length | None = None
+    spiral_altitude: _Altitude | None = None
 
     @model_validator(mode="after")
     def _misspelt(self) -> Self:

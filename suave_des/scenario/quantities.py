@@ -46,11 +46,11 @@ def wrong(problem: str, remedy: str, *keys: str) -> PydanticCustomError:
     )
 
 
-def ordered(minimum: float, maximum: float) -> None:
-    """Raise an error if the minimum is above the maximum."""
-    if minimum > maximum:
-        problem = f"minimum {minimum:g} is above maximum {maximum:g}"
-        raise wrong(problem, "give the smaller one as minimum", "minimum", "maximum")
+def ordered(low: float, high: float, low_key: str = "minimum", high_key: str = "maximum") -> None:
+    """Raise an error, in the words of the keys, if the lower of two bounds is above the other one."""
+    if low > high:
+        problem = f"{low_key} {low:g} is above {high_key} {high:g}"
+        raise wrong(problem, f"give the smaller one as {low_key}", low_key, high_key)
 
 
 @dataclass(frozen=True)

@@ -35,6 +35,7 @@ from suave_des.workbench.model_checks import (
     no_estimate,
     undefined_names,
     unmeasured_rules,
+    unreported_components,
     unused_individuals,
 )
 from suave_des.workbench.policy.space import has_effect
@@ -57,6 +58,7 @@ class Subject:
         modes: names of the modes by function; None skips the checks against them.
         needed: functions that the mission cannot do without.
         operators: qa_comparison_operator that the revision assumes of quality attribute types that have none, by name.
+        reported: components whose status something in the simulation reports; None: that is not checked.
         time_limit_s: for Pellet.
     """
 
@@ -68,6 +70,7 @@ class Subject:
     modes: Mapping[str, Collection[str]] | None = None
     needed: Collection[str] = ()
     operators: Mapping[str, str] = field(default_factory=dict)
+    reported: Collection[str] | None = None
     time_limit_s: float = TIME_LIMIT_S
 
 
@@ -112,6 +115,8 @@ def check(subject: Subject) -> tuple[Finding, ...]:
         findings += _dead_rules(whole, model, {path.resolve() for path in (*given, *subject.rules)}, by_path)
         findings += check_designs(whole, model, sources, subject.modes, subject.needed)
         findings += unused_individuals(whole, model, sources)
+        if subject.reported is not None:
+            findings += unreported_components(whole, model, sources, subject.reported)
         for name, sign in assumed.items():
             findings.append(finding_about(name, sources, Level.INFO, assumption(name, sign)))
         if values_are_right:

@@ -228,6 +228,20 @@ def _shape_finding(report: Graph, result: Node, sources: Sequence[OntologyFile])
     return finding_about(name, described or mentioning or sources, level, message)
 
 
+def unreported_components(
+    content: Content, model: Model, sources: Sequence[OntologyFile], reported: Collection[str]
+) -> Iterator[Finding]:
+    """Find the components whose status no mission can have: nothing reports, asserts or concludes it."""
+    status = TOMASYS + "c_status"
+    if status in content.head_properties():
+        return
+    asserted = {subject for subject, predicate, _ in content.triples if predicate == status}
+    for name, iri in sorted(model.components.items()):
+        if name not in reported and iri not in asserted:
+            message = f"nothing in the simulation reports the status of component {name}, so missions never have one"
+            yield finding_about(name, sources, Level.INFO, message, f"reported are {', '.join(reported)}")
+
+
 class _Possible:
     """The classes that can have members, and the values that properties can have: an upper bound for any state."""
 

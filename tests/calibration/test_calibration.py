@@ -118,7 +118,10 @@ def test_shipped_parameters_are_in_the_shipped_scenario() -> None:
         ("free: []", "free"),
         ("free:\n  - {path: calibration.position_gain, lower: 0, upper: 1}", "line 2.*position_gain_per_s"),
         ("free:\n  - {path: calibration, lower: 0, upper: 1}", "line 2.*expected a number in this scenario"),
-        (f"free:\n  - {{path: {GAIN}, lower: 1, upper: 0}}", "line 2"),
+        (
+            f"free:\n  - {{path: {GAIN}, lower: 1, upper: 0}}",
+            "line 2.*lower 1 is above upper 0 .give the smaller one as lower",
+        ),
         (f"free:\n  - {{path: {GAIN}, lower: 5, upper: 9}}", "line 2.*outside"),
         (f"free:\n  - {{path: {GAIN}, lower: 0, uper: 9}}", "line 2.*upper"),
         ("form: {calibration.drift_y_m: hello}\nfree:\n  - {path: a, lower: 0, upper: 1}", "drift_y_m"),

@@ -1,6 +1,7 @@
 """The timeline fits the terminal; elsewhere each event is one line, so that it can be searched."""
 
 import io
+from dataclasses import replace
 
 import pytest
 from rich.console import Console
@@ -49,3 +50,10 @@ def test_elsewhere_each_event_is_one_line(result: MissionResult) -> None:
 
 def test_in_a_very_narrow_terminal_it_still_says_everything(result: MissionResult) -> None:
     assert words(" ".join(printed(result, 30, terminal=True)))[-2:] == ["300.1", "s"]
+
+
+def test_a_detail_of_several_lines_keeps_to_its_columns(result: MissionResult) -> None:
+    event = replace(result.events[0], detail="first\nsecond\r\nthird")
+    told = replace(result, events=(event, *result.events[1:]))
+    assert printed(told, 120, terminal=False)[3].endswith("first second third")
+    assert len(printed(told, 120, terminal=False)) == len(printed(result, 120, terminal=False))

@@ -150,6 +150,12 @@ def test_asking_for_an_unknown_mode_or_function_names_the_nearest(write):
             "add it",
         ),
         (changed("active.low", "active.lwo"), "line 7, ", "has no mode 'lwo'", "did you mean 'low'?"),
+        (
+            changed("spiral_altitude: 3.0", "spiral_altitude: 200"),
+            "line 16, ",
+            "200 is out of range",
+            "greater than 0 and at most 20 m, the depth of the water",
+        ),
         (changed("active.low", "activ"), "line 7, ", "'activ' is not a state", "inactive, active or active.NODE_MODE"),
         (changed("active.low", "true"), "line 7, ", "true is not a state", "inactive, active or active.NODE_MODE"),
         (
@@ -184,7 +190,7 @@ def test_asking_for_an_unknown_mode_or_function_names_the_nearest(write):
         ),
         (changed("spiral_altitude: 3.0", "spiral_altitude: -3"), "line 16, ", "-3 is out of range", "greater than 0"),
         (changed("spiral_altitude: 3.0", "spiral_altitude: .inf"), "line 16, ", ".inf is not finite", "finite number"),
-        (changed("spiral_altitude: 3.0", "spiral_altitude: 1e300"), "line 16, ", "1e+300 is out of", "at most 10000 m"),
+        (changed("spiral_altitude: 3.0", "spiral_altitude: 1e300"), "line 16, ", "1e+300 is out of", "at most 20 m"),
         (changed("camera: true", "camera: .nan"), "line 16, ", ".nan is not finite", "finite number"),
         (changed("camera: true", "camera: [1]"), "line 16, ", "[1] is not a value", "number, text, true or false"),
         (

@@ -172,6 +172,18 @@ def individual(name: str, kind: str, inside: str = "") -> str:
     )
 
 
+def test_a_component_that_nothing_reports_is_noted(tmp_path: Path) -> None:
+    status = '<tomasys:c_status xmlns:tomasys="http://metacontrol.org/tomasys#">FALSE</tomasys:c_status>'
+    extra = individual("c_camera", "Component") + individual("c_broken", "Component", status)
+    reported = [f"c_thruster_{number}" for number in range(1, 7)]
+    findings = found(tmp_path, extra=extra, reported=reported)
+    assert [one.message for one in findings if "reports the status" in one.message] == [
+        "nothing in the simulation reports the status of component c_camera, so missions never have one"
+    ]
+    assert only(findings, "c_camera, so").level is Level.INFO
+    assert not any("reports the status" in one.message for one in found(tmp_path, extra=extra))
+
+
 def link(name: str, target: str) -> str:
     return f'<tomasys:{name} rdf:resource="{SUAVE}{target}"/>'
 
