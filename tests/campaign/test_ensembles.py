@@ -86,7 +86,7 @@ def test_a_campaign_without_an_ensemble_has_neither_column_nor_file(tmp_path):
     [
         ("", "line 1: has no columns of parameters"),
         ("member,loss\n1,2\n2,3\n", "line 1: has no columns of parameters"),
-        (f"{GAIN}\n0.6\n", "line 1: has 1 members"),
+        (f"{GAIN}\n0.6\n", "line 1: has 1 member "),
         (f"{GAIN},{GAIN}\n1,1\n1,1\n", "line 1: has column 'calibration.velocity_gain_per_s' twice"),
         (f"{GAIN}\n0.6\nfast\n", "line 3: calibration.velocity_gain_per_s: expected a number, got 'fast'"),
         (f"{GAIN}\n0.6\nnan\n", "line 3: calibration.velocity_gain_per_s: expected a number, got 'nan'"),

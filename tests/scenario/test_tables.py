@@ -28,7 +28,7 @@ def test_columns_may_be_in_any_order_and_excel_may_have_written_it(write):
         ("t_s;value\n0;3.5\n", "line 1", "the columns are 't_s;value'"),
         ("t_s,value,note\n0,1,a\n", "line 1", "the columns are 't_s,value,note'"),
         ("t_s,value\n", "line 1", "has no row under its header"),
-        ("t_s,value\n0,1\n60\n", "line 3", "has 1 values"),
+        ("t_s,value\n0,1\n60\n", "line 3", "has 1 value"),
         ("t_s,value\n0,1\n60,1,2\n", "line 3", "has 3 values"),
         ("t_s,value\n0,1\nsoon,2\n", "line 3", "expected a number as t_s, got 'soon'"),
         ("t_s,value\n0,murky\n", "line 2", "expected a number as value, got 'murky'"),

@@ -82,7 +82,7 @@ def test_missions_without_a_condition_are_taken_in_order_and_that_is_said(write)
     [
         (f"{OWN}\nbt,20,1\n", f"{OWN}\nbt,20,1\n", "b.csv: has the same content as .*a.csv"),
         (f"{OWN},block\nbt,20,1,1\n", f"{OWN}\nnone,20,1\n", "b.csv: does not say under which condition"),
-        (f"{OWN}\nbt,20,1\n", f"{OWN}\nnone,20,1\n", "has 1 missions of manager bt, which 3 conditions do not share"),
+        (f"{OWN}\nbt,20,1\n", f"{OWN}\nnone,20,1\n", "has 1 mission of manager bt, which 3 conditions do not share"),
         (f"{OWN},block\nbt,20,1,1\n", f"{OWN},block\n\nnone,20,1,7\n", "b.csv: line 3: block: there is no condition 7"),
     ],
 )
