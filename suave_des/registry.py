@@ -160,10 +160,9 @@ def _check_hooks(name: str, kind: type[ManagingSubsystem]) -> None:
         for each, hook in sorted(resembling.items()):
             raise InputError(f"manager {name!r} has no hook, but {each}", remedy=f"did you mean {hook}{_HOOKS[hook]}?")
     for each, hook in _misspelt_hooks(kind):
-        problem = f"manager {name!r}: nothing calls {each}, which is no hook"
-        raise InputError(
-            problem, remedy=f"did you mean {hook}{_HOOKS[hook]}? a method that others call needs another name"
-        )
+        problem = f"manager {name!r}: {each} is not a hook, and nothing calls it"
+        remedy = f"did you mean {hook}{_HOOKS[hook]}? give a method of your own a name that differs more"
+        raise InputError(problem, remedy=remedy)
     subscribed = kind.subscribes_to
     unknown = () if isinstance(subscribed, property) else [each for each in subscribed if each not in list(Kind)]
     if unknown:  # of a text, its letters are
@@ -174,9 +173,10 @@ def _check_hooks(name: str, kind: type[ManagingSubsystem]) -> None:
 
 
 def _misspelt_hooks(kind: type) -> Iterator[tuple[str, str]]:
-    """Yield methods that are hardly anything but misspelt hooks, each with the hook.
+    """Yield methods that are most likely misspelt hooks, each with the hook.
 
-    Such a method is very near to a hook that its class lacks, overrides nothing, and is not named again in its module.
+    The name of such a method is very similar to a hook that its class lacks; the method overrides nothing, and its name
+    occurs nowhere else in its module.
     """
     classes = kind.__mro__[: kind.__mro__.index(ManagingSubsystem)]
     for base in (each for each in classes if not each.__module__.startswith("suave_des.")):
@@ -188,7 +188,7 @@ def _misspelt_hooks(kind: type) -> Iterator[tuple[str, str]]:
 
 
 def _is_named_elsewhere(method: str, kind: type) -> bool:
-    """Whether a method's name stands anywhere in its module but in its definition; True if the source is not known."""
+    """Return whether a method's name occurs in its module besides its definition; True if there is no source."""
     try:
         source = inspect.getsource(sys.modules[kind.__module__])
     except (OSError, TypeError, KeyError):

@@ -113,10 +113,10 @@ def derived(method: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str
 @pytest.mark.parametrize(
     ("method", "words"),
     [
-        ("def adpat(self): pass", "nothing calls adpat, which is no hook .did you mean adapt.self.?"),
+        ("def adpat(self): pass", "adpat is not a hook, and nothing calls it .did you mean adapt.self.?"),
         (
             "def task_request(self, task): pass",
-            "nothing calls task_request, .* .did you mean task_requested.self, task.",
+            "task_request is not a hook, .* .did you mean task_requested.self, task.",
         ),
         ("def diagnostics(self, diagnostic): pass", "did you mean diagnostic.self, diagnostic."),
     ],
