@@ -5,12 +5,14 @@ import os
 import subprocess
 import sys
 import threading
+from concurrent.futures import Future
 from pathlib import Path
 
 import pytest
 
 import suave_des
 from suave_des.errors import InputError, KnowledgeError
+from suave_des.knowledge.pellet import limit
 from suave_des.knowledge.pellet.limit import TimeLimit, times_abandoned
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import ObjectiveState
@@ -214,6 +216,7 @@ main(["run", "seams2023", "--reasoner", {reasoner!r}, "--rules", {str(rules)!r}]
 import sys
 from suave_des.errors import KnowledgeError
 from suave_des.workbench import KnowledgeBase
+from suave_des.knowledge.pellet import limit
 from suave_des.knowledge.pellet.limit import TimeLimit, times_abandoned
 bench = KnowledgeBase.load(reasoner="pellet")  # Java starts in another thread than this one
 state = bench.state(groundings={HIGH["groundings"]!r}, measurements={HIGH["measurements"]!r})
@@ -229,6 +232,16 @@ sys.exit(5)
 """
         done = _python("-c", program)
         assert (done.returncode, done.stderr) == (5, "")
+
+    def test_a_reasoner_that_starts_while_the_process_ends_does_nothing(self, monkeypatch):
+        # Its thread is listed from before it runs: abandoned work may be starting another reasoner.
+        starting, done = limit._ReasonerThread(), []
+        monkeypatch.setattr("suave_des.knowledge.pellet.limit.threading.enumerate", lambda: [starting])
+        limit._end_all()
+        starting.jobs.put((Future(), lambda: done.append("reasoned")))
+        starting.start()
+        starting.join(10.0)
+        assert not starting.is_alive() and not done
 
     def test_abandoned_work_no_longer_calls_java_when_java_ends(self):
         # A call that returns at that very moment keeps Python's lock for ever, and the process never ends.

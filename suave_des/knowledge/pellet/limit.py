@@ -129,9 +129,11 @@ def _end_all() -> None:
     threads = [thread for thread in threading.enumerate() if isinstance(thread, _ReasonerThread)]
     for thread in threads:
         thread.jobs.put(None)
+    running = [thread for thread in threads if thread.is_alive()]  # one that is just starting finds None first
+    for thread in running:
         ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident or 0), ctypes.py_object(SystemExit))
     deadline = time.monotonic() + _LEAVE_JAVA_S
-    for thread in threads:
+    for thread in running:
         thread.join(max(0.0, deadline - time.monotonic()))
 
 
