@@ -6,7 +6,7 @@ import importlib
 import inspect
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from difflib import get_close_matches
 from functools import cache
 from importlib.metadata import entry_points
@@ -164,10 +164,11 @@ def _check_hooks(name: str, kind: type[ManagingSubsystem]) -> None:
         remedy = f"did you mean {hook}{_HOOKS[hook]}? give a method of your own a name that differs more"
         raise InputError(problem, remedy=remedy)
     subscribed = kind.subscribes_to
-    unknown = () if isinstance(subscribed, property) else [each for each in subscribed if each not in list(Kind)]
-    if unknown:  # of a text, its letters are
+    is_collection = isinstance(subscribed, Collection) and not isinstance(subscribed, str)
+    unknown = [each for each in subscribed if each not in list(Kind)] if is_collection else []
+    if unknown or not (is_collection or isinstance(subscribed, property)):
         remedy = f"give a tuple of some of {', '.join(f'Kind.{known.name}' for known in Kind)}"
-        what = f"is {str(subscribed)!r}" if isinstance(subscribed, str) else f"has {shown(unknown[0])}"
+        what = f"has {shown(unknown[0])}" if unknown else f"is {shown(subscribed)}"
         raise InputError(f"manager {name!r}: subscribes_to {what}", remedy=remedy)
     _checked.add(kind)
 

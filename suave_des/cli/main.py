@@ -123,10 +123,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             _leave(_report("interrupted", exit_status()), by_force=False)
         if not isinstance(error, Exception):
             raise
-        if isinstance(error, OSError) and error.errno in (
-            errno.ENOSPC,
-            errno.EDQUOT,
-        ):  # results have errors of their own
+        if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):  # stdout: files have own errors
             os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # else Python would try again when it ends
             _leave(_report(f"the output cannot be written: {error.strerror}", BAD_INPUT), by_force=False)
         # A wrong option or argument: a class that is private to typer, and was click's in earlier versions of it.

@@ -186,6 +186,9 @@ class NoKind(ManagingSubsystem):
 class OneKind(ManagingSubsystem):
     subscribes_to = "Pose"
 
+class NoKinds(ManagingSubsystem):
+    subscribes_to = None
+
 class NoClassMethod(ManagingSubsystem):
     def check(self, loaded):
         pass
@@ -213,6 +216,7 @@ class NeedsSetting(ManagingSubsystem):
         ("NoStart", 3, "starts_s is nan"),
         ("NoKind", 2, "subscribes_to has 'visibility'"),
         ("OneKind", 2, "subscribes_to is 'Pose'"),
+        ("NoKinds", 2, "subscribes_to is nothing"),
         ("NoClassMethod", 2, "write @classmethod def check(cls, loaded)"),
         ("NeedsSetting", 2, "--manager-option table=..."),
     ],
