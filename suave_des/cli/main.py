@@ -27,6 +27,10 @@ BAD_INPUT, MISSIONS_MISSING = 2, 3
 """Exit statuses besides 0 and those of signals; 3: done, but failed missions have no row."""
 
 
+class _CommandInterruptedError(Exception):
+    """A signal stopped a command; the message says what is kept."""
+
+
 class _Commands(CommandsUnderHeadings):
     """Handles interruptions before typer does, which would not report what is kept."""
 
@@ -43,7 +47,7 @@ class _Commands(CommandsUnderHeadings):
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt as error:
-            raise typer.Exit(_report(str(error) or "interrupted", exit_status())) from None
+            raise _CommandInterruptedError(str(error) or "interrupted") from None
         except BrokenPipeError:  # whoever reads the output has enough of it, such as head
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise typer.Exit(128 + signal.SIGPIPE) from None
@@ -115,7 +119,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             if sys.stdout is not None:
                 sys.stdout.flush()  # what cannot be written is told here, not while Python ends
             if was_interrupted() and status == 128 + signal.SIGINT:  # typer's for any signal before the command began
-                status = exit_status()
+                status = _report("interrupted", exit_status())
+    except _CommandInterruptedError as interruption:
+        status = _report(str(interruption), exit_status())
     except SuaveDesError as error:
         status = _report(str(error), BAD_INPUT if isinstance(error, InputError) else MISSIONS_MISSING)
     except BaseException as error:

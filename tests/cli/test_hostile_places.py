@@ -140,6 +140,17 @@ class TestStopped:
         assert "Traceback" not in done.stderr
         assert len(done.stderr.splitlines()) == 1
 
+    @pytest.mark.parametrize(("number", "status"), [("SIGINT", 130), ("SIGTERM", 143)])
+    def test_while_arguments_are_read_it_ends_in_one_line(self, tmp_path: Path, number: str, status: int) -> None:
+        program = (
+            "import os, signal\n"
+            "from suave_des.cli import main\n"
+            f"main._Commands.parse_args = lambda *_: os.kill(os.getpid(), signal.{number})\n"
+            "main.main(['scenarios'])\n"
+        )
+        done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+        assert (done.returncode, done.stderr) == (status, "suave-des: interrupted\n")
+
     @pytest.mark.slow
     def test_at_any_moment_it_ends_without_a_traceback(self, tmp_path: Path) -> None:
         for place in range(60):
