@@ -25,6 +25,7 @@ from suave_des.scenario.quantities import (
     ValueDistribution,
     Within,
     ordered,
+    wrong,
 )
 
 
@@ -40,7 +41,8 @@ class Monitor(Strict):
     @classmethod
     def _are_in_order(cls, value: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
         for since_s, to_s in value:
-            ordered(since_s, to_s)
+            if since_s > to_s:
+                raise wrong(f"the outage [{since_s:g}, {to_s:g}] ends before it begins", "give [from, to]")
         return value
 
     @property

@@ -146,7 +146,7 @@ def test_losing_messages_leaves_campaigns_the_same_for_every_reader(fly) -> None
         ("current: {wave: {period_s: 0}}", "0 is out of range"),
         ("current: {wave: {amplitude_m_per_s: 50}}", "50 is out of range"),
         ("signals: {water_visibility: {dropout_probability: 2}}", "2 is out of range"),
-        ("signals: {water_visibility: {outages_s: [[20, 10]]}}", "minimum 20 is above maximum 10"),
+        ("signals: {water_visibility: {outages_s: [[20, 10]]}}", "the outage [20, 10] ends before it begins"),
         ("signals: {water_visibility: {outages_s: [20, 10]}}", "expected a list, got 20"),
         ("thruster_monitor: {dropout: 1}", "unknown key"),
         ("thruster_events: [{thruster: 1, event: failure, time_s: 1, recoverable: 3}]", "expected true or false"),
