@@ -1,10 +1,12 @@
 """The base of every function of the managed subsystem: a node with a life cycle."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import simpy
 
+from suave_des.clock import Process
 from suave_des.scenario.modes import Mode
 
 Log = Callable[[str, str, str], None]
@@ -41,3 +43,27 @@ class FunctionNode:
 
     def deactivated(self) -> None:
         """End the function's activity."""
+
+
+@dataclass(eq=False)
+class ProcessNode(FunctionNode):
+    """A function whose activity is a process, from each activation to the deactivation."""
+
+    _process: simpy.Process | None = field(default=None, init=False)
+
+    def activity(self) -> Process:
+        """Do what the function does while it is active; a deactivation interrupts it."""
+        raise NotImplementedError
+
+    def activated(self) -> None:
+        """Start the activity."""
+        self._process = self.env.process(self._until_interrupted())
+
+    def deactivated(self) -> None:
+        """Leave the autopilot to other functions."""
+        if self._process is not None and self._process.is_alive:
+            self._process.interrupt()
+
+    def _until_interrupted(self) -> Process:
+        with suppress(simpy.Interrupt):
+            yield from self.activity()

@@ -1,16 +1,14 @@
 """Generate recharge path (revision 1.5): goes to the recharge station (facts: kas-lab/suave)."""
 
-from dataclasses import dataclass, field
-
-import simpy
+from dataclasses import dataclass
 
 from suave_des.clock import Process
-from suave_des.managed.node import FunctionNode
+from suave_des.managed.node import ProcessNode
 from suave_des.vehicle.guidance import SetPointSender
 
 
 @dataclass(eq=False)
-class GenerateRechargePath(FunctionNode):
+class GenerateRechargePath(ProcessNode):
     """The recharge function: while active, the station is the set-point, sent again once a period.
 
     Attributes:
@@ -20,21 +18,9 @@ class GenerateRechargePath(FunctionNode):
     sender: SetPointSender
     station_m: tuple[float, float, float]
     resend_period_s: float
-    _process: simpy.Process | None = field(default=None, init=False)
 
-    def activated(self) -> None:
-        """Start for the station."""
-        self._process = self.env.process(self._go_to_station())
-
-    def deactivated(self) -> None:
-        """Leave the autopilot to other functions."""
-        if self._process is not None:
-            self._process.interrupt()
-
-    def _go_to_station(self) -> Process:
-        try:
-            while True:
-                self.sender.send(*self.station_m)
-                yield self.env.timeout(self.resend_period_s)
-        except simpy.Interrupt:
-            return
+    def activity(self) -> Process:
+        """Go to the station."""
+        while True:
+            self.sender.send(*self.station_m)
+            yield self.env.timeout(self.resend_period_s)

@@ -1,12 +1,12 @@
 """Surface: goes straight up, as required after a leak."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import simpy
 
 from suave_des.clock import Process
 from suave_des.domain import SURFACE_Z_M
-from suave_des.managed.node import FunctionNode
+from suave_des.managed.node import ProcessNode
 from suave_des.vehicle.guidance import SetPointSender
 
 ABOVE_M = 3.0
@@ -17,7 +17,7 @@ RESEND_CHECKS = 20
 
 
 @dataclass(eq=False)
-class Surface(FunctionNode):
+class Surface(ProcessNode):
     """The surface function: while active, the set-point is above the place of activation, sent again every 10 s.
 
     Attributes:
@@ -25,29 +25,17 @@ class Surface(FunctionNode):
     """
 
     sender: SetPointSender
-    _process: simpy.Process | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         self.surfaced: simpy.Event = self.env.event()
 
-    def activated(self) -> None:
-        """Set off for the surface."""
-        self._process = self.env.process(self._ascend())
-
-    def deactivated(self) -> None:
-        """Leave the autopilot to other functions."""
-        if self._process is not None and self._process.is_alive:
-            self._process.interrupt()
-
-    def _ascend(self) -> Process:
+    def activity(self) -> Process:
+        """Ascend until the vehicle is at the surface."""
         x_m, y_m, _ = self.sender.vehicle.position(self.env.now)
-        try:
-            while True:
-                self.sender.send(x_m, y_m, SURFACE_Z_M + ABOVE_M)
-                for _ in range(RESEND_CHECKS):
-                    if self.sender.vehicle.position(self.env.now)[2] >= SURFACE_Z_M - SURFACED_M:
-                        self.surfaced.succeed()
-                        return
-                    yield self.env.timeout(1.0 / CHECKS_A_SECOND)
-        except simpy.Interrupt:
-            return
+        while True:
+            self.sender.send(x_m, y_m, SURFACE_Z_M + ABOVE_M)
+            for _ in range(RESEND_CHECKS):
+                if self.sender.vehicle.position(self.env.now)[2] >= SURFACE_Z_M - SURFACED_M:
+                    self.surfaced.succeed()
+                    return
+                yield self.env.timeout(1.0 / CHECKS_A_SECOND)

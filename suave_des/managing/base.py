@@ -117,9 +117,7 @@ class ManagedSystem:
         None if there is none; a repetition of the value before is not a publication.
         """
         measurements = self.measurements.get(attribute)
-        if measurements is None or not (published := measurements.count_until(self.env.now)):
-            return None
-        return measurements.values[published - 1] if measurements.times_s[published - 1] >= since_s else None
+        return None if measurements is None else measurements.value(self.env.now, since_s)
 
     def first_cycle_s(self) -> float:
         """Find when metacontrol's first cycle is due: in step with other timers, or with a phase drawn for the run."""

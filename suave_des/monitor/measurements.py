@@ -4,11 +4,12 @@ Looking up a value reads the table; a monitor publishes the value only if somebo
 """
 
 import math
+from abc import ABC, abstractmethod
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 import numpy as np
 
@@ -29,36 +30,40 @@ def region_of(value: float, thresholds: Thresholds) -> int:
     return bisect_left(thresholds, value) + bisect_right(thresholds, value)
 
 
-class Measured(Protocol):
-    """A monitor's measurements of a quality attribute."""
+class Measured(ABC):
+    """A monitor's measurements of a quality attribute.
 
-    @property
-    def is_tabulated(self) -> bool:
-        """Whether the values are known for the whole mission; if so, they may be looked up at future times."""
+    Attributes:
+        is_tabulated: whether the values are known for the whole mission; if so, they may be looked up at future times.
+        times_s: when the values were published.
+        values: the values that were published, and those that will be if they are tabulated.
+    """
 
-    @property
-    def times_s(self) -> Sequence[float]:
-        """When the values were published."""
+    is_tabulated: ClassVar[bool]
+    times_s: Sequence[float]
+    values: Sequence[float]
 
-    @property
-    def values(self) -> Sequence[float]:
-        """The values that were published, and those that will be if it is tabulated."""
-
+    @abstractmethod
     def count_until(self, t_s: float) -> int:
         """Count the values published by mission time t."""
 
-    def value(self, t_s: float) -> float | None:
-        """Look up the value last published by mission time t; None before the first."""
+    def value(self, t_s: float, since_s: float = 0.0) -> float | None:
+        """Look up the value last published by mission time t; None if there is none, or it is older than `since_s`."""
+        published = self.count_until(t_s)
+        return self.values[published - 1] if published and self.times_s[published - 1] >= since_s else None
 
     def region(self, t_s: float, thresholds: Thresholds) -> int:
         """Find the region of the value last published by mission time t."""
+        value = self.value(t_s)
+        return -1 if value is None else region_of(value, thresholds)
 
+    @abstractmethod
     def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
         """Find the first time after mission time t at which the region changes, or may change if that is not known."""
 
 
 @dataclass(frozen=True, slots=True)
-class Measurements:
+class Measurements(Measured):
     """What a signal's monitor measures in a run: the times at which the published value changes, and the values.
 
     A monitor that repeats an unchanged value reports nothing new: only values that differ from the one before are kept.
@@ -97,11 +102,6 @@ class Measurements:
         times_s, _ = self.crossings(thresholds)
         passed = bisect_right(times_s, t_s)
         return times_s[passed] if passed < len(times_s) else math.inf
-
-    def value(self, t_s: float) -> float | None:
-        """Look up the value last published by mission time t; None before the first."""
-        published = self.count_until(t_s)
-        return self.values[published - 1] if published else None
 
     def next_message_s(self, t_s: float) -> float:
         """Find the time of the first message, changed or not, at or after t."""
@@ -189,7 +189,7 @@ def _crossing_indices(values: bytes, thresholds: Thresholds) -> tuple[list[int],
 
 
 @dataclass(eq=False)
-class BatteryLevel:
+class BatteryLevel(Measured):
     """The battery's level, which falls linearly from 1 and is reset to 1 at the recharge station.
 
     It is computed on demand, from where the vehicle was at each message.
@@ -234,11 +234,6 @@ class BatteryLevel:
             self._next_s += self.timing.period_s
         return bisect_right(self.times_s, t_s)
 
-    def value(self, t_s: float) -> float | None:
-        """Look up the level last published by mission time t; None before the first."""
-        published = self.count_until(t_s)
-        return self.values[published - 1] if published else None
-
     def level(self, t_s: float) -> float:
         """Compute the true level at mission time t, which is now."""
         self.count_until(t_s)
@@ -246,11 +241,6 @@ class BatteryLevel:
 
     def _level(self, t_s: float) -> float:
         return max(0.0, 1.0 - (t_s - self._full_at_s) / self.discharge_time_s)
-
-    def region(self, t_s: float, thresholds: Thresholds) -> int:
-        """Find the region of the level last published by mission time t."""
-        published = self.count_until(t_s)
-        return region_of(self.values[published - 1], thresholds) if published else -1
 
     def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
         """Find the earliest time after t, which is now, at which the level can be in a different region.

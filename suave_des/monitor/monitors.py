@@ -1,7 +1,7 @@
 """Monitors: processes that watch signals, thrusters and battery, and publish diagnostics (facts: kas-lab/suave)."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import simpy
 
@@ -38,25 +38,6 @@ def leak_monitor(env: simpy.Environment, bus: DiagnosticsBus, time_s: float, det
     detected()
 
 
-class Publisher(Protocol):
-    """Anything to which a monitor publishes."""
-
-    def publish(self, diagnostic: Diagnostic) -> None:
-        """Publish a diagnostic."""
-
-
-class LossyPublisher(NamedTuple):
-    """A monitor's connection to the diagnostics bus that loses some of its messages."""
-
-    bus: DiagnosticsBus
-    is_lost: Callable[[float], bool]
-
-    def publish(self, diagnostic: Diagnostic) -> None:
-        """Publish a diagnostic, unless it is lost."""
-        if not self.is_lost(diagnostic.time_s):
-            self.bus.publish(diagnostic)
-
-
 class ScheduledEvent(NamedTuple):
     """A thruster that fails or recovers in a run.
 
@@ -75,7 +56,7 @@ class ScheduledEvent(NamedTuple):
 
 def thruster_monitor(
     env: simpy.Environment,
-    bus: Publisher,
+    publish: Callable[[Diagnostic], None],
     events: Sequence[ScheduledEvent],
     happens: Callable[[float, ScheduledEvent], None],
     timing: MonitorTiming,
@@ -87,7 +68,8 @@ def thruster_monitor(
     come one period apart, in list order, and a later one waits for the one before it.
 
     Args:
-        env, bus: the mission's clock, and where to publish.
+        env: the mission's clock.
+        publish: publishes a diagnostic.
         events: the schedule.
         happens: called with mission time and event.
         timing: when the monitor checks.
@@ -100,7 +82,7 @@ def thruster_monitor(
         yield until(env, tick_s)
         happens(env.now, event)
         status = FAILED if event.fails else RECOVERED
-        bus.publish(Diagnostic(env.now, Kind.COMPONENT_STATUS, thruster_name(event.thruster), status))
+        publish(Diagnostic(env.now, Kind.COMPONENT_STATUS, thruster_name(event.thruster), status))
         earliest_s = tick_s + timing.period_s
         if after_previous:
             counted_from_s = tick_s

@@ -30,7 +30,6 @@ from suave_des.metrics.result import MissionMetrics, MissionResult
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.measurements import Measured
 from suave_des.monitor.monitors import (
-    LossyPublisher,
     battery_monitor,
     leak_monitor,
     signal_monitor,
@@ -345,12 +344,14 @@ class MissionRun:
     def _start_thruster_monitor(self) -> None:
         monitors, lost = self._revision.monitors, self._chance.loss("thruster_monitor", self._scenario.thruster_monitor)
         timing = monitor_timing(self._scenario, self._chance, "thruster_monitor", monitors.thruster_check_period_s)
-        bus = self.bus if lost is None else LossyPublisher(self.bus, lost)
-        events, after_previous = (
-            schedule(self._scenario, self._chance),
-            monitors.thruster_event_times == "after_previous",
-        )
-        self.env.process(thruster_monitor(self.env, bus, events, self._faults.apply, timing, after_previous))
+        events = schedule(self._scenario, self._chance)
+        after_previous = monitors.thruster_event_times == "after_previous"
+
+        def publish(diagnostic: Diagnostic) -> None:
+            if lost is None or not lost(diagnostic.time_s):
+                self.bus.publish(diagnostic)
+
+        self.env.process(thruster_monitor(self.env, publish, events, self._faults.apply, timing, after_previous))
 
     def _publish_detection(self, _: simpy.Event) -> None:
         point = float(self._detector.first_point or 0)

@@ -8,6 +8,7 @@ import simpy
 from suave_des.domain import Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
 from suave_des.monitor.diagnostics import Diagnostic, Kind
+from suave_des.monitor.measurements import Measured, Thresholds
 from suave_des.registry import manager_class
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import Scenario
@@ -32,8 +33,10 @@ class AskedModes:
         return mode in MODES.modes(function)
 
 
-class Published:
+class Published(Measured):
     """Values of a quality attribute, all of them published by now."""
+
+    is_tabulated = False
 
     def __init__(self) -> None:
         self.times_s: list[float] = []
@@ -41,6 +44,9 @@ class Published:
 
     def count_until(self, t_s: float) -> int:
         return len(self.values)
+
+    def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
+        raise AssertionError("what will be published is not known")
 
 
 class AtWork:

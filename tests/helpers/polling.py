@@ -26,7 +26,7 @@ from suave_des.managed.node import Log
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
-from suave_des.monitor.measurements import Thresholds
+from suave_des.monitor.measurements import Measured, Thresholds
 from suave_des.scenario.modes import Mode
 from suave_des.simulation import mission
 from suave_des.simulation.host import ManagerHost
@@ -154,7 +154,7 @@ class PollingDetector:
                 return
 
 
-class Published:
+class Published(Measured):
     """What was published of a quality attribute: see `suave_des.monitor.measurements.Measured`."""
 
     is_tabulated = False
@@ -171,10 +171,6 @@ class Published:
 
     def count_until(self, t_s: float) -> int:
         return bisect_right(self.times_s, t_s)
-
-    def value(self, t_s: float) -> float | None:
-        count = self.count_until(t_s)
-        return self.values[count - 1] if count else None
 
     def region(self, t_s: float, thresholds: Thresholds) -> int:
         raise AssertionError("managers that are called at each of their times need no regions")

@@ -161,7 +161,7 @@ def publish_events(
     subscriber.env.process(
         thruster_monitor(
             subscriber.env,
-            subscriber.bus,
+            subscriber.bus.publish,
             faults,
             lambda t_s, event: happened.append((t_s, event)),
             MonitorTiming(1.0, phase_s),
