@@ -104,7 +104,7 @@ def calibrate(
         make_output_folder(out)
     console = output()
     for note in dict.fromkeys(note for case in cases for note in case.notes):
-        console.print(note, soft_wrap=True, markup=False)
+        console.print(note)
 
     def print_generation(count: int, best: Evaluation) -> None:
         console.print(f"{count:5d} sets tried, lowest loss {best.loss:.4f}")
@@ -130,7 +130,7 @@ def calibrate(
     )
     _print_fit(console, done, values)
     if out is None:
-        console.print("\nNo files were written; --out DIR keeps the fit.", soft_wrap=True)
+        console.print("\nNo files were written; --out DIR keeps the fit.")
         return
     contents[report.RECORD] = report.record(done, {"command": command_line(), "data": report.data_files(cases)})
     if found:
@@ -138,7 +138,7 @@ def calibrate(
         contents[report.FIGURE] = report.profiles_png(found, here, threshold)
     write_files(out, contents, stale=stale)
     what = "scenario" if len(cases) == 1 else "scenarios"
-    console.print(f"\nThe fitted {what} and the report are in {out}", soft_wrap=True)
+    console.print(f"\nThe fitted {what} and the report are in {out}")
 
 
 def _parameters_file(given: str | None, cases: Sequence[Case]) -> Path:
@@ -189,15 +189,15 @@ def _print_fit(console: Console, fit: Fit, values: Sequence[float]) -> None:
     admitted = {one.parameter.name: f"   {one.low:8.3f} to {one.high:.3f}" for one in fit.profiles}
     if len(fit.problem.cases) > 1:
         for case, loss in zip(fit.problem.cases, fit.best.cases, strict=True):
-            console.print(f"  of {case.name}: {loss.loss:.4f}", soft_wrap=True)
+            console.print(f"  of {case.name}: {loss.loss:.4f}")
     for scenarios in dict.fromkeys(each.scenarios for each in parameters):
         if len(fit.problem.cases) > 1:
-            console.print(f"\n{'Of ' + ', '.join(scenarios) if scenarios else 'Of all scenarios'}", soft_wrap=True)
+            console.print(f"\n{'Of ' + ', '.join(scenarios) if scenarios else 'Of all scenarios'}")
         for each, value in zip(parameters, values, strict=True):
             if each.scenarios == scenarios:
-                console.print(f"{each.path:48s} {value:8.3f}{admitted.get(each.name, '')}", soft_wrap=True)
+                console.print(f"{each.path:48s} {value:8.3f}{admitted.get(each.name, '')}")
     for name, halves in fit.judgements.items():
         console.print(f"\n{f'Conditions of {name}':40s}  loss   median difference, search time")
         for half, one in halves.items():
             listed = f"{half}: {', '.join(map(str, one.conditions))}"
-            console.print(f"{listed:38s} {one.loss:7.4f} {one.median_difference_s:7.2f} s", soft_wrap=True)
+            console.print(f"{listed:38s} {one.loss:7.4f} {one.median_difference_s:7.2f} s")

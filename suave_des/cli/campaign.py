@@ -193,7 +193,7 @@ def campaign(
     print_stops(console, result)
     print_differences(console, result)
     kept = f"{number_of(result.done, 'mission')} {'is' if result.done == 1 else 'are'}"
-    console.print(f"{kept} in {result.folder}/runs.csv", soft_wrap=True)
+    console.print(f"{kept} in {result.folder}/runs.csv")
     exit_telling_failures(result)
 
 
@@ -203,7 +203,7 @@ def exit_telling_failures(result: CampaignResult) -> None:
 
     console = errors()
     for remark in result.remarks:
-        console.print(f"suave-des: {remark}", soft_wrap=True, markup=False)
+        console.print(f"suave-des: {remark}")
     if not result.failures:
         return
     alike: dict[tuple[str, str], list[MissionFailure]] = {}
@@ -213,11 +213,11 @@ def exit_telling_failures(result: CampaignResult) -> None:
     for first, *others in groups[:_FAILURES_SHOWN]:
         line = " ".join(str(first).split())
         count = f" ({len(others) + 1} missions like this)" if others else ""
-        console.print(f"suave-des: failed: {line}{count}", soft_wrap=True, markup=False)
+        console.print(f"suave-des: failed: {line}{count}")
     more = sum(map(len, groups[_FAILURES_SHOWN:]))
     if more > 0:
         where = "" if result.folder is None else f", all of them in {result.folder}/manifest.json"
-        console.print(f"suave-des: failed: {more} more{where}", soft_wrap=True, markup=False)
+        console.print(f"suave-des: failed: {more} more{where}")
     console.print(f"suave-des: {len(result.failures)} of {result.planned} missions failed; the others are kept")
     raise typer.Exit(3)
 
@@ -269,10 +269,10 @@ def reproduce(
     console = output()
     print_comparison(console, comparison)
     if out is None:
-        console.print("\nNo files were written; --out DIR keeps each mission's figures.", soft_wrap=True)
+        console.print("\nNo files were written; --out DIR keeps each mission's figures.")
     else:
         write_files(out, dict(zip(FILES, (comparison.markdown(), comparison.csv()), strict=True)))
-        console.print(f"\nThe missions are in {out}/runs.csv, this table in {out}/paper_table.md", soft_wrap=True)
+        console.print(f"\nThe missions are in {out}/runs.csv, this table in {out}/paper_table.md")
     exit_telling_failures(result)
 
 

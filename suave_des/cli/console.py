@@ -51,7 +51,15 @@ def _escaped(char: str) -> str:
 
 
 class PlainConsole(Console):
-    """A console that writes control characters in what it is given as text."""
+    """A console that writes text as it is: control characters as text, no markup, and lines that it does not wrap."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(highlight=False, markup=False, emoji=False, **settings)
+
+    def print(self, *objects: Any, **settings: Any) -> None:
+        """Print; what is all text is left to the terminal to wrap, so that tools that search find whole lines."""
+        is_text = all(isinstance(each, str | Text) for each in objects)
+        super().print(*objects, **({"soft_wrap": is_text} | settings))
 
     def on_broken_pipe(self) -> None:
         """Leave the end to the command, whatever version of rich."""
@@ -85,7 +93,7 @@ _STYLES = {
 
 def output() -> Console:
     """The console for results."""
-    console = PlainConsole(highlight=False)
+    console = PlainConsole()
     if not console.is_terminal and "COLUMNS" not in os.environ:
         console.width = _PLAIN_WIDTH
     return console
@@ -93,7 +101,7 @@ def output() -> Console:
 
 def errors() -> Console:
     """The console for errors and progress."""
-    return PlainConsole(stderr=True, highlight=False)
+    return PlainConsole(stderr=True)
 
 
 def progress(label: str, *, quiet: bool) -> AbstractContextManager[OnProgress | None]:
@@ -114,10 +122,10 @@ def mission_status(scenario: str, console: Console) -> Iterator[Callable[[float,
     if not console.is_terminal:
         yield None
         return
-    with console.status(f"{scenario}: starting") as status:
+    with console.status(Text(f"{scenario}: starting")) as status:
 
         def show(t_s: float, limit_s: float) -> None:
-            status.update(f"{scenario}: mission time {t_s:.0f} of {limit_s:.0f} s")
+            status.update(Text(f"{scenario}: mission time {t_s:.0f} of {limit_s:.0f} s"))
 
         yield show
 
@@ -148,7 +156,7 @@ def plain_table(headings: Iterable[str] = (), *, right: Container[str] = (), **l
 
 def print_table(console: Console, title: str, table: Table) -> None:
     """Print a table under its title."""
-    console.print(Text(title, "bold"))
+    console.print(Text(title, "bold"), soft_wrap=False)
     print_trimmed(console, table)
 
 
@@ -172,12 +180,12 @@ def print_timeline(console: Console, result: MissionResult) -> None:
     sources = max((len(event.source) for event in result.events), default=0)
     names = max((len(event.event) for event in result.events), default=0)
     heading = f"\n{'time, s':>8}  {'source':<{sources}}  {'event':<{names}}  detail"
-    console.print(Text(title, "bold"), soft_wrap=True)
-    console.print(Text(heading, "italic"), soft_wrap=True)
+    console.print(Text(title, "bold"))
+    console.print(Text(heading, "italic"))
     # If the console is not a terminal, each event is one line, for tools that search.
     width = max(console.width, _LEAST_WIDTH) if console.is_terminal or "COLUMNS" in os.environ else None
     for event in result.events:
-        console.print(_event_line(event, sources, names, width), soft_wrap=True)
+        console.print(_event_line(event, sources, names, width))
     console.print()
     print_trimmed(console, _metrics_table(metrics, result.further))
 

@@ -31,10 +31,10 @@ def scenarios() -> None:
     console = output()
     print_table(console, "Scenarios", table)
     ontologies = sorted(shipped_folder("ontology").glob("*.owl"))
-    console.print(f"\nCampaign files: {', '.join(path.name for path in campaigns)}", soft_wrap=True)
-    console.print(f"Modes files: {', '.join(path.name for path in modes)}", soft_wrap=True)
-    console.print(f"Ontologies: {', '.join(path.name for path in ontologies)}", soft_wrap=True)
-    console.print(f"They are in {folder.parent}: copy what you want to change.", soft_wrap=True)
+    console.print(f"\nCampaign files: {', '.join(path.name for path in campaigns)}")
+    console.print(f"Modes files: {', '.join(path.name for path in modes)}")
+    console.print(f"Ontologies: {', '.join(path.name for path in ontologies)}")
+    console.print(f"They are in {folder.parent}: copy what you want to change.")
 
 
 class SchemaOf(StrEnum):

@@ -54,12 +54,12 @@ def run(
             **files.with_options(manager_option, [manager]),
         )
     for remark in result.remarks:
-        errors().print(f"suave-des: manager {manager}: {remark}", soft_wrap=True, markup=False)
+        errors().print(f"suave-des: manager {manager}: {remark}")
     console = output()
     print_timeline(console, result)
     if out is not None:
         *others, last = (name for name in FAMILIES["mission"] if (out / name).exists())
-        console.print(f"\n{', '.join(others)} and {last} are in {out}", soft_wrap=True)
+        console.print(f"\n{', '.join(others)} and {last} are in {out}")
 
 
 @grouped_options
@@ -99,7 +99,7 @@ def train(
         table.add_row(f"{first} to {last}", f"{time_s:.2f}", f"{distance_m:.2f}")
     console = output()
     print_table(console, f"{manager} on {scenario}, means", table)
-    console.print(f"the training result is in {out}", soft_wrap=True)
+    console.print(f"the training result is in {out}")
 
 
 @grouped_options
@@ -150,7 +150,7 @@ def bench(
     if json_file is not None:
         check_output_file(json_file, overwrite=overwrite)
     progress = errors()
-    found = measure(missions, large=large, report=lambda text: progress.print(f"measuring, {text}", markup=False))
+    found = measure(missions, large=large, report=lambda text: progress.print(f"measuring, {text}"))
     if json_file is not None:
         compared = {
             "rows": [asdict(row) for row in goal_rows(found)],
@@ -160,7 +160,7 @@ def bench(
         write_files(json_file.parent, {json_file.name: json_text(content)})
     _print_bench(found)
     if json_file is not None:
-        output().print(f"\nThe figures are in {json_file}", soft_wrap=True)
+        output().print(f"\nThe figures are in {json_file}")
 
 
 def _print_bench(found: Bench) -> None:
@@ -168,7 +168,7 @@ def _print_bench(found: Bench) -> None:
     from suave_des.cli.console import output, plain_table, print_table
 
     console = output()
-    console.print(f"{in_words(found.machine)}\n", soft_wrap=True, markup=False)
+    console.print(f"{in_words(found.machine)}\n")
     goals = plain_table(("what", "goal", "measured", "met"), right=("measured",), no_wrap=True)
     for row in goal_rows(found):
         goals.add_row(row.what, row.goal, row.measured, MET[row.met])
@@ -183,5 +183,5 @@ def _print_bench(found: Bench) -> None:
     if is_busy(found.machine):
         console.print("\nOther programs kept the machine busy at the start; without them, times are shorter.")
     if found.missions < MISSIONS:
-        console.print(f"\n-: the goal is for {MISSIONS:,} missions", soft_wrap=True)
-    console.print(f"\nmeasured in {found.took_s:.0f} s", soft_wrap=True)
+        console.print(f"\n-: the goal is for {MISSIONS:,} missions")
+    console.print(f"\nmeasured in {found.took_s:.0f} s")

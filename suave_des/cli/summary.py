@@ -62,7 +62,7 @@ def print_summary(console: Console, result: CampaignResult) -> None:
     if len(result.summary) > _ROWS_SHOWN:
         more = len(result.summary) - _ROWS_SHOWN + 1
         where = "" if result.folder is None else f", all in {result.folder}/summary.csv"
-        console.print(f"... and {more} rows more{where}", soft_wrap=True)
+        console.print(f"... and {more} rows more{where}")
 
 
 def _summary(result: CampaignResult, look: _Look) -> Table:
@@ -107,19 +107,18 @@ def print_stops(console: Console, result: CampaignResult) -> None:
     if narrow:
         listed = ", ".join(f"{_group(result, stop)} after run {stop.runs}" for stop in narrow[:_STOPS_LISTED])
         listed += f", and {len(narrow) - _STOPS_LISTED} more" if len(narrow) > _STOPS_LISTED else ""
-        console.print(f"stopped with {until.metric} ± less than {until.half_width:g}: {listed}", soft_wrap=True)
+        console.print(f"stopped with {until.metric} ± less than {until.half_width:g}: {listed}")
     wide = [stop for stop in result.stops if not stop.is_narrow]
     for stop in wide[:_STOPS_LISTED]:
         width = "has no interval" if stop.half_width is None else f"± {stop.half_width:.4g}"
         console.print(
             f"not reached: {_group(result, stop)}: {until.metric} {width} after all {stop.runs} runs,"
             f" not less than {until.half_width:g}",
-            soft_wrap=True,
         )
     if len(wide) > _STOPS_LISTED:
         console.print(f"not reached: {len(wide) - _STOPS_LISTED} more, all in {result.folder}/manifest.json")
     if wide:
-        console.print(f"more runs: suave-des campaign --resume {result.folder} --runs N", soft_wrap=True)
+        console.print(f"more runs: suave-des campaign --resume {result.folder} --runs N")
 
 
 def _print_pairs(console: Console, result: CampaignResult, until: UntilCi) -> None:
@@ -132,11 +131,11 @@ def _print_pairs(console: Console, result: CampaignResult, until: UntilCi) -> No
         verdict = (
             f"less than {until.half_width:g}" if pair.is_narrow else f"not reached: not less than {until.half_width:g}"
         )
-        console.print(f"{name}{where}: {until.metric} {known} ({pair.n} runs in pairs; ± {verdict})", soft_wrap=True)
+        console.print(f"{name}{where}: {until.metric} {known} ({pair.n} runs in pairs; ± {verdict})")
     if len(result.pairs) > _STOPS_LISTED:
         console.print(f"{len(result.pairs) - _STOPS_LISTED} more are in {result.folder}/manifest.json")
     if not all(pair.is_narrow for pair in result.pairs):
-        console.print(f"more runs: suave-des campaign --resume {result.folder} --runs N", soft_wrap=True)
+        console.print(f"more runs: suave-des campaign --resume {result.folder} --runs N")
 
 
 def _group(result: CampaignResult, stop: GroupProgress) -> str:

@@ -145,15 +145,15 @@ def validate(
     console = output()
     notes = [*real.notes, *(conditions.listing() if conditions is not None else ())]
     for note in notes:
-        console.print(note, soft_wrap=True, markup=False)
+        console.print(note)
     if notes:
         console.print()
     print_validation(console, validation, word)
     if out is None:
-        console.print("\nNo files were written; --out DIR keeps tables and figures.", soft_wrap=True)
+        console.print("\nNo files were written; --out DIR keeps tables and figures.")
     else:
         _write(out, validation, real.frame, simulated, sources, word)
-        console.print(f"\nTables, figures and validation.json are in {out}", soft_wrap=True)
+        console.print(f"\nTables, figures and validation.json are in {out}")
     if campaign is not None:
         exit_telling_failures(campaign)
     if strict and not validation.all_met:

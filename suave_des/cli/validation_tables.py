@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from rich.text import Text
+
 from suave_des.campaign.results import METRIC_TITLES
 from suave_des.cli.console import number, plain_table, print_table
 
@@ -15,7 +17,7 @@ if TYPE_CHECKING:
     from suave_des.validation.statistics import SampleTest
     from suave_des.validation.validation import Target, Validation
 
-_VERDICTS = {True: "met", False: "[bold red]NOT MET[/]", None: "not judged"}
+_VERDICTS: Mapping[bool | None, str | Text] = {True: "met", False: Text("NOT MET", "bold red"), None: "not judged"}
 _KINDS = {
     "mean": "mean",
     "std": "std",
@@ -26,7 +28,7 @@ _KINDS = {
 }
 _TITLES = {**METRIC_TITLES, "mean_reaction_time_s": "reaction, s"}
 
-_Rows = Iterable[Sequence[str]]
+_Rows = Iterable[Sequence[str | Text]]
 
 
 def print_validation(console: Console, validation: Validation, real: str = "published") -> None:
@@ -49,7 +51,7 @@ def print_validation(console: Console, validation: Validation, real: str = "publ
             print_table(console, title, table)
             console.print()
     for line in _remarks(validation, real):
-        console.print(line, soft_wrap=True)
+        console.print(line)
 
 
 def _remarks(validation: Validation, real: str) -> Iterator[str]:

@@ -101,6 +101,12 @@ def test_one_mission_is_not_called_missions(command) -> None:
     assert ended.out.endswith("\n1 mission is in out/runs.csv\n")
 
 
+def test_a_folder_with_brackets_is_named_as_it_is(command) -> None:
+    folder = "new[b] :car:"
+    ended = command("campaign", "seams2023", "--managers", "none", "--runs", "1", "--workers", "1", "--out", folder)
+    assert ended.out.endswith(f"\n1 mission is in {folder}/runs.csv\n")
+
+
 class TestResume:
     def test_does_what_is_left_and_may_add_runs(self, command, tmp_path: Path) -> None:
         command("campaign", "seams2023", "--managers", "none", "--runs", "2", "--workers", "1", *OUT)

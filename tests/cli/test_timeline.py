@@ -4,9 +4,8 @@ import io
 from dataclasses import replace
 
 import pytest
-from rich.console import Console
 
-from suave_des.cli.console import print_timeline
+from suave_des.cli.console import PlainConsole, print_timeline
 from suave_des.metrics.result import MissionResult
 from suave_des.scenario.loader import load_scenario
 from suave_des.simulation.simulator import Simulator
@@ -19,7 +18,7 @@ def result() -> MissionResult:
 
 def printed(result: MissionResult, width: int, *, terminal: bool) -> list[str]:
     file = io.StringIO()
-    print_timeline(Console(file=file, width=width, force_terminal=terminal, color_system=None, highlight=False), result)
+    print_timeline(PlainConsole(file=file, width=width, force_terminal=terminal, color_system=None), result)
     return file.getvalue().splitlines()
 
 

@@ -111,7 +111,7 @@ def test(
         _cover(console, suites, max_failed, write)
     if mutate or mutants is not None:
         if not all(result.passed for result in results):
-            console.print("no mutation testing while a test fails: every mutant would count as killed", soft_wrap=True)
+            console.print("no mutation testing while a test fails: every mutant would count as killed")
         else:
             _mutate(console, suites, only or (), mutants, max_failed)
     if not all(result.passed for result in results):
@@ -256,19 +256,19 @@ class _Dots:
 
     def __init__(self, console: Console, name: str) -> None:
         self.console, self.width = console, min(console.width, _WIDTH)
-        console.print(Text(f"{name} "), end="", soft_wrap=True)
+        console.print(f"{name} ", end="")
         self.at = len(name) + 1
 
     def add(self, passed: bool, share: float) -> None:
         """Print one test's letter."""
         if self.at >= self.width - 8:
             self.end(share)
-        self.console.print(Text("." if passed else "F", "green" if passed else "red"), end="", soft_wrap=True)
+        self.console.print(Text("." if passed else "F", "green" if passed else "red"), end="")
         self.at += 1
 
     def end(self, share: float) -> None:
         """Print how much is done, and end the line."""
-        self.console.print(Text(f"[{share:4.0%}]".rjust(max(7, self.width - self.at)), "cyan"), soft_wrap=True)
+        self.console.print(Text(f"[{share:4.0%}]".rjust(max(7, self.width - self.at)), "cyan"))
         self.at = 0
 
 
@@ -279,18 +279,18 @@ def _print_failures(console: Console, results: Sequence[TestResult]) -> None:
     if not failed:
         return
     width = min(console.width, _WIDTH)
-    console.print(Text("\n" + " FAILURES ".center(width, "=")), soft_wrap=True)
+    console.print("\n" + " FAILURES ".center(width, "="))
     for result in failed:
-        console.print(Text(f" {result.test.name} ".center(width, "_"), "bold red"), soft_wrap=True)
-        console.print(Text(_place(result.test.file, result.test.line)), soft_wrap=True)
+        console.print(Text(f" {result.test.name} ".center(width, "_"), "bold red"))
+        console.print(_place(result.test.file, result.test.line))
         for failure in result.failures:
             first, *more = failure_lines(failure)
-            console.print(Text(first, "red"), soft_wrap=True)
-            console.print(Text("\n".join(more)), soft_wrap=True)
-    console.print(Text(" short summary ".center(width, "=")), soft_wrap=True)
+            console.print(Text(first, "red"))
+            console.print("\n".join(more))
+    console.print(" short summary ".center(width, "="))
     for result in failed:
         place = _place(result.test.file, result.test.line)
-        console.print(Text(f"FAILED {place}: {result.test.name}: {result.failures[0].what}"), soft_wrap=True)
+        console.print(f"FAILED {place}: {result.test.name}: {result.failures[0].what}")
 
 
 def _print_summary(console: Console, results: Sequence[TestResult], duration_s: float) -> None:
@@ -300,7 +300,7 @@ def _print_summary(console: Console, results: Sequence[TestResult], duration_s: 
     counts = [f"{failed} failed"] * bool(failed) + [f"{passed} passed"] * bool(passed)
     line = f" {', '.join(counts)}, {number_of(states, 'state')}, in {duration_s:.2f} s "
     width = min(console.width, _WIDTH)
-    console.print(Text(line.center(width, "="), "bold red" if failed else "bold green"), soft_wrap=True)
+    console.print(Text(line.center(width, "="), "bold red" if failed else "bold green"))
 
 
 _LINES_SHOWN = 8
@@ -323,7 +323,7 @@ def print_coverage(console: Console, coverage: Coverage) -> None:
     title = f"coverage: {coverage.covered} of {coverage.reachable}, {share:.0%}"
     print_table(console, title, table)
     for line in _coverage_lines(coverage):
-        console.print(Text(line), soft_wrap=True)
+        console.print(line)
 
 
 def _coverage_lines(coverage: Coverage) -> Iterator[str]:
@@ -359,18 +359,16 @@ def print_mutation(console: Console, report: MutationReport) -> None:
     title = f"mutation: {killed} of {killed + survived} mutants killed, {report.score:.0%}; {equivalent} equivalent"
     print_table(console, title, table)
     if survived:
-        console.print("survivors, which no test notices", soft_wrap=True)
+        console.print("survivors, which no test notices")
     for verdict in report.of(SURVIVED):
-        console.print(Text(f"  {verdict.mutant}\n    {verdict.reason}\n    at {verdict.state}"), soft_wrap=True)
+        console.print(f"  {verdict.mutant}\n    {verdict.reason}\n    at {verdict.state}")
     count = len(report.verdicts)
     each_ms = 1000 * report.duration_s / count if count else 0.0
-    console.print(
-        Text(f"{number_of(count, 'mutant')} in {report.duration_s:.1f} s, {each_ms:.0f} ms each"), soft_wrap=True
-    )
+    console.print(f"{number_of(count, 'mutant')} in {report.duration_s:.1f} s, {each_ms:.0f} ms each")
     if report.states:
         components = number_of(report.max_failed, "component")
         words = f"equivalent: {report.states} kinds of states, with at most {components} reporting"
-        console.print(Text(f"{words}, or the schema says so"), soft_wrap=True)
+        console.print(f"{words}, or the schema says so")
 
 
 def _unreachable(rules: list[RuleCoverage]) -> Iterator[str]:
