@@ -7,13 +7,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.console import Console
 
+from suave_des.cli.console import output
 from suave_des.cli.options import Files, Overwrite, Seed, Workers, command_line, grouped_options
+from suave_des.errors import InputError
+from suave_des.files import check_output_folder, make_output_folder, write_files
+from suave_des.resources import find, shipped_folder
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from rich.console import Console
 
     from suave_des.calibration.cases import Case
     from suave_des.calibration.loss import Evaluation
@@ -89,8 +92,6 @@ def calibrate(
     from suave_des.calibration.loss import evaluate, resampling_spread
     from suave_des.calibration.parameters import read_problem
     from suave_des.campaign.spec import RUNS_LIMIT, check_range, check_seed, check_workers
-    from suave_des.cli.console import output
-    from suave_des.files import check_output_folder, make_output_folder, write_files
 
     check_workers(workers)
     check_seed(seed)
@@ -143,8 +144,6 @@ def calibrate(
 
 def _parameters_file(given: str | None, cases: Sequence[Case]) -> Path:
     """Return the file of free parameters: the one given, or that of the scenario, or what several share."""
-    from suave_des.resources import find, shipped_folder
-
     if given is None:
         own = shipped_folder("scenarios/calibration") / f"{cases[0].name}.yaml"
         given = ("seams2023" if not own.is_file() else cases[0].name) if len(cases) == 1 else "shared"
@@ -157,8 +156,6 @@ def _halves(cases: Sequence[Case], given: str | None) -> list[tuple[Case, Case |
     Raises:
         InputError: what is given is no list of numbers, there are no conditions, or none is left on one side.
     """
-    from suave_des.errors import InputError
-
     if given is None:
         return [(case, None) for case in cases]
     option = "--fit-conditions"

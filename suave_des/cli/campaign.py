@@ -9,7 +9,10 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.console import Console
+from rich.table import Table
 
+from suave_des.cli.console import errors, output, plain_table, print_table, progress
 from suave_des.cli.options import (
     CampaignWorkers,
     Files,
@@ -26,12 +29,10 @@ from suave_des.cli.options import (
     grouped_options,
 )
 from suave_des.errors import InputError, number_of
+from suave_des.files import write_files
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from rich.console import Console
-    from rich.table import Table
 
     from suave_des.campaign.campaign import CampaignResult
     from suave_des.campaign.missions import MissionFailure
@@ -146,7 +147,6 @@ def campaign(
         raise InputError(f"{missing} is missing", remedy="see suave-des campaign --help")
     from suave_des.campaign.campaign import resume_campaign, run_campaign
     from suave_des.campaign.spec import managers_of
-    from suave_des.cli.console import output, progress
     from suave_des.cli.summary import print_differences, print_stops, print_summary
 
     with progress(str(resume or scenario), quiet=quiet) as show:
@@ -199,8 +199,6 @@ def campaign(
 
 def exit_telling_failures(result: CampaignResult) -> None:
     """List the missions that have no row, and exit with status 3 if there are any."""
-    from suave_des.cli.console import errors
-
     console = errors()
     for remark in result.remarks:
         console.print(f"suave-des: {remark}")
@@ -245,8 +243,6 @@ def reproduce(
     Prints the table of the paper (SEAMS 2023, arXiv:2303.09220) beside the simulated results.
     """
     from suave_des.campaign.campaign import run_campaign
-    from suave_des.cli.console import output, progress
-    from suave_des.files import write_files
     from suave_des.report.paper import FILES, compare, published_estimates
 
     published = published_estimates()
@@ -278,7 +274,6 @@ def reproduce(
 
 def print_comparison(console: Console, comparison: PaperComparison) -> None:
     """Print the paper's table beside the simulated results, with remarks on their differences."""
-    from suave_des.cli.console import print_table
     from suave_des.report.compared_metrics import PAPER_METRICS
 
     for metric, title in PAPER_METRICS.items():
@@ -293,7 +288,6 @@ def print_comparison(console: Console, comparison: PaperComparison) -> None:
 
 
 def _table(figures: Sequence[PaperFigure], *, is_narrow: bool) -> Table:
-    from suave_des.cli.console import plain_table
 
     table = plain_table()
     table.add_column("manager", min_width=12)

@@ -13,6 +13,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
+from rich.progress import Progress
 from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
@@ -133,8 +134,6 @@ def mission_status(scenario: str, console: Console) -> Iterator[Callable[[float,
 @contextmanager
 def counted(what: str, console: Console) -> Iterator[Callable[[int, int], None]]:
     """Show, while it takes and where the console is a terminal, how many of how many are done."""
-    from rich.progress import Progress
-
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(what, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)

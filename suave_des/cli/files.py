@@ -9,14 +9,15 @@ from typing import Annotated
 
 import typer
 
+from suave_des.cli.console import output, plain, plain_table, print_table
 from suave_des.cli.options import Overwrite
 from suave_des.errors import InputError
+from suave_des.files import check_output_file, write_files
+from suave_des.resources import shipped_folder
 
 
 def scenarios() -> None:
     """List the shipped scenarios and other inputs."""
-    from suave_des.cli.console import output, plain_table, print_table
-    from suave_des.resources import shipped_folder
     from suave_des.scenario.loader import load_scenario
 
     folder = shipped_folder("scenarios")
@@ -102,9 +103,6 @@ def import_config(
 
     Keys without a counterpart are reported. Files may be of any revision, with or without leading slashes.
     """
-    from suave_des.cli.console import plain
-    from suave_des.errors import InputError
-    from suave_des.files import check_output_file, write_files
     from suave_des.registry import manager_names
     from suave_des.scenario.exemplar.files import ImportOptions
     from suave_des.scenario.exemplar.importing import import_config as imported_from

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from suave_des.cli.console import errors, mission_status, output, plain_table, print_table, print_timeline
 from suave_des.cli.options import Files, ManagerOptions, Overwrite, Scenario, Seed, command_line, grouped_options
+from suave_des.files import FAMILIES, check_output_file, json_text, write_files
 
 if TYPE_CHECKING:
     from suave_des.bench.bench import Bench
@@ -38,8 +40,6 @@ def run(
 ) -> None:
     """Run one mission and print its timeline."""
     from suave_des.campaign.single import run_mission
-    from suave_des.cli.console import errors, mission_status, output, print_timeline
-    from suave_des.files import FAMILIES
 
     with mission_status(scenario, errors()) as show:
         result = run_mission(
@@ -83,7 +83,6 @@ def train(
     """
     from suave_des.campaign.single import blocks
     from suave_des.campaign.single import train as trained
-    from suave_des.cli.console import output, plain_table, print_table
 
     times_s: list[float] = []
     distances_m: list[float] = []
@@ -144,8 +143,6 @@ def bench(
     from dataclasses import asdict
 
     from suave_des.bench.bench import goal_rows, measure, programs
-    from suave_des.cli.console import errors, output
-    from suave_des.files import check_output_file, json_text, write_files
 
     if json_file is not None:
         check_output_file(json_file, overwrite=overwrite)
@@ -165,7 +162,6 @@ def bench(
 
 def _print_bench(found: Bench) -> None:
     from suave_des.bench.bench import MET, MISSIONS, goal_rows, in_words, is_busy, programs
-    from suave_des.cli.console import output, plain_table, print_table
 
     console = output()
     console.print(f"{in_words(found.machine)}\n")

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_type_hints
 import typer
 from typer.core import TyperGroup
 
+from suave_des.errors import InputError, did_you_mean, shown
+
 if TYPE_CHECKING:
     from suave_des.scenario.loader import Replacements
 
@@ -144,8 +146,6 @@ def check_no_use(options: Mapping[str, object], where: str, remedy: str = "leave
     Raises:
         InputError: one is given.
     """
-    from suave_des.errors import InputError
-
     for option, value in options.items():
         if _is_given(value):
             raise InputError(f"{option} cannot be used {where}", remedy=remedy)
@@ -162,7 +162,6 @@ def key_and_value(word: str, option: str) -> tuple[str, Any]:
     Raises:
         InputError: there is no key, no value, or the value is not YAML.
     """
-    from suave_des.errors import InputError, shown
     from suave_des.scenario.yamlfile import read_value
 
     key, equals, value = word.partition("=")
@@ -191,7 +190,6 @@ def manager_options(words: Sequence[str] | None, managers: Sequence[str]) -> dic
     Raises:
         InputError: a word has another form, or is for no manager of these.
     """
-    from suave_des.errors import InputError, did_you_mean, shown
     from suave_des.registry import is_built_in
 
     settings: dict[str, dict[str, Any]] = {}

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from suave_des.cli.console import output
 from suave_des.cli.options import Files, Results, SeedIfNew, check_no_use, comma_separated, grouped_options
 from suave_des.errors import InputError
+from suave_des.files import check_output_file, write_files
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -67,7 +69,6 @@ def compare(
 
     Runs that share their random numbers are compared in pairs, which takes fewer missions.
     """
-    from suave_des.cli.console import output
     from suave_des.report.compare import Choices, compare_folders
     from suave_des.report.compare_files import ENDINGS, WRITERS, plain_text
 
@@ -83,8 +84,6 @@ def compare(
     )
     comparison = compare_folders(results, choices)
     if out is not None:
-        from suave_des.files import write_files
-
         write_files(out.parent, {out.name: WRITERS[ENDINGS[out.suffix.lower()]](comparison)})
         print(f"compared in {out}")
     elif as_format is CompareFormat.TABLE:
@@ -94,8 +93,6 @@ def compare(
 
 
 def _check_out(out: Path, endings: Iterable[str]) -> None:
-    from suave_des.errors import InputError
-    from suave_des.files import check_output_file
 
     if out.suffix.lower() not in endings:
         problem = f"expected a table, got {out.suffix or 'a file without an ending'}"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from suave_des.cli.campaign import exit_telling_failures
+from suave_des.cli.console import output, progress
 from suave_des.cli.options import (
     CampaignWorkers,
     Files,
@@ -19,6 +20,8 @@ from suave_des.cli.options import (
     command_line,
     grouped_options,
 )
+from suave_des.files import check_output_folder, make_output_folder, write_files
+from suave_des.resources import find, shipped_folder
 
 if TYPE_CHECKING:
     import pandas
@@ -91,7 +94,6 @@ def validate(
 
     With a campaign file that sweeps the conditions of the real missions, each is compared under its own condition.
     """
-    from suave_des.cli.console import output, progress
     from suave_des.cli.validation_tables import print_validation
     from suave_des.validation.conditions import CONDITION
     from suave_des.validation.real import read_conditions, read_real, targets_of
@@ -162,7 +164,6 @@ def validate(
 
 def _data_files(scenario: str, given: list[str] | None) -> list[Path]:
     """Return the files of real missions: those given, or those published for the scenario, or the paper's."""
-    from suave_des.resources import find
     from suave_des.validation.real import PAPERS_RUNS, published_for
 
     if given:
@@ -181,7 +182,6 @@ def _recorded(
 ) -> Runs:
     """Read the missions of an earlier campaign, and make the output folder."""
     from suave_des.campaign.spec import read_campaign_file
-    from suave_des.files import check_output_folder, make_output_folder
     from suave_des.report.runs import read_runs
     from suave_des.scenario.loader import load_scenario
 
@@ -207,7 +207,6 @@ def _write(
     real: str,
 ) -> None:
     from suave_des import __version__
-    from suave_des.files import write_files
     from suave_des.validation import files
     from suave_des.validation.figures import detections_png, distributions_png
 
@@ -233,6 +232,5 @@ def _shown(path: Path) -> str:
 
 
 def _is_shipped(path: Path) -> bool:
-    from suave_des.resources import shipped_folder
 
     return path.is_relative_to(shipped_folder("scenarios/published"))

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from rich.console import Console
 from rich.text import Text
 
 from suave_des.campaign.results import METRIC_TITLES
 from suave_des.cli.console import number, plain_table, print_table
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from suave_des.estimates import Estimate, Interval
     from suave_des.validation.statistics import SampleTest
     from suave_des.validation.validation import Target, Validation

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.table import Table
 
 from suave_des.cli.console import counted, errors, output, plain_table, print_table, print_trimmed
 from suave_des.cli.kb.options import (
@@ -27,11 +28,10 @@ from suave_des.cli.kb.options import (
 )
 from suave_des.cli.options import grouped_options
 from suave_des.errors import InputError, number_of
+from suave_des.files import csv_text, write_files
 from suave_des.interrupts import ends_at_once
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from suave_des.workbench.policy.cases import Policy
     from suave_des.workbench.policy.table import FunctionTable
     from suave_des.workbench.state_input import StateBuilder
@@ -108,7 +108,6 @@ def policy(
 
     Measured values are divided into ranges: at and between the numbers that the knowledge base mentions.
     """
-    from suave_des.files import csv_text, write_files
     from suave_des.workbench.policy.table import columns_of, function_table, rows_of
 
     if csv is not None and csv.is_dir():
@@ -228,8 +227,6 @@ def query(
 
     Without any option that gives a state, only the ontologies are queried.
     """
-    from suave_des.files import csv_text
-
     bench = knowledge.bench()
     state = parts.build(bench, knowledge.measured) if parts.is_given or knowledge.measured else None
     late = f"answering the query: not done after {knowledge.time_limit:g} s (allow more with --time-limit)"

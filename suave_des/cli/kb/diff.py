@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.table import Table
 
 from suave_des.cli.console import counted, errors, output, plain_table, print_trimmed, progress
 from suave_des.cli.kb.options import AsFormat, Asked, Format, MaxFailed, print_json
 from suave_des.cli.options import Quiet, Seed, Workers, grouped_options
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from suave_des.workbench.difference import MissionDifference, PolicyDifference
 
 _MOST_RUNS = 10

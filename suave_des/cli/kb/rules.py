@@ -12,6 +12,7 @@ import typer
 from suave_des.cli.kb.options import AsFormat, Format, Replayed, Sources, TimeLimitS, print_json
 from suave_des.cli.options import Modes, grouped_options
 from suave_des.errors import number_of
+from suave_des.resources import shipped_folder
 
 if TYPE_CHECKING:
     from suave_des.knowledge.ontology import Ontology
@@ -58,7 +59,6 @@ def check(
     """
     from suave_des.domain import MISSION_FUNCTIONS, THRUSTERS, thruster_name
     from suave_des.monitor.diagnostics import HULL
-    from suave_des.resources import shipped_folder
     from suave_des.scenario.loader import load_scenario
     from suave_des.workbench.check import Subject
     from suave_des.workbench.check import check as run_checks

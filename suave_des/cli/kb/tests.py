@@ -18,6 +18,8 @@ from suave_des.cli.console import output, plain_table, print_table
 from suave_des.cli.kb.options import MaxFailed, TimeLimitS
 from suave_des.cli.options import KnowledgeFiles, grouped_options
 from suave_des.errors import InputError, did_you_mean, number_of, shown
+from suave_des.files import check_output_file, write_files
+from suave_des.resources import shipped_folder
 
 if TYPE_CHECKING:
     from suave_des.knowledge.ontology import Ontology
@@ -85,8 +87,6 @@ def test(
 
     Exit status: 0 all tests pass; 1 one fails; 2 something cannot be read.
     """
-    from suave_des.files import check_output_file, write_files
-
     for file in filter(None, (junit_xml, write)):
         check_output_file(file, overwrite=file == junit_xml)
     if knowledge.set and (from_mission is not None or write is not None):
@@ -120,7 +120,6 @@ def test(
 
 def _write_mission(folder: Path, file: Path | None, knowledge: Tested, time_limit_s: float) -> None:
     """Write a recorded mission's decisions as tests, or print them."""
-    from suave_des.files import write_files
     from suave_des.workbench.prover import Prover
     from suave_des.workbench.testing.writing import mission_knowledge, mission_states, tests_text
 
@@ -138,7 +137,6 @@ def _write_mission(folder: Path, file: Path | None, knowledge: Tested, time_limi
 
 def _cover(console: Console, suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
     """Show what the tests of each knowledge base cover, and write tests of what they do not."""
-    from suave_des.files import write_files
     from suave_des.workbench.prover import Prover
     from suave_des.workbench.testing.coverage import measure_coverage
     from suave_des.workbench.testing.writing import NamedState, tests_text
@@ -242,7 +240,6 @@ def _run(console: Console, suites: Iterable[Suite], select: str | None) -> list[
 
 
 def _place(file: Path, line: int | None = None) -> str:
-    from suave_des.resources import shipped_folder
     from suave_des.workbench.findings import relative_path
 
     shipped = shipped_folder("ontology")
