@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 
 from suave_des.cli.console import output
-from suave_des.cli.options import Files, Overwrite, Seed, Workers, command_line, grouped_options
+from suave_des.cli.options import Files, ManagersInData, Overwrite, Seed, Workers, command_line, grouped_options
 from suave_des.errors import InputError
 from suave_des.files import check_output_folder, make_output_folder, write_files
 from suave_des.resources import find, shipped_folder
@@ -41,9 +41,6 @@ _Parameters = Annotated[
         show_default="the shipped file with the scenario's name, or seams2023; for several scenarios: shared",
     ),
 ]
-_Managers = Annotated[
-    str | None, typer.Option("--managers", metavar="NAME,...", help="Managers to compare; by default all in the data.")
-]
 _FitConditions = Annotated[
     str | None,
     typer.Option(
@@ -62,7 +59,7 @@ def calibrate(
     ],
     data: _Data = None,
     parameters: _Parameters = None,
-    managers: _Managers = None,
+    managers: ManagersInData = None,
     fit_conditions: _FitConditions = None,
     runs: Annotated[
         int,

@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from suave_des.cli.console import errors, output, plain_table, print_table, progress
+from suave_des.cli.console import errors, fits, output, plain_table, print_table, progress
 from suave_des.cli.options import (
     CampaignWorkers,
     Files,
@@ -279,7 +279,7 @@ def print_comparison(console: Console, comparison: PaperComparison) -> None:
     for metric, title in PAPER_METRICS.items():
         figures = [figure for figure in comparison.figures if figure.metric == metric]
         table = _table(figures, is_narrow=False)
-        if console.measure(table, options=console.options.update(width=1000)).maximum > console.width:
+        if not fits(console, table):
             table = _table(figures, is_narrow=True)
         print_table(console, title, table)
         console.print()

@@ -167,9 +167,19 @@ def print_trimmed(console: Console, table: Table) -> None:
         console.file.write(line.rstrip() + "\n")
 
 
+def fits(console: Console, table: Table) -> bool:
+    """Return whether a table is no wider than the console, with each cell in one line."""
+    return console.measure(table, options=console.options.update(width=1000)).maximum <= console.width
+
+
 def number(value: object) -> str:
     """Two decimals, as in the paper's table; empty for None."""
     return f"{value:.2f}" if isinstance(value, float) else ""
+
+
+def interval_text(interval: tuple[float, float] | None, style: str) -> str:
+    """Both ends of an interval in a number format; empty for None."""
+    return "" if interval is None else f"{interval[0]:{style}} to {interval[1]:{style}}"
 
 
 def print_timeline(console: Console, result: MissionResult) -> None:

@@ -72,6 +72,9 @@ TimeOut = Annotated[
         show_default="120; with the reasoner owlready2 1800",
     ),
 ]
+ManagersInData = Annotated[
+    str | None, typer.Option("--managers", metavar="NAME,...", help="Managers to compare; by default all in the data.")
+]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace results of the same kind in the output folder.")]
 

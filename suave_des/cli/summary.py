@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.table import Table
 
 from suave_des.campaign.display import estimated
 from suave_des.campaign.progress import GroupProgress
-from suave_des.campaign.results import METRIC_TITLES, METRICS, SUMMARY_COLUMNS
+from suave_des.campaign.results import METRIC_TITLES, METRICS, SUMMARY_COLUMNS, CampaignResult
 from suave_des.campaign.stopping import UntilCi
 from suave_des.campaign.variation import cell_of
-from suave_des.cli.console import number, plain_table, print_table
-
-if TYPE_CHECKING:
-    from suave_des.campaign.campaign import CampaignResult
+from suave_des.cli.console import fits, interval_text, number, plain_table, print_table
 
 _STOPS_LISTED = 8
 _ROWS_SHOWN = 40
@@ -55,7 +51,7 @@ def print_summary(console: Console, result: CampaignResult) -> None:
     """Print the rows of summary.csv; what does not fit into the console's width is broken up, then left out."""
     for look in _LOOKS:
         table = _summary(result, look)
-        if console.measure(table, options=console.options.update(width=1000)).maximum <= console.width:
+        if fits(console, table):
             break
     title = f"{result.loaded.scenario.name}, seed {result.spec.seed}: means ± half their 95% intervals"
     print_table(console, f"{title}, standard deviations" if look.has_std else title, table)
@@ -160,11 +156,7 @@ def print_differences(console: Console, result: CampaignResult) -> None:
             table.add_row(*[""] * len(result.variation.sweep.parameters), METRIC_TITLES[each.metric])
         swept = map(str, map(cell_of, result.variation.sweep.values(each.point).values()))
         same = f"{max(each.above, each.below)} of {len(each.member_means)}"
-        ranges = (_range(each.interval), _range(each.range))
+        ranges = (interval_text(each.interval, "+.1f"), interval_text(each.range, "+.1f"))
         table.add_row(*swept, f"  {each.first} - {each.second}", f"{each.mean:+.2f}", *ranges, same)
     console.print()
     print_table(console, "Differences, paired by run, with 95% ranges", table)
-
-
-def _range(interval: tuple[float, float] | None) -> str:
-    return "" if interval is None else f"{interval[0]:+.1f} to {interval[1]:+.1f}"

@@ -13,6 +13,7 @@ from suave_des.cli.console import output, progress
 from suave_des.cli.options import (
     CampaignWorkers,
     Files,
+    ManagersInData,
     Overwrite,
     Quiet,
     Seed,
@@ -46,9 +47,6 @@ _Data = Annotated[
         show_default=False,
     ),
 ]
-_Managers = Annotated[
-    str | None, typer.Option("--managers", metavar="NAME,...", help="Managers to compare; by default all in the data.")
-]
 
 
 @grouped_options
@@ -65,7 +63,7 @@ def validate(
     runs_file: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Compare this campaign's runs.csv; nothing is simulated.")
     ] = None,
-    managers: _Managers = None,
+    managers: ManagersInData = None,
     targets: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Shares to compare; by default NAME.targets.yaml beside NAME.csv."),

@@ -9,10 +9,10 @@ from rich.console import Console
 from rich.text import Text
 
 from suave_des.campaign.results import METRIC_TITLES
-from suave_des.cli.console import number, plain_table, print_table
+from suave_des.cli.console import interval_text, number, plain_table, print_table
 
 if TYPE_CHECKING:
-    from suave_des.estimates import Estimate, Interval
+    from suave_des.estimates import Estimate
     from suave_des.validation.statistics import SampleTest
     from suave_des.validation.validation import Target, Validation
 
@@ -89,9 +89,9 @@ def _differences(validation: Validation) -> _Rows:
             _TITLES[each.metric],
             each.manager,
             f"{each.difference:+.2f}",
-            _interval(each.difference_interval, "+.1f"),
+            interval_text(each.difference_interval, "+.1f"),
             number(each.std_ratio),
-            _interval(each.std_ratio_interval, ".2f"),
+            interval_text(each.std_ratio_interval, ".2f"),
             _p(each.kolmogorov_smirnov),
             _p(each.anderson_darling),
         )
@@ -115,7 +115,7 @@ def _shares(validation: Validation) -> _Rows:
         outside = interval is not None and share is not None and not interval[0] <= share <= interval[1]
         counted = f"{each.published.count} of {each.published.n}"
         mark = "*" if outside else ""
-        yield each.share.manager, each.share.name, counted, _interval(interval, ".0%"), _percent(share), mark
+        yield each.share.manager, each.share.name, counted, interval_text(interval, ".0%"), _percent(share), mark
 
 
 def _places(validation: Validation) -> _Rows:
@@ -167,11 +167,7 @@ def _value(target: Target) -> tuple[str, str]:
         return value, ""
     if target.high is None:
         return value, f"at least {target.low:{style}}"
-    return value, _interval((target.low, target.high), style)
-
-
-def _interval(interval: Interval | None, style: str) -> str:
-    return "" if interval is None else f"{interval[0]:{style}} to {interval[1]:{style}}"
+    return value, interval_text((target.low, target.high), style)
 
 
 def _percent(share: float | None) -> str:

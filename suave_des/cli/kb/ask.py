@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from suave_des.cli.console import counted, errors, output, plain_table, print_table, print_trimmed
+from suave_des.cli.console import counted, errors, fits, output, plain_table, print_table, print_trimmed
 from suave_des.cli.kb.options import (
     AsFormat,
     Asked,
@@ -145,7 +145,7 @@ def _print_function_table(table: FunctionTable) -> None:
     if not console.is_terminal and "COLUMNS" not in os.environ:
         console.width = _WIDE  # names stay whole where there is no window
     shown = _function_table(table, breaks_names=False)
-    if console.measure(shown, options=console.options.update(width=_WIDE)).maximum > console.width:
+    if not fits(console, shown):
         shown = _function_table(table, breaks_names=True)
     print_table(console, f"{table.function}{what}", shown)
     print()

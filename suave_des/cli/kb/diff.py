@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
-from suave_des.cli.console import counted, errors, output, plain_table, print_trimmed, progress
+from suave_des.cli.console import counted, errors, interval_text, output, plain_table, print_trimmed, progress
 from suave_des.cli.kb.options import AsFormat, Asked, Format, MaxFailed, print_json
 from suave_des.cli.options import Quiet, Seed, Workers, grouped_options
 
@@ -88,7 +88,7 @@ def _table(difference: PolicyDifference, missions: MissionDifference) -> Table:
     table.add_row("decisions", "", "", "", "", states)
     table.add_row("missions", "", "", "", "", f"{len(missions.changed)} of {missions.missions}")
     for each in missions.metrics:
-        interval = "" if each.interval is None else f"{each.interval[0]:+.2f} to {each.interval[1]:+.2f}"
+        interval = interval_text(each.interval, "+.2f")
         values = f"{each.one:.2f}", f"{each.other:.2f}", f"{each.difference:+.2f}"
         table.add_row(METRICS[each.metric], *values, interval, f"{each.changed} of {missions.missions}")
     return table
