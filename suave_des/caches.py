@@ -16,9 +16,6 @@ def cache_folder() -> Path:
     chosen = os.environ.get(_CACHE_VARIABLE)
     if chosen:
         return Path(chosen)
-    if sys.platform == "win32":
-        start = os.environ.get("LOCALAPPDATA")
-        return (Path(start) if start else Path.home() / "AppData" / "Local") / "suave-des" / "Cache"
     if sys.platform == "darwin":
         return Path.home() / "Library" / "Caches" / "suave-des"
     start = os.environ.get("XDG_CACHE_HOME")  # ignored unless absolute, as the XDG specification requires
@@ -49,8 +46,6 @@ def private_cache(kind: str) -> Path | None:
 
 def _temporary_folder() -> Path:
     """A folder of this user's alone that the next process finds, too; a new one if somebody else has made that."""
-    if not hasattr(os, "getuid"):
-        return Path(tempfile.mkdtemp(prefix="suave-des-"))
     folder = Path(tempfile.gettempdir()) / f"suave-des-{os.getuid()}"
     try:
         return _private(folder)
@@ -66,7 +61,7 @@ def _private(folder: Path) -> Path:
     """
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     status = folder.lstat()
-    if not stat.S_ISDIR(status.st_mode) or status.st_uid != getattr(os, "getuid", lambda: status.st_uid)():
+    if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.getuid():
         raise PermissionError(None, f"{folder} is not a folder of this user's")
     if stat.S_IMODE(status.st_mode) & 0o077:
         folder.chmod(0o700)

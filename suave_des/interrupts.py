@@ -6,7 +6,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Any
@@ -14,6 +14,7 @@ from typing import Any
 INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _REPEAT_S = 0.05
 _received: list[int] = []
+_Handler = Callable[[int, FrameType | None], object]
 
 
 class Stopped(KeyboardInterrupt):
@@ -31,14 +32,24 @@ def signals_raised() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    taken = [number for number in INTERRUPTS if signal.getsignal(number) is not signal.SIG_IGN]
-    before = [signal.signal(number, _stop) for number in taken]
+    with handled(not_ignored(), _stop), _repeated_if_lost():
+        yield
+
+
+def not_ignored() -> list[int]:
+    """Return the signals that ask to stop, without those that this process was started to ignore."""
+    return [number for number in INTERRUPTS if signal.getsignal(number) is not signal.SIG_IGN]
+
+
+@contextmanager
+def handled(numbers: Iterable[int], handler: _Handler) -> Iterator[None]:
+    """Have a function called on signals in the block, which must be in the main thread."""
+    before = {number: signal.signal(number, handler) for number in numbers}
     try:
-        with _repeated_if_lost():
-            yield
+        yield
     finally:
-        for number, handler in zip(taken, before, strict=True):
-            signal.signal(number, handler)
+        for number, earlier in before.items():
+            signal.signal(number, earlier)
 
 
 @contextmanager
@@ -88,20 +99,22 @@ def ends_at_once(limit_s: float, message: str) -> Iterator[None]:
         yield
         return
 
-    def end(number: int, frame: FrameType | None) -> None:
-        is_late = number == signal.SIGALRM
-        os.write(2, f"suave-des: {message if is_late else 'interrupted'}\n".encode())
-        os._exit(2 if is_late else 128 + number)
+    def end_late(number: int, frame: FrameType | None) -> None:
+        os.write(2, f"suave-des: {message}\n".encode())
+        os._exit(2)
 
-    ending = (signal.SIGALRM, *INTERRUPTS)
-    before = [signal.signal(number, end) for number in ending]
-    signal.setitimer(signal.ITIMER_REAL, limit_s)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        for number, handler in zip(ending, before, strict=True):
-            signal.signal(number, handler)
+    with handled([signal.SIGALRM], end_late), handled(not_ignored(), end_interrupted):
+        signal.setitimer(signal.ITIMER_REAL, limit_s)
+        try:
+            yield
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+
+def end_interrupted(number: int, frame: FrameType | None) -> None:
+    """End the process on a signal, without giving anything else the time to fail."""
+    os.write(2, b"suave-des: interrupted\n")
+    os._exit(128 + number)
 
 
 def was_interrupted() -> bool:
@@ -125,14 +138,10 @@ def signals_deferred() -> Iterator[None]:
         yield
         return
     came: list[int] = []
-    before = {number: signal.getsignal(number) for number in INTERRUPTS}
-    heard = {number: handler for number, handler in before.items() if callable(handler)}
-    for number in heard:
-        signal.signal(number, lambda number, frame: came.append(number))
+    heard = [number for number in INTERRUPTS if callable(signal.getsignal(number))]
     try:
-        yield
+        with handled(heard, lambda number, frame: came.append(number)):
+            yield
     finally:
-        for number, handler in heard.items():
-            signal.signal(number, handler)
         if came:
             signal.raise_signal(came[0])

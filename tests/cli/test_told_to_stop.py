@@ -1,6 +1,8 @@
 """A signal that asks to stop is heard, wherever Python is when it comes."""
 
 import signal
+import subprocess
+import sys
 import time
 
 import pytest
@@ -50,3 +52,15 @@ def test_when_the_command_has_ended_nothing_is_asked_any_more(monkeypatch: pytes
     finally:
         signal.signal(signal.SIGTERM, before)
     assert heard == []
+
+
+def test_what_the_process_was_started_to_ignore_does_not_end_a_query() -> None:
+    code = (
+        "import signal\n"
+        "from suave_des.interrupts import ends_at_once\n"
+        "signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
+        "with ends_at_once(10.0, 'late'):\n    signal.raise_signal(signal.SIGHUP)\n"
+        "print('done')\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "done\n", "")

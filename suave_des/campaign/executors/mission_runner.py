@@ -26,6 +26,7 @@ from suave_des.campaign.missions import (
 )
 from suave_des.campaign.variation import cell_of
 from suave_des.errors import MissionError
+from suave_des.interrupts import handled
 from suave_des.metrics.result import MissionResult
 from suave_des.registry import is_built_in
 from suave_des.scenario.models import MissionSettings
@@ -163,11 +164,8 @@ def _time_limits(exit_after_s: float | None) -> Iterator[_Limit]:
         with _Watchdog(exit_after_s) as watchdog:
             yield watchdog.limit
         return
-    before = signal.signal(signal.SIGALRM, _raise)
-    try:
+    with handled([signal.SIGALRM], _raise):
         yield _alarm
-    finally:
-        signal.signal(signal.SIGALRM, before)
 
 
 def _raise(number: int, frame: FrameType | None) -> None:
