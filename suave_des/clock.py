@@ -1,7 +1,7 @@
 """Additions to SimPy's clock: ticks of a periodic timer, events at a mission time, alarms.
 
 Activities are SimPy processes. What looks ahead and is often overtaken by events is not: it sets an alarm, and sets it
-anew. Alarms, `exactly_at` and `advance` alone use callbacks and SimPy's private fields.
+anew. This module alone uses callbacks and SimPy's private fields.
 """
 
 from __future__ import annotations
@@ -48,6 +48,11 @@ def advance(env: simpy.Environment, t_s: float) -> None:
     except StopSimulation:
         return
     env._now = t_s
+
+
+def stop_at(event: simpy.Event) -> None:
+    """End the simulation at an event, whether it runs by `advance` or by itself."""
+    event.callbacks.append(StopSimulation.callback)
 
 
 class Alarm:

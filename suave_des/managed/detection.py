@@ -28,7 +28,7 @@ class PipelineDetector:
         visibility: measured water visibility: the times, s, at which the value changes, and the values, m.
         points: points as the detection places them, shape (n, 3), m.
         view_tangent: tangent of half the camera's field of view.
-        detected: the event of the first sight.
+        detected: the event of the first sight; its value is the index of the point seen.
         first_point: index of the point seen, once detected.
         detected_s: mission time of the first sight; inf before.
     """
@@ -74,4 +74,4 @@ class PipelineDetector:
         self.first_point = self._seen
         self.detected_s = self._alarm.now_s
         self.log("detection", "pipeline_detected", f"point {self.first_point}")
-        self.detected.succeed()
+        self.detected.succeed(self.first_point)

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 import simpy
 
+from suave_des.clock import Process
 from suave_des.compiling import Array
 from suave_des.domain import SEA_BED_Z_M
 from suave_des.metrics.result import MissionMetrics
@@ -74,8 +75,9 @@ class FurtherMetrics:
         """Note the time that the reasoner took in a cycle that changed something."""
         self.reasoning_time_s += duration_s
 
-    def surfaced(self, leak_s: float) -> None:
+    def watch_surfacing(self, surfaced: simpy.Event, leak_s: float) -> Process:
         """Note the moment at which the vehicle has surfaced after a leak."""
+        yield surfaced
         self.surfacing_time_s = float(self.env.now) - leak_s
 
     def thrusters_changed(self) -> None:

@@ -38,6 +38,12 @@ def leak_monitor(env: simpy.Environment, bus: DiagnosticsBus, time_s: float, det
     detected()
 
 
+def detection_monitor(env: simpy.Environment, bus: DiagnosticsBus, detected: simpy.Event) -> Process:
+    """Publish the first sight of the pipeline; the value of the event `detected` is the index of the point seen."""
+    point = yield detected
+    bus.publish(Diagnostic(env.now, Kind.DETECTION, "pipeline", float(point)))
+
+
 class ScheduledEvent(NamedTuple):
     """A thruster that fails or recovers in a run.
 

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from functools import partial
 
 import simpy
-from simpy.core import StopSimulation
 
 from suave_des import domain
 from suave_des.chance import Chance
-from suave_des.clock import advance
+from suave_des.clock import advance, stop_at
 from suave_des.compiling import Array
 from suave_des.errors import SuaveDesError
 from suave_des.managed.coordinator import MissionCoordinator, MissionTiming
@@ -31,6 +30,7 @@ from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.measurements import Measured
 from suave_des.monitor.monitors import (
     battery_monitor,
+    detection_monitor,
     leak_monitor,
     signal_monitor,
     state_monitor,
@@ -282,8 +282,7 @@ class MissionRun:
         self.modes.listeners.append(further.mode_effect)
         self.modes.adaptation_listeners.append(further.adapted)
         if self._scenario.leak is not None:
-            leak_s = self._chance.value("leak.time_s")
-            self._surface.surfaced.callbacks.append(lambda event: further.surfaced(leak_s))
+            self.env.process(further.watch_surfacing(self._surface.surfaced, self._chance.value("leak.time_s")))
         return further
 
     def _record_changes(self) -> None:
@@ -322,7 +321,7 @@ class MissionRun:
         """Start the coordinator, the monitors and the manager."""
         self._coordinator.start(self._host.request, self._host.cancel)
         self._start_monitors()
-        self._coordinator.ended.callbacks.append(StopSimulation.callback)  # or `advance` would run past it
+        stop_at(self._coordinator.ended)
         self._host.start()
 
     def _start_monitors(self) -> None:
@@ -338,7 +337,7 @@ class MissionRun:
             if self.bus.has_subscribers(kind):
                 self.env.process(state_monitor(self.env, self.bus, kind, key, state))
         if self.bus.has_subscribers(Kind.DETECTION):
-            self._detector.detected.callbacks.append(self._publish_detection)
+            self.env.process(detection_monitor(self.env, self.bus, self._detector.detected))
         self._start_thruster_monitor()
 
     def _start_thruster_monitor(self) -> None:
@@ -352,7 +351,3 @@ class MissionRun:
                 self.bus.publish(diagnostic)
 
         self.env.process(thruster_monitor(self.env, publish, events, self._faults.apply, timing, after_previous))
-
-    def _publish_detection(self, _: simpy.Event) -> None:
-        point = float(self._detector.first_point or 0)
-        self.bus.publish(Diagnostic(self.env.now, Kind.DETECTION, "pipeline", point))

@@ -150,7 +150,7 @@ class PollingDetector:
             if seen >= 0:
                 self.first_point, self.detected_s = seen, float(env.now)
                 self._log("detection", "pipeline_detected", f"point {seen}")
-                self.detected.succeed()
+                self.detected.succeed(seen)
                 return
 
 
