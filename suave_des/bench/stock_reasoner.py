@@ -20,6 +20,7 @@ from typing import Any
 import owlready2
 
 from suave_des.knowledge.pellet.java import java_executable
+from suave_des.monitor.diagnostics import FAILED, RECOVERED
 from suave_des.resources import shipped_folder
 
 TIME_LIMIT_S = 300.0
@@ -52,8 +53,8 @@ class MissionState:
 STATES = (
     MissionState(SEARCH, 3.5),
     MissionState(SEARCH, 3.0, None, SEARCHING_HIGH),
-    MissionState(SEARCH, 2.0, "FALSE", SEARCHING_HIGH),
-    MissionState(INSPECT, 1.5, "RECOVERED", INSPECTING),
+    MissionState(SEARCH, 2.0, FAILED, SEARCHING_HIGH),
+    MissionState(INSPECT, 1.5, RECOVERED, INSPECTING),
 )
 """States that a mission passes through, of all kinds that take the reasoner differently long."""
 

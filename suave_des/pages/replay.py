@@ -11,6 +11,7 @@ from typing import Any, Final
 from suave_des import __version__
 from suave_des.domain import FOLLOW_PIPELINE, SEA_BED_Z_M, THRUSTERS
 from suave_des.managed.follow import InspectionPath
+from suave_des.monitor.diagnostics import FAILED
 from suave_des.pages.decisions import Cycles, explained
 from suave_des.pages.page import page
 from suave_des.pages.recorded import Recorded
@@ -91,7 +92,7 @@ def mission_on_page(mission: Recorded) -> MissionOnPage:
         component, _, status = detail.partition(" ")
         number = component.rpartition("_")[2]
         if number.isdecimal():
-            thrusters.append((t_s, int(number), status != "FALSE"))
+            thrusters.append((t_s, int(number), status != FAILED))
     events = record.events[["t_s", "source", "event", "detail"]].itertuples(index=False, name=None)
     way = _way(mission)
     x_m, y_m, seen_s = (metrics.get(name) for name in ("detection_x_m", "detection_y_m", "detection_time_s"))

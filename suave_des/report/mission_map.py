@@ -18,6 +18,7 @@ from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 from suave_des.domain import SEA_BED_Z_M
+from suave_des.monitor.diagnostics import FAILED
 from suave_des.report import style
 from suave_des.report.mission_record import MissionRecord, adaptations, battery_level
 from suave_des.report.words import mode_words
@@ -124,7 +125,7 @@ def _milestones(events: pandas.DataFrame) -> Iterator[tuple[float, str, str]]:
             yield t_s, "pipeline detected", style.BLACK
         elif event == "battery_crossing":
             yield t_s, "battery low" if detail.startswith("falls") else "recharged", _BATTERY_COLOUR
-        elif event == "component_status" and status == "FALSE":
+        elif event == "component_status" and status == FAILED:
             failed.add(component)
             yield t_s, f"{name} failed", style.VERMILION
         elif event == "component_status" and component in failed:

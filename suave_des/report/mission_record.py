@@ -14,6 +14,7 @@ import pandas
 
 from suave_des.domain import MAINTAIN_MOTION
 from suave_des.errors import InputError
+from suave_des.monitor.diagnostics import FAILED
 from suave_des.report.words import function_mode_words
 
 _NUMBERS = ("t_s", "x_m", "y_m", "z_m", "visibility_m")
@@ -166,9 +167,9 @@ def failure_spans(record: MissionRecord) -> dict[str, list[Span]]:
         component, _, status = detail.partition(" ")
         own = spans.setdefault(component, [])
         is_failed = bool(own) and own[-1].end_s == end_s
-        if status == "FALSE" and not is_failed:
+        if status == FAILED and not is_failed:
             own.append(Span(t_s, end_s, status))
-        elif status != "FALSE" and is_failed:
+        elif status != FAILED and is_failed:
             own[-1] = Span(own[-1].begin_s, t_s, own[-1].what)
     return {component: own for component, own in spans.items() if own}
 

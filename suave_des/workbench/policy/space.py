@@ -15,6 +15,7 @@ from typing import Final
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import OWL, RDFS, TOMASYS, XSD, Lit, Triple
 from suave_des.knowledge.rules.syntax import COMPARISONS, Atom, Named, Rule, Variable
+from suave_des.monitor.diagnostics import FAILED, RECOVERED
 from suave_des.workbench.ranges import numbers_in
 from suave_des.workbench.state_input import ManagingSettings
 
@@ -136,7 +137,7 @@ def component_statuses(base: Ontology) -> tuple[str, ...]:
         for term in atom.arguments
         if isinstance(term, Lit) and term.datatype == XSD + "string"
     }
-    return tuple(sorted({*asked, "FALSE", "RECOVERED"}))
+    return tuple(sorted({*asked, FAILED, RECOVERED}))
 
 
 @dataclass(frozen=True, slots=True)
