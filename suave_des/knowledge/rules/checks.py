@@ -124,8 +124,7 @@ def _check_atom(atom: Atom, vocabulary: Vocabulary, *, is_head: bool) -> Iterato
         yield RuleProblem(f"{name} takes {words}, not {len(atom.arguments)}", atom.place())
         return
     for number, term in enumerate(atom.arguments):
-        takes_value = atom.kind == "range" or (atom.kind == "data" and number == 1)
-        yield from _check_argument(atom, number, term, vocabulary, takes_value=takes_value, is_head=is_head)
+        yield from _check_argument(atom, number, term, vocabulary, is_head=is_head)
 
 
 def _check_predicate(atom: Atom, name: str, vocabulary: Vocabulary) -> RuleProblem | None:
@@ -156,10 +155,10 @@ def _a(kind: str) -> str:
 
 
 def _check_argument(
-    atom: Atom, number: int, term: Term, vocabulary: Vocabulary, *, takes_value: bool, is_head: bool
+    atom: Atom, number: int, term: Term, vocabulary: Vocabulary, *, is_head: bool
 ) -> Iterator[RuleProblem]:
     """Check that an argument is an individual or a value, as required, and possible for that property."""
-    name, place = local_name(atom.predicate), atom.place(number)
+    name, place, takes_value = local_name(atom.predicate), atom.place(number), atom.takes_value(number)
     if isinstance(term, Lit) and not takes_value:
         yield RuleProblem(f"{name}: {literal_text(term)} is a value, but an individual is needed", place)
     elif isinstance(term, Named):
@@ -257,8 +256,7 @@ def _check_variables(rule: Rule) -> Iterator[RuleProblem]:
     individuals: dict[str, Place] = {}
     values: dict[str, Place] = {}
     for atom, number, name in _uses(rule.atoms):
-        is_value = atom.kind in ("builtin", "range") or (atom.kind == "data" and number == 1)
-        (values if is_value else individuals).setdefault(name, atom.place(number) or Place(0, 0))
+        (values if atom.takes_value(number) else individuals).setdefault(name, atom.place(number) or Place(0, 0))
     for name in sorted(individuals.keys() & values.keys()):
         place = max(individuals[name], values[name])
         yield RuleProblem(f"?{name} stands for an individual and for a value", place)

@@ -84,6 +84,10 @@ class Atom:
         number = 0 if argument is None else argument + 1
         return self.places[number] if number < len(self.places) else None
 
+    def takes_value(self, argument: int) -> bool:
+        """Whether an argument stands for a value, not for an individual."""
+        return self.kind in ("builtin", "range") or (self.kind == "data" and argument == 1)
+
     def variables(self) -> Iterator[str]:
         """Names of the variables among the arguments."""
         return (term.name for term in self.arguments if isinstance(term, Variable))

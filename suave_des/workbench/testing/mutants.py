@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import partial
 from types import MappingProxyType
-from typing import Final
+from typing import Final, TypeVar
 
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import (
@@ -44,6 +44,7 @@ _FROZEN: Final = "urn:suave-des:any#"
 _MOVED: Final = (Decimal("1.1"), Decimal("0.9"))
 #: Properties whose values are thresholds, and those that connect individuals of the model.
 _LINKS: Final = tuple(TOMASYS + name for name in ("solvesF", "hasQAestimation", "isQAtype"))
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
@@ -100,20 +101,15 @@ def mutants_of(base: Ontology) -> tuple[Mutant, ...]:
     found: dict[tuple[object, ...], Mutant] = {}
     for name, operator in OPERATORS.items():
         for mutant in operator(base):
-            if mutant.new is not None and any(problem.is_fatal for problem in check_rule(mutant.new, base.vocabulary)):
+            new, old = mutant.new, mutant.old
+            if new is not None and any(problem.is_fatal for problem in check_rule(new, base.vocabulary)):
                 continue
-            if mutant.new is not None and mutant.old is not None:
-                same = set(mutant.new.body) == set(mutant.old.body) and mutant.new.head == mutant.old.head
-                if same:
-                    continue
-            body = None if mutant.new is None else (mutant.new.body, mutant.new.head)
+            if new is not None and old is not None and (set(new.body), new.head) == (set(old.body), old.head):
+                continue
+            body = None if new is None else (new.body, new.head)
             found.setdefault((mutant.name, body, mutant.removed, mutant.added), replace(mutant, operator=name))
     order = list(OPERATORS)
     return tuple(sorted(found.values(), key=lambda one: (one.old is None, one.name, order.index(one.operator))))
-
-
-def _rules(base: Ontology) -> Iterator[Rule]:
-    yield from base.content.enabled_rules
 
 
 def _changed(rule: Rule, body: Sequence[Atom], head: Sequence[Atom], text: str) -> Mutant:
@@ -129,9 +125,35 @@ def _with_atom(rule: Rule, number: int, atom: Atom) -> Mutant:
     return _changed(rule, atoms[: len(rule.body)], atoms[len(rule.body) :], text)
 
 
+def _with_argument(rule: Rule, number: int, place: int, term: Term) -> Mutant:
+    """The rule with another argument in a place of one of its atoms."""
+    atom = rule.atoms[number]
+    return _with_atom(
+        rule, number, replace(atom, arguments=(*atom.arguments[:place], term, *atom.arguments[place + 1 :]))
+    )
+
+
+def _with_value(fact: Triple, value: str | Lit) -> Mutant:
+    """The ontologies with another value in a fact."""
+
+    def shown(value: str | Lit) -> str:
+        return literal_text(value) if isinstance(value, Lit) else local_name(value)
+
+    text = f"{local_name(fact[1])} {shown(fact[2])} becomes {shown(value)}"
+    return Mutant("", text, removed=fact, added=(*fact[:2], value))
+
+
+def _arguments(base: Ontology) -> Iterator[tuple[Rule, int, int, Term]]:
+    """(rule, number of the atom, place in the atom, argument) of all arguments in the enabled rules."""
+    for rule in base.content.enabled_rules:
+        for number, atom in enumerate(rule.atoms):
+            for place, term in enumerate(atom.arguments):
+                yield rule, number, place, term
+
+
 def _comparisons(base: Ontology, change: Callable[[str], str]) -> Iterator[Mutant]:
     """Each comparison with another sign."""
-    for rule in _rules(base):
+    for rule in base.content.enabled_rules:
         for number, atom in enumerate(rule.body):
             if atom.predicate in COMPARISONS:
                 sign = change(COMPARISONS[atom.predicate])
@@ -147,102 +169,73 @@ def _shifted(sign: str) -> str:
 
 
 def _dropped(base: Ontology) -> Iterator[Mutant]:
-    for rule in _rules(base):
+    for rule in base.content.enabled_rules:
         for number, atom in enumerate(rule.body):
             body = (*rule.body[:number], *rule.body[number + 1 :])
             if body:
                 yield _changed(rule, body, rule.head, f"{write_atom(atom)} is left out")
 
 
+def _next(one: _T, alike: Sequence[_T]) -> _T:
+    """The one that follows in a sequence; the first follows the last."""
+    return alike[(alike.index(one) + 1) % len(alike)]
+
+
 def _variables_exchanged(base: Ontology) -> Iterator[Mutant]:
     """Each variable of an atom of the body, exchanged for the next one of the rule that stands for the same kind."""
-    for rule in _rules(base):
-        values = {
-            term
-            for atom in rule.atoms
-            for number, term in enumerate(atom.arguments)
-            if isinstance(term, Variable) and (atom.kind == "builtin" or (atom.kind == "data" and number == 1))
-        }
-        ordered = list(
-            dict.fromkeys(term for atom in rule.atoms for term in atom.arguments if isinstance(term, Variable))
-        )
-        for number, atom in enumerate(rule.body):
-            for place, term in enumerate(atom.arguments):
-                others = [other for other in ordered if other != term and (other in values) == (term in values)]
-                if not isinstance(term, Variable) or not others:
-                    continue
-                following = [other for other in others if ordered.index(other) > ordered.index(term)]
-                arguments = list(atom.arguments)
-                arguments[place] = (following or others)[0]
-                yield _with_atom(rule, number, replace(atom, arguments=tuple(arguments)))
-
-
-def _literals(rule: Rule, places: Sequence[int], known: Mapping[str, Sequence[Lit]]) -> Iterator[Mutant]:
-    """The literals of some atoms of a rule, each exchanged for another one that rules know of the same property."""
-    for number in places:
-        atom = rule.atoms[number]
-        last = atom.arguments[-1]
-        if atom.kind != "data" or not isinstance(last, Lit):
+    for rule, number, place, term in _arguments(base):
+        if number >= len(rule.body) or not isinstance(term, Variable):
             continue
-        if last.datatype == XSD + "boolean":
-            others = [Lit("false" if last.text in ("true", "1") else "true", last.datatype)]
-        else:
-            others = [each for each in known.get(atom.predicate, ()) if each != last and each.datatype == last.datatype]
-        for other in others:
-            yield _with_atom(rule, number, replace(atom, arguments=(*atom.arguments[:-1], other)))
-
-
-def _known_literals(base: Ontology) -> dict[str, list[Lit]]:
-    """Values that rules mention of each data property, without numbers."""
-    found: dict[str, set[Lit]] = {}
-    for rule in _rules(base):
+        is_value: dict[Term, bool] = {}
         for atom in rule.atoms:
-            last = atom.arguments[-1] if atom.arguments else None
-            if atom.kind == "data" and isinstance(last, Lit) and last.datatype not in EXACT:
-                found.setdefault(atom.predicate, set()).add(last)
-    return {name: sorted(values) for name, values in found.items()}
+            for at, each in enumerate(atom.arguments):
+                if isinstance(each, Variable):
+                    is_value[each] = is_value.get(each, False) or atom.takes_value(at)
+        other = _next(term, [each for each in is_value if is_value[each] == is_value[term]])
+        if other != term:
+            yield _with_argument(rule, number, place, other)
 
 
-def _conclusions(base: Ontology) -> Iterator[Mutant]:
-    known = _known_literals(base)
-    for rule in _rules(base):
-        yield from _literals(rule, range(len(rule.body), len(rule.atoms)), known)
+def _literals_exchanged(base: Ontology, *, in_head: bool) -> Iterator[Mutant]:
+    """Each literal of bodies or heads, exchanged for the others that rules mention of the same property."""
+    known: dict[str, set[Lit]] = {}
+    for rule, number, _, term in _arguments(base):
+        if rule.atoms[number].kind == "data" and isinstance(term, Lit) and term.datatype not in EXACT:
+            known.setdefault(rule.atoms[number].predicate, set()).add(term)
+    for rule, number, place, term in _arguments(base):
+        atom = rule.atoms[number]
+        if (number >= len(rule.body)) != in_head or atom.kind != "data" or not isinstance(term, Lit):
+            continue
+        if term.datatype == XSD + "boolean":
+            others = [Lit("false" if term.text in ("true", "1") else "true", term.datatype)]
+        else:
+            there = sorted(known.get(atom.predicate, ()))
+            others = [each for each in there if each != term and each.datatype == term.datatype]
+        for other in others:
+            yield _with_argument(rule, number, place, other)
 
 
 def _statuses(base: Ontology) -> Iterator[Mutant]:
-    known = _known_literals(base)
-    for rule in _rules(base):
-        yield from _literals(rule, range(len(rule.body)), known)
-    yield from _operators_of_attributes(base)
-
-
-def _operators_of_attributes(base: Ontology) -> Iterator[Mutant]:
-    """The comparison operator of each quality attribute, turned."""
-    for triple in base.content.triples:
-        subject, predicate, value = triple
-        if predicate == TOMASYS + "qa_comparison_operator" and isinstance(value, Lit):
-            yield _data(triple, (subject, predicate, Lit(mirrored(value.text), value.datatype)))
+    """Each literal of a body exchanged, and the comparison operator of each quality attribute turned."""
+    yield from _literals_exchanged(base, in_head=False)
+    for fact in base.content.triples:
+        if fact[1] == TOMASYS + "qa_comparison_operator" and isinstance(fact[2], Lit):
+            yield _with_value(fact, fact[2]._replace(text=mirrored(fact[2].text)))
 
 
 def _removed(base: Ontology) -> Iterator[Mutant]:
-    for rule in _rules(base):
+    for rule in base.content.enabled_rules:
         yield Mutant("", "the rule is removed", rule)
 
 
 def _moved(base: Ontology) -> Iterator[Mutant]:
     """Each number of a rule, and each value of an individual, moved up and down by a tenth."""
-    for rule in _rules(base):
-        for number, atom in enumerate(rule.atoms):
-            for place, term in enumerate(atom.arguments):
-                if isinstance(term, Lit) and term.datatype in EXACT:
-                    for moved in _tenths(term):
-                        arguments = (*atom.arguments[:place], moved, *atom.arguments[place + 1 :])
-                        yield _with_atom(rule, number, replace(atom, arguments=arguments))
-    for triple in base.content.triples:
-        subject, predicate, value = triple
-        if predicate == HAS_VALUE and isinstance(value, Lit):
-            for moved in _tenths(value):
-                yield _data(triple, (subject, predicate, moved))
+    for rule, number, place, term in _arguments(base):
+        if isinstance(term, Lit) and term.datatype in EXACT:
+            yield from (_with_argument(rule, number, place, moved) for moved in _tenths(term))
+    for fact in base.content.triples:
+        if fact[1] == HAS_VALUE and isinstance(fact[2], Lit):
+            yield from (_with_value(fact, moved) for moved in _tenths(fact[2]))
 
 
 def _tenths(value: Lit) -> Iterator[Lit]:
@@ -252,14 +245,6 @@ def _tenths(value: Lit) -> Iterator[Lit]:
         yield Lit(format(moved.normalize(), "f"), XSD + "decimal")
 
 
-def _data(removed: Triple, added: Triple) -> Mutant:
-    def shown(value: str | Lit) -> str:
-        return literal_text(value) if isinstance(value, Lit) else local_name(value)
-
-    text = f"{local_name(removed[1])} {shown(removed[2])} becomes {shown(added[2])}"
-    return Mutant("", text, removed=removed, added=added)
-
-
 def _individuals(base: Ontology) -> Iterator[Mutant]:
     """Each individual that a rule names, and each one that a fact leads to, exchanged for the next of its class."""
     classes: dict[str, list[str]] = {}
@@ -267,25 +252,18 @@ def _individuals(base: Ontology) -> Iterator[Mutant]:
         if predicate == RDF_TYPE and isinstance(value, str) and not value.startswith(LANGUAGE_NAMESPACES):
             classes.setdefault(value, []).append(subject)
 
-    def next_one(iri: str) -> str | None:
-        for members in classes.values():
-            if iri in members and len(members) > 1:
-                return members[(members.index(iri) + 1) % len(members)]
-        return None
+    def other(iri: str) -> str | None:
+        groups = (members for members in classes.values() if iri in members and len(members) > 1)
+        return next((_next(iri, members) for members in groups), None)
 
-    for rule in _rules(base):
-        for number, atom in enumerate(rule.atoms):
-            for place, term in enumerate(atom.arguments):
-                other = next_one(term.iri) if isinstance(term, Named) else None
-                if other is not None:
-                    arguments: tuple[Term, ...] = (*atom.arguments[:place], Named(other), *atom.arguments[place + 1 :])
-                    yield _with_atom(rule, number, replace(atom, arguments=arguments))
-    for triple in base.content.triples:
-        subject, predicate, value = triple
-        if isinstance(value, str) and (predicate in _LINKS or predicate.endswith("requiredBy")):
-            other = next_one(value)
-            if other is not None:
-                yield _data(triple, (subject, predicate, other))
+    for rule, number, place, term in _arguments(base):
+        if isinstance(term, Named) and (exchanged := other(term.iri)) is not None:
+            yield _with_argument(rule, number, place, Named(exchanged))
+    for fact in base.content.triples:
+        if isinstance(fact[2], str) and (fact[1] in _LINKS or fact[1].endswith("requiredBy")):
+            exchanged = other(fact[2])
+            if exchanged is not None:
+                yield _with_value(fact, exchanged)
 
 
 #: Kinds of changes, by name.
@@ -295,7 +273,7 @@ OPERATORS: Final[Mapping[str, Callable[[Ontology], Iterator[Mutant]]]] = Mapping
         "comparison shifted": partial(_comparisons, change=_shifted),
         "atom dropped": _dropped,
         "variable exchanged": _variables_exchanged,
-        "conclusion changed": _conclusions,
+        "conclusion changed": partial(_literals_exchanged, in_head=True),
         "rule removed": _removed,
         "threshold moved": _moved,
         "status exchanged": _statuses,
