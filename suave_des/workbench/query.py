@@ -14,20 +14,16 @@ from rdflib.namespace import RDFS
 from suave_des.errors import InputError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import InProcessPellet
-from suave_des.knowledge.rdf import MROS, OWL, RDF, SUAVE, SWRL, TOMASYS, XSD, Triple, n_triple
+from suave_des.knowledge.rdf import Triple, n_triple
+from suave_des.knowledge.rules.parser import PREFIXES
 from suave_des.knowledge.state import KnowledgeState
 
 _UNNAMED: Final = re.compile(r"(?<![^\s])_:([A-Za-z0-9]+)(?=\s)")
-_PREFIXES: Final = {
-    "suave": SUAVE,
-    "tomasys": TOMASYS,
-    "mros": MROS,
-    "rdf": RDF,
-    "rdfs": str(RDFS),
-    "owl": OWL,
-    "xsd": XSD,
-    "swrl": SWRL,
-}
+#: SELECT * as the first SELECT.
+_ALL_VARIABLES: Final = re.compile(
+    r"\A(?:(?!\bselect\b).)*select(\s+(distinct|reduced))?\s*\*", re.IGNORECASE | re.DOTALL
+)
+_PREFIXES: Final = {name: PREFIXES[name] for name in ("suave", "tomasys", "mros", "rdf", "rdfs", "owl", "xsd", "swrl")}
 
 
 @dataclass(frozen=True)
@@ -108,10 +104,12 @@ def answer(graph: rdflib.Graph, text: str) -> QueryResult:
         if result.type == "ASK":
             return QueryResult(("answer",), ((str(result.askAnswer).lower(),),))
         if result.type == "SELECT":
-            columns = tuple(map(str, result.vars or ()))
-            rows = [tuple(_text(graph, cell) for cell in row) for row in result]  # type: ignore[union-attr]
+            columns = list(map(str, result.vars or ()))
+            if _ALL_VARIABLES.search(text):  # which rdflib returns in any order
+                columns.sort(key=re.findall(r"[?$](\w+)", text).index)
+            rows = [tuple(_text(graph, row[name]) for name in columns) for row in result]  # type: ignore
             ordered = "OrderBy" in str(query.algebra)
-            return QueryResult(columns, tuple(rows if ordered else sorted(rows, key=_sortable)))
+            return QueryResult(tuple(columns), tuple(rows if ordered else sorted(rows, key=_sortable)))
         triples = [tuple(_text(graph, term) for term in triple) for triple in result.graph or ()]
         return QueryResult(("subject", "predicate", "object"), tuple(sorted(triples, key=_sortable)))
     except InputError:

@@ -34,6 +34,11 @@ def test_answers_are_the_same_each_time():
     assert all(first)
 
 
+def test_columns_of_all_variables_are_in_the_order_of_the_query(bench):
+    found = bench.query("SELECT  * WHERE { ?zone suave:on ?a ; suave:to ?m . ?b suave:of ?z1, ?c, [] }")
+    assert found.columns == ("zone", "a", "m", "b", "z1", "c")
+
+
 def test_no_answer_is_told(command):
     assert command("query", "SELECT ?d WHERE { ?d tomasys:solvsF ?f }")[:2] == (0, "d\nno rows\n")
 
