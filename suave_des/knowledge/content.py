@@ -36,6 +36,7 @@ from suave_des.knowledge.rdf import (
     local_name,
     n_triple,
     n_triple_with_nodes,
+    reached,
     term_of,
 )
 from suave_des.knowledge.rules.rdf import rules_of
@@ -95,12 +96,11 @@ class Content:
 
     def decision_terms(self) -> Terms:
         """Terms on which decisions depend, and terms that rules assert, with super-properties and inverses."""
-        wanted = set(self.head_properties()) | set(DECISION_PROPERTIES)
         both_ways = (OWL + "inverseOf", OWL + "equivalentProperty")
-        edges = [(s, o) for s, p, o in self.triples if p in (RDFS + "subPropertyOf", *both_ways)]
-        edges += [(o, s) for s, p, o in self.triples if p in both_ways and isinstance(o, str)]
-        while more := {str(end) for start, end in edges if start in wanted} - wanted:
-            wanted |= more
+        related = [(s, p, o) for s, p, o in self.triples if isinstance(o, str)]
+        edges = [(s, o) for s, p, o in related if p in (RDFS + "subPropertyOf", *both_ways)]
+        edges += [(o, s) for s, p, o in related if p in both_ways]
+        wanted = reached((*self.head_properties(), *DECISION_PROPERTIES), edges)
         return Terms(_named(wanted), tuple(sorted(self.head_classes())))
 
     def all_terms(self) -> Terms:

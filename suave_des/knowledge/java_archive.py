@@ -33,7 +33,6 @@ MAX_FILES: Final = 6
 #: Another attempt to make an archive is made after this time.
 AGAIN_AFTER_S: Final = 86400.0
 _MAKING_S: Final = 600.0
-_started: Final[list[subprocess.Popen[bytes]]] = []  # so that Python does not wait for them
 
 #: What training runs begin with: the shipped ontology, and a state.
 _STATE: Final = """
@@ -107,7 +106,6 @@ def make_later(archive: Path | None, reasoner: str = "pellet") -> None:
         # A session of its own: Ctrl-C is meant for the command that the user runs.
         making = subprocess.Popen(command, stdin=silent, stdout=silent, stderr=silent, start_new_session=True)
         making.returncode = 0  # it is not waited for, and Python shall not warn of that
-        _started.append(making)
     except OSError:  # another process was first, or the folder cannot be written to
         return
 

@@ -26,6 +26,7 @@ from suave_des.knowledge.rdf import (
     is_fact,
     local_name,
     namespace,
+    reached,
     value_of,
 )
 from suave_des.knowledge.state import KnowledgeState, Value, grounding_name, measurement_name, objective_name
@@ -254,10 +255,8 @@ def with_operators(content: Content, model: Model, operators: Mapping[str, str])
 
 def _members(triples: Iterable[Triple], name: str) -> set[str]:
     """Individuals of a class of TOMASys or of its subclasses."""
-    classes = {TOMASYS + name}
-    below = [(s, o) for s, p, o in triples if p == RDFS + "subClassOf"]
-    while more := {child for child, parent in below if parent in classes} - classes:
-        classes |= more
+    below = ((str(o), s) for s, p, o in triples if p == RDFS + "subClassOf")
+    classes = reached([TOMASYS + name], below)
     return {s for s, p, o in triples if p == RDF_TYPE and o in classes}
 
 

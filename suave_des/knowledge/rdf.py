@@ -12,7 +12,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from decimal import Decimal, InvalidOperation
-from typing import Final, NamedTuple, overload
+from typing import Final, NamedTuple, TypeVar, overload
 
 from rdflib import BNode, Literal
 from rdflib.term import Node
@@ -92,6 +92,7 @@ Triple = tuple[str, str, str | Lit]
 #: A triple of rdflib, perhaps with blank nodes.
 RdfTriple = tuple[Node, Node, Node]
 
+_T = TypeVar("_T")
 _WHOLE: Final = (
     *("integer", "int", "long", "short", "byte"),
     *("nonNegativeInteger", "positiveInteger", "nonPositiveInteger", "negativeInteger"),
@@ -104,7 +105,8 @@ NUMERIC: Final = EXACT | {XSD + "float", XSD + "double"}
 _DECIMAL: Final = re.compile(r"([+-]?)(?=\.?[0-9])([0-9]*)\.?([0-9]*)")
 _WHOLE_NUMBER: Final = re.compile(r"[+-]?[0-9]{1,400}")
 _FLOAT: Final = re.compile(r"[+-]?(?=\.?[0-9])[0-9]*\.?[0-9]*(?:[eE][+-]?[0-9]+)?")
-_ESCAPES: Final = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"})
+#: Escapes in texts between quotes, of N-Triples and of rules.
+ESCAPES: Final = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"})
 
 
 def literal(term: Literal) -> Lit:
@@ -160,7 +162,7 @@ def _written(value: str | Lit) -> str:
     if isinstance(value, str):
         return f"<{value}>"
     value = for_pellet(value)
-    text = "".join(char if char.isascii() else f"\\U{ord(char):08X}" for char in value.text.translate(_ESCAPES))
+    text = "".join(char if char.isascii() else f"\\U{ord(char):08X}" for char in value.text.translate(ESCAPES))
     return f'"{text}"{value.datatype}' if value.datatype.startswith("@") else f'"{text}"^^<{value.datatype}>'
 
 
@@ -206,6 +208,14 @@ class Names:
         return iri if iri in self._long else local_name(iri)
 
 
+def reached(start: Iterable[_T], steps: Iterable[tuple[_T, _T]]) -> set[_T]:
+    """Find what steps, from one thing to another, lead to from a start, which is among it."""
+    found, pairs = set(start), list(steps)
+    while more := {other for one, other in pairs if one in found} - found:
+        found |= more
+    return found
+
+
 def value_of(value: str | Lit, names: Names) -> Value:
     """Convert the object of a triple: to a short name, a number, a truth value or text."""
     if isinstance(value, str):
@@ -226,10 +236,13 @@ def is_fact(triple: Triple) -> bool:
     return isinstance(term, str) and not term.startswith(LANGUAGE_NAMESPACES)
 
 
+def fact_of(triple: Triple, names: Names) -> Fact:
+    """Convert a triple that describes an individual."""
+    subject, predicate, value = triple
+    name = "type" if predicate == RDF_TYPE else names.short(predicate)
+    return Fact(names.short(subject), name, value_of(value, names))
+
+
 def facts_of(triples: Iterable[Triple], names: Names) -> Iterator[Fact]:
     """Convert the triples that describe individuals."""
-    for triple in triples:
-        if is_fact(triple):
-            subject, predicate, value = triple
-            name = "type" if predicate == RDF_TYPE else names.short(predicate)
-            yield Fact(names.short(subject), name, value_of(value, names))
+    return (fact_of(triple, names) for triple in triples if is_fact(triple))

@@ -17,7 +17,7 @@ from math import inf
 from typing import Any, Final
 
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import HAS_VALUE, OWL, RDF_TYPE, RDFS, XSD, Lit, local_name
+from suave_des.knowledge.rdf import HAS_VALUE, OWL, RDF_TYPE, RDFS, XSD, Lit, local_name, reached
 from suave_des.knowledge.rules.syntax import COMPARISONS, EXPRESSION, Rule, Variable
 from suave_des.knowledge.state import MAX_EXPONENT, KnowledgeState
 
@@ -80,8 +80,7 @@ class Regions:
         measured = state.measurements
         if self.reasons:
             return state.objectives, state.groundings, state.components, measured
-        thresholds = self.thresholds
-        where = [(name, bisect_left(thresholds, value) + bisect_right(thresholds, value)) for name, value in measured]
+        where = [(name, self.region(value)) for name, value in measured]
         if len(measured) > 1 and len({number for _, number in where}) < len(where):
             return state.objectives, state.groundings, state.components, _ranked(state, where)
         return state.objectives, state.groundings, state.components, tuple(where)
@@ -107,11 +106,8 @@ def regions_of(ontology: Ontology) -> Regions:
 
 def _carriers(ontology: Ontology) -> frozenset[str]:
     """Properties that can have a measured value: hasValue, and properties that it implies."""
-    found = {HAS_VALUE}
-    pairs = [{s, o} for s, p, o in ontology.content.triples if p in _SAME_VALUES and isinstance(o, str)]
-    while more := set[str]().union(*(pair for pair in pairs if pair & found)) - found:
-        found |= more
-    return frozenset(found)
+    pairs = [(s, o) for s, p, o in ontology.content.triples if p in _SAME_VALUES and isinstance(o, str)]
+    return frozenset(reached([HAS_VALUE], [*pairs, *((o, s) for s, o in pairs)]))
 
 
 def _of_rules(ontology: Ontology, carriers: frozenset[str]) -> Iterator[str]:

@@ -14,7 +14,7 @@ from rdflib.term import Node
 
 from suave_des.errors import InputError, number_of
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import RDF_TYPE, Lit, Triple, facts_of, is_fact, local_name, term_of
+from suave_des.knowledge.rdf import RDF_TYPE, Lit, Triple, fact_of, is_fact, local_name, term_of
 from suave_des.knowledge.rules.writer import literal_text
 from suave_des.workbench.policy.cases import Policy, PolicyCase, no_proof
 from suave_des.workbench.ranges import ValueRange
@@ -69,7 +69,7 @@ def axioms_of(base: Ontology) -> Iterator[str]:
 
 def _triple(base: Ontology, triple: Triple) -> str:
     if is_fact(triple):
-        return str(next(facts_of([triple], base.names)))
+        return str(fact_of(triple, base.names))
     subject, predicate, value = triple
     shown = literal_text(value) if isinstance(value, Lit) else base.names.short(value)
     if predicate == RDF_TYPE:

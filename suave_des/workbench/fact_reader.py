@@ -8,7 +8,7 @@ from typing import Final
 
 from suave_des.errors import InputError, nearest, shown
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, facts_of, local_name
+from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, fact_of, local_name
 from suave_des.knowledge.rules.parser import parse_rule
 from suave_des.knowledge.rules.syntax import Atom, Named, RuleError, Term, Variable
 from suave_des.knowledge.state import Fact
@@ -67,7 +67,7 @@ class FactReader:
 
     def fact(self, text: str) -> Fact:
         """Read one fact, in the form in which inferences have it."""
-        return next(facts_of([self.triple(text)], self.base.names))
+        return fact_of(self.triple(text), self.base.names)
 
     def _predicate(self, name: str, kinds: tuple[str, ...]) -> tuple[str, str]:
         vocabulary = self.base.vocabulary

@@ -91,16 +91,13 @@ class TimeLimit:
 
     def exceeded(self, doing: str, rules: Iterable[Rule] = ()) -> KnowledgeError:
         """Make the error for work that took too long."""
-        more = f", or allow more with {self._option}" if self._option else ""
-        problem, remedy = (
-            f"{doing}: not done after {self.seconds:g} s",
-            "look for a rule that matches too many combinations",
-        )
+        problem = f"{doing}: not done after {self.seconds:g} s"
         for rule in recursing_rules(rules):
             problem += f"; rule {rule.name} computes ever new values from what it concludes itself"
             remedy = f"give rule {rule.name} another property to conclude, or a bound in its body"
             return KnowledgeError(problem, file=rule.file, place=rule.place, remedy=remedy)
-        return KnowledgeError(problem, remedy=f"{remedy}{more}")
+        more = f", or allow more with {self._option}" if self._option else ""
+        return KnowledgeError(problem, remedy=f"look for a rule that matches too many combinations{more}")
 
 
 class _ReasonerThread(threading.Thread):

@@ -27,7 +27,7 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import unescape
 from suave_des.knowledge.pellet.java import SHORT_LIVED, java_executable, launcher_environment
 from suave_des.knowledge.rdf import RDF as RDF_IRI
-from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, n_triple, term_of
+from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, n_triple, reached, term_of
 
 _PLAIN: Final = RDF_IRI + "PlainLiteral"
 _STATE_IRI: Final = "urn:suave-des:state"
@@ -92,15 +92,9 @@ def _value(term: Node) -> str | Lit:
 
 def _below(graph: Any, name: str) -> set[Node]:
     """A class with all its subclasses: the reasoner returns only the nearest classes of an individual."""
-    found: set[Node] = {URIRef(name)}
-    waiting = list(found)
-    while waiting:
-        kind = waiting.pop()
-        below = {*graph.subjects(RDFS.subClassOf, kind), *graph.subjects(OWL.equivalentClass, kind)}
-        below |= set(graph.objects(kind, OWL.equivalentClass))
-        waiting += below - found
-        found |= below
-    return found
+    same = list(graph.subject_objects(OWL.equivalentClass))
+    below = ((upper, lower) for lower, upper in [*graph.subject_objects(RDFS.subClassOf), *same])
+    return reached([URIRef(name)], [*same, *below])
 
 
 def _reason(world: owlready2.World) -> bool:

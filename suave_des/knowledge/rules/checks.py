@@ -13,7 +13,7 @@ from operator import gt, lt
 from typing import Final
 
 from suave_des.errors import KnowledgeError, nearest
-from suave_des.knowledge.rdf import NUMERIC, OWL, RDF_TYPE, XSD, Lit, Triple, local_name
+from suave_des.knowledge.rdf import NUMERIC, OWL, RDF_TYPE, XSD, Lit, Triple, local_name, reached
 from suave_des.knowledge.rules.names import Vocabulary
 from suave_des.knowledge.rules.syntax import (
     BUILTINS,
@@ -290,18 +290,12 @@ def _computed(builtins: Iterable[Atom], bound: set[str]) -> set[str]:
 def recursing_rules(rules: Iterable[Rule]) -> list[Rule]:
     """Find rules whose computed values feed back, through any rules, into their own computation."""
     enabled = [rule for rule in rules if rule.enabled]
-    follows: dict[str, set[str]] = {}  # properties and classes that a rule concludes from one
-    for rule in enabled:
-        for atom in rule.body:
-            follows.setdefault(atom.predicate, set()).update(head.predicate for head in rule.head)
-    found = []
-    for rule in enabled:
-        reached = _computed_properties(rule)
-        while more := set[str]().union(*(follows.get(name, ()) for name in reached)) - reached:
-            reached |= more
-        if any(atom.predicate in reached for atom in rule.body):
-            found.append(rule)
-    return found
+    steps = {(atom.predicate, head.predicate) for rule in enabled for atom in rule.body for head in rule.head}
+    return [
+        rule
+        for rule in enabled
+        if not reached(_computed_properties(rule), steps).isdisjoint(atom.predicate for atom in rule.body)
+    ]
 
 
 def _computed_properties(rule: Rule) -> set[str]:

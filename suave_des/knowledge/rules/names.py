@@ -136,7 +136,7 @@ def rule_from_text(parsed: ParsedRule, vocabulary: Vocabulary, file: Path) -> Ru
         RuleError: a name is unknown or ambiguous; with line and column.
     """
     body, head = (tuple(_resolved(atom, vocabulary, file) for atom in side) for side in (parsed.body, parsed.head))
-    text = line_of_rule(body, head).name
+    text, _, _ = line_of_rule(body, head)
     place = f"line {parsed.place.line}"
     return with_triples(Rule(parsed.name, text, file, parsed.enabled, BNode(), (), body, head, place))
 

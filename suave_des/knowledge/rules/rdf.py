@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -52,11 +53,11 @@ def rules_of(file: OntologyFile) -> tuple[Rule, ...]:
 def _read_rules(path: Path, graph: Graph) -> tuple[Rule, ...]:
     found = sorted(
         ((line_of_rule(*_sides(graph, node)), node) for node in graph.subjects(RDF.type, IMP)),
-        key=lambda rule: (rule[0].name, str(rule[1])),
+        key=lambda rule: (rule[0][0], str(rule[1])),
     )
     unnamed = 0
     rules = []
-    for line, node in found:
+    for (text, body, head), node in found:
         label = graph.value(node, RDFS.label)
         name = str(label) if label is not None else local_name(str(node))
         if label is None and isinstance(node, BNode):
@@ -65,13 +66,13 @@ def _read_rules(path: Path, graph: Graph) -> tuple[Rule, ...]:
         rules.append(
             Rule(
                 name=name,
-                text=line.name,
+                text=text,
                 file=path,
                 enabled=str(graph.value(node, _ENABLED)).strip().lower() not in ("false", "0"),
                 node=node,
                 triples=tuple(_closure(graph, node)),
-                body=line.body,
-                head=line.head,
+                body=body,
+                head=head,
             )
         )
     return tuple(sorted(rules, key=lambda rule: (rule.name, rule.text)))
@@ -99,13 +100,9 @@ def _is_part_of_rule(graph: Graph, node: Node) -> bool:
 
 def _items(graph: Graph, start: Node | None) -> Iterator[Node]:
     """Items of a list; one that leads back into itself ends there."""
-    seen: set[Node] = set()
-    while start is not None and start != RDF.nil and start not in seen:
-        seen.add(start)
-        item = graph.value(start, RDF.first)
-        if item is not None:
-            yield item
-        start = graph.value(start, RDF.rest)
+    if start is not None:
+        with suppress(ValueError):
+            yield from graph.items(start)
 
 
 def _sides(graph: Graph, rule: Node) -> list[tuple[Atom, ...]]:

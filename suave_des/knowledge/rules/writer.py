@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Final
 
-from suave_des.knowledge.rdf import SWRLB, XSD, Lit, local_name, namespace
+from suave_des.knowledge.rdf import ESCAPES, SWRLB, XSD, Lit, local_name, namespace
 from suave_des.knowledge.rules.parser import PREFIXES
-from suave_des.knowledge.rules.syntax import Atom, Named, ParsedRule, Place, Term, Variable
+from suave_des.knowledge.rules.syntax import Atom, Named, Place, Term, Variable
 
 _WORD: Final = re.compile(r"[^\W\d](?:[\w.-]*\w)?")
 #: Literals without quotes, by the datatype that the parser gives them.
@@ -19,7 +19,6 @@ _BARE: Final = {
     XSD + "decimal": re.compile(r"[+-]?(?:[0-9]+\.[0-9]*|\.[0-9]+)"),
     XSD + "double": re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)[eE][+-]?[0-9]{1,4}"),
 }
-_ESCAPES: Final = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"}
 #: Gives the text of an IRI.
 Naming = Callable[[str], str]
 
@@ -59,12 +58,8 @@ def write_rule(name: str, body: Sequence[Atom], head: Sequence[Atom], named: Nam
     return f"{start}\n    " + "\n    ^ ".join(sides[0]) + "\n    -> " + "\n    ^ ".join(sides[1]) + "\n"
 
 
-def line_of_rule(body: Sequence[Atom], head: Sequence[Atom]) -> ParsedRule:
-    """Write a rule on one line, body -> head.
-
-    Returns:
-        a rule whose name is that text, and whose atoms have their places in it.
-    """
+def line_of_rule(body: Sequence[Atom], head: Sequence[Atom]) -> tuple[str, tuple[Atom, ...], tuple[Atom, ...]]:
+    """Write a rule on one line, body -> head; also return body and head with the places of their atoms in it."""
     text = ""
     placed: list[list[Atom]] = [[], []]
     for side, atoms in enumerate((body, head)):
@@ -78,7 +73,7 @@ def line_of_rule(body: Sequence[Atom], head: Sequence[Atom]) -> ParsedRule:
                 text += _term(argument, local_name)
             text += ")"
             placed[side].append(replace(atom, places=tuple(places)))
-    return ParsedRule(text, tuple(placed[0]), tuple(placed[1]))
+    return text, tuple(placed[0]), tuple(placed[1])
 
 
 def write_atom(atom: Atom, named: Naming = local_name) -> str:
@@ -106,7 +101,7 @@ def _term(term: Term, named: Naming) -> str:
 
 
 def _quoted(text: str) -> str:
-    return '"' + "".join(_ESCAPES.get(char, char) for char in text) + '"'
+    return f'"{text.translate(ESCAPES)}"'
 
 
 def distinct_variables(atoms: Iterable[Atom]) -> dict[str, str]:

@@ -13,7 +13,7 @@ from math import comb
 from typing import Final
 
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import OWL, RDFS, TOMASYS, XSD, Lit, Triple
+from suave_des.knowledge.rdf import OWL, RDFS, TOMASYS, XSD, Lit, Triple, reached
 from suave_des.knowledge.rules.syntax import COMPARISONS, Atom, Named, Rule, Variable
 from suave_des.monitor.diagnostics import FAILED, RECOVERED
 from suave_des.workbench.ranges import numbers_in
@@ -57,20 +57,10 @@ def has_effect(base: Ontology, attribute: str) -> bool:
     ):
         return True
     # The classes of the individual: QAvalue, what the domains of its properties say, and all above.
-    classes = {TOMASYS + "QAvalue", OWL + "Thing"}
-    while True:
-        more = {
-            value
-            for subject, predicate, value in triples
-            if isinstance(value, str)
-            and (
-                (predicate == RDFS + "domain" and subject in _OF_VALUES)
-                or (predicate in (RDFS + "subClassOf", OWL + "equivalentClass") and subject in classes)
-            )
-        }
-        if more <= classes:
-            return any(_can_match(rule, iri, measured.iri, classes) for rule in base.content.enabled_rules)
-        classes |= more
+    domains = {str(o) for s, p, o in triples if p == RDFS + "domain" and s in _OF_VALUES}
+    above = ((s, str(o)) for s, p, o in triples if p in (RDFS + "subClassOf", OWL + "equivalentClass"))
+    classes = reached({TOMASYS + "QAvalue", OWL + "Thing", *domains}, above)
+    return any(_can_match(rule, iri, measured.iri, classes) for rule in base.content.enabled_rules)
 
 
 def _can_match(rule: Rule, attribute: str, measured: str, classes: set[str]) -> bool:

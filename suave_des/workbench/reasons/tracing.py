@@ -25,7 +25,7 @@ from suave_des.knowledge.pellet.in_process import (
     read_term,
     trace_contradiction,
 )
-from suave_des.knowledge.rdf import OWL, RDF_TYPE, Lit, Triple, canonical, facts_of, is_fact, n_triple
+from suave_des.knowledge.rdf import OWL, RDF_TYPE, Lit, Triple, canonical, fact_of, is_fact, n_triple
 from suave_des.knowledge.rules.syntax import Atom, AtomKind, Rule
 from suave_des.knowledge.state import Fact, KnowledgeState, Value
 from suave_des.workbench.reasons.matching import Binding, Facts, matched, shown_bindings
@@ -315,7 +315,7 @@ class Tracer:
         return Derivation(self._fact(triple), "state" if triple in self.situation else "ontology")
 
     def _fact(self, triple: Triple) -> Fact:
-        return next(facts_of([triple], self.base.names))
+        return fact_of(triple, self.base.names)
 
 
 def pellet_for(base: Ontology) -> InProcessPellet:
