@@ -93,6 +93,12 @@ class OntologyFile:
                 return number
         return None
 
+    def line_of_rule(self, name: str) -> int | None:
+        """The line of a rule's label, else the first line that describes a thing of its name."""
+        text = text_of(self.content)
+        found = re.search(rf"label[^<>]*>\s*{re.escape(name)}\s*<", text)
+        return self.line_of(name) if found is None else text.count("\n", 0, found.start()) + 1
+
 
 def place_of(name: str, sources: Sequence[OntologyFile]) -> tuple[Path, int | None]:
     """Find the file and line that describe the thing of a name; the first file, where none does."""

@@ -14,7 +14,7 @@ from typing import Final
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import PERFORMANCE
+from suave_des.knowledge.rdf import PERFORMANCE, local_name
 from suave_des.knowledge.state import (
     UNGROUNDED,
     Decision,
@@ -28,6 +28,7 @@ from suave_des.knowledge.state import (
 
 #: Performance of a design for which none is given.
 DEFAULT_PERFORMANCE: Final = Decimal("0.001")
+_PERFORMANCE: Final = local_name(PERFORMANCE)
 #: Statuses that call for adaptation, besides all that start with IN_ERROR_; the last three occur in older files.
 _CALLING: Final = frozenset({UNGROUNDED, "INTERNAL_ERROR", "EXTERNAL_ERROR", "UPDATABLE"})
 _COMPARE: Final[Mapping[str, Callable[[Decimal, Decimal], bool]]] = MappingProxyType(
@@ -85,7 +86,7 @@ def _decide(ontology: Ontology, inference: Inference, function: str, call: str) 
     designs = [name for name in inference.subjects("solvesF", function) if name in ontology.model.designs]
     objections = {design: next(_objections(inference, design, function), None) for design in designs}
     rejected = tuple(Rejection(design, reason) for design, reason in objections.items() if reason is not None)
-    left = {design: performance(ontology, inference, design) for design, reason in objections.items() if reason is None}
+    left = {design: performance(inference, design) for design, reason in objections.items() if reason is None}
     if not left:
         present = inference.state.grounded(function)
         kept = f"{present} is kept" if present else "it stays ungrounded"
@@ -134,7 +135,7 @@ def _values(inference: Inference, subject: str, property_name: str) -> Iterator[
 def _expected(inference: Inference, design: str, attribute: str) -> list[Decimal]:
     """Expected values of one quality attribute; a missing performance is the default, as in the choice."""
     found = [value for name, value in _values(inference, design, "hasQAestimation") if name == attribute]
-    return found or ([DEFAULT_PERFORMANCE] if attribute == "performance" else [])
+    return found or ([DEFAULT_PERFORMANCE] if attribute == _PERFORMANCE else [])
 
 
 def _operators(inference: Inference, attribute: str) -> list[str]:
@@ -142,11 +143,9 @@ def _operators(inference: Inference, attribute: str) -> list[str]:
     return [sign for sign in map(str, inference.values(attribute, "qa_comparison_operator")) if sign in _COMPARE]
 
 
-def performance(ontology: Ontology, inference: Inference, design: str) -> Decimal:
+def performance(inference: Inference, design: str) -> Decimal:
     """The design's expected performance, which the planner maximises."""
-    name = ontology.names.short(PERFORMANCE)
-    found = (value for kind, value in _values(inference, design, "hasQAestimation") if kind == name)
-    return max(found, default=DEFAULT_PERFORMANCE)
+    return max(_expected(inference, design, _PERFORMANCE))
 
 
 def _show(value: Decimal, digits: int = 2) -> str:

@@ -196,7 +196,7 @@ class _Explainer:
             for name in base.designs(decision.function):
                 is_chosen = name == decision.design
                 verdict = "chosen" if is_chosen else "left out" if name in rejected else "not the best"
-                expected = float(performance(base, inference, name))
+                expected = float(performance(inference, name))
                 designs.append(Design(name, verdict, expected, rejected.get(name, "")))
             designs.sort(key=lambda each: (-each.performance, each.name))
             before = inference.state.grounded(decision.function)

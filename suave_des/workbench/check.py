@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -188,19 +187,10 @@ def _about(
 ) -> Finding:
     """Make a finding about a rule, with the line where it begins, or where an atom of it is."""
     if rule.place is None:
-        line = _line_in_ontology(rule.name, sources.get(rule.file))
+        line = sources[rule.file].line_of_rule(rule.name) if rule.file in sources else None
     else:
         line = int(rule.place.removeprefix("line ")) if at is None else at.line
     return Finding(level, message, str(rule.file), line, rule.name, at.column if at else None, remedy)
-
-
-def _line_in_ontology(name: str, source: OntologyFile | None) -> int | None:
-    """The line of a rule's label, else that of the first thing of its name."""
-    if source is None:
-        return None
-    text = source.content.decode("utf-8", "replace")
-    found = re.search(rf"label[^<>]*>\s*{re.escape(name)}\s*<", text)
-    return source.line_of(name) if found is None else text.count("\n", 0, found.start()) + 1
 
 
 def _ask_pellet(subject: Subject, before: Sequence[Finding]) -> Iterator[Finding]:

@@ -44,6 +44,14 @@ class Situation:
     facts: tuple[Triple, ...] = ()
     ranges: str = ""
 
+    def assertions(self, base: Ontology) -> tuple[Triple, ...]:
+        """What it asserts besides the ontologies."""
+        return *base.assertions(self.state), *self.facts
+
+    def asserted(self, base: Ontology) -> Iterator[Fact]:
+        """The same, as facts."""
+        return facts_of(self.assertions(base), base.names)
+
 
 class Entailed(NamedTuple):
     """What Pellet adds to a situation: inferred facts, and numbers of the conjunctions that hold."""
@@ -146,7 +154,7 @@ class Prover:
             facts = self.entailed(situation).facts
         except ContradictionError as error:
             return Outcome(None, error.problem.removeprefix("contradiction: "))
-        inference = Inference(situation.state, lambda _: self._asserted(situation), facts)
+        inference = Inference(situation.state, lambda _: self.base.facts.union(situation.asserted(self.base)), facts)
         return Outcome(Conclusion(inference, plan(self.base, inference, improve_exceeded=self.improves_exceeded)))
 
     def entailed(self, situation: Situation) -> Entailed:
@@ -159,10 +167,10 @@ class Prover:
         found = self.known.get(situation)
         if found is None:
             try:
-                assertions, names = self._assertions(situation), self.base.names
-                triples = self._infer(assertions, situation.state)
-                facts = frozenset(facts_of((each for each in triples if not each[0].startswith(_PROBE)), names))
-                found = Entailed(facts.difference(self.base.facts, facts_of(assertions, names)), _holding(triples))
+                triples = self._infer(situation.assertions(self.base), situation.state)
+                others = (each for each in triples if not each[0].startswith(_PROBE))
+                facts = frozenset(facts_of(others, self.base.names))
+                found = Entailed(facts.difference(self.base.facts, situation.asserted(self.base)), _holding(triples))
             except ContradictionError as error:
                 found = error
             self.known[situation] = found
@@ -177,7 +185,7 @@ class Prover:
             KnowledgeError: Pellet takes too long.
         """
         try:
-            return _holding(self._infer(self._assertions(situation), situation.state))
+            return _holding(self._infer(situation.assertions(self.base), situation.state))
         except ContradictionError:
             return frozenset()
 
@@ -214,12 +222,6 @@ class Prover:
 
     def _infer(self, assertions: tuple[Triple, ...], state: KnowledgeState) -> frozenset[Triple]:
         return self.limit.run(lambda: self._pellet.infer(assertions), reasoning_on(state))
-
-    def _assertions(self, situation: Situation) -> tuple[Triple, ...]:
-        return *self.base.assertions(situation.state), *situation.facts
-
-    def _asserted(self, situation: Situation) -> frozenset[Fact]:
-        return self.base.facts.union(facts_of(self._assertions(situation), self.base.names))
 
 
 def _holding(triples: frozenset[Triple]) -> frozenset[int]:

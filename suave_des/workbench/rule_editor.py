@@ -29,6 +29,7 @@ from suave_des.knowledge.ontology_file import OntologyFile, read_ontology
 from suave_des.knowledge.rdf import RDF as RDF_NS
 from suave_des.knowledge.rdf import RDFS, SWRL, SWRLA, XSD, RdfTriple, local_name
 from suave_des.knowledge.rules.files import read_rule
+from suave_des.knowledge.rules.parser import PREFIXES
 from suave_des.knowledge.rules.rdf import rules_of
 from suave_des.knowledge.rules.syntax import Rule
 
@@ -37,7 +38,7 @@ _GIVEN: Final = Path("the rule")
 _INDENT: Final = "    "
 _TAG: Final = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
 _MARK: Final = re.compile(rb"(<[\w.-]*:?isRuleEnabled\b[^>]*>)[^<]*(?=</)")
-_NAMESPACES: Final = {"rdf": RDF_NS, "rdfs": RDFS, "owl": str(OWL), "swrl": SWRL, "swrla": SWRLA}
+_NAMESPACES: Final = {name: PREFIXES[name] for name in ("rdf", "rdfs", "owl", "swrl", "swrla")}
 _ENABLED: Final = SWRLA + "isRuleEnabled"
 #: In these encodings, markup and references to characters are written in the bytes of ASCII.
 _ENCODINGS: Final = ("UTF-8", "US-ASCII", "ASCII", "ISO-8859-1")

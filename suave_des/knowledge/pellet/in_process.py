@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from typing import Any, Final, NamedTuple
@@ -18,7 +18,7 @@ from suave_des.knowledge.content import RULE_IRI, Terms
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import jvm
 from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, canonical, facts_of, for_pellet, n_triple
-from suave_des.knowledge.rules.syntax import Rule
+from suave_des.knowledge.rules.syntax import Atom, Rule
 from suave_des.knowledge.state import ContradictionError
 
 _LITERAL: Final = re.compile(r"literal\((.*),([^,]*),([^,]*)\)", re.DOTALL)
@@ -135,13 +135,7 @@ class InProcessPellet:
         ):
             if known is not None:
                 collection.removeAll(known[number])  # in Java, so that few cross to Python
-            for item in collection:
-                if number >= len(self._properties):
-                    yield str(item.toString()), RDF_TYPE, name
-                else:
-                    subject = str(item.getKey().toString())
-                    for value in item.getValue():
-                        yield subject, name, read_term(str(value.toString()))
+            yield from (_values if number < len(self._properties) else _members)(collection, name)
 
     def _collections(self, knowledge_base: Any) -> list[Any]:
         """The (subject, values) entries of each property to read, and the members of each class to read."""
@@ -159,6 +153,36 @@ class InProcessPellet:
                 raise _dropped(self._ontology.content.rules[int(named.group(1))], warning)
             if "SWRL" in warning or "rule" in warning.lower():
                 raise KnowledgeError(f"Pellet does not use part of a rule: {warning}", file=_files(self._ontology))
+
+
+def _values(entries: Any, name: str) -> Iterator[Triple]:
+    """Read the values of a property from Pellet's (subject, values) entries."""
+    for entry in entries:
+        subject = str(entry.getKey().toString())
+        for value in entry.getValue():
+            yield subject, name, read_term(str(value.toString()))
+
+
+def _members(individuals: Any, name: str) -> Iterator[Triple]:
+    return ((str(each.toString()), RDF_TYPE, name) for each in individuals)
+
+
+def entailed(text: str, asked: Iterable[Atom]) -> frozenset[Triple]:
+    """Load N-Triples alone, and read the values of the properties and the members of the classes that atoms name.
+
+    There are none where the triples contradict one another.
+    """
+    with one_at_a_time:
+        knowledge_base = load_n_triples(text)
+        found: set[Triple] = set()
+        term = jvm.java_class(_PELLET + "utils.ATermUtils").makeTermAppl
+        for kind, name in {(atom.kind, atom.predicate) for atom in asked} if knowledge_base.isConsistent() else ():
+            if kind in ("object", "data"):
+                found.update(_values(knowledge_base.getPropertyValues(term(name)).entrySet(), name))
+            elif kind == "class":
+                found.update(_members(knowledge_base.getInstances(term(name)), name))
+        jvm.take_warnings()
+        return frozenset(found)
 
 
 class Trace(NamedTuple):
@@ -216,7 +240,7 @@ def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> Contradic
 def _rule_with_place(ontology: Ontology, rule: Rule) -> str:
     """A rule's name with its file and line, as far as the file shows where it is."""
     files = {source.path: source for source in ontology.sources}
-    line = files[rule.file].line_of(rule.name) if rule.file in files else None
+    line = files[rule.file].line_of_rule(rule.name) if rule.file in files else None
     place = rule.place or (f"line {line}" if line else None)
     return f"{rule.name} ({', '.join(filter(None, (rule.file.name, place)))})"
 

@@ -221,8 +221,7 @@ class _Explainer:
                     design, "left out", rejection.reason, tuple(self._objection(decision.function, design))
                 )
         inference = self.conclusion.inference
-        own = performance(self.base, inference, design)
-        best = performance(self.base, inference, str(decision.design))
+        own, best = performance(inference, design), performance(inference, str(decision.design))
         if own == best:
             return Candidate(design, "not the best", f"performance {own}, as {decision.design}, which is first by name")
         return Candidate(design, "not the best", f"performance {own} < {best} of {decision.design}")

@@ -14,9 +14,8 @@ from typing import Final
 from rdflib import BNode
 
 from suave_des.knowledge.content import Content
-from suave_des.knowledge.pellet import jvm
-from suave_des.knowledge.pellet.in_process import load_n_triples, one_at_a_time, read_term
-from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Names, Triple, canonical, value_of
+from suave_des.knowledge.pellet.in_process import entailed
+from suave_des.knowledge.rdf import OWL, RDF_TYPE, XSD, Lit, Names, Triple, canonical, value_of
 from suave_des.knowledge.rules.rdf import with_triples
 from suave_des.knowledge.rules.syntax import TESTERS, Atom, Named, Rule, Term, Variable
 from suave_des.knowledge.state import Value
@@ -75,6 +74,15 @@ def matched(atom: Atom, triple: Triple, binding: Binding) -> Binding | None:
         return unified(atom.arguments[:1], (subject,), binding) if fits else None
     fits = atom.kind in FACT_KINDS and predicate == atom.predicate
     return unified(atom.arguments, (subject, value), binding) if fits else None
+
+
+def stated(atom: Atom, binding: Binding) -> Triple | None:
+    """The triple that an atom says with the values of its variables; None where one has none, or for another atom."""
+    terms = [bound(term, binding) for term in atom.arguments]
+    if atom.kind not in FACT_KINDS or None in terms:
+        return None
+    subject, value = str(terms[0]), terms[-1] or ""
+    return (subject, RDF_TYPE, atom.predicate) if atom.kind == "class" else (subject, atom.predicate, value)
 
 
 class Facts:
@@ -274,12 +282,6 @@ def _ask_pellet(atom: Atom, *, computes: bool) -> tuple[Lit, ...]:
     result = atom.arguments[0] if computes else Lit("true", XSD + "boolean")
     head = Atom("data", f"{_PROBE}#value", (Named(f"{_PROBE}#it"), result))
     rule = with_triples(Rule("probe", "", Path(), True, BNode(), (), (atom,), (head,)))
-    with one_at_a_time:
-        knowledge_base = load_n_triples(Content((), (), (rule,)).n_triples())
-        term = jvm.java_class("org.mindswap.pellet.utils.ATermUtils").makeTermAppl
-        knowledge_base.addIndividual(term(f"{_PROBE}#it"))
-        knowledge_base.isConsistent()
-        entries = knowledge_base.getPropertyValues(term(f"{_PROBE}#value")).entrySet()
-        found = [read_term(str(value.toString())) for entry in entries for value in entry.getValue()]
-        jvm.take_warnings()
-    return tuple(sorted(value for value in found if isinstance(value, Lit)))
+    known = ((f"{_PROBE}#it", RDF_TYPE, OWL + "Thing"),)
+    found = entailed(Content(known, (), (rule,)).n_triples(), [head])
+    return tuple(sorted(value for _, _, value in found if isinstance(value, Lit)))

@@ -12,17 +12,15 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Final
+from typing import Final
 
 from suave_des.knowledge.content import Content, Terms
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet import jvm
 from suave_des.knowledge.pellet.in_process import (
     InProcessPellet,
     Trace,
-    load_n_triples,
+    entailed,
     one_at_a_time,
-    read_term,
     trace_contradiction,
 )
 from suave_des.knowledge.rdf import OWL, RDF_TYPE, Lit, Triple, canonical, fact_of, is_fact, n_triple
@@ -289,10 +287,7 @@ class Tracer:
         number = -1 if rule is None else self.base.content.rules.index(rule)
         key = facts, tuple((atom.kind, atom.predicate) for atom in asked), number
         if key not in self._steps:
-            knowledge_base = load_n_triples(self._text(facts, [] if rule is None else [rule]))
-            is_consistent = knowledge_base.isConsistent()
-            self._steps[key] = frozenset(_values_of(knowledge_base, asked) if is_consistent else ())
-            jvm.take_warnings()
+            self._steps[key] = entailed(self._text(facts, [] if rule is None else [rule]), asked)
         return self._steps[key]
 
     def _text(self, facts: Iterable[Triple], rules: Sequence[Rule]) -> str:
@@ -337,19 +332,6 @@ def _matches(rule: Rule, binding: Binding, facts: Facts) -> list[tuple[Binding, 
 def _canonical(triple: Triple) -> Triple:
     """A triple with a number in its one shortest form."""
     return (*triple[:2], canonical(triple[2]))
-
-
-def _values_of(knowledge_base: Any, atoms: Iterable[Atom]) -> Iterator[Triple]:
-    """Read the values of the properties and the members of the classes that atoms name."""
-    make = jvm.java_class("org.mindswap.pellet.utils.ATermUtils").makeTermAppl
-    for kind, name in sorted({(atom.kind, atom.predicate) for atom in atoms}):
-        if kind in ("object", "data"):
-            for entry in knowledge_base.getPropertyValues(make(name)).entrySet():
-                for value in entry.getValue():
-                    yield str(entry.getKey().toString()), name, read_term(str(value.toString()))
-        elif kind == "class":
-            for member in knowledge_base.getInstances(make(name)):
-                yield str(member.toString()), RDF_TYPE, name
 
 
 def _as_axiom(triple: Triple) -> tuple[str, str, str]:

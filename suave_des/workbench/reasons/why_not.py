@@ -14,7 +14,7 @@ from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.knowledge.content import with_rules
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.limit import TimeLimit
-from suave_des.knowledge.rdf import RDF_TYPE, TOMASYS, Lit, Triple, facts_of, value_of
+from suave_des.knowledge.rdf import TOMASYS, Lit, Triple, fact_of, facts_of, value_of
 from suave_des.knowledge.rules.checks import RuleProblem, check_rule
 from suave_des.knowledge.rules.files import RulesFile
 from suave_des.knowledge.rules.syntax import Atom, Rule, RuleError
@@ -32,6 +32,7 @@ from suave_des.workbench.reasons.matching import (
     NearestFinder,
     bound,
     shown_bindings,
+    stated,
     unified,
 )
 from suave_des.workbench.reasons.tracing import Tracer
@@ -234,22 +235,13 @@ class RuleQuestions:
         concluded = []
         stays = ""
         for atom in rule.head:
-            instance = self._instance(atom, binding)
-            concluded.append(instance)
+            fact = stated(atom, binding)
+            concluded.append(write_atom(atom) if fact is None else str(fact_of(fact, self.base.names)))
             others = self._other_values(atom, binding, facts)
             if others:
                 stays = f"; {others[0]} remains as well, because rules only add values"
         bound = ", ".join(f"?{name} = {value}" for name, value in shown_bindings(binding, self.base.names))
         return f"it fires{f' with {bound}' if bound else ''}, and concludes {', '.join(concluded)}{stays}"
-
-    def _instance(self, atom: Atom, binding: Binding) -> str:
-        """An atom of a head with the values of its variables, as a fact."""
-        terms = [bound(term, binding) for term in atom.arguments]
-        if atom.kind not in FACT_KINDS or None in terms:
-            return write_atom(atom)
-        subject, value = str(terms[0]), terms[-1] or ""
-        triple = (subject, RDF_TYPE, atom.predicate) if atom.kind == "class" else (subject, atom.predicate, value)
-        return str(next(facts_of([triple], self.base.names)))
 
     def _other_values(self, atom: Atom, binding: Binding, facts: Facts) -> list[str]:
         """Facts that give the subject of a head's atom another value of the same data property."""

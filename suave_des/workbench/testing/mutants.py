@@ -33,7 +33,7 @@ from suave_des.knowledge.rules.writer import literal_text, write_atom
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.prover import Body, Prover, Situation
-from suave_des.workbench.reasons.matching import FACT_KINDS, instance, matched
+from suave_des.workbench.reasons.matching import FACT_KINDS, instance, matched, stated
 
 _NOT_HORN: Final = (
     *("unionOf", "complementOf", "oneOf", "disjointUnionOf", "maxCardinality", "maxQualifiedCardinality"),
@@ -320,24 +320,17 @@ def follows_anyway(bench: KnowledgeBase, mutant: Mutant) -> bool:
     dropped = next((atom for atom in mutant.old.body if atom not in mutant.new.body), None)
     if dropped is None or dropped.kind not in FACT_KINDS:
         return False
-    free = {name: f"{_FROZEN}{name}" for name in dropped.variables()}
-    facts: list[Triple] = []
+    individuals = {name: f"{_FROZEN}{name}" for atom in mutant.old.body for name in atom.variables()}
+    facts = []
     for atom in mutant.new.body:
-        if atom.kind in ("class", "object"):
-            terms = [
-                term.iri if isinstance(term, Named) else f"{_FROZEN}{term.name}"
-                for term in atom.arguments
-                if isinstance(term, Named | Variable)
-            ]
-            is_class = atom.kind == "class"
-            facts.append((terms[0], RDF_TYPE if is_class else atom.predicate, atom.predicate if is_class else terms[1]))
-        elif atom.kind == "data" and isinstance(atom.arguments[0], Variable) and isinstance(atom.arguments[1], Lit):
-            facts.append((f"{_FROZEN}{atom.arguments[0].name}", atom.predicate, atom.arguments[1]))
-        elif atom.kind == "data" and isinstance(atom.arguments[0], Variable) and atom.predicate == HAS_VALUE:
-            facts.append((f"{_FROZEN}{atom.arguments[0].name}", atom.predicate, Lit("123.456", XSD + "decimal")))
-    asked = instance(dropped, free)
-    prover = Prover.of(bench, bodies=[(asked,)])
-    return prover.holding(Situation(KnowledgeState(), tuple(facts))) == {0}
+        binding: dict[str, str | Lit] = dict(individuals)
+        if atom.kind == "data" and isinstance(last := atom.arguments[-1], Variable):
+            if atom.predicate != HAS_VALUE:
+                continue
+            binding[last.name] = Lit("123.456", XSD + "decimal")
+        facts.append(stated(atom, binding))
+    prover = Prover.of(bench, bodies=[(instance(dropped, individuals),)])
+    return prover.holding(Situation(KnowledgeState(), tuple(filter(None, facts)))) == {0}
 
 
 def is_horn(base: Ontology) -> bool:

@@ -22,7 +22,7 @@ from suave_des.errors import KnowledgeError
 from suave_des.knowledge.deliberation import Conclusion
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.planning import plan
-from suave_des.knowledge.rdf import DECISION_PROPERTIES, HAS_VALUE, TOMASYS, facts_of, local_name
+from suave_des.knowledge.rdf import DECISION_PROPERTIES, HAS_VALUE, TOMASYS, local_name
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.knowledge.state import ContradictionError, Fact, Inference, KnowledgeState
 from suave_des.workbench.knowledge_base import KnowledgeBase
@@ -142,8 +142,7 @@ class _Original:
         found = self.entailed(situation)
         if found is None:
             return Outcome(None)
-        assertions = (*base.assertions(situation.state), *situation.facts)
-        inference = Inference(situation.state, known.union(facts_of(assertions, base.names)), found.facts)
+        inference = Inference(situation.state, known.union(situation.asserted(base)), found.facts)
         improves = self.bench.settings.improves_exceeded
         return Outcome(Conclusion(inference, plan(base, inference, improve_exceeded=improves)))
 
@@ -167,10 +166,6 @@ class _Changed:
     @cached_property
     def base(self) -> Ontology:
         return self.mutant.applied(self.original.bench.base)
-
-    @property
-    def improves_exceeded(self) -> bool:
-        return self.original.bench.settings.improves_exceeded
 
     @cached_property
     def known(self) -> frozenset[Fact]:
@@ -306,15 +301,11 @@ def _difference(before: Outcome, after: Outcome) -> str | None:
         one, other = before.choice(function), after.choice(function)
         if one != other:
             return f"{function}: {other}, not {one}"
-    for missing in _sorted(before.inferred - after.inferred):
+    for missing in sorted(map(str, before.inferred - after.inferred)):
         return f"{missing} does not follow"
-    for more in _sorted(after.inferred - before.inferred):
+    for more in sorted(map(str, after.inferred - before.inferred)):
         return f"{more} follows"
     return None
-
-
-def _sorted(facts: Iterable[Fact]) -> list[Fact]:
-    return sorted(facts, key=str)
 
 
 def _space(bench: KnowledgeBase, mutants: Iterable[_Changed]) -> PolicySpace:

@@ -70,14 +70,10 @@ class Concluder(Protocol):
 
     Attributes:
         base: ontologies and rules.
-        improves_exceeded: as ManagingSettings has it.
     """
 
     @property
     def base(self) -> Ontology: ...  # noqa: D102
-
-    @property
-    def improves_exceeded(self) -> bool: ...  # noqa: D102
 
     def outcome(self, situation: Situation) -> Outcome:
         """Conclude what follows."""
@@ -178,7 +174,7 @@ class Runner:
         """Why something follows or does not, or is decided as it is."""
         fact, function = failure.fact, failure.function
         base = self.prover.base.with_facts(failure.situation.facts)
-        state, improves = failure.situation.state, self.prover.improves_exceeded
+        state, improves = failure.situation.state, self.bench.settings.improves_exceeded
         try:
             if fact is not None and failure.what.endswith("does not follow"):
                 yield from _missing(base, failure.situation, fact)
