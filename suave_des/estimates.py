@@ -90,3 +90,10 @@ class RunningMean:
         if self.n < 2:
             return None
         return t_quantile(self.n - 1) * math.sqrt(self._squares / (self.n - 1) / self.n)
+
+    def is_narrow(self, wanted: float | None, fewest: int) -> bool:
+        """Return whether the half-width is below one that is wanted, and there are enough values to tell."""
+        if wanted is None or self.n < fewest:
+            return False
+        half_width = self.half_width
+        return half_width is not None and half_width < wanted

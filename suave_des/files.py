@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from suave_des.errors import InputError
 
@@ -45,6 +45,7 @@ FAMILIES: Mapping[str, tuple[str, ...]] = {
 
 DECIMALS = 6
 """Digits after the point in result files."""
+_Cell = TypeVar("_Cell", float, "float | None", "str | int | float | bool | None")
 
 
 def read_bytes(path: Path, limit: int) -> bytes:
@@ -83,9 +84,9 @@ def decode(path: Path, content: bytes) -> str:
         raise InputError("is not UTF-8 text", file=path, place=f"line {line}", remedy="save it as UTF-8") from None
 
 
-def rounded(value: float) -> float:
-    """Round a number as in result files."""
-    return round(value, DECIMALS) + 0.0  # + 0.0: no minus before a zero
+def rounded(value: _Cell) -> _Cell:
+    """Round a number as in result files; what is no float stays."""
+    return round(value, DECIMALS) + 0.0 if isinstance(value, float) else value  # + 0.0: no minus before a zero
 
 
 def cell(value: object) -> object:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 from weakref import WeakSet
 
-from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.errors import InputError, did_you_mean, nearest, shown
 from suave_des.managing.base import ManagingSubsystem
 from suave_des.monitor.diagnostics import Kind
 
@@ -108,8 +108,7 @@ def manager_class(name: str) -> type[ManagingSubsystem]:
         return _member(family, argument)
     target = name if ":" in name else _BUILT_IN.get(name) or _registered().get(name)
     if target is None:
-        close = get_close_matches(name, manager_names(), n=1)
-        hint = f"did you mean {close[0]}?" if close else f"known: {', '.join(manager_names())}"
+        hint = nearest(name, manager_names()) or f"known: {', '.join(manager_names())}"
         raise InputError(f"there is no manager {name!r}", remedy=f"{hint}; your own is given as package.module:Class")
     found = _load(f"manager {name!r}", target, ManagingSubsystem)
     if not is_built_in(name):

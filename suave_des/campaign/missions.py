@@ -64,8 +64,9 @@ def plan(
             yield from (MissionKey(point, manager, run) for manager in left if run not in known[manager])
 
 
-COLUMNS = tuple(field.name for field in fields(MissionMetrics))
-"""Columns of runs.csv that every campaign has."""
+COLUMN_TYPES = {field.name: str(field.type).removesuffix(" | None") for field in fields(MissionMetrics)}
+"""Columns of runs.csv that every campaign has, and the names of their types."""
+COLUMNS = tuple(COLUMN_TYPES)
 
 Cell = str | int | float | bool | None
 Row = tuple[Cell, ...]
@@ -75,12 +76,12 @@ _cells: Callable[[MissionMetrics], Row] = attrgetter(*COLUMNS)
 
 def row_of(metrics: MissionMetrics) -> Row:
     """Return the cells of runs.csv, rounded as in the file, from which all statistics are computed."""
-    return tuple(rounded(cell) if isinstance(cell, float) else cell for cell in _cells(metrics))
+    return tuple(map(rounded, _cells(metrics)))
 
 
 def further_of(result: MissionResult) -> Row:
     """Return the cells of the columns that the scenario asks for, rounded likewise."""
-    return tuple(rounded(cell) if isinstance(cell, float) else cell for cell in result.further.values())
+    return tuple(map(rounded, result.further.values()))
 
 
 class MissionFailure(NamedTuple):

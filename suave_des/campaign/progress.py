@@ -131,14 +131,10 @@ class PairTracker:
             self._next += 1
             if isinstance(x, float | int) and isinstance(y, float | int):
                 self.differences.add(x - y)
-            if (self._next - 1) % PAIR_STEP == 0 and self._is_narrow():
+            if (self._next - 1) % PAIR_STEP == 0 and self.differences.is_narrow(self._half_width, FEWEST_PAIRS):
                 self.is_narrow = True
                 return self._next - 1
         return None
-
-    def _is_narrow(self) -> bool:
-        half_width = self.differences.half_width
-        return self.differences.n >= FEWEST_PAIRS and half_width is not None and half_width < self._half_width
 
     def progress(self, point: int) -> PairProgress:
         """Return the precision of the difference."""
@@ -155,11 +151,6 @@ class GroupTracker:
         half_width: the group is over as soon as the interval's half-width is below this; None: after all runs.
         can_end_earlier: whether ended_at may be called, for which all values are kept.
     """
-
-    __slots__ = (
-        *("_half_width", "_index", "_metric", "_next", "_values", "_waiting"),
-        *("done", "failed", "is_narrow", "runs", "values"),
-    )
 
     def __init__(self, runs: int, metric: str, half_width: float | None, *, can_end_earlier: bool = False) -> None:
         self._values: dict[int, object] | None = {} if can_end_earlier else None
@@ -188,7 +179,10 @@ class GroupTracker:
         while self._next in self._waiting:
             value = self._waiting.pop(self._next)
             self._next += 1
-            if isinstance(value, float | int) and self._is_narrow_with(value):
+            if not isinstance(value, float | int):
+                continue
+            self.values.add(value)
+            if self.values.is_narrow(self._half_width, FEWEST_RUNS):
                 # The run before the next one is the last; what is known of later ones does not count.
                 self.is_narrow = True
                 self.runs = self.done = self._next - 1
@@ -203,13 +197,6 @@ class GroupTracker:
             ended._add(number, found)
         ended.is_narrow = True
         return ended
-
-    def _is_narrow_with(self, value: float) -> bool:
-        self.values.add(value)
-        if self._half_width is None or self.values.n < FEWEST_RUNS:
-            return False
-        half_width = self.values.half_width
-        return half_width is not None and half_width < self._half_width
 
     def progress(self, point: int, manager: str) -> GroupProgress:
         """Return the group's progress."""

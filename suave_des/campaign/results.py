@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from suave_des.campaign.ensemble import MemberDifferences, differences
 from suave_des.campaign.knowledge_records import scenario_line
-from suave_des.campaign.missions import COLUMNS, Finished, MissionFailure, MissionGroup, Row
+from suave_des.campaign.missions import COLUMN_TYPES, COLUMNS, Finished, MissionFailure, MissionGroup, Row
 from suave_des.campaign.progress import GroupProgress, PairProgress, ProgressTracker
 from suave_des.campaign.spec import CampaignSpec
 from suave_des.campaign.stopping import FEWEST_PAIRS, FEWEST_RUNS, UntilCi
 from suave_des.campaign.variation import Variation, cell_of
 from suave_des.estimates import estimate
 from suave_des.files import rounded
-from suave_des.metrics.result import MissionMetrics
 from suave_des.scenario.loader import LoadedScenario
 
 if TYPE_CHECKING:
@@ -122,11 +121,7 @@ class CampaignResult:
     def _frame(self, rows: Iterable[Row]) -> pandas.DataFrame:
         import pandas
 
-        types: dict[str, Any] = {
-            field.name: _TYPES[kind]
-            for field in fields(MissionMetrics)
-            if (kind := str(field.type).removesuffix(" | None")) in _TYPES
-        }
+        types: dict[str, Any] = {name: _TYPES[kind] for name, kind in COLUMN_TYPES.items() if kind in _TYPES}
         types["scenario"] = pandas.CategoricalDtype([self.loaded.scenario.name])
         types["manager"] = pandas.CategoricalDtype(list(self.spec.managers))
         return pandas.DataFrame.from_records(list(rows), columns=list(self.columns)).astype(types)
@@ -307,8 +302,8 @@ def _until_ci(result: CampaignResult) -> dict[str, Any] | None:
                 "last_run": stop.runs,
                 "why": _why(stop),
                 "n": stop.n,
-                "mean": None if stop.mean is None else rounded(stop.mean),
-                "half_width": None if stop.half_width is None else rounded(stop.half_width),
+                "mean": rounded(stop.mean),
+                "half_width": rounded(stop.half_width),
             }
             for stop in result.stops
         ],
@@ -323,8 +318,8 @@ def _pairs(result: CampaignResult, until: UntilCi) -> dict[str, Any]:
         {
             **result.variation.sweep.values(pair.point),
             "n": pair.n,
-            "difference": None if pair.difference is None else rounded(pair.difference),
-            "half_width": None if pair.half_width is None else rounded(pair.half_width),
+            "difference": rounded(pair.difference),
+            "half_width": rounded(pair.half_width),
             "is_narrow": pair.is_narrow,
         }
         for pair in result.pairs

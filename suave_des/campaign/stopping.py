@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
-from suave_des.campaign.missions import Finished, JobSpec, MissionFailure, MissionKey, WorkerError
+from suave_des.campaign.missions import COLUMN_TYPES, Finished, JobSpec, MissionFailure, MissionKey, WorkerError
 from suave_des.errors import InputError, nearest
-from suave_des.metrics.result import MissionMetrics
 
 FEWEST_RUNS = 20
 """Missions with a value that a manager has at least: the interval of fewer is not reliable (estimates.py)."""
@@ -21,11 +20,7 @@ covered the true one in 81% of cases if it might stop after 20 runs, in 94% if a
 """
 SEARCH_TIME = "search_time_s"
 
-METRICS = tuple(
-    field.name
-    for field in fields(MissionMetrics)
-    if field.name not in ("run", "seed") and str(field.type).removesuffix(" | None") in ("float", "int")
-)
+METRICS = tuple(name for name, kind in COLUMN_TYPES.items() if name not in ("run", "seed") and kind in ("float", "int"))
 """Columns of runs.csv that have a mean."""
 
 LARGE = 1_000_000

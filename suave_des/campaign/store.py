@@ -155,7 +155,7 @@ class Store:
             found = self._select("SELECT value, crc FROM about WHERE name = ?", name).fetchone()
         if found is None and default is not None:
             return default
-        if found is None or _note_crc(name, found[0]) != found[1]:
+        if found is None or _crc(name, found[0]) != found[1]:
             raise _damaged(self.path, f"its {name} is {'missing' if found is None else 'not what was written'}")
         return json.loads(found[0])
 
@@ -307,18 +307,14 @@ def _damaged(path: Path | None, what: object) -> InputError:
 
 def _note(name: str, value: Any) -> tuple[str, str, int]:
     text = json.dumps(value)
-    return name, text, _note_crc(name, text)
-
-
-def _note_crc(name: str, text: object) -> int:
-    return zlib.crc32(f"{name} {text}".encode(errors="replace"))
+    return name, text, _crc(name, text)
 
 
 def _record(finished: Finished) -> tuple[int, int, int, int, str, int]:
     key, outcome = finished
     kind = _ROW if not isinstance(outcome, MissionFailure) else _LASTING if outcome.lasting else _PASSING
     content = json.dumps(outcome)
-    return (*key, kind, content, _crc(key, kind, content))
+    return (*key, kind, content, _crc(*key, kind, content))
 
 
 def _finished(record: tuple[int, int, int, int, str, int], path: Path | None) -> Finished:
@@ -327,11 +323,11 @@ def _finished(record: tuple[int, int, int, int, str, int], path: Path | None) ->
         key = MissionKey(*map(int, numbers))
     except (TypeError, ValueError):
         raise _damaged(path, "an outcome has no number of its mission") from None
-    if _crc(key, kind, content) != crc:
+    if _crc(*key, kind, content) != crc:
         raise _damaged(path, f"the outcome of run {key.run} is not what was written")
     cells = json.loads(content)
     return key, tuple(cells) if kind == _ROW else MissionFailure(*cells)
 
 
-def _crc(key: MissionKey, kind: int, content: str) -> int:
-    return zlib.crc32(f"{key.point} {key.manager} {key.run} {kind} {content}".encode(errors="replace"))
+def _crc(*parts: object) -> int:
+    return zlib.crc32(" ".join(map(str, parts)).encode(errors="replace"))
