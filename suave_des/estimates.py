@@ -18,6 +18,11 @@ def interval_columns(name: str, interval: Interval | None) -> dict[str, float | 
     return {f"{name}_ci95_low": low, f"{name}_ci95_high": high}
 
 
+def interval_text(interval: Interval | None, style: str) -> str:
+    """Return an interval for a table, with its ends in a number format; empty for None."""
+    return "" if interval is None else f"{interval[0]:{style}} to {interval[1]:{style}}"
+
+
 @dataclass(frozen=True, slots=True)
 class Estimate:
     """Estimates from a sample; None where it has too few values.

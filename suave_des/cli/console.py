@@ -177,11 +177,6 @@ def number(value: object) -> str:
     return f"{value:.2f}" if isinstance(value, float) else ""
 
 
-def interval_text(interval: tuple[float, float] | None, style: str) -> str:
-    """Both ends of an interval in a number format; empty for None."""
-    return "" if interval is None else f"{interval[0]:{style}} to {interval[1]:{style}}"
-
-
 def print_timeline(console: Console, result: MissionResult) -> None:
     """Print a mission's events and metrics."""
     metrics = result.metrics

@@ -13,7 +13,8 @@ from suave_des.campaign.progress import GroupProgress
 from suave_des.campaign.results import METRIC_TITLES, METRICS, SUMMARY_COLUMNS, CampaignResult
 from suave_des.campaign.stopping import UntilCi
 from suave_des.campaign.variation import cell_of
-from suave_des.cli.console import fits, interval_text, number, plain_table, print_table
+from suave_des.cli.console import fits, number, plain_table, print_table
+from suave_des.estimates import interval_text
 
 _STOPS_LISTED = 8
 _ROWS_SHOWN = 40

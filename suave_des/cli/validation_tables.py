@@ -9,7 +9,8 @@ from rich.console import Console
 from rich.text import Text
 
 from suave_des.campaign.results import METRIC_TITLES
-from suave_des.cli.console import interval_text, number, plain_table, print_table
+from suave_des.cli.console import number, plain_table, print_table
+from suave_des.estimates import interval_text
 
 if TYPE_CHECKING:
     from suave_des.estimates import Estimate

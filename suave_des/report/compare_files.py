@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from textwrap import fill
 
 from suave_des.errors import number_of
-from suave_des.estimates import Interval
+from suave_des.estimates import Interval, interval_text
 from suave_des.report.compare import Comparison, Difference, Summary
 from suave_des.report.compared_metrics import FOUND, PAPER_METRICS, ComparedMetric
 from suave_des.report.statistics import Tested
@@ -211,7 +211,7 @@ def _search_cells(each: Summary) -> Cells:
     return (
         each.group,
         f"{mean.value:.2f}",
-        "" if mean.interval is None else f"{mean.interval[0]:.1f} to {mean.interval[1]:.1f}",
+        interval_text(mean.interval, ".1f"),
         _seconds(search.median_s),
         interval,
     )
@@ -266,7 +266,7 @@ def interval_cell(interval: Interval | None, metric: ComparedMetric) -> str:
     low, high = interval
     if metric.name == FOUND:
         return f"{100 * low:.1f} to {100 * high:.1f}%"
-    return f"{low:.{metric.interval_decimals}f} to {high:.{metric.interval_decimals}f}"
+    return interval_text(interval, f".{metric.interval_decimals}f")
 
 
 def p_cell(p: float | None) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from suave_des.errors import InputError, number_of
-from suave_des.estimates import Estimate, Interval, estimate, interval_columns
+from suave_des.estimates import Estimate, Interval, estimate, interval_columns, interval_text
 from suave_des.report.compared_metrics import PAPER_METRICS
 from suave_des.report.result_files import PAPER_ORDER
 from suave_des.report.runs import read_runs
@@ -66,9 +66,9 @@ class PaperFigure:
         """Format the paper's figure and its interval, ours, the difference, and the mark of one outside."""
         return (
             f"{self.published:.2f}",
-            _interval(self.published_interval),
+            interval_text(self.published_interval, ".1f"),
             "" if self.ours is None else f"{self.ours:.2f}",
-            _interval(self.ours_interval),
+            interval_text(self.ours_interval, ".1f"),
             "" if self.difference is None else f"{self.difference:+.2f}",
             MARK if self.is_inside is False else "",
         )
@@ -206,7 +206,3 @@ def _sizes(estimates: Estimates) -> str:
 
 def _rounded(value: object) -> object:
     return round(value, _DECIMALS) if isinstance(value, float) else value
-
-
-def _interval(interval: Interval | None) -> str:
-    return "" if interval is None else f"{interval[0]:.1f} to {interval[1]:.1f}"

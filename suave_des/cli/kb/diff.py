@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
-from suave_des.cli.console import counted, errors, interval_text, output, plain_table, print_trimmed, progress
+from suave_des.cli.console import counted, errors, output, plain_table, print_trimmed, progress
 from suave_des.cli.kb.options import AsFormat, Asked, Format, MaxFailed, print_json
 from suave_des.cli.options import Quiet, Seed, Workers, grouped_options
+from suave_des.estimates import interval_text
 
 if TYPE_CHECKING:
     from suave_des.workbench.difference import MissionDifference, PolicyDifference
