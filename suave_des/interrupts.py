@@ -103,12 +103,18 @@ def ends_at_once(limit_s: float, message: str) -> Iterator[None]:
         os.write(2, f"suave-des: {message}\n".encode())
         os._exit(2)
 
-    with handled([signal.SIGALRM], end_late), handled(not_ignored(), end_interrupted):
-        signal.setitimer(signal.ITIMER_REAL, limit_s)
-        try:
-            yield
-        finally:
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
+    with handled([signal.SIGALRM], end_late), handled(not_ignored(), end_interrupted), alarm(limit_s):
+        yield
+
+
+@contextmanager
+def alarm(seconds: float, repeat_s: float = 0.0) -> Iterator[None]:
+    """Send this process SIGALRM when the block takes longer than a time, and again at intervals, unless these are 0."""
+    signal.setitimer(signal.ITIMER_REAL, seconds, repeat_s)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
 def end_interrupted(number: int, frame: FrameType | None) -> None:

@@ -77,7 +77,7 @@ def run_campaign(
     on_progress: OnProgress | None = None,
     **options: Unpack[CampaignOptions],
 ) -> CampaignResult:
-    """Run `runs` missions of a scenario under each manager, at each point of the sweep if there is one.
+    """Run `runs` missions of a scenario under each manager, as suave_des.run_campaign does, whose arguments it has.
 
     The result is the same for any number of workers, and however often the campaign was interrupted and resumed. A
     mission that fails (its manager raises, it takes too long, its worker process dies repeatedly) has no row;
@@ -88,16 +88,9 @@ def run_campaign(
         print(result.frame().groupby("manager")["search_time_s"].mean())
 
     Args:
-        scenario: path of a scenario file or of a campaign file, name of a shipped scenario, or a loaded one.
-        managers: names, module:Class, or classes; one or several.
-        runs: missions for each manager, at each point; with `until_ci` at most, and 10,000 if they are left out.
-        seed: of everything that is random.
-        workers: processes; with 1 the missions run in this one. With more, managers that the calling script defines
-            itself (`__main__:Class`) need `if __name__ == "__main__":` around the call, as workers import the script.
-            None: 2, or 1 for few missions of built-in managers.
-        out: folder for runs.csv, summary.csv and manifest.json; it is made if its parent exists. None: no files.
+        scenario, managers, runs, seed, out, options: see CampaignSpec.
+        workers: None: 2, or 1 for few missions of built-in managers.
         on_progress: called when missions are done.
-        options: see CampaignSpec.
 
     Raises:
         InputError: something given cannot be used; nothing is written then.
@@ -151,19 +144,14 @@ def resume_campaign(
     managers: Collection[str] = (),
     confirmed: bool = False,
 ) -> CampaignResult:
-    """Resume a campaign where it stopped; its specification is in its folder.
+    """Resume a campaign where it stopped, as suave_des.resume_campaign does, whose arguments it has.
 
     Missions that failed for reasons that may not recur (time-out, a worker that was killed) are run again.
 
     Args:
-        folder: the campaign's output folder.
+        folder, runs, until_ci, scheduler, managers, confirmed: see suave_des.resume_campaign.
         workers: as in run_campaign; the number may differ.
-        runs: a greater number of runs; by default the original number.
-        until_ci: the original metric with a smaller half-width; by default the original one.
         on_progress: called when missions are done.
-        scheduler: as of run_campaign; it may be another, or none.
-        managers: those of the campaign's that are not installed; their code is run only if they are named here.
-        confirmed: whether to run the code of all managers that the folder names.
 
     Raises:
         InputError: there is no campaign, it is damaged or in use, or something that decides results has changed; the
@@ -171,8 +159,11 @@ def resume_campaign(
         WorkerError, StoreError, CampaignInterrupted: as run_campaign.
     """
     folder = Path(folder)
-    spec = _stored_spec(folder, runs, until_ci)
-    spec = replace(spec, out=folder, workers=workers, scheduler=scheduler)
+    if not (folder / STORE_FILE).is_file():
+        raise InputError("there is no campaign to resume", file=folder, remedy="start one with --out")
+    changed = {"runs": runs, "until_ci": until_ci, "out": folder, "workers": workers, "scheduler": scheduler}
+    with locked(folder), closing(Store(folder / STORE_FILE)) as store:
+        spec = CampaignSpec.of_stored(store.about("request"), **changed)
     if unknown := [name for name in managers if name not in spec.managers]:
         problem = f"the campaign has no manager {unknown[0]!r}, and cannot be given new ones"
         remedy = f"{did_you_mean(unknown[0], spec.managers, 'its managers')}; {_MORE_MANAGERS.format(folder)}"
@@ -202,13 +193,6 @@ def _check_new(folder: Path, *, overwrite: bool) -> None:
 def _is_of_campaign(name: str) -> bool:
     """Whether a file belongs to a campaign; without a store, it was left by one that was killed at its start."""
     return name in (LOCK_FILE, SUAVE_FOLDER, *FILES) or name.startswith((STORE_FILE, NEW_STORE_FILE))
-
-
-def _stored_spec(folder: Path, runs: int | None, until_ci: str | None) -> CampaignSpec:
-    if not (folder / STORE_FILE).is_file():
-        raise InputError("there is no campaign to resume", file=folder, remedy="start one with --out")
-    with locked(folder), closing(Store(folder / STORE_FILE)) as store:
-        return CampaignSpec.of_stored(store.about("request"), runs=runs, until_ci=until_ci)
 
 
 class _Campaign:

@@ -18,6 +18,7 @@ from pydantic import TypeAdapter, ValidationError
 from suave_des.campaign.ensemble import COLUMN as ENSEMBLE_COLUMN
 from suave_des.campaign.ensemble import Ensemble
 from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.metrics.result import MissionResult
 from suave_des.scenario.loader import LoadedScenario, value_at, with_values
 from suave_des.scenario.models import MissionSettings
 from suave_des.scenario.quantities import Distribution
@@ -350,10 +351,7 @@ def _check_drawn(loaded: LoadedScenario, perturbed: Mapping[str, str]) -> None:
     """Check that each is drawn once per run, unlike latencies and noise, which are drawn at each use."""
     if not perturbed:
         return
-    from suave_des.simulation.simulator import Simulator  # with it comes the compiler, which takes a while
-
-    short = loaded.scenario.model_copy(update={"mission": MissionSettings(time_limit_s=1.0)})
-    drawn = Simulator(replace(loaded, scenario=short)).run("none", 1, 0).drawn
+    drawn = short_mission(loaded).drawn
     for name, path in perturbed.items():
         if path not in drawn:
             raise _wrong(
@@ -361,6 +359,14 @@ def _check_drawn(loaded: LoadedScenario, perturbed: Mapping[str, str]) -> None:
                 "is drawn at each use, not once per run",
                 "put the distribution into the scenario itself, or sweep its parameters",
             )
+
+
+def short_mission(loaded: LoadedScenario) -> MissionResult:
+    """Run a mission of one second without a managing subsystem."""
+    from suave_des.simulation.simulator import Simulator  # with it comes the compiler, which takes a while
+
+    short = loaded.scenario.model_copy(update={"mission": MissionSettings(time_limit_s=1.0)})
+    return Simulator(replace(loaded, scenario=short)).run("none", 1, 0)
 
 
 def _check_points(loaded: LoadedScenario, variation: Variation, place: str) -> None:

@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import replace
+from functools import partial
 from types import FrameType
 
 from suave_des.campaign.knowledge_records import mission_line
@@ -24,12 +24,11 @@ from suave_des.campaign.missions import (
     further_of,
     row_of,
 )
-from suave_des.campaign.variation import cell_of
+from suave_des.campaign.variation import cell_of, short_mission
 from suave_des.errors import MissionError
-from suave_des.interrupts import handled
+from suave_des.interrupts import alarm, handled
 from suave_des.metrics.result import MissionResult
 from suave_des.registry import is_built_in
-from suave_des.scenario.models import MissionSettings
 from suave_des.simulation.simulator import Simulator
 
 NOT_REPEATABLE = (
@@ -56,8 +55,7 @@ class MissionRunner:
         self._exit_after_s = exit_after_s
         self._drawn = tuple(job.variation.drawn)
         # Load or compile what missions run, before the first one's time counts: a mission of a second does.
-        short = job.loaded.scenario.model_copy(update={"mission": MissionSettings(time_limit_s=1.0)})
-        Simulator(replace(job.loaded, scenario=short)).run("none", 1, 0)
+        short_mission(job.loaded)
         self._is_own = [not is_built_in(name) for name in job.managers]
         self._first: dict[int, tuple[MissionKey, MissionOutcome]] = {}
         self._number: dict[int, int] = {}
@@ -165,20 +163,11 @@ def _time_limits(exit_after_s: float | None) -> Iterator[_Limit]:
             yield watchdog.limit
         return
     with handled([signal.SIGALRM], _raise):
-        yield _alarm
+        yield partial(alarm, repeat_s=_REPEAT_S)
 
 
 def _raise(number: int, frame: FrameType | None) -> None:
     raise MissionTimeOut
-
-
-@contextmanager
-def _alarm(seconds: float) -> Iterator[None]:
-    signal.setitimer(signal.ITIMER_REAL, seconds, _REPEAT_S)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
 class _Watchdog:
