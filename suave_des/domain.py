@@ -31,3 +31,6 @@ class Task:
 def thruster_name(thruster: int) -> str:
     """Name of a thruster in diagnostics and in the knowledge base."""
     return f"c_thruster_{thruster}"
+
+
+THRUSTER_NAMES = tuple(map(thruster_name, range(1, THRUSTERS + 1)))

@@ -17,6 +17,7 @@ import time
 from collections.abc import Collection, Mapping
 from dataclasses import asdict
 from functools import cache
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
@@ -152,7 +153,7 @@ class ExecManager(ManagingSubsystem):
         self._command = tuple(str(system.files[word].resolve()) if word in system.files else word for word in words)
         settings = dict(system.settings)
         self._time_out_s = float(settings.pop("time_out_s", TIME_OUT_S))
-        self._thresholds: Dependencies | None = None
+        self._depends_on: Dependencies | None = None
         answer = self._ask(
             "mission_started",
             protocol=PROTOCOL,
@@ -182,7 +183,7 @@ class ExecManager(ManagingSubsystem):
             raise ValueError(f"subscribes_to: {did_you_mean(unknown[0], KINDS)}")
         self._subscribes_to = tuple(KINDS[name] for name in names)
         if (edges := answer.pop("depends_on", None)) is not None:
-            self._thresholds = {name: tuple(sorted(map(float, each))) for name, each in edges.items()}
+            self._depends_on = {name: tuple(sorted(map(float, each))) for name, each in edges.items()}
 
     def mission_started(self) -> None:
         """Send the program this message with the settings, and carry out its answer."""
@@ -266,12 +267,5 @@ def exec_manager(command: str) -> type[ManagingSubsystem]:
         raise InputError(f"exec:{command}: {error}", remedy="close the quotes") from None
     if not words:
         raise InputError("there is no manager 'exec'", remedy="write exec:COMMAND")
-
-    def thresholds(self: ExecManager) -> Dependencies | None:
-        return self._thresholds
-
-    def kinds(self: ExecManager) -> Collection[Kind]:
-        return self._subscribes_to
-
-    own = {"command": command, "depends_on": property(thresholds), "subscribes_to": property(kinds)}
-    return type("ExecManager", (ExecManager,), own)
+    answered = {name: property(attrgetter(f"_{name}")) for name in ("depends_on", "subscribes_to")}
+    return type("ExecManager", (ExecManager,), {"command": command, **answered})

@@ -14,13 +14,13 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
-from suave_des.domain import FOLLOW_PIPELINE, GENERATE_RECHARGE_PATH, MISSION_FUNCTIONS, THRUSTERS, thruster_name
+from suave_des.domain import FOLLOW_PIPELINE, GENERATE_RECHARGE_PATH, MISSION_FUNCTIONS, THRUSTER_NAMES, THRUSTERS
 from suave_des.errors import InputError
 from suave_des.interfaces.mission import CALLER, CallerManages
 from suave_des.managing.base import ManagedSystem
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
 from suave_des.scenario.loader import load_scenario
-from suave_des.scenario.modes import DEFAULT_MODE, UNGROUND_MODE
+from suave_des.scenario.modes import grounding_modes
 from suave_des.simulation.simulator import Simulator
 
 Observation = NDArray[np.float32]
@@ -53,7 +53,6 @@ class _Observing(CallerManages):
     """Keeps track of which thrusters work."""
 
     subscribes_to: ClassVar[Collection[Kind]] = (Kind.COMPONENT_STATUS,)
-    _NUMBERS: ClassVar = {thruster_name(number): number - 1 for number in range(1, THRUSTERS + 1)}
 
     def __init__(self, system: ManagedSystem) -> None:
         super().__init__(system)
@@ -61,8 +60,8 @@ class _Observing(CallerManages):
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
         """Take a component's status."""
-        if diagnostic.key in self._NUMBERS:
-            self.works[self._NUMBERS[diagnostic.key]] = float(diagnostic.value != FAILED)
+        if diagnostic.key in THRUSTER_NAMES:
+            self.works[THRUSTER_NAMES.index(diagnostic.key)] = float(diagnostic.value != FAILED)
 
 
 class _Episodes:
@@ -91,17 +90,16 @@ class _Episodes:
             function: modes
             for function in loaded.modes.functions
             if (function in MISSION_FUNCTIONS or (function == GENERATE_RECHARGE_PATH and has_battery))
-            and len(modes := _choices(loaded.modes.modes(function))) > 1
+            and len(modes := grounding_modes(loaded.modes.modes(function))) > 1
         }
         self.names = (
             *self.attributes,
-            *(thruster_name(number) for number in range(1, THRUSTERS + 1)),
+            *THRUSTER_NAMES,
             "inspects",
             "distance_inspected_m",
             "time_share",
             *self.choices,
         )
-        self.sized_choices = tuple((function, modes, len(modes)) for function, modes in self.choices.items())
         self.indices: list[tuple[str, dict[str | None, float]]] = [
             (function, {mode: float(n) for n, mode in enumerate(modes)}) for function, modes in self.choices.items()
         ]
@@ -112,18 +110,9 @@ class _Episodes:
         self.observation_space = spaces.Box(np.array(low, np.float32), np.array(high, np.float32), dtype=np.float32)
         self.action_space = spaces.MultiDiscrete(sizes)
 
-    def begin(self, seed: int) -> _Episode:
-        """Start the mission of a seed: run 1 of a campaign with it."""
-        return _Episode(self, seed)
-
-
-def _choices(modes: Sequence[str]) -> tuple[str, ...]:
-    """Modes to choose from: named ones that ground the function."""
-    return tuple(mode for mode in modes if mode not in (UNGROUND_MODE, DEFAULT_MODE))
-
 
 class _Episode:
-    """One mission as numbers."""
+    """One mission as numbers: that of a seed, which is run 1 of a campaign with it."""
 
     def __init__(self, of: _Episodes, seed: int) -> None:
         self._of = of
@@ -150,13 +139,12 @@ class _Episode:
         return self._reward(), self._is_over
 
     def _request(self, action: Sequence[int]) -> None:
-        for (function, choices, size), choice in zip(self._of.sized_choices, action, strict=True):
-            if not 0 <= choice < size:
-                raise InputError(
-                    f"action {choice} for {function} is out of range", remedy=f"0 to {size - 1}: {', '.join(choices)}"
-                )
+        for (function, modes), choice in zip(self._of.choices.items(), action, strict=True):
+            if not 0 <= choice < len(modes):
+                remedy = f"0 to {len(modes) - 1}: {', '.join(modes)}"
+                raise InputError(f"action {choice} for {function} is out of range", remedy=remedy)
             if function in self._needed:
-                self._modes.change_mode(function, choices[choice])
+                self._modes.change_mode(function, modes[choice])
         self._requested = action
         self._read_modes()
 
@@ -273,7 +261,7 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         super().reset(seed=seed)
         self.close()
         drawn = int(self.np_random.integers(SEED_LIMIT)) if seed is None else seed
-        self._episode = self._episodes.begin(drawn)
+        self._episode = _Episode(self._episodes, drawn)
         return self._episode.observation(), {"seed": drawn, **self._episode.info()}
 
     def step(self, action: Sequence[int] | NDArray[np.int64]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -339,7 +327,7 @@ class PipelineInspectionVector(VectorEnv[Observation, NDArray[np.int64], NDArray
         self.close_extras()
         numbers = range(self.num_envs)
         seeds = list(seed) if isinstance(seed, list) else [None if seed is None else seed + n for n in numbers]
-        self._all = [self._of.begin(self._drawn() if one is None else one) for one in seeds]
+        self._all = [_Episode(self._of, self._drawn() if one is None else one) for one in seeds]
         self._is_over[:] = False
         return self._observations(), {}
 
@@ -356,7 +344,7 @@ class PipelineInspectionVector(VectorEnv[Observation, NDArray[np.int64], NDArray
         for n, action in enumerate(rows.tolist()):
             if self._is_over[n]:
                 self._all[n].close()
-                self._all[n] = self._of.begin(self._drawn())
+                self._all[n] = _Episode(self._of, self._drawn())
                 continue
             rewards[n], over[n] = self._all[n].step(action)
             if over[n]:

@@ -13,12 +13,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from math import inf, isfinite
+from math import inf
 from typing import Any, Final
 
+from suave_des.domain import THRUSTER_NAMES
 from suave_des.errors import InputError, SuaveDesError, shown
 from suave_des.interfaces.mission import Mission
-from suave_des.scenario.modes import DEFAULT_MODE, UNGROUND_MODE
+from suave_des.scenario.modes import grounding_modes
 from suave_des.simulation.simulator import Simulator
 
 BODY_LIMIT_BYTES: Final = 100_000
@@ -91,21 +92,13 @@ class Session:
             "distance_inspected_m": mission.distance_inspected_m,
         }
         found |= {name: mission.measured(name) for name in mission.attributes}
-        found |= {name: mission.components.get(name, "") for name in self._components()}
+        found |= {name: mission.components.get(name, "") for name in THRUSTER_NAMES}
         found |= {name: mission.current_mode(name) or "" for name in self._options()}
         pose = mission.pose
         return found | dict(zip(pose._fields, pose, strict=True))
 
-    def _components(self) -> list[str]:
-        from suave_des.domain import THRUSTERS, thruster_name
-
-        return [thruster_name(number) for number in range(1, THRUSTERS + 1)]
-
     def _options(self) -> Json:
-        return {
-            function: [mode for mode in modes if mode not in (DEFAULT_MODE, UNGROUND_MODE)]
-            for function, modes in self._mission.modes.items()
-        }
+        return {function: list(grounding_modes(modes)) for function, modes in self._mission.modes.items()}
 
     def _execute(self, content: Any) -> Json:
         wanted = _object(content)
@@ -136,7 +129,7 @@ class Session:
         number, text, either = {"type": "number"}, {"type": "string"}, {"type": ["number", "null"]}
         kinds: Json = {"is_over": {"type": "boolean"}, "task": text}
         kinds |= dict.fromkeys(self._mission.attributes, either)
-        kinds |= dict.fromkeys((*self._components(), *self._options()), text)
+        kinds |= dict.fromkeys((*THRUSTER_NAMES, *self._options()), text)
         return _schema({name: kinds.get(name, number) for name in self._monitor()}, required=True)
 
     def _execute_schema(self) -> Json:
@@ -169,12 +162,7 @@ def _object(content: Any, known: Sequence[str] = ()) -> Json:
 
 
 def _seconds(value: Any) -> float:
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, int | float)
-        or not isfinite(value)
-        or not 0 <= value <= _LONGEST_S
-    ):
+    if type(value) not in (int, float) or not 0 <= value <= _LONGEST_S:  # true is an int, too, and nan in no range
         raise InputError(f"{shown(value)} is not a time in seconds", remedy=f"a number from 0 to {_LONGEST_S:g}")
     return float(value)
 

@@ -13,7 +13,7 @@ from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.managing.base import AdaptationProcess, Dependencies, FunctionsManager, ManagedSystem, ManagingSubsystem
 from suave_des.managing.simple import NoManager
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
-from suave_des.scenario.modes import DEFAULT_MODE, UNGROUND_MODE
+from suave_des.scenario.modes import grounding_modes
 
 if TYPE_CHECKING:
     from suave_des.scenario.loader import LoadedScenario
@@ -32,8 +32,7 @@ class FixedMode(NoManager):
         """Check that some function has the mode."""
         known = sorted({mode for function in loaded.modes.functions for mode in loaded.modes.modes(function)})
         if cls.mode not in known:
-            known = [mode for mode in known if mode not in (DEFAULT_MODE, UNGROUND_MODE)]
-            remedy = did_you_mean(cls.mode, known, f"modes in {loaded.modes_path.name}")
+            remedy = did_you_mean(cls.mode, grounding_modes(known), f"modes in {loaded.modes_path.name}")
             raise InputError(f"manager fixed:{cls.mode}: no function has a mode {shown(cls.mode)}", remedy=remedy)
 
     def task_requested(self, task: Task) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -29,8 +29,14 @@ from suave_des.scenario.yamlfile import YamlDocument, read_yaml
 DEFAULT_MODE = "__DEFAULT__"
 UNGROUND_MODE = "fd_unground"
 
+
 ParameterValue = float | str | bool
 _STATES = "inactive, active or active.NODE_MODE"
+
+
+def grounding_modes(modes: Iterable[str]) -> tuple[str, ...]:
+    """Return those of a function's modes that ground it by a design: all but fd_unground and __DEFAULT__."""
+    return tuple(mode for mode in modes if mode not in (UNGROUND_MODE, DEFAULT_MODE))
 
 
 @dataclass(frozen=True)
