@@ -199,7 +199,8 @@ def replay(
 
     It needs no network, and shows the vehicle, what its camera sees, and what its manager knew, inferred and decided.
     """
-    from suave_des.pages.page import check_page_file, write_page
+    from suave_des.files import check_output_file
+    from suave_des.pages.page import write_page
     from suave_des.pages.recorded import Chosen, missions_in, missions_run
     from suave_des.pages.replay import replay_page
     from suave_des.scenario.loader import load_scenario
@@ -220,7 +221,7 @@ def replay(
         point=point or _POINT,
     )
     if out is not None or not folders:
-        check_page_file(page_file)
+        check_output_file(page_file, overwrite=True)
     if scenario is not None:
         missions = missions_run(load_scenario(scenario, **files.replacements), chosen)
     else:
@@ -248,7 +249,8 @@ def report(
 
     It is one file that needs no network.
     """
-    from suave_des.pages.page import check_page_file, write_page
+    from suave_des.files import check_output_file
+    from suave_des.pages.page import write_page
     from suave_des.pages.report import report_page
 
     runs = _PATHS if paths is None else paths
@@ -257,6 +259,6 @@ def report(
     first = results[0]
     page_file = out or (first if first.is_dir() else first.parent) / "report.html"
     if out is not None:
-        check_page_file(page_file)
+        check_output_file(page_file, overwrite=True)
     write_page(page_file, report_page(results, runs), show=show)
     print(f"the report is {page_file}")

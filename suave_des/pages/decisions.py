@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
@@ -248,15 +248,13 @@ def adaptation_rules(folder: Path, record: MissionRecord) -> Mapping[tuple[float
     return found
 
 
-def _decided_in(cycles: Iterable[Cycle], t_s: float, function: str, design: str) -> Cycle | None:
+def _decided_in(cycles: Sequence[Cycle], t_s: float, function: str, design: str) -> Cycle | None:
     """Return the last cycle before a time that chose a design for a function in place of another."""
-    last = None
-    for cycle in cycles:
-        if cycle.t_s > t_s:
-            break
-        if any(each.function == function and each.before != each.chosen == design for each in cycle.decided):
-            last = cycle
-    return last
+
+    def chose(cycle: Cycle) -> bool:
+        return any(each.function == function and each.before != each.chosen == design for each in cycle.decided)
+
+    return next((cycle for cycle in reversed(cycles) if cycle.t_s <= t_s and chose(cycle)), None)
 
 
 def _rules(known: Cycles, cycle: Cycle, function: str, before: str) -> Iterator[str]:

@@ -14,7 +14,7 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-from suave_des.files import check_output_file, write_files
+from suave_des.files import write_files
 
 _COMPRESSION = 6
 
@@ -58,15 +58,6 @@ def page(name: str, title: str, content: Any, styles: Sequence[str], scripts: Se
         script="(() => {\n'use strict';\n" + "\n".join(map(asset, scripts)) + "\n})();",
         **blocks,
     )
-
-
-def check_page_file(file: Path) -> None:
-    """Check that a page can be written; an earlier page of that name is replaced.
-
-    Raises:
-        InputError: the path is a folder, or its folder does not exist or cannot be written.
-    """
-    check_output_file(file, overwrite=True)
 
 
 def write_page(file: Path, text: str, *, show: bool) -> None:

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from suave_des.campaign.inputs import check_inputs
 from suave_des.campaign.knowledge_records import KNOWLEDGE_FILE, read_knowledge
 from suave_des.campaign.missions import COLUMNS, row_of
-from suave_des.campaign.single import OpenedCampaign, opened_campaign
+from suave_des.campaign.single import MISSION_FILE, OpenedCampaign, opened_campaign
 from suave_des.campaign.spec import RUNS_LIMIT, check_range, check_seed
 from suave_des.campaign.store import STORE_FILE
 from suave_des.errors import InputError
@@ -25,7 +25,6 @@ from suave_des.simulation.simulator import Simulator
 
 MOST_MISSIONS = 2
 """Missions that a replay shows side by side."""
-_MISSION_FILE = "mission.json"
 _ANGLES = ("roll_rad", "pitch_rad", "yaw_rad")
 
 
@@ -63,7 +62,7 @@ def read_recorded(folder: Path) -> Recorded:
         InputError: one of its files is missing, or is not what a mission writes.
     """
     record = read_mission(folder)
-    path = folder / _MISSION_FILE
+    path = folder / MISSION_FILE
     try:
         scenario = Scenario.model_validate(record.scenario)
         inputs = json.loads(path.read_text(encoding="utf-8")).get("inputs_sha256", {})
@@ -105,16 +104,18 @@ def missions_in(folders: Sequence[Path], chosen: Chosen) -> list[Recorded]:
     """
     missions: list[Recorded] = []
     for folder in folders:
-        if (folder / _MISSION_FILE).is_file() or not (folder / STORE_FILE).is_file():
-            _check_folder(folder)
+        if (folder / MISSION_FILE).is_file():
             missions.append(read_recorded(folder))
-        else:
+        elif (folder / STORE_FILE).is_file():
             with opened_campaign(folder, chosen.managers) as campaign:
                 missions += missions_of(campaign, chosen)
+        else:
+            problem = f"has neither a mission ({MISSION_FILE}) nor a campaign that can be run again ({STORE_FILE})"
+            remedy = "give the folder that run or campaign wrote with --out"
+            raise InputError(problem if folder.is_dir() else "no such folder", file=folder, remedy=remedy)
     _check_number(len(missions))
-    pipelines = [mission.scenario.pipeline.vertices_m for mission in missions]
-    for mission, folder in zip(missions[1:], folders[1:], strict=False):
-        if mission.scenario.pipeline.vertices_m != pipelines[0]:
+    for mission, folder in zip(missions, folders, strict=False):
+        if mission.scenario.pipeline.vertices_m != missions[0].scenario.pipeline.vertices_m:
             raise InputError("has another pipeline", file=folder, remedy="give missions over the same one")
     return missions
 
@@ -149,14 +150,6 @@ def missions_run(loaded: LoadedScenario, chosen: Chosen) -> list[Recorded]:
     check_inputs(loaded, managers, given=False)
     simulator = Simulator(loaded)
     return [recorded_result(loaded, simulator.run(each, chosen.run, chosen.seed, record=True)) for each in managers]
-
-
-def _check_folder(folder: Path) -> None:
-    if not folder.is_dir():
-        raise InputError("no such folder", file=folder, remedy="give the folder that run or campaign wrote with --out")
-    if not (folder / _MISSION_FILE).is_file():
-        problem = f"has neither a mission ({_MISSION_FILE}) nor a campaign that can be run again ({STORE_FILE})"
-        raise InputError(problem, file=folder, remedy="give the folder that run or campaign wrote with --out")
 
 
 def _check_number(number: int) -> None:

@@ -12,7 +12,6 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
 import pandas
 
 from suave_des import __version__
@@ -214,16 +213,14 @@ def _section(found: Comparison, name: str) -> Section:
 def drawn(missions: Missions) -> ChartColumns:
     """Put missions into columns, at most MOST_DRAWN of them."""
     groups, _ = grouped(missions)
-    keys = list(dict.fromkeys(zip(missions.frame["manager"], missions.frame["source"], strict=True)))
-    numbers = {key: number for number, key in enumerate(keys)}
+    numbers = missions.frame.groupby(["manager", "source"], sort=False).ngroup()  # as grouped() orders them
     frame = missions.frame
     every = max(1, math.ceil(len(frame) / MOST_DRAWN))
     has_runs = bool(frame["run"].notna().all())
     if every > 1:
-        place = frame["run"] if has_runs else pandas.Series(np.arange(len(frame)), frame.index)
+        place = frame["run"] if has_runs else pandas.Series(range(len(frame)), frame.index)
         frame = frame[(place % every) == (1 if has_runs else 0)]
-    pairs = zip(frame["manager"], frame["source"], strict=True)
-    columns: dict[str, list[Any]] = {"group": [numbers[pair] for pair in pairs]}
+    columns: dict[str, list[Any]] = {"group": numbers[frame.index].tolist()}
     columns["run"] = _plain(frame["run"]) if has_runs else list(range(1, len(frame) + 1))
     columns["seed"] = frame["seed"].astype(str).tolist()
     if len(set(columns["seed"])) == 1:
@@ -233,7 +230,7 @@ def drawn(missions: Missions) -> ChartColumns:
     columns["found"] = [None if value != value else int(value) for value in found.tolist()]
     for name in (*titles, *missions.swept):
         columns[name] = _plain(frame[name])
-    is_paired = has_runs and bool((frame["seed"] != "").all()) and len(keys) > 1
+    is_paired = has_runs and bool((frame["seed"] != "").all()) and len(groups) > 1
     names = [each.name for each in groups]
     return ChartColumns(names, titles, columns, missions.swept, every, len(missions.frame), is_paired)
 
