@@ -117,8 +117,7 @@ class OneSidedTests:
 
 def conclude(first: Sample, second: Sample, *, lower_is_better: bool) -> OneSidedTests:
     """Test two samples both ways (scipy.stats.mannwhitneyu, normal approximation, ties corrected)."""
-    first_p, second_p = _mann_whitney(first[np.newaxis, :], second[np.newaxis, :], lower_is_better=lower_is_better)
-    return OneSidedTests(float(first_p[0]), float(second_p[0]))
+    return OneSidedTests(*map(float, _mann_whitney(first, second, lower_is_better=lower_is_better)))
 
 
 def agreement(
@@ -149,18 +148,17 @@ def agreement(
         np.array([rng.choice(sample, size, replace=False) for _ in range(subsamples)])
         for sample, size in zip(samples, sizes, strict=True)
     )
-    first_p, second_p = _mann_whitney(*drawn, lower_is_better=lower_is_better)
-    signs = (first_p < SIGNIFICANCE).astype(int) - (second_p < SIGNIFICANCE).astype(int)
-    return float(np.mean(signs == sign))
+    tests = map(OneSidedTests, *_mann_whitney(*drawn, lower_is_better=lower_is_better))
+    return float(np.mean([each.sign == sign for each in tests]))
 
 
 def _mann_whitney(firsts: Sample, seconds: Sample, *, lower_is_better: bool) -> tuple[Sample, Sample]:
-    """For each row of two arrays (k, n) and (k, m): p that the first is better, p that the second is."""
+    """For each row of two arrays (..., n) and (..., m): p that the first is better, p that the second is."""
     from scipy.stats import mannwhitneyu
 
     def p(alternative: str) -> Sample:
         with np.errstate(divide="ignore", invalid="ignore"):  # all values equal: no test, and no evidence
-            found = mannwhitneyu(firsts, seconds, axis=1, alternative=alternative, method="asymptotic").pvalue
+            found = mannwhitneyu(firsts, seconds, axis=-1, alternative=alternative, method="asymptotic").pvalue
         values: Sample = np.nan_to_num(np.asarray(found), nan=1.0)
         return values
 
