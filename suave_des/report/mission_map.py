@@ -27,7 +27,6 @@ _IDLE_MODES = ("", "fd_unground", "inactive")
 _ZOOM_MARGIN_M, _PATHS_MARGIN_M = 0.6, 1.0
 _PIPELINE: dict[str, Any] = {"color": "#CFCFCF", "lw": 4.0}
 _VISIBILITY: dict[str, Any] = {"color": style.GREY, "lw": 1.0, "ls": (0, (4, 1.5))}
-_THRESHOLD_COLOUR = "#B5B5B5"
 _BATTERY_COLOUR = style.GREEN
 _LETTER_OFFSETS = ((4, 4), (-9, 4), (4, -10), (-9, -10), (0, 9), (0, -14), (12, 0), (-16, 0), (12, 10), (-16, 10))
 """Where a letter may stand beside its point, in points; the first that is free is taken."""
@@ -237,8 +236,7 @@ def _draw_adaptations(axes: Axes, record: MissionRecord, colours: dict[str, str]
 def _draw_over_time(axes: Axes, record: MissionRecord, colours: dict[str, str], marks: Sequence[_Mark]) -> None:
     """Draw altitude, visibility with its thresholds, and battery."""
     way = record.trajectory.assign(altitude_m=record.trajectory["z_m"] - SEA_BED_Z_M)
-    for threshold_m in record.scenario.get("reaction_metric", {}).get("visibility_thresholds_m", ()):
-        axes.axhline(threshold_m, color=_THRESHOLD_COLOUR, lw=0.7, ls=":", zorder=1)
+    draw_thresholds(axes, record)
     axes.plot(way["t_s"], way["visibility_m"], **_VISIBILITY)
     timed = replace(record, trajectory=way)
     _draw_way(axes, timed, colours, "t_s", "altitude_m")
@@ -272,6 +270,12 @@ def _draw_over_time(axes: Axes, record: MissionRecord, colours: dict[str, str], 
         beside.grid(False)
         beside.spines["right"].set_visible(True)
         beside.set_ylabel("battery (%)")
+
+
+def draw_thresholds(axes: Axes, record: MissionRecord) -> None:
+    """Draw the thresholds of the visibility over time."""
+    for threshold_m in record.scenario.get("reaction_metric", {}).get("visibility_thresholds_m", ()):
+        axes.axhline(threshold_m, color="#B5B5B5", lw=0.7, ls=":", zorder=1)
 
 
 def _letter_rows(marks: Sequence[_Mark], end_s: float) -> list[int]:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 
 from suave_des.domain import SEA_BED_Z_M
 from suave_des.report import style
-from suave_des.report.mission_map import mode_colours
+from suave_des.report.mission_map import draw_thresholds, mode_colours
 from suave_des.report.mission_record import (
     Adaptation,
     MissionRecord,
@@ -71,8 +71,7 @@ def draw_timeline(record: MissionRecord) -> style.Picture:
 def _draw_altitude(axes: Axes, record: MissionRecord, changes: Sequence[Adaptation]) -> None:
     """Draw visibility and its thresholds, and the requested altitude and flown."""
     way = record.trajectory
-    for threshold_m in record.scenario.get("reaction_metric", {}).get("visibility_thresholds_m", ()):
-        axes.axhline(threshold_m, color="#B5B5B5", lw=0.7, ls=":", zorder=1)
+    draw_thresholds(axes, record)
     axes.plot(way["t_s"], way["visibility_m"], color=style.GREY, lw=1.0, label="visibility; dotted: thresholds")
     times_s, asked_m = _altitude_asked_for(record)
     axes.step(times_s, asked_m, where="post", color=style.BLACK, lw=0.9, ls="--", label="requested altitude")
