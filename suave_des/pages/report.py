@@ -21,6 +21,7 @@ from suave_des.pages.paths import Paths, paths_of
 from suave_des.report.compare import Choices, Comparison, compare
 from suave_des.report.compare_files import (
     Table,
+    capital,
     difference_table,
     remarks,
     runs_table,
@@ -206,8 +207,7 @@ def _section(found: Comparison, name: str) -> Section:
         tables.append(("with missions that never found the pipeline as censored (Kaplan-Meier)", censored))
     if differences:
         tables.append(("differences", difference_table(metric, differences)))
-    heading = metric.heading
-    return Section(heading[:1].upper() + heading[1:], tables, [each.conclusion for each in differences])
+    return Section(capital(metric.heading), tables, [each.conclusion for each in differences])
 
 
 def drawn(missions: Missions) -> ChartColumns:

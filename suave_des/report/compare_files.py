@@ -8,7 +8,7 @@ from textwrap import fill
 
 from suave_des.errors import number_of
 from suave_des.estimates import Interval, interval_text
-from suave_des.report.compare import Comparison, Difference, Summary
+from suave_des.report.compare import Comparison, Difference, RunsNeeded, Summary
 from suave_des.report.compared_metrics import FOUND, PAPER_METRICS, ComparedMetric
 from suave_des.report.statistics import Tested
 from suave_des.report.words import folded
@@ -24,12 +24,10 @@ def csv_text(comparison: Comparison) -> str:
     """Write all statistics as one table: a row for each group and metric, then one for each pair and metric."""
     import pandas
 
-    summaries, differences = comparison.summary_frame(), comparison.difference_frame()
-    columns = [*summaries.columns, *(name for name in differences.columns if name not in summaries.columns)]
-    rows = [*comparison.summary_rows(), *comparison.difference_rows()]
-    if "other" in columns:
-        columns.insert(1, columns.pop(columns.index("other")))
-    return pandas.DataFrame(rows, columns=columns, dtype=object).to_csv(index=False, lineterminator="\n")
+    frame = pandas.DataFrame([*comparison.summary_rows(), *comparison.difference_rows()], dtype=object)
+    if "other" in frame:
+        frame.insert(1, "other", frame.pop("other"))
+    return frame.to_csv(index=False, lineterminator="\n")
 
 
 def plain_text(comparison: Comparison, width: int = 95) -> str:
@@ -96,7 +94,7 @@ def markdown_text(comparison: Comparison) -> str:
     parts = [_markdown(comparison.conclusion)]
     for metric in comparison.metrics:
         summaries, differences = comparison.of_metric(metric.name)
-        parts.append(f"### {metric.heading[0].upper()}{metric.heading[1:]}")
+        parts.append(f"### {capital(metric.heading)}")
         parts.append(_markdown_table(summary_table(metric, summaries)))
         if censored := search_table(summaries):
             parts.append("Missions that never found it as censored (Kaplan-Meier):")
@@ -121,9 +119,7 @@ def latex_text(comparison: Comparison) -> str:
         rf"  \caption{{{_latex(_sizes(comparison))}}}",
         rf"  \begin{{tabular}}{{l{'rr' * len(metrics)}}}",
         r"    \toprule",
-        "    "
-        + "".join(rf" & \multicolumn{{2}}{{c}}{{{_latex(_capital(each.heading))}}}" for each in metrics)
-        + r" \\",
+        "    " + "".join(rf" & \multicolumn{{2}}{{c}}{{{_latex(capital(each.heading))}}}" for each in metrics) + r" \\",
         "    " + " ".join(rf"\cmidrule(lr){{{2 * place + 2}-{2 * place + 3}}}" for place in range(len(metrics))),
         "    Manager" + " & Mean & Std" * len(metrics) + r" \\",
         r"    \midrule",
@@ -150,7 +146,7 @@ def _latex_differences(comparison: Comparison) -> list[str]:
         r"    Difference & Mean & 95\% interval & Effect & $p$ (Holm) \\",
     ]
     for metric in comparison.metrics:
-        lines += [r"    \midrule", rf"    \multicolumn{{5}}{{l}}{{{_latex(_capital(metric.heading))}}} \\"]
+        lines += [r"    \midrule", rf"    \multicolumn{{5}}{{l}}{{{_latex(capital(metric.heading))}}} \\"]
         for each in comparison.of_metric(metric.name)[1]:
             name, _, mean, interval, _, p, effect = _difference_cells(each, metric)
             cells = [_latex(name), *(_latex_number(cell) for cell in (mean, interval, effect, p))]
@@ -188,8 +184,11 @@ def difference_table(metric: ComparedMetric, differences: Sequence[Difference], 
 
 def runs_table(comparison: Comparison) -> Table:
     """Return the number of runs that an interval needs, for each pair and metric."""
-    rows = (_runs_cells(each, comparison.metric(each.metric)) for each in comparison.differences if each.runs_needed)
-    return _RUNS_HEADINGS, list(rows)
+    return _RUNS_HEADINGS, [
+        _runs_cells(each, each.runs_needed, comparison.metric(each.metric))
+        for each in comparison.differences
+        if each.runs_needed
+    ]
 
 
 def _summary_cells(each: Summary, metric: ComparedMetric) -> Cells:
@@ -234,17 +233,12 @@ def _difference_cells(each: Difference, metric: ComparedMetric) -> Cells:
 def _effect(tested: Tested) -> str:
     if tested.effect is None:
         return ""
-    if tested.effect_interval is None:
-        return f"{tested.effect:.2f}"
-    low, high = tested.effect_interval
-    return f"{tested.effect:.2f} ({low:.2f} to {high:.2f})"
+    interval = interval_text(tested.effect_interval, ".2f")
+    return f"{tested.effect:.2f} ({interval})" if interval else f"{tested.effect:.2f}"
 
 
-def _runs_cells(each: Difference, metric: ComparedMetric) -> Cells:
+def _runs_cells(each: Difference, needed: RunsNeeded, metric: ComparedMetric) -> Cells:
     """Write a row of runs_table."""
-    needed = each.runs_needed
-    if needed is None:
-        return f"{each.first} - {each.second}", "", "", "", ""
     ratio = "" if each.variance_ratio is None else f"{each.variance_ratio:.1f}"
     paired = f"{needed.paired:,}" if needed.paired else ""
     unpaired = f"{needed.unpaired:,}" if needed.unpaired else "over 10,000,000"
@@ -261,11 +255,8 @@ def number(value: float | None, metric: ComparedMetric) -> str:
 
 def interval_cell(interval: Interval | None, metric: ComparedMetric) -> str:
     """Write an interval; empty for None."""
-    if interval is None:
-        return ""
-    low, high = interval
-    if metric.name == FOUND:
-        return f"{100 * low:.1f} to {100 * high:.1f}%"
+    if interval is not None and metric.name == FOUND:
+        return f"{interval_text((100 * interval[0], 100 * interval[1]), '.1f')}%"
     return interval_text(interval, f".{metric.interval_decimals}f")
 
 
@@ -289,7 +280,7 @@ def _methods(comparison: Comparison) -> list[str]:
     whys: dict[str, dict[str, None]] = {}
     for each in tested:
         whys.setdefault(each.pairing.why, {})[f"{each.first} - {each.second}"] = None
-    lines = [f"{_capital(why)}{'' if len(whys) == 1 else f' ({_listed(pairs)})'}." for why, pairs in whys.items()]
+    lines = [f"{capital(why)}{'' if len(whys) == 1 else f' ({_listed(pairs)})'}." for why, pairs in whys.items()]
     tests = dict.fromkeys(each.tested.name for each in tested if each.tested is not None)
     if tests:
         counted = f", Holm's correction over all {len(tested)}" if len(tested) > 1 else ""
@@ -321,7 +312,8 @@ def _sizes(comparison: Comparison) -> str:
     return "; ".join(f"{name}: {number_of(n, 'mission')}" for name, n in sizes.items()) + "."
 
 
-def _capital(text: str) -> str:
+def capital(text: str) -> str:
+    """Begin a text with a capital, and leave the rest as it is."""
     return text[:1].upper() + text[1:]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from suave_des.estimates import interval_text
 from suave_des.report.compared_metrics import FOUND, ComparedMetric
 from suave_des.report.statistics import FISHER, MANN_WHITNEY, MCNEMAR, WILCOXON
 
@@ -16,7 +17,7 @@ def conclusion(found: Difference, metric: ComparedMetric) -> str:
     """Write the conclusion from one difference."""
     if found.difference is None or found.tested is None or found.p_holm is None:
         return f"{found.first} and {found.second} cannot be compared in {metric.title}: one of them has no value."
-    evidence = f"{interval_text(found, metric)}{_basis(found)}, {p_text(found.p_holm)}"
+    evidence = f"{_interval(found, metric)}{_basis(found)}, {p_text(found.p_holm)}"
     if not found.is_significant:
         return f"No difference in {metric.title} is shown between {found.first} and {found.second} ({evidence})."
     claim = difference_claim(found, metric)
@@ -71,7 +72,7 @@ def overall_conclusion(
         assert each.difference is not None
         _, _, words = (metric.less if metric.better < 0 else metric.more).partition("{}")
         amount = metric.amount(abs(each.difference.value))
-        parts.append(f"{amount}{words} {_other(each, best)} ({interval_text(each, metric)}{_basis(each)})")
+        parts.append(f"{amount}{words} {_other(each, best)} ({_interval(each, metric)}{_basis(each)})")
     sentence = f"{best} {metric.most}: {_listed(parts)}"
     largest = p_text(max(each.p_holm or 0.0 for each in shown))
     if len(shown) > 1:
@@ -90,7 +91,7 @@ def _listed(parts: Sequence[str]) -> str:
     return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
 
 
-def interval_text(found: Difference, metric: ComparedMetric) -> str:
+def _interval(found: Difference, metric: ComparedMetric) -> str:
     """Write the interval of a difference's size, in the direction in which the sentence speaks."""
     assert found.difference is not None
     if found.difference.interval is None:
@@ -99,7 +100,7 @@ def interval_text(found: Difference, metric: ComparedMetric) -> str:
     if found.difference.value < 0.0 and found.is_significant:
         low, high = -high, -low
     scale, decimals = (100.0, 1) if metric.name == FOUND else (1.0, metric.decimals)
-    return f"95% interval {scale * low:.{decimals}f} to {scale * high:.{decimals}f}"
+    return f"95% interval {interval_text((scale * low, scale * high), f'.{decimals}f')}"
 
 
 def _basis(found: Difference) -> str:

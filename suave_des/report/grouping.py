@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.report.result_files import Missions
+from suave_des.report.words import printable
 
 _MOST_GROUPS = 60
 """More make tables that nobody reads, and thousands of tests."""
@@ -83,10 +84,7 @@ def grouped(
     for name in managers:
         if name not in known:
             raise InputError(f"there is no mission of {shown(name)}", remedy=did_you_mean(name, known, "there are"))
-    for name in by:
-        if name not in missions.swept:
-            remedy = did_you_mean(name, missions.swept, "swept are")
-            raise InputError(f"{shown(name)} is not what a sweep varies here", place="by", remedy=remedy)
+    missions.check_swept(by, "by")
     if managers:
         frame = frame[frame["manager"].isin(managers)]
     keys = ["manager", "source", *by]
@@ -107,20 +105,15 @@ def _names(keys: Sequence[tuple[object, ...]], by: Sequence[str]) -> list[str]:
     for manager, source, *_ in keys:
         sources.setdefault(manager, set()).add(source)
     return [
-        _printable(str(manager))
-        + (f" ({_printable(str(source))})" if len(sources[manager]) > 1 else "")
+        printable(str(manager))
+        + (f" ({printable(str(source))})" if len(sources[manager]) > 1 else "")
         + "".join(f", {name} {_short(value)}" for name, value in zip(by, values, strict=True))
         for manager, source, *values in keys
     ]
 
 
-def _printable(name: str) -> str:
-    """Return a name from a file without terminal control characters."""
-    return name if name.isprintable() else repr(name)[1:-1]
-
-
 def _short(value: object) -> str:
-    return f"{value:g}" if isinstance(value, float) else _printable(str(value))
+    return f"{value:g}" if isinstance(value, float) else printable(str(value))
 
 
 def _group(name: str, frame: pandas.DataFrame, averaged: Sequence[str]) -> Group:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pandas
 
-from suave_des.errors import InputError
+from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.metrics.result import MissionMetrics
 from suave_des.report.runs import COLUMNS, read_runs
 
@@ -38,6 +38,17 @@ class Missions:
     frame: pandas.DataFrame
     swept: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+
+    def check_swept(self, names: Sequence[str], place: str) -> None:
+        """Check that a sweep varies these columns.
+
+        Raises:
+            InputError: it does not vary one of them; `place` says where that was asked for.
+        """
+        for name in names:
+            if name not in self.swept:
+                remedy = did_you_mean(name, self.swept, "swept are")
+                raise InputError(f"{shown(name)} is not what a sweep varies here", place=place, remedy=remedy)
 
 
 def read_missions(paths: Sequence[Path]) -> Missions:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from textwrap import fill
 
 import numpy as np
 import pandas
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.errors import InputError
 from suave_des.estimates import estimate
 from suave_des.report import style
 from suave_des.report.campaign_figures import legend_columns
@@ -40,10 +41,7 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
         InputError: one of them is not swept, or there are too many for one figure.
     """
     parameters = list(parameters or missions.swept)
-    for name in parameters:
-        if name not in missions.swept:
-            remedy = did_you_mean(name, missions.swept, "swept are")
-            raise InputError(f"{shown(name)} is not what a sweep varies here", place="parameters", remedy=remedy)
+    missions.check_swept(parameters, "parameters")
     for source, part in missions.frame.groupby("source", sort=False):
         if fixed := [name for name in parameters if part[name].isna().all()]:
             problem = f"{source} does not vary {', '.join(fixed)}"
@@ -141,6 +139,4 @@ def _draw_means(axes: Axes, frame: pandas.DataFrame, metric: str, beside: float,
 
 def _folded(text: str, width: int = 26) -> str:
     """Break a long name into lines, so that names stay apart."""
-    from textwrap import fill
-
     return fill(text, width, break_long_words=False)

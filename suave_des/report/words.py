@@ -72,7 +72,7 @@ def key_words(key: str) -> str:
 def value_words(value: object) -> str:
     """Return what a value that is a word, such as a mode or a file, is called in a figure."""
     text = str(value)
-    return _MODES.get(text, plain(text)) if text else "none"
+    return mode_words(text) if text else "none"
 
 
 def mode_words(mode: str) -> str:
@@ -89,7 +89,7 @@ def function_mode_words(function: str, mode: str) -> str:
     """Return what a mode is called beside the name of its function."""
     if mode in _OFF:
         return "off"
-    text = _OTHER_MODES.get((function, mode)) or _MODES.get(mode, plain(mode))
+    text = _OTHER_MODES.get((function, mode)) or mode_words(mode)
     return text.removeprefix(f"{function_words(function)}, ")
 
 
@@ -101,7 +101,12 @@ def is_off(function: str, mode: str) -> bool:
 def plain(name: str) -> str:
     """Return a name from a file as words, without what LaTeX or a terminal would take for commands."""
     text = name.removeprefix("fd_").strip("_").replace("_", " ") or name
-    return text if text.isprintable() else repr(text)[1:-1]
+    return printable(text)
+
+
+def printable(name: str) -> str:
+    """Return a name from a file without terminal control characters."""
+    return name if name.isprintable() else repr(name)[1:-1]
 
 
 def folded(name: str, width: int = 40) -> str:
