@@ -285,7 +285,7 @@ def _name(layer: Layer, path: Path) -> object:
 def _check_modes(layer: Layer, scenario: Scenario, modes: ModeTable) -> None:
     """Check that the modes file has the functions and modes that the mission and the scenario use."""
     for function in scenario.needed_functions():
-        if function not in modes.functions:
+        if function not in modes:
             remedy = did_you_mean(function, modes.functions, "its functions")
             problem = f"defines no function {function}, which the mission needs"
             raise InputError(problem, file=modes.source, remedy=remedy)
@@ -293,27 +293,27 @@ def _check_modes(layer: Layer, scenario: Scenario, modes: ModeTable) -> None:
             remedy = f"add {UNGROUND_MODE}: {{NODE: inactive}}, which a cancelled task sets"
             raise InputError(f"function {function} has no mode {UNGROUND_MODE}", file=modes.source, remedy=remedy)
 
-    def check(function: str, mode: str, key_path: KeyPath) -> None:
+    def check_function(function: str, problem: str, key_path: KeyPath) -> None:
+        if function not in modes:
+            remedy = did_you_mean(function, modes.functions, f"functions in {modes.source}")
+            raise layer.error(f"{problem} {shown(function)}", key_path, remedy)
+
+    def check_mode(function: str, mode: str, key_path: KeyPath) -> None:
         known = modes.modes(function)
         if mode not in known:
             remedy = did_you_mean(mode, known, f"its modes in {modes.source}")
             raise layer.error(f"function {function} has no mode {shown(mode)}", key_path, remedy)
 
     for function in scenario.functions:
-        if function not in modes.functions:
-            remedy = did_you_mean(function, modes.functions, f"functions in {modes.source}")
-            raise layer.error(f"the modes file has no function {shown(function)}", ("functions", function), remedy)
-
+        check_function(function, "the modes file has no function", ("functions", function))
     for function, mode in scenario.default_modes.items():
-        if function not in modes.functions:
-            remedy = did_you_mean(function, modes.functions, f"functions in {modes.source}")
-            raise layer.error(f"there is no function {shown(function)}", ("default_modes", function), remedy)
-        check(function, mode, ("default_modes", function))
+        check_function(function, "there is no function", ("default_modes", function))
+        check_mode(function, mode, ("default_modes", function))
     for index, mode in enumerate(scenario.managers.bt.search_modes):
         key_path: KeyPath = ("managers", "bt", "search_modes", index)
         # The default names the shipped modes, which another modes file need not have: it matters only to bt.
         if layer.has(key_path):
-            check(GENERATE_SEARCH_PATH, mode, key_path)
+            check_mode(GENERATE_SEARCH_PATH, mode, key_path)
 
 
 def _check_managers(layer: Layer, scenario: Scenario) -> None:

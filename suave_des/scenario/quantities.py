@@ -151,10 +151,15 @@ class Normal(Drawn):
     maximum: Number | None = None
     """Greatest value, if any."""
 
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Smallest and greatest value, infinite where there is none."""
+        low, high = self.minimum, self.maximum
+        return -math.inf if low is None else low, math.inf if high is None else high
+
     @model_validator(mode="after")
     def _interval_is_likely(self) -> Self:
-        low = -math.inf if self.minimum is None else self.minimum
-        high = math.inf if self.maximum is None else self.maximum
+        low, high = self.interval
         ordered(low, high)
         if self.std == 0:
             share = 1.0 if low <= self.mean <= high else 0.0
@@ -168,10 +173,10 @@ class Normal(Drawn):
 
     def draw(self, stream: random.Random) -> float:
         """One value."""
-        while True:
-            value = stream.normalvariate(self.mean, self.std)
-            if (self.minimum is None or value >= self.minimum) and (self.maximum is None or value <= self.maximum):
-                return value
+        low, high = self.interval
+        while not low <= (value := stream.normalvariate(self.mean, self.std)) <= high:
+            pass
+        return value
 
 
 class Uniform(Drawn):
@@ -276,9 +281,8 @@ def _stated(distribution: AnyDistribution) -> list[tuple[str, float]]:
     """The values that a scenario states for a distribution, with their keys: itself, its mean, bounds, choices."""
     match distribution:
         case Normal():
-            mean, low, high = distribution.mean, distribution.minimum, distribution.maximum
-            bounds = (("minimum", low), ("maximum", high))
-            return [("mean", mean), *((key, bound) for key, bound in bounds if bound is not None)]
+            stated = {"mean": distribution.mean, "minimum": distribution.minimum, "maximum": distribution.maximum}
+            return [(key, value) for key, value in stated.items() if value is not None]
         case Uniform():
             return [("minimum", distribution.minimum), ("maximum", distribution.maximum)]
         case Exponential():
@@ -295,8 +299,7 @@ def support(distribution: AnyDistribution) -> tuple[float, float]:
         case Normal(std=0):
             return distribution.mean, distribution.mean
         case Normal():
-            low, high = distribution.minimum, distribution.maximum
-            return -math.inf if low is None else low, math.inf if high is None else high
+            return distribution.interval
         case Exponential():
             return distribution.minimum, distribution.minimum if distribution.mean == 0 else math.inf
         case _:

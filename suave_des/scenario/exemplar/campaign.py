@@ -125,30 +125,28 @@ def campaign_text(
         varied = _conditions(perturbations, settings, runs, options.runner_seed, notes)
         runs = min(runs, settings.random_interval) if perturbations else runs
     else:
-        varied = _drawn_anew(perturbations, _said("random_interval", settings.random_interval, runner))
+        varied = _drawn_anew(perturbations, settings.random_interval, _comment("random_interval", runner))
     where = _source(runner["experiments"])
     lines = [
         *heading(configuration.files),
         commented(0, "campaign: 1", "version of this file's form"),
         f"scenario: {flow(scenario)}",
         commented(0, f"managers: {flow(names)}", where),
-        commented(
-            0, f"runs: {runs}", f"{where}; at each of the conditions" if options.runner_seed is not None else where
-        ),
-        commented(0, f"seed: {settings.random_seed}", _said("random_seed", "", runner)[1]),
+        commented(0, f"runs: {runs}", where if options.runner_seed is None else f"{where}; at each of the conditions"),
+        commented(0, f"seed: {settings.random_seed}", _comment("random_seed", runner)),
         *varied,
     ]
     return "\n".join(lines) + "\n"
 
 
-def _said(key: str, value: Any, runner: Mapping[str, Parameter]) -> tuple[Any, str]:
-    """A value with a comment: its source, or that it is the runner's default."""
-    return value, _source(runner[key]) if key in runner else f"default of {RUNNER}.{key}"
+def _comment(key: str, runner: Mapping[str, Parameter]) -> str:
+    """The source of a value, or that it is the runner's default."""
+    return _source(runner[key]) if key in runner else f"default of {RUNNER}.{key}"
 
 
-def _drawn_anew(perturbations: Sequence[_Perturbation], interval: tuple[int, str]) -> Iterator[str]:
+def _drawn_anew(perturbations: Sequence[_Perturbation], runs_per_draw: int, comment: str) -> Iterator[str]:
     if perturbations:
-        yield commented(0, f"runs_per_draw: {interval[0]}", interval[1])
+        yield commented(0, f"runs_per_draw: {runs_per_draw}", comment)
         yield commented(0, "perturbations:", "drawn at random, the same for every manager")
     for each in perturbations:
         yield f"  # {one_line(each.comment)}"

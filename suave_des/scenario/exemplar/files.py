@@ -98,7 +98,7 @@ class Parameter:
     @property
     def node(self) -> str:
         """The node's name, without a slash."""
-        return self.entry.removeprefix("/")
+        return _name(self.entry)
 
     @property
     def key_path(self) -> KeyPath:
@@ -260,7 +260,7 @@ def _parameters(document: YamlDocument, entry: str, content: Any, notes: list[st
         )
     for other in content:
         if other != _PARAMETERS:
-            place = _place(document, (entry, other), entry.removeprefix("/"), other)
+            place = _place(document, (entry, other), _name(entry), other)
             notes.append(f"{place}: not taken over: it is beside {_PARAMETERS}, where ROS 2 does not read it")
     parameters = content[_PARAMETERS]
     if parameters is None:
@@ -328,11 +328,9 @@ class Experiment(BaseModel):
     @property
     def is_extended(self) -> bool:
         """Whether its mission is the one with a battery."""
-        names = (
-            self.mission_name,
-            *(self._arguments.get(key, "") for key in ("mission_name", "mission", "mission_type")),
-        )
-        return EXTENDED in names or self._arguments.get("bt_executable") == "suave_bt_extended"
+        given = self._arguments
+        names = (self.mission_name, *(given.get(key) for key in ("mission_name", "mission", "mission_type")))
+        return EXTENDED in names or given.get("bt_executable") == "suave_bt_extended"
 
     @property
     def _arguments(self) -> Mapping[str, str]:
