@@ -50,6 +50,15 @@ function toggleTheme() {
 /** The value of a colour of the theme. */
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
+/** A function that gives the theme's colour of a mode. */
+function modeColours() {
+  const named = {
+    fd_spiral_low: colour('--mode-low'), fd_spiral_medium: colour('--mode-medium'), fd_spiral_high: colour('--mode-high'),
+    fd_follow_pipeline: colour('--mode-follow'), fd_unground: colour('--mode-idle'), '': colour('--mode-idle'),
+  };
+  return (mode) => named[mode] ?? colour('--mode-other');
+}
+
 /** Buttons of which one is pressed. */
 function choice(parent, entries, chosen, onChoose) {
   const buttons = entries.map(([value, label, title]) => element('button', {

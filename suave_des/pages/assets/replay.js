@@ -188,7 +188,7 @@ function draw() {
   state.requested = false;
   for (const pane of panes) drawPane(pane, state.t);
   const surface = fitted(byId('timeline'), plays.length > 1 ? 104 : 84);
-  modeColour ??= themeModes();
+  modeColour ??= modeColours();
   if (surface) drawTimeline(surface, plays, state.t, span, modeColour);
   byId('clock').replaceChildren(`${state.t.toFixed(1)} s`, element('small', {}, ` of ${span.toFixed(0)} s`));
   const scrub = byId('scrub');

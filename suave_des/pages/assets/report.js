@@ -79,8 +79,7 @@ function drawSpread() {
     yaxis: { tickvals: shownGroups(), ticktext: shownGroups().map((number) => plain(short(groups[number]))), zeroline: false, showgrid: false, automargin: true,
       range: [Math.min(...shownGroups()) - 0.55, Math.max(...shownGroups()) + 0.85] },
   }));
-  byId('spread').removeAllListeners?.('plotly_click');
-  byId('spread').on?.('plotly_click', (event) => pick(event.points[0].customdata));
+  onClick('spread', pick);
 }
 
 const short = (name) => (name.length > 22 ? `${name.slice(0, 21)}…` : name);
@@ -175,11 +174,7 @@ function drawWhere() {
     });
   }
   show('where', traces, layoutOf('x, east (m)', 'y, north (m)', { yaxis: { scaleanchor: 'x', scaleratio: 1 } }));
-  byId('where').removeAllListeners?.('plotly_click');
-  byId('where').on?.('plotly_click', (event) => {
-    const [group, run] = event.points[0].customdata ?? [];
-    if (run !== undefined) selectRun(run, group);
-  });
+  onClick('where', ([group, run] = []) => { if (run !== undefined) selectRun(run, group); });
 }
 
 const hasWay = (group, run) => ways.paths.some((way) => way.group === group && way.run === run);
@@ -202,8 +197,7 @@ function drawRuns() {
     });
   }
   show('runs', traces, layoutOf(titles[x], titles[other]));
-  byId('runs').removeAllListeners?.('plotly_click');
-  byId('runs').on?.('plotly_click', (event) => pick(event.points[0].customdata));
+  onClick('runs', pick);
 }
 
 function pick(row) {
@@ -259,7 +253,7 @@ function drawTimeOf(way) {
     if (empty) empty.textContent = with_.length ? `this page has the paths and timelines of runs ${with_.join(', ')}; ${otherWays}, and the command above shows any run` : ways.note;
     return;
   }
-  const modeColour = themeMode();
+  const modeColour = modeColours();
   const traces = [{
     type: 'scatter', mode: 'lines', x: way.t_s, y: way.visibility_m, name: 'visibility', fill: 'tozeroy', fillcolor: fade(groupColour(0), 0.08),
     line: { color: colour('--faint'), width: 1.2, dash: 'dot' }, hovertemplate: '%{y:.2f} m at %{x:.0f} s<extra>visibility</extra>',
@@ -284,21 +278,13 @@ function drawTimeOf(way) {
   show('run-time', traces, layoutOf('mission time (s)', 'altitude; visibility, dotted (m)', { yaxis: { rangemode: 'tozero' } }));
 }
 
-function themeMode() {
-  const named = {
-    fd_spiral_low: '--mode-low', fd_spiral_medium: '--mode-medium', fd_spiral_high: '--mode-high', fd_follow_pipeline: '--mode-follow',
-    fd_unground: '--mode-idle', '': '--mode-idle',
-  };
-  return (mode) => colour(named[mode] ?? '--mode-other');
-}
-
 function drawMapOf(way) {
   if (!way) {
     show('run-map', [], {});
     byId('run-map').replaceChildren();
     return;
   }
-  const modeColour = themeMode();
+  const modeColour = modeColours();
   const colours = way.t_s.map((t) => modeColour(way.modes.findLast(([from]) => from <= t)?.[1] ?? ''));
   show('run-map', [pipelineTrace(), {
     type: 'scatter', mode: 'lines+markers', x: way.x_m, y: way.y_m, name: 'way', text: way.t_s, line: { color: colour('--faint'), width: 1 },

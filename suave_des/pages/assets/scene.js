@@ -32,6 +32,32 @@ for (let i = 1, length = 0; i < PIPELINE.length; i++) {
 }
 const PIPE_RADIUS = 0.14;
 
+function strokeLine(d, [x0, y0], [x1, y1]) {
+  d.beginPath();
+  d.moveTo(x0, y0);
+  d.lineTo(x1, y1);
+  d.stroke();
+}
+
+function fillEllipse(d, style, ...shape) {
+  d.fillStyle = style;
+  d.beginPath();
+  d.ellipse(...shape, 0, 7);
+  d.fill();
+}
+
+/** A gradient with some colours, each at a share of its length. */
+function withStops(gradient, ...stops) {
+  for (const [share, style] of stops) gradient.addColorStop(share, style);
+  return gradient;
+}
+
+/** Light around a point of the screen, of a colour that fades out to the other one. */
+function drawGlow(d, [x, y], size, inner, outer) {
+  d.fillStyle = withStops(d.createRadialGradient(x, y, 0, x, y, size), [0, inner], [1, outer]);
+  d.fillRect(x - size, y - size, 2 * size, 2 * size);
+}
+
 function drawScene(surface, play, moment, view) {
   const { drawing: d, width, height } = surface;
   const { pose, clarity } = moment;
@@ -55,26 +81,22 @@ function drawScene(surface, play, moment, view) {
 
 function drawWater({ d, camera, width, height, water, moment }) {
   const horizon = clamp(camera.horizon, -0.2 * height, height);
-  const sky = d.createLinearGradient(0, 0, 0, Math.max(1, horizon));
-  sky.addColorStop(0, rgb(water.top));
-  sky.addColorStop(1, rgb(water.far));
-  d.fillStyle = sky;
+  d.fillStyle = withStops(d.createLinearGradient(0, 0, 0, Math.max(1, horizon)), [0, rgb(water.top)], [1, rgb(water.far)]);
   d.fillRect(0, 0, width, height);
-  const ground = d.createLinearGradient(0, Math.max(horizon, 0), 0, height);
-  ground.addColorStop(0, rgb(horizon > 0 ? water.far : mixed(water.far, water.bed, 0.7)));
-  ground.addColorStop(0.55, rgb(mixed(water.far, water.bed, 0.8)));
-  ground.addColorStop(1, rgb(mixed(water.deep, water.bed, 0.62)));
-  d.fillStyle = ground;
+  d.fillStyle = withStops(
+    d.createLinearGradient(0, Math.max(horizon, 0), 0, height),
+    [0, rgb(horizon > 0 ? water.far : mixed(water.far, water.bed, 0.7))],
+    [0.55, rgb(mixed(water.far, water.bed, 0.8))],
+    [1, rgb(mixed(water.deep, water.bed, 0.62))],
+  );
   d.fillRect(0, Math.max(0, horizon), width, height);
   if (horizon <= 0) return;
   d.globalCompositeOperation = 'screen'; // shafts of light from the surface
   for (let n = 0; n < 6; n++) {
     const x = width * (0.06 + 0.17 * n + 0.02 * Math.sin(moment.t * 0.21 + n * 2.1));
     const broad = width * (0.03 + 0.03 * hash(n, 3));
-    const shaft = d.createLinearGradient(0, 0, 0, height * 0.8);
-    shaft.addColorStop(0, rgb([150, 230, 235], 0.13 + 0.05 * Math.sin(moment.t * 0.4 + n)));
-    shaft.addColorStop(1, rgb([150, 230, 235], 0));
-    d.fillStyle = shaft;
+    const brightest = rgb([150, 230, 235], 0.13 + 0.05 * Math.sin(moment.t * 0.4 + n));
+    d.fillStyle = withStops(d.createLinearGradient(0, 0, 0, height * 0.8), [0, brightest], [1, rgb([150, 230, 235], 0)]);
     d.beginPath();
     d.moveTo(x, 0);
     d.lineTo(x + broad, 0);
@@ -112,21 +134,13 @@ function drawBed({ d, camera, water, fog, reach, view, moment }) {
       d.stroke();
       if (hash(i, j, 4) > 0.86) {
         const size = at[3] * (0.03 + 0.06 * hash(i, j, 5));
-        d.fillStyle = rgb(mixed(water.deep, water.bed, 0.45), 0.75 * alpha);
-        d.beginPath();
-        d.ellipse(at[0], at[1], size, size * 0.62, 0, 0, 7);
-        d.fill();
-        d.fillStyle = rgb(mixed(water.bed, [230, 245, 235], 0.4), 0.45 * alpha);
-        d.beginPath();
-        d.ellipse(at[0] - size * 0.15, at[1] - size * 0.22, size * 0.6, size * 0.3, 0, 0, 7);
-        d.fill();
+        fillEllipse(d, rgb(mixed(water.deep, water.bed, 0.45), 0.75 * alpha), at[0], at[1], size, size * 0.62, 0);
+        const light = rgb(mixed(water.bed, [230, 245, 235], 0.4), 0.45 * alpha);
+        fillEllipse(d, light, at[0] - size * 0.15, at[1] - size * 0.22, size * 0.6, size * 0.3, 0);
       }
       const glint = Math.sin(moment.t * 0.9 + 6.3 * hash(i, j, 6));
       if (glint > 0.55) {
-        d.fillStyle = rgb([214, 250, 240], 0.09 * alpha * (glint - 0.55));
-        d.beginPath();
-        d.ellipse(at[0], at[1], at[3] * 0.42, at[3] * 0.2, turn, 0, 7);
-        d.fill();
+        fillEllipse(d, rgb([214, 250, 240], 0.09 * alpha * (glint - 0.55)), at[0], at[1], at[3] * 0.42, at[3] * 0.2, turn);
       }
     }
   }
@@ -184,10 +198,7 @@ function drawPipeline({ d, camera, fog, moment, water }) {
       const line = (dx, dy, wide, style) => {
         d.lineWidth = wide;
         d.strokeStyle = style;
-        d.beginPath();
-        d.moveTo(a[0] + dx - 0.03 * (b[0] - a[0]), a[1] + dy - 0.03 * (b[1] - a[1]));
-        d.lineTo(b[0] + dx, b[1] + dy);
-        d.stroke();
+        strokeLine(d, [a[0] + dx - 0.03 * (b[0] - a[0]), a[1] + dy - 0.03 * (b[1] - a[1])], [b[0] + dx, b[1] + dy]);
       };
       if (pass === 0) {
         line(broad * 0.25, broad * 0.42, broad * 1.15, rgb(water.deep, 0.4 * alpha));
@@ -222,10 +233,7 @@ function drawWay({ d, camera, fog, play, moment }) {
         d.globalAlpha = alpha;
         d.strokeStyle = seaColour(track.mode[Math.min(i, moment.index)]);
         d.lineWidth = clamp(at[3] * 0.045, 1.1, 5.5);
-        d.beginPath();
-        d.moveTo(last[0], last[1]);
-        d.lineTo(at[0], at[1]);
-        d.stroke();
+        strokeLine(d, last, at);
       }
     }
     if (at && !isEnd && i % 30 === 0) { // stems to the sea bed, so that the height can be seen
@@ -235,10 +243,7 @@ function drawWay({ d, camera, fog, play, moment }) {
         d.globalAlpha = alpha;
         d.strokeStyle = '#d6f6ff';
         d.lineWidth = 0.8;
-        d.beginPath();
-        d.moveTo(at[0], at[1]);
-        d.lineTo(foot[0], foot[1]);
-        d.stroke();
+        strokeLine(d, at, foot);
       }
     }
     last = at;
@@ -252,13 +257,9 @@ function drawShadow({ d, camera, moment }) {
   const at = camera.project(pose.x, pose.y, BED);
   if (!at) return;
   const size = at[3] * 0.3 * VEHICLE_SCALE;
-  const dark = d.createRadialGradient(at[0], at[1], 0, at[0], at[1], size);
-  dark.addColorStop(0, `rgba(0,16,22,${clamp(0.62 - 0.13 * altitude, 0.15, 0.6)})`);
-  dark.addColorStop(1, 'rgba(0,16,22,0)');
-  d.fillStyle = dark;
-  d.beginPath();
-  d.ellipse(at[0], at[1], size, size * clamp(-camera.forward[2] + 0.15, 0.25, 1), 0, 0, 7);
-  d.fill();
+  const darkest = `rgba(0,16,22,${clamp(0.62 - 0.13 * altitude, 0.15, 0.6)})`;
+  const dark = withStops(d.createRadialGradient(at[0], at[1], 0, at[0], at[1], size), [0, darkest], [1, 'rgba(0,16,22,0)']);
+  fillEllipse(d, dark, at[0], at[1], size, size * clamp(-camera.forward[2] + 0.15, 0.25, 1), 0);
 }
 
 /** The camera's view: a pyramid down to the sea bed, or as far as the water lets it see. */
@@ -271,10 +272,9 @@ function drawFootprint({ d, camera, moment }) {
   const top = camera.project(...eye);
   const middle = camera.project(pose.x, pose.y, pose.z - depth);
   if (!top || !middle) return;
-  const light = d.createLinearGradient(top[0], top[1], middle[0], middle[1] + 1);
   const tint = sees ? [255, 247, 205] : [214, 226, 205];
-  light.addColorStop(0, rgb(tint, sees ? 0.34 : 0.3));
-  light.addColorStop(1, rgb(tint, sees ? 0.1 : 0));
+  const light = withStops(d.createLinearGradient(top[0], top[1], middle[0], middle[1] + 1),
+    [0, rgb(tint, sees ? 0.34 : 0.3)], [1, rgb(tint, sees ? 0.1 : 0)]);
   d.fillStyle = camera.forward[2] < -0.9 ? rgb(tint, 0.09) : light; // from above both ends of it coincide
   for (let n = 0; n < 4; n++) {
     d.beginPath();
@@ -325,13 +325,8 @@ function drawVehicle({ d, camera, moment, water, clarity }, pose) {
   shapes.sort((one, other) => other.depth - one.depth).forEach((shape) => shape.draw());
   const lamp = camera.project(...place([0.24, 0, 0.0]));
   if (lamp) {
-    const size = lamp[3] * 0.5;
-    const glow = d.createRadialGradient(lamp[0], lamp[1], 0, lamp[0], lamp[1], size);
-    glow.addColorStop(0, 'rgba(224,252,255,0.55)');
-    glow.addColorStop(1, 'rgba(224,252,255,0)');
     d.globalCompositeOperation = 'screen';
-    d.fillStyle = glow;
-    d.fillRect(lamp[0] - size, lamp[1] - size, 2 * size, 2 * size);
+    drawGlow(d, lamp, lamp[3] * 0.5, 'rgba(224,252,255,0.55)', 'rgba(224,252,255,0)');
     d.globalCompositeOperation = 'source-over';
   }
 }
@@ -358,20 +353,12 @@ function drawThruster(d, camera, axis, centre, moment, number) {
     const [from, to] = [camera.project(...ring(0.12, angle)), camera.project(...ring(0.82, angle))];
     if (!from || !to) continue;
     d.strokeStyle = works ? 'rgba(150,255,245,0.85)' : 'rgba(255,120,96,0.8)';
-    d.beginPath();
-    d.moveTo(from[0], from[1]);
-    d.lineTo(to[0], to[1]);
-    d.stroke();
+    strokeLine(d, from, to);
   }
   if (works) return;
   const at = camera.project(...centre);
   if (!at) return;
-  const size = at[3] * 0.3;
-  const glow = d.createRadialGradient(at[0], at[1], 0, at[0], at[1], size);
-  glow.addColorStop(0, `rgba(255,70,40,${0.5 + 0.25 * Math.sin(moment.t * 5)})`);
-  glow.addColorStop(1, 'rgba(255,70,40,0)');
-  d.fillStyle = glow;
-  d.fillRect(at[0] - size, at[1] - size, 2 * size, 2 * size);
+  drawGlow(d, at, at[3] * 0.3, `rgba(255,70,40,${0.5 + 0.25 * Math.sin(moment.t * 5)})`, 'rgba(255,70,40,0)');
 }
 
 /** Particles in the water: the more, the murkier. */
@@ -395,17 +382,14 @@ function drawSnow({ d, camera, view, moment, clarity }) {
 
 function drawMurk({ d, width, height, water, clarity, camera, moment }) {
   const at = camera.project(moment.pose.x, moment.pose.y, moment.pose.z) ?? [width / 2, height / 2];
-  const veil = d.createRadialGradient(at[0], at[1], height * 0.12, at[0], at[1], Math.max(width, height) * 0.75);
-  veil.addColorStop(0, rgb(water.far, 0.02 + 0.1 * (1 - clarity)));
-  veil.addColorStop(0.55, rgb(mixed(water.far, water.deep, 0.45), 0.1 + 0.24 * (1 - clarity)));
-  veil.addColorStop(1, rgb(water.deep, 0.45 + 0.28 * (1 - clarity)));
-  d.fillStyle = veil;
+  d.fillStyle = withStops(
+    d.createRadialGradient(at[0], at[1], height * 0.12, at[0], at[1], Math.max(width, height) * 0.75),
+    [0, rgb(water.far, 0.02 + 0.1 * (1 - clarity))],
+    [0.55, rgb(mixed(water.far, water.deep, 0.45), 0.1 + 0.24 * (1 - clarity))],
+    [1, rgb(water.deep, 0.45 + 0.28 * (1 - clarity))],
+  );
   d.fillRect(0, 0, width, height);
-  const top = d.createLinearGradient(0, 0, 0, height);
-  top.addColorStop(0, 'rgba(2,26,36,0.42)');
-  top.addColorStop(0.25, 'rgba(2,26,36,0)');
-  top.addColorStop(0.72, 'rgba(2,26,36,0)');
-  top.addColorStop(1, 'rgba(2,26,36,0.62)');
-  d.fillStyle = top;
+  d.fillStyle = withStops(d.createLinearGradient(0, 0, 0, height),
+    [0, 'rgba(2,26,36,0.42)'], [0.25, 'rgba(2,26,36,0)'], [0.72, 'rgba(2,26,36,0)'], [1, 'rgba(2,26,36,0.62)']);
   d.fillRect(0, 0, width, height);
 }

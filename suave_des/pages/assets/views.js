@@ -45,10 +45,7 @@ function drawMap({ drawing: d, width, height }, play, moment) {
   d.lineWidth = 1.3;
   for (let i = 4; i <= moment.index; i += 4) {
     d.strokeStyle = seaColour(track.mode[i]);
-    d.beginPath();
-    d.moveTo(...at(track.x[i - 4], track.y[i - 4]));
-    d.lineTo(...at(track.x[i], track.y[i]));
-    d.stroke();
+    strokeLine(d, at(track.x[i - 4], track.y[i - 4]), at(track.x[i], track.y[i]));
   }
   const { pose, altitude } = moment;
   const [x, y] = at(pose.x, pose.y);
@@ -80,10 +77,7 @@ function drawSide({ drawing: d, width, height }, play, moment) {
   const metre = (floor - 14) / play.top;
   const across = (t) => ((t - moment.t + before) / (before + after)) * width;
   const up = (metres) => floor - metres * metre;
-  const water = d.createLinearGradient(0, 0, 0, floor);
-  water.addColorStop(0, '#0e5a73');
-  water.addColorStop(1, '#0b4156');
-  d.fillStyle = water;
+  d.fillStyle = withStops(d.createLinearGradient(0, 0, 0, floor), [0, '#0e5a73'], [1, '#0b4156']);
   d.fillRect(0, 0, width, floor);
   const first = Math.max(0, play.indexAt(moment.t - before) - 1);
   const last = Math.min(track.t.length - 1, play.indexAt(moment.t + after) + 1);
@@ -95,10 +89,7 @@ function drawSide({ drawing: d, width, height }, play, moment) {
   }
   d.lineTo(across(track.t[last]), 0);
   d.closePath();
-  const murk = d.createLinearGradient(0, 0, 0, floor);
-  murk.addColorStop(0, 'rgba(96,112,84,0.95)');
-  murk.addColorStop(1, 'rgba(96,112,84,0.72)');
-  d.fillStyle = murk;
+  d.fillStyle = withStops(d.createLinearGradient(0, 0, 0, floor), [0, 'rgba(96,112,84,0.95)'], [1, 'rgba(96,112,84,0.72)']);
   d.fill();
   d.strokeStyle = 'rgba(226,238,200,0.65)';
   d.lineWidth = 1;
@@ -115,19 +106,14 @@ function drawSide({ drawing: d, width, height }, play, moment) {
   d.lineCap = 'round';
   for (let i = first + 1; i <= moment.index; i++) {
     d.strokeStyle = seaColour(track.mode[i]);
-    d.beginPath();
-    d.moveTo(across(track.t[i - 1]), up(track.z[i - 1] - BED));
-    d.lineTo(across(track.t[i]), up(track.z[i] - BED));
-    d.stroke();
+    strokeLine(d, [across(track.t[i - 1]), up(track.z[i - 1] - BED)], [across(track.t[i]), up(track.z[i] - BED)]);
   }
   const { altitude, visibility } = moment;
   const [x, y] = [across(moment.t), up(altitude)];
   const sees = visibility !== null && altitude <= visibility;
   const deep = sees || visibility === null ? altitude : visibility;
-  const cone = d.createLinearGradient(0, y, 0, up(altitude - deep) + 1);
-  cone.addColorStop(0, sees ? 'rgba(255,248,210,0.75)' : 'rgba(255,236,210,0.6)');
-  cone.addColorStop(1, sees ? 'rgba(255,248,210,0.22)' : 'rgba(255,236,210,0)');
-  d.fillStyle = cone;
+  d.fillStyle = withStops(d.createLinearGradient(0, y, 0, up(altitude - deep) + 1),
+    [0, sees ? 'rgba(255,248,210,0.75)' : 'rgba(255,236,210,0.6)'], [1, sees ? 'rgba(255,248,210,0.22)' : 'rgba(255,236,210,0)']);
   d.beginPath();
   d.moveTo(x, y);
   d.lineTo(x - deep * TANGENT * metre, up(altitude - deep));
@@ -150,24 +136,14 @@ function drawSide({ drawing: d, width, height }, play, moment) {
     d.fillRect(width - 6, up(metres), 6, 1);
     if (metre > 13) d.fillText(`${metres} m`, width - 27, up(metres) + 3.5);
   }
-  const limit = visibility === null ? null : up(visibility);
-  if (limit !== null) {
+  if (visibility !== null && width > 420) {
     d.textAlign = 'right';
-    d.fillStyle = 'rgba(240,246,220,0.95)';
     const words = sees ? 'above the dashed line the sea bed is out of sight' : 'too high: the sea bed is out of sight';
     d.fillStyle = sees ? 'rgba(240,246,220,0.85)' : '#ffc4b0';
-    if (width > 420) d.fillText(words, width - 40, 14);
+    d.fillText(words, width - 40, 14);
     d.textAlign = 'left';
   }
 }
-
-const themeModes = () => {
-  const named = {
-    fd_spiral_low: colour('--mode-low'), fd_spiral_medium: colour('--mode-medium'), fd_spiral_high: colour('--mode-high'),
-    fd_follow_pipeline: colour('--mode-follow'), fd_unground: colour('--mode-idle'), '': colour('--mode-idle'),
-  };
-  return (mode) => named[mode] ?? colour('--mode-other');
-};
 
 /** Altitude and visibility of every mission over the whole time, with what happened. */
 function drawTimeline(surface, plays, t, span, modeColour) {
@@ -193,10 +169,7 @@ function drawTimeline(surface, plays, t, span, modeColour) {
       d.strokeStyle = modeColour(track.mode[i]);
       d.globalAlpha = track.t[i] <= t ? 1 : 0.42;
       d.lineWidth = 1.9;
-      d.beginPath();
-      d.moveTo(across(track.t[i - 4]), up(track.z[i - 4] - BED));
-      d.lineTo(across(track.t[i]), up(track.z[i] - BED));
-      d.stroke();
+      strokeLine(d, [across(track.t[i - 4]), up(track.z[i - 4] - BED)], [across(track.t[i]), up(track.z[i] - BED)]);
       d.fillStyle = modeColour(track.mode[i]);
       d.fillRect(across(track.t[i - 4]), bottom + 1.5, across(track.t[i]) - across(track.t[i - 4]) + 0.4, 3);
     }
