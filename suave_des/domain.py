@@ -19,6 +19,12 @@ MOVING_FUNCTIONS = (GENERATE_SEARCH_PATH, FOLLOW_PIPELINE, GENERATE_RECHARGE_PAT
 MISSION_FUNCTIONS = (MAINTAIN_MOTION, GENERATE_SEARCH_PATH, FOLLOW_PIPELINE)
 """Functions that the mission's two tasks need, so that a modes file must have them."""
 
+DEFAULT_MODE, UNGROUND_MODE = "__DEFAULT__", "fd_unground"
+"""The mode that a function's node starts with, and the one that a cancelled task sets; no function designs."""
+
+WATER_VISIBILITY, BATTERY_LEVEL = "water_visibility", "battery_level"
+"""Quality attributes that the exemplar's monitors measure."""
+
 
 @dataclass(frozen=True, slots=True)
 class Task:

@@ -19,15 +19,16 @@ from typing import Any
 
 import owlready2
 
+from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOTION, WATER_VISIBILITY
 from suave_des.knowledge.pellet.java import java_executable
 from suave_des.monitor.diagnostics import FAILED, RECOVERED
 from suave_des.resources import shipped_folder
 
 TIME_LIMIT_S = 300.0
 REASONING_PERIOD_S = 2.0
-SEARCH, INSPECT = (("f_maintain_motion", task) for task in ("f_generate_search_path", "f_follow_pipeline"))
-SEARCHING_HIGH = {"f_maintain_motion": "fd_all_thrusters", "f_generate_search_path": "fd_spiral_high"}
-INSPECTING = {"f_maintain_motion": "fd_all_thrusters", "f_follow_pipeline": "fd_follow_pipeline"}
+SEARCH, INSPECT = ((MAINTAIN_MOTION, task) for task in (GENERATE_SEARCH_PATH, FOLLOW_PIPELINE))
+SEARCHING_HIGH = {MAINTAIN_MOTION: "fd_all_thrusters", GENERATE_SEARCH_PATH: "fd_spiral_high"}
+INSPECTING = {MAINTAIN_MOTION: "fd_all_thrusters", FOLLOW_PIPELINE: "fd_follow_pipeline"}
 
 _TOMASYS = "http://metacontrol.org/tomasys#"
 _PERFORMANCE = "performance"
@@ -112,7 +113,7 @@ class StockReasoner:
             candidates = {}
             for design in terms.FunctionDesign.instances():
                 expected = {value.isQAtype.name: float(value.hasValue) for value in design.hasQAestimation}
-                visible = state.visibility_m >= expected.get("water_visibility", 0.0)
+                visible = state.visibility_m >= expected.get(WATER_VISIBILITY, 0.0)
                 if design.solvesF is suave[function] and design.fd_realisability is not False and visible:
                     candidates[design.name] = expected.get(_PERFORMANCE, 0.001)
             if candidates:

@@ -17,6 +17,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from suave_des.campaign.ensemble import COLUMN as ENSEMBLE_COLUMN
 from suave_des.campaign.ensemble import Ensemble
+from suave_des.domain import WATER_VISIBILITY
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.metrics.result import MissionResult
 from suave_des.scenario.loader import LoadedScenario, value_at, with_values
@@ -234,7 +235,7 @@ def _full_path(loaded: LoadedScenario, place: str, name: str) -> str:
     """Return the key path of a name: a signal needs no `signals.`, and visibility is water_visibility."""
     first, *rest = name.split(".")
     if first not in type(loaded.scenario).model_fields:
-        signal = "water_visibility" if first == "visibility" else first
+        signal = WATER_VISIBILITY if first == "visibility" else first
         if signal in loaded.scenario.signals:
             name = ".".join(("signals", signal, *rest))
     try:

@@ -14,7 +14,14 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
-from suave_des.domain import FOLLOW_PIPELINE, GENERATE_RECHARGE_PATH, MISSION_FUNCTIONS, THRUSTER_NAMES, THRUSTERS
+from suave_des.domain import (
+    BATTERY_LEVEL,
+    FOLLOW_PIPELINE,
+    GENERATE_RECHARGE_PATH,
+    MISSION_FUNCTIONS,
+    THRUSTER_NAMES,
+    THRUSTERS,
+)
 from suave_des.errors import InputError
 from suave_des.interfaces.mission import CALLER, CallerManages
 from suave_des.managing.base import ManagedSystem
@@ -85,7 +92,7 @@ class _Episodes:
         self.limit_s = loaded.scenario.mission.time_limit_s
         self.attributes = tuple(sorted(loaded.scenario.signals))
         has_battery = loaded.scenario.battery is not None
-        self.attributes += ("battery_level",) * has_battery
+        self.attributes += (BATTERY_LEVEL,) * has_battery
         self.choices = {
             function: modes
             for function in loaded.modes.functions

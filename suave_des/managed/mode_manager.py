@@ -7,8 +7,9 @@ from functools import partial
 import simpy
 
 from suave_des.clock import Alarm
+from suave_des.domain import UNGROUND_MODE
 from suave_des.managed.node import FunctionNode, Log
-from suave_des.scenario.modes import UNGROUND_MODE, Mode, ModeTable
+from suave_des.scenario.modes import Mode, ModeTable
 
 
 @dataclass(eq=False)

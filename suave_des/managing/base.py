@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import simpy
 
-from suave_des.domain import Task
+from suave_des.domain import UNGROUND_MODE, Task
 from suave_des.errors import InputError
 from suave_des.monitor.diagnostics import EXEMPLAR_KINDS, Diagnostic, Kind
 from suave_des.scenario.models import Scenario
-from suave_des.scenario.modes import UNGROUND_MODE
 
 if TYPE_CHECKING:  # or looking a manager up would load the vehicle and the compiler
     from suave_des.knowledge.state import Inference, KnowledgeState, Plan

@@ -5,18 +5,20 @@ from functools import partial
 from typing import ClassVar
 
 from suave_des.domain import (
+    BATTERY_LEVEL,
     FOLLOW_PIPELINE,
     GENERATE_RECHARGE_PATH,
     GENERATE_SEARCH_PATH,
     MAINTAIN_MOTION,
     SURFACE,
     SURFACE_MODE,
+    UNGROUND_MODE,
+    WATER_VISIBILITY,
 )
 from suave_des.managing import behaviours
 from suave_des.managing.base import Dependencies, FunctionsManager, ManagedSystem
 from suave_des.managing.behaviours import Behaviour, Condition, Fallback, Parallel, Sequence, SetMode
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
-from suave_des.scenario.modes import UNGROUND_MODE
 
 
 class BehaviourTree(FunctionsManager):
@@ -65,7 +67,7 @@ class BehaviourTree(FunctionsManager):
     @property
     def depends_on(self) -> Dependencies:
         """The thresholds between the search modes."""
-        return {"water_visibility": tuple(sorted(self._settings.visibility_thresholds_m))}
+        return {WATER_VISIBILITY: tuple(sorted(self._settings.visibility_thresholds_m))}
 
     # The branches of the tree, one for each function.
 
@@ -103,7 +105,7 @@ class BehaviourTree(FunctionsManager):
 
     def _is_clear(self, least_m: float) -> Behaviour:
         def holds() -> bool:
-            visibility_m = self.system.measured("water_visibility")
+            visibility_m = self.system.measured(WATER_VISIBILITY)
             return visibility_m is None or visibility_m >= least_m
 
         return Condition(f"visibility is at least {least_m:g} m, or unknown", holds=holds)
@@ -118,7 +120,7 @@ class ExtendedBehaviourTree(BehaviourTree):
     @property
     def depends_on(self) -> Dependencies:
         """The conditions of bt, and whether the battery is low."""
-        return {**super().depends_on, "battery_level": (self._settings.battery_limit,)}
+        return {**super().depends_on, BATTERY_LEVEL: (self._settings.battery_limit,)}
 
     def make_tree(self) -> Behaviour:
         """Make the tree; without a battery there is no station to go to."""
@@ -137,7 +139,7 @@ class ExtendedBehaviourTree(BehaviourTree):
 
     def _is_low(self) -> Behaviour:
         def holds() -> bool:
-            level = self.system.measured("battery_level")
+            level = self.system.measured(BATTERY_LEVEL)
             return level is not None and level < self._settings.battery_limit and SURFACE not in self.functions
 
         return Condition(f"battery is below {self._settings.battery_limit:g}", holds=holds)

@@ -10,13 +10,12 @@ from functools import partial
 from typing import ClassVar, Final
 from weakref import WeakKeyDictionary
 
-from suave_des.domain import GENERATE_SEARCH_PATH, Task
+from suave_des.domain import GENERATE_SEARCH_PATH, UNGROUND_MODE, Task
 from suave_des.knowledge.deliberation import Conclusion
 from suave_des.knowledge.state import UNGROUNDED, Inference, KnowledgeState, ObjectiveState, Plan
 from suave_des.managing.adapter import Adapter, TaskBridge
 from suave_des.managing.base import AdaptationProcess, Dependencies, Knowledge, ManagedSystem, ManagingSubsystem
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, Kind
-from suave_des.scenario.modes import UNGROUND_MODE
 from suave_des.scenario.quantities import draw
 from suave_des.scenario.revision import MetacontrolRevision
 

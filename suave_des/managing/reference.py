@@ -8,7 +8,13 @@ from functools import cache
 from itertools import count
 from typing import TYPE_CHECKING, ClassVar
 
-from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOTION, Task
+from suave_des.domain import (
+    FOLLOW_PIPELINE,
+    GENERATE_SEARCH_PATH,
+    MAINTAIN_MOTION,
+    WATER_VISIBILITY,
+    Task,
+)
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.managing.base import AdaptationProcess, Dependencies, FunctionsManager, ManagedSystem, ManagingSubsystem
 from suave_des.managing.simple import NoManager
@@ -72,7 +78,7 @@ class Threshold(FunctionsManager):
     @property
     def depends_on(self) -> Dependencies:
         """The thresholds between the search modes."""
-        return {"water_visibility": tuple(sorted(self.thresholds_m))}
+        return {WATER_VISIBILITY: tuple(sorted(self.thresholds_m))}
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
         """Remember failed thrusters."""
@@ -83,7 +89,7 @@ class Threshold(FunctionsManager):
 
     def adapt(self) -> None:
         """Request the modes that fit."""
-        for function, mode in self.wanted(self.system.measured("water_visibility")):
+        for function, mode in self.wanted(self.system.measured(WATER_VISIBILITY)):
             self.system.change_mode(function, mode)
 
     def wanted(self, visibility_m: float | None) -> Iterator[tuple[str, str]]:
@@ -108,7 +114,7 @@ class Oracle(Threshold):
     def __init__(self, system: ManagedSystem) -> None:
         super().__init__(system)
         self.period_s = None
-        self._visibility_m = system.true_signal("water_visibility")
+        self._visibility_m = system.true_signal(WATER_VISIBILITY)
 
     def mission_started(self) -> None:
         """Start watching the true visibility."""

@@ -3,10 +3,9 @@
 from collections.abc import Collection
 from typing import ClassVar
 
-from suave_des.domain import GENERATE_SEARCH_PATH, MAINTAIN_MOTION, Task
+from suave_des.domain import GENERATE_SEARCH_PATH, MAINTAIN_MOTION, UNGROUND_MODE, Task
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
 from suave_des.monitor.diagnostics import Diagnostic, Kind
-from suave_des.scenario.modes import UNGROUND_MODE
 
 
 class NoManager(ManagingSubsystem):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import simpy
 
-from suave_des.domain import MOVING_FUNCTIONS
+from suave_des.domain import BATTERY_LEVEL, MOVING_FUNCTIONS, WATER_VISIBILITY
 from suave_des.metrics.result import Event, KnowledgeRecord, TrajectoryPoint
 from suave_des.monitor.diagnostics import HULL, Diagnostic, Kind
 from suave_des.monitor.measurements import Measured, Measurements
@@ -46,7 +46,7 @@ class Recorder:
     def diagnostic_of(self, thresholds_m: Sequence[float], battery_limit: float) -> Callable[[Diagnostic], None]:
         """A subscriber that keeps component reports, and measurements of visibility and battery that cross a limit."""
         bands: dict[str, int] = {}
-        edges = {"water_visibility": sorted(thresholds_m), "battery_level": [battery_limit]}
+        edges = {WATER_VISIBILITY: sorted(thresholds_m), BATTERY_LEVEL: [battery_limit]}
 
         def take(diagnostic: Diagnostic) -> None:
             if diagnostic.kind == Kind.COMPONENT_STATUS:
@@ -55,7 +55,7 @@ class Recorder:
             elif diagnostic.key in edges:
                 value, rising = diagnostic.value, edges[diagnostic.key]
                 assert isinstance(value, float)
-                word, unit = ("visibility", " m") if diagnostic.key == "water_visibility" else ("battery", "")
+                word, unit = ("visibility", " m") if diagnostic.key == WATER_VISIBILITY else ("battery", "")
                 band, now_in = bands.get(diagnostic.key), bisect_right(rising, value)
                 if band is None:
                     self.log(f"{word}_monitor", "first_measurement", f"{value:.2f}{unit}")

@@ -15,6 +15,7 @@ import numpy as np
 
 from suave_des.clock import tick_at_or_after
 from suave_des.compiling import Array, IntArray
+from suave_des.domain import BATTERY_LEVEL
 from suave_des.world.signals import Signal
 
 Thresholds = tuple[float, ...]
@@ -204,7 +205,7 @@ class BatteryLevel(Measured):
         recharges: number of visits to the station so far.
     """
 
-    key: ClassVar[str] = "battery_level"
+    key: ClassVar[str] = BATTERY_LEVEL
     is_tabulated: ClassVar[bool] = False
     is_at_station: Callable[[float], bool]
     discharge_time_s: float

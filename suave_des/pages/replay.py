@@ -9,7 +9,7 @@ from itertools import accumulate
 from typing import Any, Final
 
 from suave_des import __version__
-from suave_des.domain import FOLLOW_PIPELINE, SEA_BED_Z_M, THRUSTERS
+from suave_des.domain import FOLLOW_PIPELINE, SEA_BED_Z_M, THRUSTERS, UNGROUND_MODE
 from suave_des.managed.follow import InspectionPath
 from suave_des.monitor.diagnostics import FAILED
 from suave_des.pages.decisions import Cycles, explained
@@ -17,7 +17,6 @@ from suave_des.pages.page import page
 from suave_des.pages.recorded import Recorded
 from suave_des.report.mission_record import details, mode_spans
 from suave_des.scenario.models import Scenario
-from suave_des.scenario.modes import UNGROUND_MODE
 from suave_des.world.pipeline import sample_points, there_and_back
 
 _DECIMALS: Final = 3

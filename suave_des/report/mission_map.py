@@ -17,13 +17,13 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
-from suave_des.domain import SEA_BED_Z_M
+from suave_des.domain import SEA_BED_Z_M, UNGROUND_MODE
 from suave_des.monitor.diagnostics import FAILED
 from suave_des.report import style
 from suave_des.report.mission_record import MissionRecord, adaptations, battery_level
 from suave_des.report.words import mode_words
 
-_IDLE_MODES = ("", "fd_unground", "inactive")
+_IDLE_MODES = ("", UNGROUND_MODE, "inactive")
 _ZOOM_MARGIN_M, _PATHS_MARGIN_M = 0.6, 1.0
 _PIPELINE: dict[str, Any] = {"color": "#CFCFCF", "lw": 4.0}
 _VISIBILITY: dict[str, Any] = {"color": style.GREY, "lw": 1.0, "ls": (0, (4, 1.5))}

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas
 
-from suave_des.domain import MAINTAIN_MOTION
+from suave_des.domain import MAINTAIN_MOTION, UNGROUND_MODE
 from suave_des.errors import InputError
 from suave_des.monitor.diagnostics import FAILED
 from suave_des.report.words import function_mode_words
@@ -22,7 +22,6 @@ _METRICS = (
     *("scenario", "manager", "run", "seed", "search_time_s", "pipeline_found"),
     *("detection_x_m", "detection_y_m"),
 )
-_UNGROUND = "fd_unground"
 _MISSING = {"visibility_m": [""], "battery_level": [""]}
 _REMEDY = "give the --out folder of suave-des run"
 
@@ -192,10 +191,12 @@ def adaptations(record: MissionRecord) -> list[Adaptation]:
     found = []
     for function, spans in mode_spans(record).items():
         for before, after in pairwise(spans):
-            is_task_end = after.what == _UNGROUND and any(
+            is_task_end = after.what == UNGROUND_MODE and any(
                 0.0 <= after.begin_s - end_s < _TASK_END_S for end_s in ends_s
             )
-            is_begin = before.what == _UNGROUND and any(abs(before.begin_s - end_s) < _TASK_END_S for end_s in ends_s)
+            is_begin = before.what == UNGROUND_MODE and any(
+                abs(before.begin_s - end_s) < _TASK_END_S for end_s in ends_s
+            )
             if function_mode_words(function, before.what) == function_mode_words(function, after.what):
                 continue  # two names for the same, such as two ways of being off
             if not is_task_end and not is_begin:
@@ -223,7 +224,7 @@ def _with_cause(found: Adaptation, record: MissionRecord) -> Adaptation:
 def _battery_cause(found: Adaptation, record: MissionRecord) -> str:
     """Return the battery as the cause of a function's activation or deactivation, if it is."""
     level = battery_level(record)
-    if level is None or found.function == MAINTAIN_MOTION or _UNGROUND not in (found.before, found.after):
+    if level is None or found.function == MAINTAIN_MOTION or UNGROUND_MODE not in (found.before, found.after):
         return ""
     at = int(np.searchsorted(record.trajectory["t_s"], found.t_s))
     earlier = int(np.searchsorted(record.trajectory["t_s"], found.t_s - _LATEST_REACTION_S))

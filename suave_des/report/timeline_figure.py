@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from suave_des.domain import SEA_BED_Z_M
+from suave_des.domain import DEFAULT_MODE, FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, SEA_BED_Z_M
 from suave_des.report import style
 from suave_des.report.mission_map import draw_thresholds, mode_colours
 from suave_des.report.mission_record import (
@@ -33,8 +33,7 @@ _LISTED = 26
 _COLUMN_LETTERS = 66
 """Longest line of which two stand side by side."""
 _FAILED, _TASK, _ON = style.VERMILION, "#D9D9D9", "#9ECAE1"
-_SPIRAL_ALTITUDES_M = {"fd_spiral_low": 1.0, "fd_spiral_medium": 2.0, "fd_spiral_high": 3.0, "__DEFAULT__": 1.0}
-_SEARCH, _FOLLOW = "f_generate_search_path", "f_follow_pipeline"
+_SPIRAL_ALTITUDES_M = {"fd_spiral_low": 1.0, "fd_spiral_medium": 2.0, "fd_spiral_high": 3.0, DEFAULT_MODE: 1.0}
 
 
 def draw_timeline(record: MissionRecord) -> style.Picture:
@@ -111,11 +110,11 @@ def _altitude_asked_for(record: MissionRecord) -> tuple[list[float], list[float]
     times_s, altitudes_m = [0.0], [np.nan]
     changes = [(span.begin_s, function, span.what) for function, spans in mode_spans(record).items() for span in spans]
     for t_s, function, mode in sorted(changes):
-        if function not in (_SEARCH, _FOLLOW):
+        if function not in (GENERATE_SEARCH_PATH, FOLLOW_PIPELINE):
             continue
         asked.pop(function, None)
         if not is_off(function, mode):
-            asked[function] = _SPIRAL_ALTITUDES_M.get(mode, np.nan) if function == _SEARCH else follow_m
+            asked[function] = _SPIRAL_ALTITUDES_M.get(mode, np.nan) if function == GENERATE_SEARCH_PATH else follow_m
         times_s.append(t_s)
         altitudes_m.append(next(reversed(asked.values()), np.nan))
     return [*times_s, record.end_s], [*altitudes_m, altitudes_m[-1]]
@@ -129,7 +128,7 @@ def _lines(record: MissionRecord) -> Iterator[tuple[str, list[tuple[Span, str, s
         bars = []
         for span in spans:
             if not is_off(function, span.what):
-                is_moving = span.what in style.MODE_COLOURS and function in (_SEARCH, _FOLLOW)
+                is_moving = span.what in style.MODE_COLOURS and function in (GENERATE_SEARCH_PATH, FOLLOW_PIPELINE)
                 colour = colours[span.what] if is_moving else _ON if "recover" not in span.what else style.ORANGE
                 bars.append((span, colour, function_mode_words(function, span.what)))
         yield function_words(function), bars

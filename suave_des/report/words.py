@@ -4,6 +4,15 @@ from __future__ import annotations
 
 import re
 
+from suave_des.domain import (
+    DEFAULT_MODE,
+    FOLLOW_PIPELINE,
+    GENERATE_RECHARGE_PATH,
+    GENERATE_SEARCH_PATH,
+    MAINTAIN_MOTION,
+    UNGROUND_MODE,
+)
+
 _UNITS = {
     "_m_per_s": "m/s",
     "_per_s": "1/s",
@@ -17,15 +26,15 @@ _UNITS = {
 }
 """Units by the ending of a key; the longer endings first."""
 _FUNCTIONS = {
-    "f_generate_search_path": "search",
-    "f_follow_pipeline": "follow",
-    "f_maintain_motion": "thrusters",
-    "generate_recharge_path": "recharge",
+    GENERATE_SEARCH_PATH: "search",
+    FOLLOW_PIPELINE: "follow",
+    MAINTAIN_MOTION: "thrusters",
+    GENERATE_RECHARGE_PATH: "recharge",
 }
 _MODES = {
     "": "before the first mode",
-    "fd_unground": "no function moves it",
-    "__DEFAULT__": "search, default altitude",
+    UNGROUND_MODE: "no function moves it",
+    DEFAULT_MODE: "search, default altitude",
     "fd_spiral_low": "search, low",
     "fd_spiral_medium": "search, medium",
     "fd_spiral_high": "search, high",
@@ -35,14 +44,14 @@ _MODES = {
 }
 """Modes of the functions that move the vehicle."""
 _OTHER_MODES = {
-    ("f_maintain_motion", "fd_all_thrusters"): "in use",
-    ("f_maintain_motion", "fd_recover_thrusters"): "recovery",
-    ("f_maintain_motion", "__DEFAULT__"): "recovery, default",
-    ("f_follow_pipeline", "__DEFAULT__"): "off",
-    ("f_follow_pipeline", "fd_follow_pipeline"): "on",
-    ("generate_recharge_path", "normal"): "on",
+    (MAINTAIN_MOTION, "fd_all_thrusters"): "in use",
+    (MAINTAIN_MOTION, "fd_recover_thrusters"): "recovery",
+    (MAINTAIN_MOTION, DEFAULT_MODE): "recovery, default",
+    (FOLLOW_PIPELINE, DEFAULT_MODE): "off",
+    (FOLLOW_PIPELINE, "fd_follow_pipeline"): "on",
+    (GENERATE_RECHARGE_PATH, "normal"): "on",
 }
-_OFF = ("fd_unground", "inactive")
+_OFF = (UNGROUND_MODE, "inactive")
 
 _BREAKS = re.compile(r"(?<=[:_./-])|(?<= )(?=[^\s=\d])|(?<=[^\W\d_A-ZÀ-Þ])(?=[A-ZÀ-Þ])")
 """Where a name may be broken: after a separator or space, but not in "(n = 20)", and before a capital within a word."""

@@ -9,12 +9,12 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, Protocol, TypedDict, Unpack
 
-from suave_des.domain import GENERATE_SEARCH_PATH
+from suave_des.domain import GENERATE_SEARCH_PATH, UNGROUND_MODE
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown
 from suave_des.resources import find
 from suave_des.scenario.layers import Files, find_named, holder_of, scenario_layer
 from suave_des.scenario.models import REASONERS, ManagerSettings, Scenario
-from suave_des.scenario.modes import UNGROUND_MODE, ModeTable, modes_of
+from suave_des.scenario.modes import ModeTable, modes_of
 from suave_des.scenario.problems import validated
 from suave_des.scenario.signal_kinds import SignalTable, TableSignal, read_table
 from suave_des.scenario.yamlfile import Layer, Location

@@ -8,11 +8,13 @@ from typing import Annotated, Any, Literal, Self, get_args
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from suave_des.domain import (
+    BATTERY_LEVEL,
     FOLLOW_PIPELINE,
     GENERATE_SEARCH_PATH,
     MISSION_FUNCTIONS,
     SURFACE,
     SURFACE_MODE,
+    WATER_VISIBILITY,
 )
 from suave_des.scenario.physical import Battery, Current, Leak, Pipeline, Start, ThrusterEvent, VehicleDescription
 from suave_des.scenario.quantities import (
@@ -326,7 +328,7 @@ class Scenario(Strict):
     @field_validator("signals", mode="after")
     @classmethod
     def _visibility_is_there(cls, value: dict[str, Any]) -> dict[str, Any]:
-        if "water_visibility" not in value:
+        if WATER_VISIBILITY not in value:
             raise wrong("there is no signal named water_visibility", "add it: the pipeline's detection needs it")
         return value
 
@@ -363,9 +365,9 @@ class Scenario(Strict):
         needed = {*self.metrics, *(each.metric for each in self.requirements.values())}
         if self.leak is None and "surfacing_time_s" in needed:
             raise wrong("surfacing_time_s needs a leak", "add leak: {time_s: 100}", "metrics")
-        if self.battery is None and (missing := [each for each in ("battery_level", "recharges") if each in needed]):
+        if self.battery is None and (missing := [each for each in (BATTERY_LEVEL, "recharges") if each in needed]):
             raise wrong(f"{missing[0]} needs a battery", "add battery: {}", "metrics")
-        measured = {*self.signals, *(("battery_level",) if self.battery is not None else ())}
+        measured = {*self.signals, *((BATTERY_LEVEL,) if self.battery is not None else ())}
         for name, each in self.requirements.items():
             if each.attribute is not None and each.attribute not in measured:
                 raise wrong(f"nothing measures {each.attribute} ({name})", "add a signal of that name", "requirements")
@@ -373,6 +375,6 @@ class Scenario(Strict):
 
     @model_validator(mode="after")
     def _one_battery(self) -> Self:
-        if self.battery is not None and "battery_level" in self.signals:
+        if self.battery is not None and BATTERY_LEVEL in self.signals:
             raise wrong("there are a battery and a signal battery_level", "remove one of them", "battery")
         return self

@@ -20,15 +20,11 @@ from pydantic import (
     model_validator,
 )
 
-from suave_des.domain import SEA_BED_Z_M, SURFACE_Z_M
+from suave_des.domain import DEFAULT_MODE, SEA_BED_Z_M, SURFACE_Z_M, UNGROUND_MODE
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown
 from suave_des.scenario.problems import input_error
 from suave_des.scenario.quantities import Real, Strict, Within, wrong
 from suave_des.scenario.yamlfile import YamlDocument, read_yaml
-
-DEFAULT_MODE = "__DEFAULT__"
-UNGROUND_MODE = "fd_unground"
-
 
 ParameterValue = float | str | bool
 _STATES = "inactive, active or active.NODE_MODE"

@@ -8,7 +8,7 @@ from typing import Any, SupportsFloat, TypeVar
 import simpy
 
 from suave_des.clock import Process, exactly_at, until
-from suave_des.domain import Task
+from suave_des.domain import BATTERY_LEVEL, WATER_VISIBILITY, Task
 from suave_des.errors import InputError, MissionError, SuaveDesError, did_you_mean, shown
 from suave_des.managing.base import AdaptationProcess, Dependencies, ManagedSystem, ManagingSubsystem
 from suave_des.metrics.result import MissionMetrics
@@ -19,7 +19,7 @@ RAISED = (Exception, SystemExit)
 """Exceptions of a manager: sys.exit must neither end a campaign, nor end a mission without an error."""
 
 _T = TypeVar("_T")
-_MEASURED_SOMEWHERE = ("water_visibility", "battery_level")
+_MEASURED_SOMEWHERE = (WATER_VISIBILITY, BATTERY_LEVEL)
 """Attributes that some shipped scenario measures: a manager may be written for all of them."""
 _MAY_RETURN = "it may return None, or yield events, such as system.env.timeout(1.0)"
 _MAX_YIELDS_AT_ONE_TIME = 10_000

@@ -149,7 +149,7 @@ class MissionRun:
         recorder, drawn, metrics = self._recorder, self._chance.drawn, self.metrics()
         self._host.end(metrics)
         measured = {} if self._battery is None else {self._battery.key: self._battery}
-        trajectory = recorder.trajectory(self._vehicle, self._signals["water_visibility"], measured)
+        trajectory = recorder.trajectory(self._vehicle, self._signals[domain.WATER_VISIBILITY], measured)
         events, knowledge = tuple(recorder.events), tuple(recorder.knowledge)
         further = {} if self._further is None else self._further.columns(metrics)
         remarks = self._host.remarks
@@ -189,7 +189,7 @@ class MissionRun:
     # The parts.
 
     def _make_detector(self) -> PipelineDetector:
-        prepared, visibility = self._prepared, self._signals["water_visibility"].arrays
+        prepared, visibility = self._prepared, self._signals[domain.WATER_VISIBILITY].arrays
         points, view_tangent, log = prepared.detection_points, prepared.view_tangent, self._recorder.log
         return PipelineDetector(self.env, self._vehicle, visibility, points, view_tangent, log)
 
@@ -269,7 +269,7 @@ class MissionRun:
 
     def _make_reaction_meter(self) -> ReactionMeter:
         settings, altitude_m = self._scenario.reaction_metric, self._revision.spiral.initial_altitude_m
-        meter = ReactionMeter(self.env, settings, self._signals["water_visibility"], altitude_m, self._battery)
+        meter = ReactionMeter(self.env, settings, self._signals[domain.WATER_VISIBILITY], altitude_m, self._battery)
         self.bus.subscribe(meter.diagnostic, (Kind.COMPONENT_STATUS,))
         self.modes.listeners.append(meter.mode_effect)
         return meter

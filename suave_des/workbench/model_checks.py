@@ -11,6 +11,7 @@ from rdflib import RDF, Graph, Literal, Namespace, URIRef
 from rdflib.plugins.parsers.notation3 import BadSyntax
 from rdflib.term import Node
 
+from suave_des.domain import DEFAULT_MODE, UNGROUND_MODE
 from suave_des.errors import InputError, nearest
 from suave_des.files import decode, read_bytes
 from suave_des.knowledge.content import Content
@@ -34,8 +35,6 @@ from suave_des.knowledge.rules.syntax import EXPRESSION, Atom, Named, Rule
 from suave_des.resources import shipped_folder
 from suave_des.workbench.findings import Finding, Level, finding_about
 
-#: Modes that are no function design: the one that a cancelled task sets, and the one that a file starts with.
-_NO_DESIGNS: Final = {"fd_unground", "__DEFAULT__"}
 _PROPERTIES: Final = ("object property", "data property", "annotation property")
 _SH: Final = Namespace("http://www.w3.org/ns/shacl#")
 _REASON: Final = re.compile(r"Bad syntax \((.*?)\) at \^ in:", re.DOTALL)
@@ -114,7 +113,7 @@ def check_designs(
             yield finding_about(name, sources, level, f"function {name} has no function design", remedy)
         if modes is not None:
             named, solving = set(modes.get(name, ())), designs.get(name, set())
-            spare = named - solving - _NO_DESIGNS
+            spare = named - solving - {UNGROUND_MODE, DEFAULT_MODE}
             for design in sorted(solving - named):
                 remedy = nearest(design, spare) or (
                     "add a mode of this name to the System Modes file, or remove the design"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from suave_des.domain import WATER_VISIBILITY
 from suave_des.errors import InputError, KeyPath
 from suave_des.resources import find, shipped_folder
 from suave_des.scenario.exemplar.campaign import campaign_text, commented, flow, heading, one_line
@@ -100,7 +101,7 @@ def import_config(files: Sequence[Path], out: Path, options: ImportOptions) -> I
 
 def _with_kind_of_signal(settings: Settings, base: Layer) -> Settings:
     """The settings with the kind of the visibility, if there are some of it and the base has another kind."""
-    kind = base.data.get("signals", {}).get("water_visibility", {}).get("kind")
+    kind = base.data.get("signals", {}).get(WATER_VISIBILITY, {}).get("kind")
     if kind == "sinusoid" or not any(path.startswith(VISIBILITY) for path in settings):
         return settings
     return {f"{VISIBILITY}kind": Setting("sinusoid", "as water_visibility_observer_node has it"), **settings}
