@@ -32,6 +32,7 @@ from suave_des.workbench.model_checks import (
     dead_rules,
     designs_without_performance,
     no_estimate,
+    undeclared_differences,
     undefined_names,
     unmeasured_rules,
     unreported_components,
@@ -166,15 +167,19 @@ def _replacing_rules(rules: Sequence[Rule], groups: Sequence[Sequence[Rule]]) ->
 def _dead_rules(
     content: Content, model: Model, given: Collection[Path], sources: Mapping[Path, OntologyFile]
 ) -> Iterator[Finding]:
-    """Find the rules that cannot fire: a note for imported ontologies, which have rules for many models."""
+    """Find the rules that cannot, or hardly can, fire: notes for imported ontologies, with rules for many models."""
     dead = [(rule, atom, f"{write_atom(atom)} holds in no state", "") for rule, atom in dead_rules(content, model)]
     known = {id(rule) for rule, *_ in dead}
     for rule, atom, attribute in unmeasured_rules(content, model):
         if id(rule) not in known:
             dead.append((rule, atom, *no_estimate(attribute)))
-    for rule, atom, message, remedy in dead:
+    found = [(rule, atom, f"can never fire: {message}", remedy) for rule, atom, message, remedy in dead]
+    for rule, atom in undeclared_differences(content):
+        message = f"{write_atom(atom)} needs individuals that are declared different; different names are not enough"
+        found.append((rule, atom, message, "add owl:AllDifferent to the ontology (Protégé: Different Individuals)"))
+    for rule, atom, message, remedy in found:
         level = Level.WARN if rule.file.resolve() in given else Level.INFO
-        yield _about(rule, sources, level, f"can never fire: {message}", remedy or None, atom.place())
+        yield _about(rule, sources, level, message, remedy or None, atom.place())
 
 
 def _about(

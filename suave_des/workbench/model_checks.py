@@ -42,6 +42,8 @@ _LEVELS: Final = {_SH.Violation: Level.ERROR, _SH.Warning: Level.WARN, _SH.Info:
 _TURTLE: Final = "give SHACL shapes in Turtle"
 _SHAPES_LIMIT_BYTES: Final = 8 * 2**20
 _ANY: Final = "any value"
+#: Axioms by which individuals are different: declared so, or members of disjoint classes or properties.
+_MAKE_DIFFERENT: Final = re.compile(OWL + "(different|AllDifferent|AllDisjoint|disjoint|propertyDisjoint|complement)")
 _ANY_TEXT: Final = "any text"
 _SUBCLASS: Final = RDFS + "subClassOf"
 _SPREADS: Final = (RDFS + "subPropertyOf", OWL + "inverseOf", OWL + "equivalentProperty")
@@ -333,6 +335,20 @@ def dead_rules(content: Content, model: Model) -> list[tuple[Rule, Atom]]:
         possible.spread()
         waiting = [rule for rule in waiting if rule not in firing]
     return [(rule, next(atom for atom in rule.body if not possible.allows(atom))) for rule in waiting]
+
+
+def undeclared_differences(content: Content) -> list[tuple[Rule, Atom]]:
+    """Find the enabled rules that ask for different individuals (differentFrom), where nothing makes any different.
+
+    Values of functional properties can, so such a rule is suspicious, not dead.
+    """
+    terms = (*(predicate for _, predicate, _ in content.triples), *content.structure)
+    if any(map(_MAKE_DIFFERENT.search, terms)):
+        return []
+    rules = content.enabled_rules
+    if any(atom.kind == "different" for rule in rules for atom in rule.head):
+        return []
+    return [(rule, atom) for rule in rules for atom in rule.body if atom.kind == "different"]
 
 
 def no_estimate(attribute: str) -> tuple[str, str]:

@@ -22,6 +22,7 @@ from tests.helpers.exemplar_files import write_as_owlready2_saves_it
 
 SUAVE = "http://www.metacontrol.org/suave#"
 TOMASYS = "http://metacontrol.org/tomasys#"
+OWL = "http://www.w3.org/2002/07/owl#"
 SWRL = "http://www.w3.org/2003/11/swrl#"
 
 
@@ -135,6 +136,37 @@ def test_all_mistakes_of_a_file_are_told_at_once(tmp_path: Path) -> None:
     findings = found(tmp_path, rules)
     assert [one.line for one in errors(findings)] == [1, 2]
     assert only(findings, "switched off").level is Level.INFO
+
+
+TWO_FAILED = 'two: c_status(?a, "FALSE") ^ c_status(?b, "FALSE") ^ differentFrom(?a, ?b) -> Role(?a)\n'
+
+
+def test_different_names_alone_do_not_make_individuals_different(tmp_path: Path) -> None:
+    warning = only(found(tmp_path, TWO_FAILED), "differentFrom(?a, ?b)")
+    assert (warning.level, warning.rule, warning.column) == (Level.WARN, "two", 54)
+    assert "owl:AllDifferent" in str(warning.remedy)
+
+
+@pytest.mark.parametrize(
+    "axiom",
+    [
+        f'''<rdf:Description><rdf:type rdf:resource="{OWL}AllDifferent"/>
+        <owl:distinctMembers rdf:parseType="Collection"><rdf:Description rdf:about="{SUAVE}c_thruster_1"/>
+        <rdf:Description rdf:about="{SUAVE}c_thruster_2"/></owl:distinctMembers></rdf:Description>''',
+        f'''<rdf:Description rdf:about="{SUAVE}c_thruster_1">
+        <owl:differentFrom rdf:resource="{SUAVE}c_thruster_2"/></rdf:Description>''',
+        f'''<rdf:Description rdf:about="{TOMASYS}Component">
+        <owl:disjointWith rdf:resource="{TOMASYS}FunctionDesign"/></rdf:Description>''',
+    ],
+    ids=["all different", "different from", "disjoint classes"],
+)
+def test_individuals_that_are_declared_different(tmp_path: Path, axiom: str) -> None:
+    assert not [each for each in found(tmp_path, TWO_FAILED, axiom) if "differentFrom" in each.message]
+
+
+def test_a_rule_may_conclude_that_individuals_are_different(tmp_path: Path) -> None:
+    concluding = 'other: c_status(?a, "FALSE") ^ c_status(?b, "RECOVERED") -> differentFrom(?a, ?b)\n'
+    assert not [each for each in found(tmp_path, TWO_FAILED + concluding) if "declare" in str(each.remedy)]
 
 
 def test_a_rule_that_never_fires(tmp_path: Path) -> None:
