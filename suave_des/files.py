@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 import json
 import os
@@ -13,7 +14,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, TypeVar
 
-from suave_des.errors import InputError
+from suave_des.errors import InputError, line_error
 
 _PIECE_ROWS = 1000
 _PART = ".part"
@@ -82,6 +83,36 @@ def decode(path: Path, content: bytes) -> str:
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise InputError("is not UTF-8 text", file=path, place=f"line {line}", remedy="save it as UTF-8") from None
+
+
+def read_csv(path: Path, limit: int, remedy: str) -> tuple[list[str], Iterator[tuple[int, list[str]]], str]:
+    """Read a CSV file that the user named.
+
+    Args:
+        path: the file.
+        limit: bytes that it may have.
+        remedy: for a line that is not CSV.
+
+    Returns:
+        Its header, its rows, each with its line, read as they are requested and without empty ones, and its SHA-256.
+
+    Raises:
+        InputError: as of read_bytes and decode; or with the line, when its turn comes, that it is not CSV.
+    """
+    content = read_bytes(path, limit)
+    reader = csv.reader(io.StringIO(decode(path, content), newline=""), strict=True)
+
+    def rows() -> Iterator[tuple[int, list[str]]]:
+        try:
+            for row in reader:
+                yield reader.line_num, row
+        except csv.Error as error:
+            raise line_error(path, reader.line_num, f"is not valid CSV: {error}", remedy) from None
+
+    numbered = rows()
+    _, header = next(numbered, (1, []))
+    filled = ((line, row) for line, row in numbered if any(map(str.strip, row)))
+    return [name.strip() for name in header], filled, hashlib.sha256(content).hexdigest()
 
 
 def rounded(value: _Cell) -> _Cell:

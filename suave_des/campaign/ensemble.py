@@ -7,9 +7,6 @@ managers can be analysed member by member.
 
 from __future__ import annotations
 
-import csv
-import hashlib
-import io
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from suave_des.errors import InputError, line_error, number_of, shown
 from suave_des.estimates import estimate, t_quantile
-from suave_des.files import decode, read_bytes
+from suave_des.files import read_csv
 from suave_des.resources import find
 from suave_des.scenario.loader import LoadedScenario, value_at
 
@@ -89,13 +86,8 @@ def read_ensemble(name: str | Path, beside: Path | None = None) -> tuple[Ensembl
         InputError: with file and line: it cannot be read, has fewer than two members, or something else than numbers.
     """
     path = find(name, _KIND, beside=beside)
-    content = read_bytes(path, _SIZE_LIMIT_BYTES)
-    reader = csv.reader(io.StringIO(decode(path, content), newline=""), strict=True)
-    try:
-        header = [cell.strip() for cell in next(reader, [])]
-        rows = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
-    except csv.Error as error:
-        raise line_error(path, reader.line_num, f"is not valid CSV: {error}", "a row for each member") from None
+    header, numbered, digest = read_csv(path, _SIZE_LIMIT_BYTES, "a row for each member")
+    rows = list(numbered)
     places = [place for place, each in enumerate(header) if each not in _NO_PARAMETERS]
     if not places or not all(header):
         raise line_error(path, 1, "has no columns of parameters", "name each by its key path in the scenario")
@@ -105,7 +97,7 @@ def read_ensemble(name: str | Path, beside: Path | None = None) -> tuple[Ensembl
         raise line_error(path, 1, f"has {number_of(len(rows), 'member')}", "an ensemble has two or more")
     members = tuple(tuple(_number(path, line, header, row, place) for place in places) for line, row in rows)
     ensemble = Ensemble(path.stem, tuple(header[place] for place in places), members)
-    return ensemble, path, hashlib.sha256(content).hexdigest()
+    return ensemble, path, digest
 
 
 def _number(path: Path, line: int, header: Sequence[str], row: Sequence[str], place: int) -> float:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import hashlib
-import io
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -18,7 +15,7 @@ import pandas
 from numpy.typing import NDArray
 
 from suave_des.errors import InputError, did_you_mean, line_error, number_of, shown
-from suave_des.files import decode, read_bytes
+from suave_des.files import read_csv
 from suave_des.metrics.result import MissionMetrics
 from suave_des.report.compared_metrics import PAPER_METRICS
 
@@ -152,32 +149,26 @@ def read_runs(
         InputError: with file and line: the file cannot be read, has other columns, no mission, or an impossible value.
     """
     path = Path(path)
-    content = read_bytes(path, _SIZE_LIMIT_BYTES)
-    reader = csv.reader(io.StringIO(decode(path, content), newline=""), strict=True)
+    remedy = "one line for each mission, cells separated by commas"
+    header, numbered, digest = read_csv(path, _SIZE_LIMIT_BYTES, remedy)
+    layout = _layout(path, header, further)
+    metrics = [each for each in fields(MissionMetrics) if are_simulated and each.name in header]
+    optional = (layout.time_limit_s, layout.pipeline_found, layout.mean_reaction_time_s, layout.scenario)
+    further = (*further, *(name for name in where_present if name in header))
+    wanted = (*layout[:3], *layout.detection_x_m, *optional, layout.run, layout.seed, *further)
+    wanted += tuple(each.name for each in metrics)
+    names = [name for name in dict.fromkeys(wanted) if name in header]
+    chosen = itemgetter(*(header.index(name) for name in names))
     rows, lines, averages = [], [], []
-    try:
-        header = [name.strip() for name in next(reader, [])]
-        layout = _layout(path, header, further)
-        metrics = [each for each in fields(MissionMetrics) if are_simulated and each.name in header]
-        optional = (layout.time_limit_s, layout.pipeline_found, layout.mean_reaction_time_s, layout.scenario)
-        further = (*further, *(name for name in where_present if name in header))
-        wanted = (*layout[:3], *layout.detection_x_m, *optional, layout.run, layout.seed, *further)
-        wanted += tuple(each.name for each in metrics)
-        names = [name for name in dict.fromkeys(wanted) if name in header]
-        chosen = itemgetter(*(header.index(name) for name in names))
-        for cells in reader:
-            if any(map(str.strip, cells)):
-                if layout.is_exemplars and _first_word(cells) in _AVERAGES:
-                    averages.append(reader.line_num)
-                    continue
-                if len(cells) != len(header):
-                    problem = f"has {number_of(len(cells), 'value')}, but the header has {len(header)}"
-                    raise line_error(path, reader.line_num, problem, "give each column a value, if only an empty one")
-                rows.append(tuple(map(str.strip, chosen(cells))))
-                lines.append(reader.line_num)
-    except csv.Error as error:
-        remedy = "one line for each mission, cells separated by commas"
-        raise line_error(path, reader.line_num, f"is not valid CSV: {error}", remedy) from None
+    for line, cells in numbered:
+        if layout.is_exemplars and _first_word(cells) in _AVERAGES:
+            averages.append(line)
+            continue
+        if len(cells) != len(header):
+            problem = f"has {number_of(len(cells), 'value')}, but the header has {len(header)}"
+            raise line_error(path, line, problem, "give each column a value, if only an empty one")
+        rows.append(tuple(map(str.strip, chosen(cells))))
+        lines.append(line)
     if not rows:
         raise line_error(path, 1, "has no missions under its header", "one line for each mission is needed")
     cells_by_name = pandas.DataFrame(rows, columns=names, index=lines, dtype=str)
@@ -188,7 +179,6 @@ def read_runs(
     managers = _first_lines(frame["manager"])
     scenarios = _first_lines(cells_by_name[layout.scenario]) if layout.scenario in names else {}
     frame = frame.assign(**{name: checked.numbers_or_words(name) for name in further})
-    digest = hashlib.sha256(content).hexdigest()
     return Runs(path, frame.reset_index(drop=True), managers, scenarios, digest, tuple(averages), tuple(lines))
 
 

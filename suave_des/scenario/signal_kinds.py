@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import hashlib
-import io
 import math
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -12,7 +9,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from suave_des.errors import line_error, number_of, shown
-from suave_des.files import decode, read_bytes
+from suave_des.files import read_csv
 from suave_des.scenario.quantities import (
     LARGEST,
     LONGEST_S,
@@ -134,34 +131,24 @@ def read_table(path: Path) -> tuple[SignalTable, str]:
         InputError: with file and line: another header, a value that is not a finite number, times that do not
             increase, no row.
     """
-    content = read_bytes(path, _SIZE_LIMIT_BYTES)
-    rows = csv.reader(io.StringIO(decode(path, content), newline=""), strict=True)
+    header, rows, digest = read_csv(path, _SIZE_LIMIT_BYTES, f"write lines of two numbers: {_COLUMNS}")
+    if sorted(header) != sorted(_LARGEST):
+        raise line_error(path, 1, f"the columns are {shown(','.join(header))}", f"the first line must be {_COLUMNS}")
     table: list[tuple[float, float]] = []
-    try:
-        header = [name.strip() for name in next(rows, [])]
-        if sorted(header) != sorted(_LARGEST):
-            raise line_error(
-                path, 1, f"the columns are {shown(','.join(header))}", f"the first line must be {_COLUMNS}"
-            )
-        for row in rows:
-            if not any(cell.strip() for cell in row):
-                continue
-            if len(row) != len(header):
-                remedy = f"each line has two, separated by a comma: {_COLUMNS}"
-                raise line_error(path, rows.line_num, f"has {number_of(len(row), 'value')}", remedy)
-            cells = dict(zip(header, row, strict=True))
-            time_s, value = (_number(path, rows.line_num, column, cells[column]) for column in _LARGEST)
-            if table and time_s <= table[-1][0]:
-                remedy = "sort the rows, and give each time once"
-                raise line_error(path, rows.line_num, f"t_s {time_s:g} does not come after {table[-1][0]:g}", remedy)
-            table.append((time_s, value))
-    except csv.Error as error:
-        remedy = f"write lines of two numbers: {_COLUMNS}"
-        raise line_error(path, rows.line_num, f"is not valid CSV: {error}", remedy) from None
+    for line, row in rows:
+        if len(row) != len(header):
+            remedy = f"each line has two, separated by a comma: {_COLUMNS}"
+            raise line_error(path, line, f"has {number_of(len(row), 'value')}", remedy)
+        cells = dict(zip(header, row, strict=True))
+        time_s, value = (_number(path, line, column, cells[column]) for column in _LARGEST)
+        if table and time_s <= table[-1][0]:
+            remedy = "sort the rows, and give each time once"
+            raise line_error(path, line, f"t_s {time_s:g} does not come after {table[-1][0]:g}", remedy)
+        table.append((time_s, value))
     if not table:
         raise line_error(path, 1, "has no row under its header", f"write lines of two numbers: {_COLUMNS}")
     times_s, values = zip(*table, strict=True)
-    return (times_s, values), hashlib.sha256(content).hexdigest()
+    return (times_s, values), digest
 
 
 def _number(path: Path, line: int, column: str, cell: str) -> float:
