@@ -134,41 +134,42 @@ def _check_hooks(name: str, kind: type[ManagingSubsystem]) -> None:
     """
     if kind in _checked:
         return
+
+    def wrong(problem: str, remedy: str) -> InputError:
+        return InputError(f"manager {name!r}{problem}", remedy=remedy)
+
     for hook, form in (_HOOKS | _CLASS_METHODS).items():
         function = getattr(kind, hook)
         arguments = [object()] * (form.count(",") + form.startswith("(self"))
         if not callable(function):
-            raise InputError(f"manager {name!r}: {hook} is not a method", remedy=f"write def {hook}{form}")
+            raise wrong(f": {hook} is not a method", f"write def {hook}{form}")
         try:
             inspect.signature(function).bind(*arguments)
         except TypeError as error:
-            problem = f"manager {name!r}: {hook}{inspect.signature(function)} cannot be called as a hook: {error}"
+            problem = f": {hook}{inspect.signature(function)} cannot be called as a hook: {error}"
             decorator = "@classmethod " if hook in _CLASS_METHODS else ""
-            raise InputError(problem, remedy=f"write {decorator}def {hook}{form}") from None
+            raise wrong(problem, f"write {decorator}def {hook}{form}") from None
         except ValueError:  # no signature: compiled
             continue
         if inspect.iscoroutinefunction(function) or inspect.isasyncgenfunction(function):
-            remedy = f"write def {hook}{form}; {_LETS_TIME_PASS}"
-            raise InputError(f"manager {name!r}: {hook} is async, and nothing would run it", remedy=remedy)
+            raise wrong(f": {hook} is async, and nothing would run it", f"write def {hook}{form}; {_LETS_TIME_PASS}")
         if inspect.isgeneratorfunction(function) and hook not in ("adapt", "input_files"):
-            problem = f"manager {name!r}: {hook} yields, and nothing would run it"
-            raise InputError(problem, remedy=f"return from {hook} at once; {_LETS_TIME_PASS}")
+            raise wrong(f": {hook} yields, and nothing would run it", f"return from {hook} at once; {_LETS_TIME_PASS}")
     own = {each for base in kind.__mro__ if base is not object and base is not ManagingSubsystem for each in vars(base)}
     if not own & _HOOKS.keys():
         resembling = {each: near for each in own for near in get_close_matches(each, _HOOKS, n=1, cutoff=0.75)}
         for each, hook in sorted(resembling.items()):
-            raise InputError(f"manager {name!r} has no hook, but {each}", remedy=f"did you mean {hook}{_HOOKS[hook]}?")
+            raise wrong(f" has no hook, but {each}", f"did you mean {hook}{_HOOKS[hook]}?")
     for each, hook in _misspelt_hooks(kind):
-        problem = f"manager {name!r}: {each} is not a hook, and nothing calls it"
         remedy = f"did you mean {hook}{_HOOKS[hook]}? give a method of your own a name that differs more"
-        raise InputError(problem, remedy=remedy)
+        raise wrong(f": {each} is not a hook, and nothing calls it", remedy)
     subscribed = kind.subscribes_to
     is_collection = isinstance(subscribed, Collection) and not isinstance(subscribed, str)
     unknown = [each for each in subscribed if each not in list(Kind)] if is_collection else []
     if unknown or not (is_collection or isinstance(subscribed, property)):
         remedy = f"give a tuple of some of {', '.join(f'Kind.{known.name}' for known in Kind)}"
         what = f"has {shown(unknown[0])}" if unknown else f"is {shown(subscribed)}"
-        raise InputError(f"manager {name!r}: subscribes_to {what}", remedy=remedy)
+        raise wrong(f": subscribes_to {what}", remedy)
     _checked.add(kind)
 
 

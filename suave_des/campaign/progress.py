@@ -102,28 +102,29 @@ class PairTracker:
 
     Args:
         half_width: wanted.
+
+    Attributes:
+        last_run: the run after which no more are needed; None until that is known.
+        differences: mean of first - second, in the runs in which both have a value.
     """
 
     def __init__(self, half_width: float) -> None:
         self._half_width = half_width
         self._waiting: tuple[dict[int, object], dict[int, object]] = ({}, {})
         self._next = 1
-        self.is_narrow = False
+        self.last_run: int | None = None
         self.differences = RunningMean()
 
-    def add(self, side: int, run: int, value: object) -> int | None:
+    def add(self, side: int, run: int, value: object) -> None:
         """Take the value of a manager in a run; anything but a number is a run without one.
 
         Args:
             side: 0 for the first manager, 1 for the second.
             run: its number.
             value: of the metric.
-
-        Returns:
-            The run after which no more are needed; None until that is known.
         """
-        if self.is_narrow or run < self._next:
-            return None
+        if self.last_run is not None or run < self._next:
+            return
         first, second = self._waiting
         self._waiting[side][run] = value
         while self._next in first and self._next in second:
@@ -132,14 +133,14 @@ class PairTracker:
             if isinstance(x, float | int) and isinstance(y, float | int):
                 self.differences.add(x - y)
             if (self._next - 1) % PAIR_STEP == 0 and self.differences.is_narrow(self._half_width, FEWEST_PAIRS):
-                self.is_narrow = True
-                return self._next - 1
-        return None
+                self.last_run = self._next - 1
+                return
 
     def progress(self, point: int) -> PairProgress:
         """Return the precision of the difference."""
         known = self.differences
-        return PairProgress(point, known.n, known.mean if known.n else None, known.half_width, self.is_narrow)
+        is_narrow = self.last_run is not None
+        return PairProgress(point, known.n, known.mean if known.n else None, known.half_width, is_narrow)
 
 
 class GroupTracker:
@@ -228,7 +229,6 @@ class ProgressTracker:
         self.done = self.failed = self._before = 0
         self.total = runs * self._groups_in_all
         self._pairs: dict[int, PairTracker] = {}
-        self._last_runs: dict[int, int] = {}
         self._sides: dict[int, int] = {}
         if until is not None and until.pair is not None:
             self._sides = {managers.index(name): side for side, name in enumerate(until.pair)}
@@ -257,18 +257,19 @@ class ProgressTracker:
     def _follow_pair(self, point: int, manager: int, run: int, outcome: MissionOutcome) -> None:
         """Add an outcome to the difference of its point; end all managers there when it is precise enough."""
         assert self._until is not None
-        if manager not in self._sides or point in self._last_runs:
+        if manager not in self._sides:
             return
         pair = self._pairs.setdefault(point, PairTracker(self._until.half_width))
-        value = None if isinstance(outcome, MissionFailure) else outcome[COLUMNS.index(self._until.metric)]
-        last = pair.add(self._sides[manager], run, value)
-        if last is None:
+        if pair.last_run is not None:
             return
-        self._last_runs[point] = last
+        value = None if isinstance(outcome, MissionFailure) else outcome[COLUMNS.index(self._until.metric)]
+        pair.add(self._sides[manager], run, value)
+        if pair.last_run is None:
+            return
         for group in ((point, number) for number in range(len(self._managers))):
             tracker = self._under_way.get(group) or self._new()
             self._count(tracker, -1)
-            self._under_way[group] = tracker.ended_at(last)
+            self._under_way[group] = tracker.ended_at(pair.last_run)
             self._count(self._under_way[group])
 
     def _count(self, tracker: GroupTracker, sign: int = 1) -> None:
@@ -304,7 +305,10 @@ class ProgressTracker:
 
     def is_over(self, group: MissionGroup, run: int) -> bool:
         """Return whether a group needs neither this run nor later ones, because an interval is narrow."""
-        return group in self._complete or run > self._last_runs.get(group[0], run)
+        if group in self._complete:
+            return run > self._complete[group].runs
+        pair = self._pairs.get(group[0])
+        return pair is not None and pair.last_run is not None and run > pair.last_run
 
     def progress(self) -> Progress:
         """Return the campaign's progress."""
@@ -328,7 +332,5 @@ class ProgressTracker:
     def counted(self, outcomes: Iterable[Finished]) -> Iterator[Finished]:
         """Yield those outcomes of a campaign whose runs count."""
         for key, outcome in outcomes:
-            stop = self._complete.get((key.point, key.manager))
-            last = self._last_runs.get(key.point) if stop is None else stop.runs
-            if last is None or key.run <= last:
+            if not self.is_over((key.point, key.manager), key.run):
                 yield key, outcome
