@@ -108,6 +108,16 @@ def test_a_name_that_nothing_measures_is_reported_once(workers: int, tmp_path: P
     assert remark.endswith("(did you mean 'water_visibility'? known: battery_level, water_visibility)")
 
 
+def test_a_name_that_nothing_measures_in_the_second_run_alone_is_reported_too() -> None:
+    manager = f"{AWKWARD}:WaitsInVainAtTimes"
+    has_remark = {
+        seed: [bool(run_mission("seams2023", manager, run, seed).remarks) for run in (1, 2)] for seed in range(9)
+    }
+    seed = next(seed for seed, runs in has_remark.items() if runs == [False, True])
+    with pytest.warns(UserWarning, match="depends_on has 'water_visiblity'"):
+        run_campaign("seams2023", [manager], 2, seed)
+
+
 def test_a_name_that_nothing_measures_is_reported_of_one_mission_too() -> None:
     (remark,) = run_mission("seams2023", f"{AWKWARD}:WaitsInVain").remarks
     assert "did you mean 'water_visibility'?" in remark

@@ -141,6 +141,15 @@ class WaitsInVain(NoManager):
         return {"water_visiblity": (3.25,)}
 
 
+class WaitsInVainAtTimes(NoManager):
+    """Misspells a measured value in runs that it draws."""
+
+    @property
+    def depends_on(self) -> Dependencies:
+        misspells = self.system.stream("misspells").random() < 0.5
+        return {"water_visiblity" if misspells else "water_visibility": (3.25,)}
+
+
 class SavesCharge(NoManager):
     """Serves scenarios with a battery, and others."""
 

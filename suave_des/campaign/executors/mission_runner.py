@@ -59,8 +59,6 @@ class MissionRunner:
         self._is_own = [not is_built_in(name) for name in job.managers]
         self._first: dict[int, tuple[MissionKey, MissionOutcome]] = {}
         self._number: dict[int, int] = {}
-        self._refused: dict[tuple[str, str], int] = {}
-        self._remarks: tuple[str, ...] = ()
         self._go_to(0)
 
     def each(self, missions: Iterable[MissionKey]) -> Iterator[Finished]:
@@ -71,7 +69,7 @@ class MissionRunner:
         """
         with _time_limits(self._exit_after_s) as limit:
             for key in missions:
-                outcome = self._outcome(key, limit)
+                outcome, remarks = self._outcome(key, limit)
                 yield key, outcome
                 if (
                     self._is_own[key.manager]
@@ -79,12 +77,8 @@ class MissionRunner:
                     and self._differs(key, outcome, limit)
                 ):
                     yield key, Remark(self._job.managers[key.manager], NOT_REPEATABLE)
-                for (function, mode), count in self._refused.items():
-                    yield key, Remark(self._job.managers[key.manager], f"{function} has no mode {mode}", count)
-                self._refused = {}
-                for text in self._remarks:
-                    yield key, Remark(self._job.managers[key.manager], text, 0)
-                self._remarks = ()
+                for remark in remarks:
+                    yield key, remark
 
     def _differs(self, key: MissionKey, outcome: MissionOutcome, limit: _Limit) -> bool:
         """Whether a manager's first mission in this process gives another outcome when it is run again.
@@ -96,30 +90,30 @@ class MissionRunner:
         self._number[key.manager] = number
         if number != 2 and (number < 4 or number & (number - 1) or number.bit_length() % 2 == 0):
             return False
-        refused, again = self._refused, self._outcome(first[0], limit)
-        self._refused = refused
+        again, _ = self._outcome(first[0], limit)
         return again != first[1] and not (isinstance(again, MissionFailure) and not again.lasting)
 
-    def _outcome(self, key: MissionKey, limit: _Limit) -> MissionOutcome:
+    def _outcome(self, key: MissionKey, limit: _Limit) -> tuple[MissionOutcome, list[Remark]]:
+        """Run a mission; return its outcome, and what its manager's author should know."""
         job = self._job
+        manager = job.managers[key.manager]
         if key.point != self._point:
             self._go_to(key.point)
         member = job.variation.member(key.run)
         simulator = self._simulator(member)
         try:
             with limit(job.time_out_s):
-                result = simulator.run(job.managers[key.manager], key.run, job.seed, record=job.record_knowledge)
+                result = simulator.run(manager, key.run, job.seed, record=job.record_knowledge)
         except MissionError as error:
-            return MissionFailure(error.manager, error.run, error.time_s, error.cause, point=key.point)
+            return MissionFailure(error.manager, error.run, error.time_s, error.cause, point=key.point), []
         except MissionTimeOut:
-            return job.timed_out(key)[1]
+            return job.timed_out(key)[1], []
         drawn = (result.drawn[path] for path in self._drawn)
         members = () if member is None else (member,)
-        if result.refused:
-            self._refused = result.refused
-        self._remarks = result.remarks
-        row = (*row_of(result.metrics), *self._swept, *drawn, *members, *further_of(result))
-        return (*row, self._knowledge(key, result)) if job.record_knowledge else row
+        known = (self._knowledge(key, result),) if job.record_knowledge else ()
+        row = (*row_of(result.metrics), *self._swept, *drawn, *members, *further_of(result), *known)
+        remarks = [Remark(manager, f"{name} has no mode {mode}", n) for (name, mode), n in result.refused.items()]
+        return row, [*remarks, *(Remark(manager, text, 0) for text in result.remarks)]
 
     def _knowledge(self, key: MissionKey, result: MissionResult) -> str:
         if not result.knowledge:
