@@ -6,6 +6,7 @@ import csv
 import hashlib
 import io
 import json
+import math
 import os
 import stat
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -113,6 +114,14 @@ def read_csv(path: Path, limit: int, remedy: str) -> tuple[list[str], Iterator[t
     _, header = next(numbered, (1, []))
     filled = ((line, row) for line, row in numbered if any(map(str.strip, row)))
     return [name.strip() for name in header], filled, hashlib.sha256(content).hexdigest()
+
+
+def as_number(text: str) -> float:
+    """Return the number that a text is; nan if it is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
 
 
 def rounded(value: _Cell) -> _Cell:

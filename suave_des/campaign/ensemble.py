@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from suave_des.errors import InputError, line_error, number_of, shown
 from suave_des.estimates import estimate, t_quantile
-from suave_des.files import read_csv
+from suave_des.files import as_number, read_csv
 from suave_des.resources import find
 from suave_des.scenario.loader import LoadedScenario, value_at
 
@@ -105,10 +105,7 @@ def _number(path: Path, line: int, header: Sequence[str], row: Sequence[str], pl
         raise line_error(
             path, line, f"has {number_of(len(row), 'value')}, but the header has {len(header)}", "give each column one"
         )
-    try:
-        number = float(row[place])
-    except ValueError:
-        number = math.nan
+    number = as_number(row[place])
     if not math.isfinite(number):
         raise line_error(path, line, f"{header[place]}: expected a number, got {shown(row[place])}", "give it a value")
     return number

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from suave_des.campaign.missions import COLUMN_TYPES, Finished, JobSpec, MissionFailure, MissionKey, WorkerError
 from suave_des.errors import InputError, nearest
+from suave_des.files import as_number
 
 FEWEST_RUNS = 20
 """Missions with a value that a manager has at least: the interval of fewer is not reliable (estimates.py)."""
@@ -83,10 +84,7 @@ def parse_until_ci(text: str) -> UntilCi:
         meant = nearest(name, METRICS)
         remedy = f"{f'{meant} ' if meant else ''}there are {', '.join(METRICS)}"
         raise _wrong(text, f"runs.csv has no metric {name!r}", remedy)
-    try:
-        half_width = float(number)
-    except ValueError:
-        half_width = math.nan
+    half_width = as_number(number)
     if not 0.0 < half_width < math.inf:
         raise _wrong(text, f"{number!r} is not a half-width", "give a number above 0, in the metric's unit")
     return UntilCi(name, half_width, pair)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.files import as_number
 
 if TYPE_CHECKING:
     from suave_des.report.grouping import Group
@@ -143,10 +144,7 @@ def parse_half_widths(texts: Sequence[str], metrics: Sequence[ComparedMetric]) -
     found = {}
     for text in texts:
         name, _, number = (part.strip() for part in text.partition(":"))
-        try:
-            half_width = float(number)
-        except ValueError:
-            half_width = math.nan
+        half_width = as_number(number)
         if name not in names:
             remedy = did_you_mean(name, names, "compared are")
             raise InputError(f"{shown(name)} is not compared", place="half-width", remedy=remedy)
