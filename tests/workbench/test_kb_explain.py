@@ -99,7 +99,7 @@ def test_a_fact_that_the_schema_adds_names_it(edited):
     assert tree.rule == "compError"
     kind = next(each for each in tree.premises if each.fact.property == "type")
     assert (kind.source, str(kind.fact)) == ("axioms", "Component(c_new)")
-    assert {each.source for each in kind.leaves()} <= {"state", "ontology"}
+    assert {each.source for each in kind.premises} <= {"state", "ontology"}
 
 
 def test_a_rule_that_computes_is_traced(tmp_path):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from types import MappingProxyType
 from typing import Final
 
 from suave_des.errors import nearest
@@ -22,16 +21,14 @@ _WORDS: Final = {
     "!=": "different from",
 }
 #: What a state asserts, and how to give it.
-_GIVEN_BY_STATES: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        TOMASYS + "FunctionGrounding": "ground a function: --at FUNCTION=DESIGN",
-        TOMASYS + "typeFD": "ground a function: --at FUNCTION=DESIGN",
-        TOMASYS + "solvesO": "ground a function: --at FUNCTION=DESIGN",
-        TOMASYS + "c_status": "report a component: --at COMPONENT=FALSE",
-        TOMASYS + "hasQAvalue": "measure what the grounded design expects: --at ATTRIBUTE=NUMBER",
-        TOMASYS + "Objective": "ask for a function: --objective FUNCTION",
-    }
-)
+_GIVEN_BY_STATES: Final[Mapping[str, str]] = {
+    TOMASYS + "FunctionGrounding": "ground a function: --at FUNCTION=DESIGN",
+    TOMASYS + "typeFD": "ground a function: --at FUNCTION=DESIGN",
+    TOMASYS + "solvesO": "ground a function: --at FUNCTION=DESIGN",
+    TOMASYS + "c_status": "report a component: --at COMPONENT=FALSE",
+    TOMASYS + "hasQAvalue": "measure what the grounded design expects: --at ATTRIBUTE=NUMBER",
+    TOMASYS + "Objective": "ask for a function: --objective FUNCTION",
+}
 #: How OWL says what is not, or what all values are: neither follows from facts that are missing.
 _CLOSED_WORLD: Final = ("complementOf", "allValuesFrom", "maxCardinality", "maxQualifiedCardinality")
 
@@ -79,20 +76,16 @@ def _comparison(base: Ontology, atom: Atom, binding: Binding) -> str:
 def _property(base: Ontology, atom: Atom, binding: Binding, facts: Facts) -> str:
     name = local_name(atom.predicate)
     subject, wanted = (bound(term, binding) for term in (atom.arguments[0], atom.arguments[-1]))
-    if isinstance(subject, str):
-        values = facts.values(subject, atom.predicate)
-        who = base.names.short(subject)
-        if not values:
-            return f"{who} has no {name}{_help(base, atom)}"
-        if wanted is None:
-            return f"{who} has {name} {_list(base, values)}, but not as the other atoms need it"
-        return f"found {name} {_list(base, values)} of {who}, needed {_show(base, wanted)}{_unequal(values, wanted)}"
-    values = facts.values(None, atom.predicate)
+    who = base.names.short(subject) if isinstance(subject, str) else None
+    values = facts.values(subject if isinstance(subject, str) else None, atom.predicate)
     if not values:
-        return f"nothing has a {name}{_help(base, atom)}"
-    if wanted is None:
-        return f"no {name} connects what the other atoms need"
-    return f"found {name} {_list(base, values)}, needed {_show(base, wanted)}{_unequal(values, wanted)}"
+        return f"{f'{who} has no' if who else 'nothing has a'} {name}{_help(base, atom)}"
+    if wanted is not None:
+        of = f" of {who}" if who else ""
+        return f"found {name} {_list(base, values)}{of}, needed {_show(base, wanted)}{_unequal(values, wanted)}"
+    if who:
+        return f"{who} has {name} {_list(base, values)}, but not as the other atoms need it"
+    return f"no {name} connects what the other atoms need"
 
 
 def _class(base: Ontology, atom: Atom, binding: Binding, facts: Facts) -> str:

@@ -138,12 +138,10 @@ class NearestMatch:
     Attributes:
         binding: what the variables stand for.
         failing: numbers of the atoms that do not hold, ascending; none where the whole body holds.
-        is_complete: whether all ways were looked at.
     """
 
     binding: Binding
     failing: tuple[int, ...]
-    is_complete: bool = True
 
 
 @dataclass
@@ -175,19 +173,13 @@ class NearestFinder:
             if atom.kind in FACT_KINDS and not any(True for _ in self.facts.matches(atom, self.start))
         )
         order = [number for number in testable_order(body) if number not in hopeless]
-        complete = True
         for allowed in range(len(order) + 1):
             self._ways = 0
-            best: tuple[tuple[object, ...], NearestMatch] | None = None
-            for binding, failing in self._ways_to_match(order, self.start, (), allowed):
-                found = NearestMatch(binding, tuple(sorted({*failing, *hopeless})))
-                rank = tuple(self._distance(number, binding) for number in failing), str(sorted(binding.items()))
-                if best is None or rank < best[0]:
-                    best = rank, found
-            complete = complete and self._ways < MOST_WAYS
-            if best is not None:
-                return NearestMatch(best[1].binding, best[1].failing, complete)
-        return NearestMatch(self.start, tuple(range(len(body))), False)
+            ways = list(self._ways_to_match(order, self.start, (), allowed))
+            if ways:
+                binding, failing = min(ways, key=self._rank)
+                return NearestMatch(binding, tuple(sorted({*failing, *hopeless})))
+        return NearestMatch(self.start, tuple(range(len(body))))
 
     def _ways_to_match(
         self, order: Sequence[int], binding: Binding, failing: tuple[int, ...], allowed: int
@@ -235,6 +227,11 @@ class NearestFinder:
             name = atom.arguments[0].name  # type: ignore[union-attr]
             return [{**binding, name: canonical(value)} for value in values]
         return [binding] if values else []
+
+    def _rank(self, way: tuple[Binding, tuple[int, ...]]) -> tuple[object, ...]:
+        """Order ways to match, the nearest first."""
+        binding, failing = way
+        return tuple(self._distance(number, binding) for number in failing), str(sorted(binding.items()))
 
     def _distance(self, number: int, binding: Binding) -> tuple[int, int]:
         """How far an atom is from holding: a comparison, another value, nothing."""

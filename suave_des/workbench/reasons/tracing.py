@@ -70,13 +70,6 @@ class Derivation:
         for premise in self.premises:
             yield from premise.lines(indent + "  ")
 
-    def leaves(self) -> Iterator[Derivation]:
-        """The asserted facts that it follows from."""
-        if not self.premises:
-            yield self
-        for premise in self.premises:
-            yield from premise.leaves()
-
     def grounds(self) -> frozenset[tuple[str, str]]:
         """(subject, property) of all facts that it follows from, without itself."""
         direct = frozenset((premise.fact.subject, premise.fact.property) for premise in self.premises)
