@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import operator
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Final
@@ -32,7 +33,12 @@ from suave_des.knowledge.rdf import (
 from suave_des.knowledge.state import KnowledgeState, Value, grounding_name, measurement_name, objective_name
 
 #: Comparison operators that a quality attribute type may have.
-OPERATORS: Final = ("<", "<=", ">", ">=")
+OPERATORS: Final[Mapping[str, Callable[[Decimal, Decimal], bool]]] = {
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
 _C_STATUS: Final = TOMASYS + "c_status"
 _HAS_QA_ESTIMATION: Final = TOMASYS + "hasQAestimation"
 _HAS_QA_VALUE: Final = TOMASYS + "hasQAvalue"
@@ -245,8 +251,11 @@ def assumption(name: str, sign: str) -> str:
 def with_operators(content: Content, model: Model, operators: Mapping[str, str]) -> tuple[Content, dict[str, str]]:
     """Add the comparison operators of quality attribute types that have none; return those that were added, by name."""
     present = {subject for subject, predicate, _ in content.triples if predicate == _OPERATOR}
-    added = {name: sign for name, sign in sorted(operators.items()) if model.attributes.get(name, "") not in present}
-    added = {name: sign for name, sign in added.items() if name in model.attributes}
+    added = {
+        name: sign
+        for name, sign in sorted(operators.items())
+        if name in model.attributes and model.attributes[name] not in present
+    }
     if not added:
         return content, {}
     more = [(model.attributes[name], _OPERATOR, Lit(sign, XSD + "string")) for name, sign in added.items()]

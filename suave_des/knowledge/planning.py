@@ -6,13 +6,12 @@ section on Metacontrol; repository kas-lab/suave). Unlike there, the filter by r
 
 from __future__ import annotations
 
-import operator
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from decimal import Decimal
-from types import MappingProxyType
 from typing import Final
 
 from suave_des.errors import KnowledgeError
+from suave_des.knowledge.model import OPERATORS
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import PERFORMANCE, local_name
 from suave_des.knowledge.state import (
@@ -31,9 +30,6 @@ DEFAULT_PERFORMANCE: Final = Decimal("0.001")
 _PERFORMANCE: Final = local_name(PERFORMANCE)
 #: Statuses that call for adaptation, besides all that start with IN_ERROR_; the last three occur in older files.
 _CALLING: Final = frozenset({UNGROUNDED, "INTERNAL_ERROR", "EXTERNAL_ERROR", "UPDATABLE"})
-_COMPARE: Final[Mapping[str, Callable[[Decimal, Decimal], bool]]] = MappingProxyType(
-    {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
-)
 
 
 def plan(ontology: Ontology, inference: Inference, *, improve_exceeded: bool = False) -> Plan:
@@ -108,17 +104,17 @@ def _objections(inference: Inference, design: str, function: str) -> Iterator[st
         if not signs:
             raise KnowledgeError(
                 f"{objective} requires a value of {attribute}, which has no qa_comparison_operator",
-                remedy=f"give {attribute} one of {' '.join(_COMPARE)}: "
+                remedy=f"give {attribute} one of {' '.join(OPERATORS)}: "
                 "the way in which a value is worse than the required one",
             )
         for expected in _expected(inference, design, attribute):
-            if _COMPARE[signs[0]](expected, required):
+            if OPERATORS[signs[0]](expected, required):
                 left, right = _show_pair(expected, required)
                 yield f"{attribute} {left} expected {signs[0]} {right} required"
     for attribute, expected in _values(inference, design, "hasQAestimation"):
         for measured in inference.state.measured(attribute):
             for sign in _operators(inference, attribute):
-                if _COMPARE[sign](measured, expected):
+                if OPERATORS[sign](measured, expected):
                     left, right = _show_pair(measured, expected)
                     yield f"{attribute} {left} measured {sign} {right} expected"
 
@@ -140,7 +136,7 @@ def _expected(inference: Inference, design: str, attribute: str) -> list[Decimal
 
 def _operators(inference: Inference, attribute: str) -> list[str]:
     """Return the operators by which a value of a quality attribute is worse than an expected one; usually one."""
-    return [sign for sign in map(str, inference.values(attribute, "qa_comparison_operator")) if sign in _COMPARE]
+    return [sign for sign in map(str, inference.values(attribute, "qa_comparison_operator")) if sign in OPERATORS]
 
 
 def performance(inference: Inference, design: str) -> Decimal:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
-from types import MappingProxyType
 from typing import Final, Protocol
 
 from suave_des.errors import InputError
@@ -106,9 +105,11 @@ def _cached(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Reason
     return CachedPellet(ontology, limit=limit, terms=terms)
 
 
-BACKENDS: Final[Mapping[str, Callable[[Ontology, TimeLimit, Terms | None], Reasoner]]] = MappingProxyType(
-    {"cached": _cached, "pellet": _pellet, "owlready2": _owlready2}
-)
+BACKENDS: Final[Mapping[str, Callable[[Ontology, TimeLimit, Terms | None], Reasoner]]] = {
+    "cached": _cached,
+    "pellet": _pellet,
+    "owlready2": _owlready2,
+}
 
 
 def make_reasoner(

@@ -247,18 +247,14 @@ class Plan:
         return frozenset([each.function for each in self.decisions if each.design is None])
 
 
-def _swap_prefix(name: str, old: str, new: str) -> str:
-    return new + (name.removeprefix(old) if name.startswith(old) else name)
-
-
 def objective_name(function: str) -> str:
     """Name of the objective of a function: o_generate_search_path for f_generate_search_path."""
-    return _swap_prefix(function, "f_", "o_")
+    return f"o_{function.removeprefix('f_')}"
 
 
 def grounding_name(design: str) -> str:
     """Name of the grounding of a function design: fg_spiral_high for fd_spiral_high."""
-    return _swap_prefix(design, "fd_", "fg_")
+    return f"fg_{design.removeprefix('fd_')}"
 
 
 def measurement_name(attribute: str) -> str:

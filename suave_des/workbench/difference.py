@@ -301,10 +301,7 @@ def compare_missions(
             missions.seed,
             missions.workers,
             on_progress=on_progress,
-            ontologies=replacements.get("ontologies", ()),
-            rules=replacements.get("rules", ()),
-            disabled_rules=replacements.get("disabled_rules", ()),
-            values=replacements.get("values", {}),
+            **replacements,
         )
         frames.append(result.frame().set_index("run"))
     before, after = frames

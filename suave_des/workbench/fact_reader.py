@@ -88,7 +88,7 @@ class FactReader:
 
     def _individual(self, term: Term) -> str:
         if not isinstance(term, Named):
-            raise InputError(f"{shown(_text(term))} is a value, but an individual is needed")
+            raise InputError(f"{shown(term[0])} is a value, but an individual is needed")
         name = term.iri
         if ":" in name:
             return name
@@ -124,7 +124,3 @@ def _parsed(text: str) -> Atom:
     if len(rule.head) != 1:
         raise InputError(f"{shown(text)} has {len(rule.head)} facts", remedy="write one")
     return rule.head[0]
-
-
-def _text(term: Term) -> str:
-    return term.text if isinstance(term, Lit) else str(term[0])

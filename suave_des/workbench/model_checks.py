@@ -56,9 +56,9 @@ def undefined_names(
 
     Names of other vocabularies than those of the ontologies may be defined elsewhere, and are a warning.
     """
-    groups = (model.objectives, model.groundings, model.measurements) if model is not None else ()
     described = {subject for subject, _, _ in content.triples}
-    described |= {individual.iri for group in groups for individual in group.values()}
+    if model is not None:
+        described |= {individual.iri for individual in model.individuals()}
     namespaces = {namespace(iri) for iri in described}
 
     def undefined(subject: str, what: str, name: str, *kinds: str) -> Finding:
@@ -143,14 +143,9 @@ def unused_individuals(content: Content, model: Model, sources: Sequence[Ontolog
     mentioned |= {
         term.iri for rule in content.rules for atom in rule.atoms for term in atom.arguments if isinstance(term, Named)
     }
-    components = {*model.components.values()}
-    mentioned |= {
-        subject for subject, name, _ in content.triples if not name.startswith(LANGUAGE_NAMESPACES)
-    } & components
-    mentioned |= {*model.designs.values()}
-    mentioned |= {
-        one.iri for group in (model.objectives, model.groundings, model.measurements) for one in group.values()
-    }
+    holders = {subject for subject, name, _ in content.triples if not name.startswith(LANGUAGE_NAMESPACES)}
+    mentioned |= holders & {*model.components.values()}
+    mentioned |= {*model.designs.values(), *(individual.iri for individual in model.individuals())}
     individuals = {
         subject
         for subject, predicate, value in content.triples

@@ -47,7 +47,7 @@ class ValueRange:
     def __str__(self) -> str:
         """In words: "not measured", "1.25", "< 1.25", ">= 1.25", "1.25 <= . < 2.25"."""
         if self.is_missing:
-            return "not measured"
+            return _MISSING
         if self.is_number:
             return str(self.low)
         below = "" if self.high is None else f"{'<=' if self.high_closed else '<'} {self.high}"
@@ -144,8 +144,8 @@ def parse_region(text: str) -> ValueRange | None:
             return ValueRange(high=number, high_closed=closed)
         return ValueRange(low=number, low_closed=closed)
     if found := _TWO_SIDED.fullmatch(text):
-        region = ValueRange(exact(found[1]), exact(found[4]), found[2] == "<=", found[3] == "<=")
         low, high = exact(found[1]), exact(found[4])
+        region = ValueRange(low, high, found[2] == "<=", found[3] == "<=")
         if low > high or (low == high and not (region.low_closed and region.high_closed)):
             raise InputError(f"no number is in the region {shown(text)}", remedy="write the smaller number first")
         return region

@@ -13,7 +13,8 @@ from suave_des.domain import BATTERY_LEVEL, GENERATE_SEARCH_PATH, MAINTAIN_MOTIO
 from suave_des.errors import InputError, KeyPath, KnowledgeError, did_you_mean, nearest, shown
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.planning import calls
-from suave_des.knowledge.rdf import TOMASYS, XSD, Lit
+from suave_des.knowledge.rdf import TOMASYS
+from suave_des.knowledge.rules.syntax import texts_of
 from suave_des.knowledge.state import UNGROUNDED, KnowledgeState, ObjectiveState
 from suave_des.metrics.result import KnowledgeRecord
 from suave_des.scenario.models import Scenario
@@ -112,14 +113,7 @@ class StateBuilder:
 
     def _check_status(self, property_name: str, value: str) -> None:
         """Reject a status that resembles one that a rule mentions, because nothing would follow from it."""
-        known = {
-            term.text
-            for rule in self.base.rules
-            for atom in rule.atoms
-            if atom.predicate == TOMASYS + property_name
-            for term in atom.arguments
-            if isinstance(term, Lit) and term.datatype == XSD + "string"
-        }
+        known = texts_of((atom for rule in self.base.rules for atom in rule.atoms), TOMASYS + property_name)
         if property_name == "o_status":
             known.add(UNGROUNDED)
         if value not in known and not calls(value) and nearest(value.upper(), known) is not None:

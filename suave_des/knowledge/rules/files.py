@@ -39,7 +39,10 @@ class RulesFile:
         Raises:
             InputError: it is missing, a folder, too large, or not text in UTF-8.
         """
-        text = _read_text(path)
+        text = decode(path, read_bytes(path, MAX_BYTES))
+        if text.lstrip().startswith("<?xml"):
+            raise InputError("this is XML, not rules as text", file=path, remedy="give it with --ontology")
+        text = text.replace("\r\n", "\n").replace("\r", "\n")
         return cls(path, text, parse_rules(text, path))
 
     def looked_up(self, vocabulary: Vocabulary) -> Iterator[tuple[str, Rule | RuleError]]:
@@ -94,13 +97,6 @@ def read_rule(text: str, vocabulary: Vocabulary, file: Path) -> Rule:
     if error is not None:
         raise error
     return rule
-
-
-def _read_text(path: Path) -> str:
-    text = decode(path, read_bytes(path, MAX_BYTES))
-    if text.lstrip().startswith("<?xml"):
-        raise InputError("this is XML, not rules as text", file=path, remedy="give it with --ontology")
-    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def hash_with_rules(digest: str, texts: Iterable[str], disabled: Collection[str]) -> str:

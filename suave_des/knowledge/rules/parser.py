@@ -20,7 +20,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 from suave_des.errors import nearest
@@ -31,20 +30,18 @@ if TYPE_CHECKING:
     from lark import Lark, Token
 
 #: Prefixes that need not be declared.
-PREFIXES: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        "mros": MROS,
-        "owl": OWL,
-        "rdf": RDF,
-        "rdfs": RDFS,
-        "suave": SUAVE,
-        "swrl": SWRL,
-        "swrla": SWRLA,
-        "swrlb": SWRLB,
-        "tomasys": TOMASYS,
-        "xsd": XSD,
-    }
-)
+PREFIXES: Final[Mapping[str, str]] = {
+    "mros": MROS,
+    "owl": OWL,
+    "rdf": RDF,
+    "rdfs": RDFS,
+    "suave": SUAVE,
+    "swrl": SWRL,
+    "swrla": SWRLA,
+    "swrlb": SWRLB,
+    "tomasys": TOMASYS,
+    "xsd": XSD,
+}
 #: Prefixes of further built-ins, which Protégé's SWRLTab has and Pellet has not.
 _FOREIGN_BUILTINS: Final = ("sqwrl", "swrlm", "swrlx", "temporal")
 MAX_DIGITS: Final = 400

@@ -8,13 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 from typing import Final, Literal, NamedTuple
 
 from rdflib.term import Node
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.rdf import OWL, SWRL, SWRLB, Lit, RdfTriple
+from suave_des.knowledge.rdf import OWL, SWRL, SWRLB, XSD, Lit, RdfTriple
 
 
 class RuleError(KnowledgeError):
@@ -165,47 +164,48 @@ def _properties(atoms: Iterable[Atom]) -> frozenset[tuple[str, bool]]:
     )
 
 
+def texts_of(atoms: Iterable[Atom], predicate: str) -> set[str]:
+    """Texts that atoms mention as values of a property."""
+    terms = (term for atom in atoms if atom.predicate == predicate for term in atom.arguments)
+    return {term.text for term in terms if isinstance(term, Lit) and term.datatype == XSD + "string"}
+
+
 #: The sign of each built-in that compares two values.
-COMPARISONS: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        SWRLB + "equal": "=",
-        SWRLB + "notEqual": "!=",
-        SWRLB + "lessThan": "<",
-        SWRLB + "lessThanOrEqual": "<=",
-        SWRLB + "greaterThan": ">",
-        SWRLB + "greaterThanOrEqual": ">=",
-    }
-)
+COMPARISONS: Final[Mapping[str, str]] = {
+    SWRLB + "equal": "=",
+    SWRLB + "notEqual": "!=",
+    SWRLB + "lessThan": "<",
+    SWRLB + "lessThanOrEqual": "<=",
+    SWRLB + "greaterThan": ">",
+    SWRLB + "greaterThanOrEqual": ">=",
+}
 #: The built-in of each sign.
-COMPARISON_OF: Final[Mapping[str, str]] = MappingProxyType({sign: name for name, sign in COMPARISONS.items()})
+COMPARISON_OF: Final[Mapping[str, str]] = {sign: name for name, sign in COMPARISONS.items()}
 _TESTING_TEXT: Final = ["contains", "containsIgnoreCase", "endsWith", "matches", "startsWith", "stringEqualIgnoreCase"]
 #: Built-ins that compare, so that every argument must be bound; the others compute their first one.
 TESTERS: Final = frozenset((*COMPARISONS, *(SWRLB + name for name in _TESTING_TEXT)))
 #: Pellet's built-ins, with the least and the largest number of arguments.
-BUILTINS: Final[Mapping[str, tuple[int, int]]] = MappingProxyType(
-    dict.fromkeys(TESTERS, (2, 2))
-    | {
-        SWRLB + name: counts
-        for names, counts in (
-            ("abs ceiling cos floor round sin tan unaryMinus unaryPlus booleanNot", (2, 2)),
-            ("lowerCase normalizeSpace stringLength upperCase", (2, 2)),
-            ("divide integerDivide mod pow subtract", (3, 3)),
-            ("add multiply", (3, 99)),
-            ("roundHalfToEven", (2, 3)),
-            ("stringConcat", (2, 99)),
-            ("substring", (3, 4)),
-            ("substringAfter substringBefore tokenize", (3, 3)),
-            ("replace translate", (4, 4)),
-            ("anyURI resolveURI", (2, 99)),
-            ("date", (4, 5)),
-            ("dateTime", (7, 8)),
-            ("time", (4, 5)),
-            ("dayTimeDuration", (2, 5)),
-            ("yearMonthDuration", (2, 3)),
-        )
-        for name in names.split()
-    }
-)
+BUILTINS: Final[Mapping[str, tuple[int, int]]] = dict.fromkeys(TESTERS, (2, 2)) | {
+    SWRLB + name: counts
+    for names, counts in (
+        ("abs ceiling cos floor round sin tan unaryMinus unaryPlus booleanNot", (2, 2)),
+        ("lowerCase normalizeSpace stringLength upperCase", (2, 2)),
+        ("divide integerDivide mod pow subtract", (3, 3)),
+        ("add multiply", (3, 99)),
+        ("roundHalfToEven", (2, 3)),
+        ("stringConcat", (2, 99)),
+        ("substring", (3, 4)),
+        ("substringAfter substringBefore tokenize", (3, 3)),
+        ("replace translate", (4, 4)),
+        ("anyURI resolveURI", (2, 99)),
+        ("date", (4, 5)),
+        ("dateTime", (7, 8)),
+        ("time", (4, 5)),
+        ("dayTimeDuration", (2, 5)),
+        ("yearMonthDuration", (2, 3)),
+    )
+    for name in names.split()
+}
 
 
 def mirrored(sign: str) -> str:

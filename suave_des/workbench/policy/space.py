@@ -13,8 +13,8 @@ from math import comb
 from typing import Final
 
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import OWL, RDFS, TOMASYS, XSD, Lit, Triple, reached
-from suave_des.knowledge.rules.syntax import COMPARISONS, Atom, Named, Rule, Variable
+from suave_des.knowledge.rdf import OWL, RDFS, TOMASYS, Lit, Triple, reached
+from suave_des.knowledge.rules.syntax import COMPARISONS, Atom, Named, Rule, Variable, texts_of
 from suave_des.monitor.diagnostics import FAILED, RECOVERED
 from suave_des.workbench.ranges import numbers_in
 from suave_des.workbench.state_input import ManagingSettings
@@ -119,14 +119,7 @@ def _exchangeable(base: Ontology, one: str, other: str) -> bool:
 
 def component_statuses(base: Ontology) -> tuple[str, ...]:
     """Values of c_status to look at: what the thruster monitor reports, and what enabled rules ask for."""
-    asked = {
-        term.text
-        for rule in base.content.enabled_rules
-        for atom in rule.body
-        if atom.predicate == _C_STATUS
-        for term in atom.arguments
-        if isinstance(term, Lit) and term.datatype == XSD + "string"
-    }
+    asked = texts_of((atom for rule in base.content.enabled_rules for atom in rule.body), _C_STATUS)
     return tuple(sorted({*asked, FAILED, RECOVERED}))
 
 

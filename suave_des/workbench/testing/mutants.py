@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import partial
-from types import MappingProxyType
 from typing import Final, TypeVar
 
 from suave_des.knowledge.ontology import Ontology
@@ -267,19 +266,17 @@ def _individuals(base: Ontology) -> Iterator[Mutant]:
 
 
 #: Kinds of changes, by name.
-OPERATORS: Final[Mapping[str, Callable[[Ontology], Iterator[Mutant]]]] = MappingProxyType(
-    {
-        "comparison turned": partial(_comparisons, change=_turned),
-        "comparison shifted": partial(_comparisons, change=_shifted),
-        "atom dropped": _dropped,
-        "variable exchanged": _variables_exchanged,
-        "conclusion changed": partial(_literals_exchanged, in_head=True),
-        "rule removed": _removed,
-        "threshold moved": _moved,
-        "status exchanged": _statuses,
-        "individual exchanged": _individuals,
-    }
-)
+OPERATORS: Final[Mapping[str, Callable[[Ontology], Iterator[Mutant]]]] = {
+    "comparison turned": partial(_comparisons, change=_turned),
+    "comparison shifted": partial(_comparisons, change=_shifted),
+    "atom dropped": _dropped,
+    "variable exchanged": _variables_exchanged,
+    "conclusion changed": partial(_literals_exchanged, in_head=True),
+    "rule removed": _removed,
+    "threshold moved": _moved,
+    "status exchanged": _statuses,
+    "individual exchanged": _individuals,
+}
 
 
 def sample(mutants: Sequence[Mutant], most: int | None) -> tuple[Mutant, ...]:
