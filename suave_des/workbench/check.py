@@ -15,7 +15,7 @@ from suave_des.knowledge.content import Content, merge, with_rules
 from suave_des.knowledge.model import Model, assumption, build_model, check_values, with_operators
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, collect, enumerated_texts
-from suave_des.knowledge.pellet.limit import TIME_LIMIT_S, TimeLimit, times_abandoned
+from suave_des.knowledge.pellet.limit import TIME_LIMIT_S, ReasonerTimeoutError, TimeLimit
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.regions import regions_of
 from suave_des.knowledge.rules.checks import check_rule
@@ -219,13 +219,12 @@ def _ask_pellet(subject: Subject, before: Sequence[Finding]) -> Iterator[Finding
         # What is in its cache has been asked with this very knowledge base, without a contradiction or a dropped rule.
         pellet = make_reasoner("cached", base, TimeLimit(subject.time_limit_s, "--time-limit"))
         states = tuple(islice(simple_states(base), MAX_STATES)) or (KnowledgeState(),)
-        abandoned = times_abandoned()
         try:
             for state in combined(states):
                 pellet.infer(state)
+        except ReasonerTimeoutError:
+            raise
         except KnowledgeError:
-            if times_abandoned() > abandoned:
-                raise
             for state in states:  # the first that contradicts itself is the easiest to understand
                 pellet.infer(state)
     except InputError as error:

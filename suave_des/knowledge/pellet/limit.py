@@ -34,6 +34,10 @@ def times_abandoned() -> int:
     return len(_abandoned)
 
 
+class ReasonerTimeoutError(KnowledgeError):
+    """A reasoner that takes too long, or still works on what took too long before."""
+
+
 class TimeLimit:
     """Runs work in a separate thread, and stops waiting for it after a time limit.
 
@@ -65,10 +69,10 @@ class TimeLimit:
             rules: those that it takes into account, so that the message can name one that never comes to an end.
 
         Raises:
-            KnowledgeError: it took longer, or an earlier one still has not ended.
+            ReasonerTimeoutError: it took longer, or an earlier one still has not ended.
         """
         if self._stuck is not None:
-            raise KnowledgeError(
+            raise ReasonerTimeoutError(
                 f"the reasoner is still {self._stuck}", remedy="restart the program with different rules"
             )
         if self._thread is None or self._process != os.getpid():  # a process that was forked has none of the threads
@@ -89,15 +93,15 @@ class TimeLimit:
             self._stuck = doing
             raise self.exceeded(doing, rules) from None
 
-    def exceeded(self, doing: str, rules: Iterable[Rule] = ()) -> KnowledgeError:
+    def exceeded(self, doing: str, rules: Iterable[Rule] = ()) -> ReasonerTimeoutError:
         """Make the error for work that took too long."""
         problem = f"{doing}: not done after {self.seconds:g} s"
         for rule in recursing_rules(rules):
             problem += f"; rule {rule.name} computes ever new values from what it concludes itself"
             remedy = f"give rule {rule.name} another property to conclude, or a bound in its body"
-            return KnowledgeError(problem, file=rule.file, place=rule.place, remedy=remedy)
+            return ReasonerTimeoutError(problem, file=rule.file, place=rule.place, remedy=remedy)
         more = f", or allow more with {self._option}" if self._option else ""
-        return KnowledgeError(problem, remedy=f"look for a rule that matches too many combinations{more}")
+        return ReasonerTimeoutError(problem, remedy=f"look for a rule that matches too many combinations{more}")
 
 
 class _ReasonerThread(threading.Thread):

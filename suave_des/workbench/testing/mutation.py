@@ -21,8 +21,9 @@ from functools import cached_property
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.deliberation import Conclusion
 from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet.limit import ReasonerTimeoutError
 from suave_des.knowledge.planning import plan
-from suave_des.knowledge.rdf import DECISION_PROPERTIES, HAS_VALUE, TOMASYS, local_name
+from suave_des.knowledge.rdf import DECISION_PROPERTIES, HAS_VALUE, IS_QA_TYPE, local_name
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.knowledge.state import ContradictionError, Fact, Inference, KnowledgeState
 from suave_des.workbench.knowledge_base import KnowledgeBase
@@ -242,9 +243,9 @@ def _killer(changed: _Changed, tests: Iterable[RuleTest]) -> str | None:
         for test in tests:
             if not all(map(changed.is_same, test.situations)) and not runner.passes(test):
                 return test.name
+    except ReasonerTimeoutError:
+        raise
     except KnowledgeError as error:
-        if "not done after" in error.problem or "is still" in error.problem:
-            raise
         return f"it cannot be used: {error.problem}"
     return None
 
@@ -318,7 +319,7 @@ def _space(bench: KnowledgeBase, mutants: Iterable[_Changed]) -> PolicySpace:
         if removed is None:
             numbers |= set(numbers_in(changed.base))
         elif removed[1] != HAS_VALUE or any(
-            (removed[0], TOMASYS + "isQAtype", each) in bench.base.content.triples for each in measured
+            (removed[0], IS_QA_TYPE, each) in bench.base.content.triples for each in measured
         ):
             space = space.common(PolicySpace.of(changed.base, bench.settings))
             numbers |= set(space.numbers)
