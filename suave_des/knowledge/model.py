@@ -13,10 +13,14 @@ from suave_des.errors import KnowledgeError
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.ontology_file import OntologyFile, place_of
 from suave_des.knowledge.rdf import (
+    C_STATUS,
     EXACT,
+    HAS_QA_VALUE,
     HAS_VALUE,
+    IS_QA_TYPE,
     MROS,
     OWL,
+    QA_OPERATOR,
     RDF_TYPE,
     RDFS,
     TOMASYS,
@@ -39,20 +43,16 @@ OPERATORS: Final[Mapping[str, Callable[[Decimal, Decimal], bool]]] = {
     ">": operator.gt,
     ">=": operator.ge,
 }
-_C_STATUS: Final = TOMASYS + "c_status"
 _HAS_QA_ESTIMATION: Final = TOMASYS + "hasQAestimation"
-_HAS_QA_VALUE: Final = TOMASYS + "hasQAvalue"
-_IS_QA_TYPE: Final = TOMASYS + "isQAtype"
 _O_STATUS: Final = TOMASYS + "o_status"
 _ALWAYS: Final = TOMASYS + "o_always_improve"
-_OPERATOR: Final = TOMASYS + "qa_comparison_operator"
 _SOLVES_F: Final = TOMASYS + "solvesF"
 _SOLVES_O: Final = TOMASYS + "solvesO"
 _TYPE_F: Final = TOMASYS + "typeF"
 _TYPE_FD: Final = TOMASYS + "typeFD"
 #: What a state asserts of an objective, a grounding or a measurement, in place of what an ontology asserts of it.
 _STATE_PROPERTIES: Final = frozenset(
-    {_TYPE_F, _TYPE_FD, _SOLVES_O, _O_STATUS, _ALWAYS, _HAS_QA_VALUE, _IS_QA_TYPE, HAS_VALUE}
+    {_TYPE_F, _TYPE_FD, _SOLVES_O, _O_STATUS, _ALWAYS, HAS_QA_VALUE, IS_QA_TYPE, HAS_VALUE}
     | {TOMASYS + "fg_status", TOMASYS + "o_updatable"}
 )
 
@@ -134,7 +134,7 @@ class Model:
         reported = dict(state.components)
         for name, iri in self.components.items():
             if name in reported:
-                yield iri, _C_STATUS, Lit(reported[name], XSD + "string")
+                yield iri, C_STATUS, Lit(reported[name], XSD + "string")
             else:
                 yield from self.initial.get(name, ())
         for name, value in state.measurements:
@@ -142,7 +142,7 @@ class Model:
                 individual = self.measurements[name]
                 yield individual.iri, RDF_TYPE, TOMASYS + "QAvalue"
                 yield from individual.own
-                yield individual.iri, _IS_QA_TYPE, self.attributes[name]
+                yield individual.iri, IS_QA_TYPE, self.attributes[name]
                 yield individual.iri, HAS_VALUE, Lit(format(value, "f"), XSD + "decimal")
 
     def _groundings(self, state: KnowledgeState) -> Iterator[Triple]:
@@ -156,7 +156,7 @@ class Model:
                 yield individual.iri, _SOLVES_O, self.objectives[function].iri
             for name, _ in state.measurements:
                 if name in self.estimated[design]:
-                    yield individual.iri, _HAS_QA_VALUE, self.measurements[name].iri
+                    yield individual.iri, HAS_QA_VALUE, self.measurements[name].iri
 
 
 def _known(name: str, names: Mapping[str, str], what: str) -> None:
@@ -194,9 +194,9 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
 
     functions = by_name(_members(triples, "Function") | objects(_SOLVES_F), "functions")
     designs = by_name(_members(triples, "FunctionDesign") | subjects(_SOLVES_F), "function designs")
-    parts = _members(triples, "Component") | subjects(MROS + "requiredBy") | subjects(_C_STATUS)
+    parts = _members(triples, "Component") | subjects(MROS + "requiredBy") | subjects(C_STATUS)
     components = by_name(parts, "components")
-    attributes = by_name(_members(triples, "QualityAttributeType") | objects(_IS_QA_TYPE), "quality attribute types")
+    attributes = by_name(_members(triples, "QualityAttributeType") | objects(IS_QA_TYPE), "quality attribute types")
     existing = {local_name(iri): iri for iri in sorted({triple[0] for triple in triples}, reverse=True)}
     groups = [
         {name: existing.get(rename(name), namespace(iri) + rename(name)) for name, iri in things.items()}
@@ -235,11 +235,11 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
         measurements=measurements,
         estimated={name: frozenset(found) for name, found in estimated.items()},
         initial={
-            name: tuple(triple for triple in triples if triple[:2] == (iri, _C_STATUS))
+            name: tuple(triple for triple in triples if triple[:2] == (iri, C_STATUS))
             for name, iri in components.items()
         },
     )
-    kept = tuple(t for t in triples if t[0] not in in_states and t[2] not in in_states and t[1] != _C_STATUS)
+    kept = tuple(t for t in triples if t[0] not in in_states and t[2] not in in_states and t[1] != C_STATUS)
     return model, replace(content, triples=kept)
 
 
@@ -250,7 +250,7 @@ def assumption(name: str, sign: str) -> str:
 
 def with_operators(content: Content, model: Model, operators: Mapping[str, str]) -> tuple[Content, dict[str, str]]:
     """Add the comparison operators of quality attribute types that have none; return those that were added, by name."""
-    present = {subject for subject, predicate, _ in content.triples if predicate == _OPERATOR}
+    present = {subject for subject, predicate, _ in content.triples if predicate == QA_OPERATOR}
     added = {
         name: sign
         for name, sign in sorted(operators.items())
@@ -258,7 +258,7 @@ def with_operators(content: Content, model: Model, operators: Mapping[str, str])
     }
     if not added:
         return content, {}
-    more = [(model.attributes[name], _OPERATOR, Lit(sign, XSD + "string")) for name, sign in added.items()]
+    more = [(model.attributes[name], QA_OPERATOR, Lit(sign, XSD + "string")) for name, sign in added.items()]
     return replace(content, triples=tuple(sorted((*content.triples, *more), key=str))), added
 
 
@@ -275,7 +275,7 @@ def _estimations(
     """(design, quality attribute type, IRI of the QAvalue individual) of each hasQAestimation."""
     design_names = {iri: name for name, iri in designs.items()}
     attribute_names = {iri: name for name, iri in attributes.items()}
-    types = {s: attribute_names[o] for s, p, o in triples if p == _IS_QA_TYPE and isinstance(o, str)}
+    types = {s: attribute_names[o] for s, p, o in triples if p == IS_QA_TYPE and isinstance(o, str)}
     for subject, predicate, value in triples:
         if predicate == _HAS_QA_ESTIMATION and subject in design_names and value in types:
             yield design_names[subject], types[str(value)], str(value)
@@ -312,7 +312,7 @@ def check_values(content: Content, sources: Sequence[OntologyFile]) -> None:
         shown = value.text if isinstance(value, Lit) else value
         if predicate == HAS_VALUE and not _is_decimal(value):
             raise wrong_in(subject, sources, f"hasValue {shown!r} is not an xsd:decimal", "a number such as 2.25")
-        if predicate == _OPERATOR and shown not in OPERATORS:
+        if predicate == QA_OPERATOR and shown not in OPERATORS:
             problem = f"qa_comparison_operator {shown!r} is unknown"
             raise wrong_in(subject, sources, problem, f"one of {' '.join(OPERATORS)}")
         if predicate in functional and isinstance(value, Lit):

@@ -36,6 +36,10 @@ LANGUAGE_NAMESPACES: Final = (RDF, RDFS, OWL, XSD, SWRL, SWRLB, SWRLA)
 
 RDF_TYPE: Final = RDF + "type"
 HAS_VALUE: Final = TOMASYS + "hasValue"
+HAS_QA_VALUE: Final = TOMASYS + "hasQAvalue"
+IS_QA_TYPE: Final = TOMASYS + "isQAtype"
+QA_OPERATOR: Final = TOMASYS + "qa_comparison_operator"
+C_STATUS: Final = TOMASYS + "c_status"
 
 #: What the planner and the loop read, whether or not a rule can conclude it.
 DECISION_PROPERTIES: Final = tuple(

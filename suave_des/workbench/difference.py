@@ -94,14 +94,11 @@ def _structure(base: Ontology) -> Iterator[str]:
         return f"[{'; '.join(parts)}]"
 
     for subject in sorted(set(graph.subjects()), key=str):
-        is_part = isinstance(subject, rdflib.BNode) and next(graph.subjects(object=subject), None) is not None
-        if is_part:
-            continue
-        if isinstance(subject, rdflib.BNode):
+        if not isinstance(subject, rdflib.BNode):
+            for predicate, value in graph.predicate_objects(subject):
+                yield f"{text(subject, frozenset())} {local_name(str(predicate))} {text(value, frozenset({subject}))}"
+        elif (None, None, subject) not in graph:  # else it is part of another one
             yield text(subject, frozenset())
-            continue
-        for predicate, value in graph.predicate_objects(subject):
-            yield f"{text(subject, frozenset())} {local_name(str(predicate))} {text(value, frozenset({subject}))}"
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,13 @@ from suave_des.knowledge.content import Content
 from suave_des.knowledge.model import Model, expectations
 from suave_des.knowledge.ontology_file import OntologyFile, without_log
 from suave_des.knowledge.rdf import (
+    C_STATUS,
+    HAS_QA_VALUE,
+    IS_QA_TYPE,
     LANGUAGE_NAMESPACES,
     OWL,
     PERFORMANCE,
+    QA_OPERATOR,
     RDF_TYPE,
     RDFS,
     TOMASYS,
@@ -177,7 +181,7 @@ def check_shapes(
     for source in sources:
         data += source.graph
     for attribute, sign in assumed.items():
-        data.add((URIRef(attribute), URIRef(TOMASYS + "qa_comparison_operator"), Literal(sign)))
+        data.add((URIRef(attribute), URIRef(QA_OPERATOR), Literal(sign)))
     try:
         _, report, _ = validate(data, shacl_graph=shapes, do_owl_imports=False, meta_shacl=False, inplace=False)
     except Exception as error:  # each kind of malformed shape raises another error
@@ -228,7 +232,7 @@ def unreported_components(
     content: Content, model: Model, sources: Sequence[OntologyFile], reported: Collection[str]
 ) -> Iterator[Finding]:
     """Find the components whose status no mission can have: nothing reports, asserts or concludes it."""
-    status = TOMASYS + "c_status"
+    status = C_STATUS
     if status in content.head_properties():
         return
     asserted = {subject for subject, predicate, _ in content.triples if predicate == status}
@@ -259,7 +263,7 @@ class _Possible:
             self.classes.add(TOMASYS + "QAvalue")
             self.values.update({TOMASYS + name: {_ANY} for name in ("isQAtype", "hasValue")})
         if any(model.estimated.values()):
-            self.values[TOMASYS + "hasQAvalue"] = {_ANY}
+            self.values[HAS_QA_VALUE] = {_ANY}
         self.spread()
 
     def spread(self) -> None:
@@ -360,7 +364,7 @@ def unmeasured_rules(content: Content, model: Model) -> list[tuple[Rule, Atom, s
     Returns:
         each rule with the atom that names the attribute, and the attribute's name.
     """
-    has_value, is_type = TOMASYS + "hasQAvalue", TOMASYS + "isQAtype"
+    has_value, is_type = HAS_QA_VALUE, IS_QA_TYPE
     estimated = frozenset().union(*model.estimated.values())
     never = {iri: name for name, iri in model.attributes.items() if name not in estimated}
     if content.head_properties() & {has_value, is_type} or any(triple[1] == has_value for triple in content.triples):

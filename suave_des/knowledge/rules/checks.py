@@ -282,7 +282,7 @@ def _computed(builtins: Iterable[Atom], bound: set[str]) -> set[str]:
     """Variables that builtins compute: the first argument, once all others have values."""
     return {
         first.name
-        for first, *others in (atom.arguments for atom in builtins if atom.predicate not in TESTERS)
+        for first, *others in (atom.arguments for atom in builtins if atom.computes)
         if isinstance(first, Variable) and all(not isinstance(term, Variable) or term.name in bound for term in others)
     }
 

@@ -83,6 +83,11 @@ class Atom:
         number = 0 if argument is None else argument + 1
         return self.places[number] if number < len(self.places) else None
 
+    @property
+    def computes(self) -> bool:
+        """Whether it is a built-in that computes its first argument, and does not only test it."""
+        return self.kind == "builtin" and self.predicate not in TESTERS
+
     def takes_value(self, argument: int) -> bool:
         """Whether an argument stands for a value, not for an individual."""
         return self.kind in ("builtin", "range") or (self.kind == "data" and argument == 1)

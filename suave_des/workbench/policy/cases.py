@@ -39,7 +39,7 @@ class PolicyCase:
         reports: what the components report.
         asked: functions that have an objective.
         statuses: what is inferred of objectives and groundings, as text, sorted.
-        choices: (function, design) decided; None for the design when none is left.
+        changes: (function, new design) of each function whose grounding changes; "none left" for the design if so.
         marks: any of "inconsistent", "none left", "flip-flop".
         flipping: functions whose grounding flips back and forth.
         problem: what contradicts what, in an inconsistent state.
@@ -50,7 +50,7 @@ class PolicyCase:
     reports: ComponentReports
     asked: tuple[str, ...]
     statuses: tuple[str, ...] = ()
-    choices: tuple[tuple[str, str | None], ...] = ()
+    changes: tuple[tuple[str, str], ...] = ()
     marks: tuple[str, ...] = ()
     flipping: tuple[str, ...] = ()
     problem: str | None = None
@@ -59,10 +59,7 @@ class PolicyCase:
         """What happens to a function's grounding: a design, "stays", "none left" or "inconsistent"."""
         if INCONSISTENT in self.marks:
             return INCONSISTENT
-        choices = dict(self.choices)
-        if function not in choices or choices[function] == self.state.grounded(function) is not None:
-            return STAYS
-        return choices[function] or NONE_LEFT
+        return dict(self.changes).get(function, STAYS)
 
     def outcome_text(self, function: str) -> str:
         """The outcome, and whether the choice flips back and forth."""
@@ -77,7 +74,7 @@ class PolicyCase:
     @property
     def after(self) -> tuple[tuple[str, str], ...]:
         """Groundings after the decisions."""
-        chosen = {function: design for function, design in self.choices if design is not None}
+        chosen = {function: design for function, design in self.changes if design != NONE_LEFT}
         return tuple(sorted({**dict(self.state.groundings), **chosen}.items()))
 
 
@@ -227,9 +224,9 @@ def _decide(case: PolicyCase, infer: Callable[[KnowledgeState], Conclusion]) -> 
         conclusion = infer(case.state)
     except ContradictionError as error:
         return replace(case, marks=(INCONSISTENT,), problem=error.problem)
-    choices = tuple((each.function, each.design) for each in conclusion.plan.decisions)
-    marks = (NONE_LEFT,) if any(design is None for _, design in choices) else ()
-    return replace(case, statuses=tuple(sorted(conclusion.statuses)), choices=choices, marks=marks)
+    marks = (NONE_LEFT,) if conclusion.plan.without_design else ()
+    changes = tuple(conclusion.changes.items())
+    return replace(case, statuses=tuple(sorted(conclusion.statuses)), changes=changes, marks=marks)
 
 
 def _with_flip_flops(cases: list[PolicyCase]) -> list[PolicyCase]:

@@ -13,16 +13,13 @@ from math import comb
 from typing import Final
 
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import OWL, RDFS, TOMASYS, Lit, Triple, reached
+from suave_des.knowledge.rdf import C_STATUS, HAS_VALUE, IS_QA_TYPE, OWL, RDFS, TOMASYS, Lit, Triple, reached
 from suave_des.knowledge.rules.syntax import COMPARISONS, Atom, Named, Rule, Variable, texts_of
 from suave_des.monitor.diagnostics import FAILED, RECOVERED
 from suave_des.workbench.ranges import numbers_in
 from suave_des.workbench.state_input import ManagingSettings
 
-_IS_QA_TYPE: Final = TOMASYS + "isQAtype"
-_HAS_VALUE: Final = TOMASYS + "hasValue"
-_OF_VALUES: Final = frozenset({_IS_QA_TYPE, _HAS_VALUE})
-_C_STATUS: Final = TOMASYS + "c_status"
+_OF_VALUES: Final = frozenset({IS_QA_TYPE, HAS_VALUE})
 
 
 def rules_that_compute(base: Ontology) -> tuple[str, ...]:
@@ -51,7 +48,7 @@ def has_effect(base: Ontology, attribute: str) -> bool:
         return True
     related = ("subPropertyOf", "inverseOf", "equivalentProperty")
     if any(
-        (predicate == _IS_QA_TYPE and value == iri)
+        (predicate == IS_QA_TYPE and value == iri)
         or (predicate.endswith(related) and (subject in _OF_VALUES or value in _OF_VALUES))
         for subject, predicate, value in triples
     ):
@@ -69,9 +66,9 @@ def _can_match(rule: Rule, attribute: str, measured: str, classes: set[str]) -> 
     def could_hold(atom: Atom, term: Variable) -> bool:
         if atom.arguments[0] != term:
             return False
-        if atom.predicate == _IS_QA_TYPE:
+        if atom.predicate == IS_QA_TYPE:
             return isinstance(atom.arguments[-1], Variable) or atom.arguments[-1] == Named(attribute)
-        return atom.predicate in classes if atom.kind == "class" else atom.predicate == _HAS_VALUE
+        return atom.predicate in classes if atom.kind == "class" else atom.predicate == HAS_VALUE
 
     terms = {term for atom in rule.atoms for term in atom.arguments}
     if Named(measured) in terms or any(atom.kind in ("same", "different") for atom in rule.atoms):
@@ -119,7 +116,7 @@ def _exchangeable(base: Ontology, one: str, other: str) -> bool:
 
 def component_statuses(base: Ontology) -> tuple[str, ...]:
     """Values of c_status to look at: what the thruster monitor reports, and what enabled rules ask for."""
-    asked = texts_of((atom for rule in base.content.enabled_rules for atom in rule.body), _C_STATUS)
+    asked = texts_of((atom for rule in base.content.enabled_rules for atom in rule.body), C_STATUS)
     return tuple(sorted({*asked, FAILED, RECOVERED}))
 
 

@@ -7,7 +7,7 @@ from typing import Final
 
 from suave_des.errors import nearest
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import NUMERIC, OWL, TOMASYS, Lit, local_name, value_of
+from suave_des.knowledge.rdf import C_STATUS, HAS_QA_VALUE, NUMERIC, OWL, TOMASYS, Lit, local_name, value_of
 from suave_des.knowledge.rules.syntax import COMPARISONS, Atom, Variable
 from suave_des.knowledge.rules.writer import literal_text
 from suave_des.workbench.reasons.matching import FACT_KINDS, Binding, Facts, bound
@@ -25,8 +25,8 @@ _GIVEN_BY_STATES: Final[Mapping[str, str]] = {
     TOMASYS + "FunctionGrounding": "ground a function: --at FUNCTION=DESIGN",
     TOMASYS + "typeFD": "ground a function: --at FUNCTION=DESIGN",
     TOMASYS + "solvesO": "ground a function: --at FUNCTION=DESIGN",
-    TOMASYS + "c_status": "report a component: --at COMPONENT=FALSE",
-    TOMASYS + "hasQAvalue": "measure what the grounded design expects: --at ATTRIBUTE=NUMBER",
+    C_STATUS: "report a component: --at COMPONENT=FALSE",
+    HAS_QA_VALUE: "measure what the grounded design expects: --at ATTRIBUTE=NUMBER",
     TOMASYS + "Objective": "ask for a function: --objective FUNCTION",
 }
 #: How OWL says what is not, or what all values are: neither follows from facts that are missing.

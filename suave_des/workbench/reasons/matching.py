@@ -17,7 +17,7 @@ from suave_des.knowledge.content import Content
 from suave_des.knowledge.pellet.in_process import entailed
 from suave_des.knowledge.rdf import OWL, RDF_TYPE, XSD, Lit, Names, Triple, canonical, value_of
 from suave_des.knowledge.rules.rdf import with_triples
-from suave_des.knowledge.rules.syntax import TESTERS, Atom, Named, Rule, Term, Variable
+from suave_des.knowledge.rules.syntax import Atom, Named, Rule, Term, Variable
 from suave_des.knowledge.state import Value
 
 #: What the variables of a rule stand for: IRIs and literals by name.
@@ -214,7 +214,7 @@ class NearestFinder:
         """
         asked = instance(atom, binding)
         unbound = [number for number, term in enumerate(asked.arguments) if isinstance(term, Variable)]
-        computes = atom.kind == "builtin" and atom.predicate not in TESTERS and unbound == [0]
+        computes = atom.computes and unbound == [0]
         if unbound and not computes:
             return None
         if atom.kind in ("same", "different"):
@@ -256,11 +256,7 @@ def testable_order(body: Sequence[Atom]) -> list[int]:
     known: set[str] = set()
     order: list[int] = []
     while waiting:
-        ready = (
-            number
-            for number in waiting
-            if body[number].kind in FACT_KINDS or set(list(body[number].variables())[_outputs(body[number]) :]) <= known
-        )
+        ready = (number for number in waiting if body[number].kind in FACT_KINDS or _inputs(body[number]) <= known)
         number = next(ready, waiting[0])
         waiting.remove(number)
         order.append(number)
@@ -268,10 +264,9 @@ def testable_order(body: Sequence[Atom]) -> list[int]:
     return order
 
 
-def _outputs(atom: Atom) -> int:
-    """Whether the first argument of a built-in is computed: 1, else 0."""
-    is_computing = atom.kind == "builtin" and atom.predicate not in TESTERS
-    return int(is_computing and isinstance(atom.arguments[0], Variable))
+def _inputs(atom: Atom) -> set[str]:
+    """Variables that must have values before an atom can be tested, or its first argument computed."""
+    return {term.name for term in atom.arguments[int(atom.computes) :] if isinstance(term, Variable)}
 
 
 def _ask_pellet(atom: Atom, *, computes: bool) -> tuple[Lit, ...]:

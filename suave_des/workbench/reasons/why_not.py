@@ -14,7 +14,7 @@ from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.knowledge.content import with_rules
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.limit import TimeLimit
-from suave_des.knowledge.rdf import TOMASYS, Lit, Triple, fact_of, facts_of, value_of
+from suave_des.knowledge.rdf import HAS_QA_VALUE, Lit, Triple, fact_of, facts_of, value_of
 from suave_des.knowledge.rules.checks import RuleProblem, check_rule
 from suave_des.knowledge.rules.files import RulesFile
 from suave_des.knowledge.rules.syntax import Atom, Rule, RuleError
@@ -166,7 +166,7 @@ class RuleQuestions:
         if not match.failing:
             return WhyNot(rule.name, self._fires(rule, match.binding, facts), True, bindings=bindings)
         first = rule.body[match.failing[0]]
-        if first.predicate == TOMASYS + "hasQAvalue" and id(rule) in self._unmeasured:
+        if first.predicate == HAS_QA_VALUE and id(rule) in self._unmeasured:
             reason = "; ".join(no_estimate(self._unmeasured[id(rule)]))
         else:
             reason = describe_failure(self._usable, first, match.binding, facts)

@@ -17,6 +17,7 @@ from suave_des.knowledge.rdf import (
     HAS_VALUE,
     LANGUAGE_NAMESPACES,
     OWL,
+    QA_OPERATOR,
     RDF_TYPE,
     RDFS,
     TOMASYS,
@@ -218,7 +219,7 @@ def _statuses(base: Ontology) -> Iterator[Mutant]:
     """Each literal of a body exchanged, and the comparison operator of each quality attribute turned."""
     yield from _literals_exchanged(base, in_head=False)
     for fact in base.content.triples:
-        if fact[1] == TOMASYS + "qa_comparison_operator" and isinstance(fact[2], Lit):
+        if fact[1] == QA_OPERATOR and isinstance(fact[2], Lit):
             yield _with_value(fact, fact[2]._replace(text=mirrored(fact[2].text)))
 
 
