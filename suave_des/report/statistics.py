@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from suave_des.errors import InputError
-from suave_des.estimates import CONFIDENCE, Interval, t_quantile
+from suave_des.estimates import CONFIDENCE, Interval, estimate, t_quantile
 
 Sample = NDArray[np.float64]
 Statistic = Callable[..., NDArray[np.float64]]
@@ -73,13 +73,9 @@ def student_interval(sample: Sample) -> Estimated:
 
     It serves for differences of shares in pairs, too: few of them are not 0, so that a bootstrap is too narrow.
     """
-    n = len(sample)
-    mean = math.fsum(sample) / n  # summed exactly, as in estimates.py: the order of the values makes no difference
-    if np.ptp(sample) == 0.0:
-        return Estimated(mean, None, STUDENT)
-    std = math.sqrt(math.fsum((sample - mean) ** 2) / (n - 1))
-    half = t_quantile(n - 1) * std / math.sqrt(n)
-    return Estimated(mean, (mean - half, mean + half), STUDENT)
+    found = estimate(sample.tolist())
+    assert found.mean is not None
+    return Estimated(found.mean, found.mean_interval if np.ptp(sample) > 0.0 else None, STUDENT)
 
 
 def difference_interval(first: Sample, second: Sample) -> Estimated:
