@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
-from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
@@ -24,7 +23,7 @@ from suave_des.domain import DEFAULT_MODE, SEA_BED_Z_M, SURFACE_Z_M, UNGROUND_MO
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown
 from suave_des.scenario.problems import input_error
 from suave_des.scenario.quantities import Real, Strict, Within, wrong
-from suave_des.scenario.yamlfile import YamlDocument, read_yaml
+from suave_des.scenario.yamlfile import YamlDocument
 
 ParameterValue = float | str | bool
 _STATES = "inactive, active or active.NODE_MODE"
@@ -162,21 +161,16 @@ class _Entry(Strict):
 _FILE = TypeAdapter(dict[str, _Entry])
 
 
-def read_modes(path: Path | str) -> ModeTable:
-    """Read a System Modes YAML file.
+def modes_of(document: YamlDocument) -> ModeTable:
+    """Make the table of a System Modes YAML file.
 
     A function is an entry `type: system` whose parts are nodes; a system of systems only groups functions and
     is ignored. A function without a mode __DEFAULT__ gets one that is inactive, as its node is at first.
 
     Raises:
-        InputError: with file and line: what cannot be read, an entry or mode of another form, an unknown part,
+        InputError: with file and line: an entry or mode of another form, an unknown part,
             an undefined mode of a node, missing ros__parameters, a parameter of the wrong kind.
     """
-    return modes_of(read_yaml(path))
-
-
-def modes_of(document: YamlDocument) -> ModeTable:
-    """Make the table of a System Modes file that has already been read; raises as read_modes does."""
     keys: dict[str, str] = {}
     for key in document.data:
         name = key.removeprefix("/")

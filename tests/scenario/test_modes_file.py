@@ -6,7 +6,8 @@ import pytest
 
 from suave_des.errors import InputError
 from suave_des.resources import find
-from suave_des.scenario.modes import Mode, read_modes
+from suave_des.scenario.modes import Mode, ModeTable, modes_of
+from suave_des.scenario.yamlfile import read_yaml
 
 SEARCH = """\
 /f_generate_search_path:
@@ -26,6 +27,10 @@ f_generate_search_path_node:
       low: {ros__parameters: {spiral_altitude: 1}}
       high: {ros__parameters: {spiral_altitude: 3.0, label: high, camera: true}}
 """
+
+
+def read_modes(path) -> ModeTable:
+    return modes_of(read_yaml(path))
 
 
 def changed(old: str, new: str) -> str:
