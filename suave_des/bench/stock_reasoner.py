@@ -61,11 +61,7 @@ STATES = (
 
 
 class StockReasoner:
-    """SUAVE's ontologies with stock Pellet.
-
-    Args:
-        folder: of the ontologies.
-    """
+    """SUAVE's ontologies, in a folder, with stock Pellet."""
 
     def __init__(self, folder: Path) -> None:
         owlready2.JAVA_EXE = str(java_executable())

@@ -110,14 +110,7 @@ class Profile:
 
 
 def profiles(problem: Problem, best: Evaluation, threshold: float, workers: int) -> list[Profile]:
-    """Compute the profile of every parameter.
-
-    Args:
-        problem: what was fitted to what.
-        best: the best fit.
-        threshold: loss up to which a value is admitted.
-        workers: processes.
-    """
+    """Compute the profile of every parameter; a value is admitted up to a loss of `threshold`."""
     grids = [_grid(parameter, value) for parameter, value in zip(problem.parameters, best.values, strict=True)]
     many = [
         (*best.values[:place], value, *best.values[place + 1 :]) for place, grid in enumerate(grids) for value in grid

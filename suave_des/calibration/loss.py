@@ -115,12 +115,7 @@ class CaseLoss:
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """One set of values and its loss.
-
-    Attributes:
-        values: of the parameters.
-        cases: the loss of each case.
-    """
+    """One set of values of the parameters, and the loss of each case."""
 
     values: tuple[float, ...]
     cases: tuple[CaseLoss, ...]

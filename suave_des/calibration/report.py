@@ -52,20 +52,13 @@ def judge_halves(
     }
 
 
-def fitted_values(best: Evaluation, digits: int = 3) -> list[float]:
+def fitted_values(best: Evaluation) -> list[float]:
     """Return the fitted values of the parameters, rounded to what the data can tell."""
-    return [round(value, digits) for value in best.values]
+    return [round(value, 3) for value in best.values]
 
 
 def fitted_scenario(problem: Problem, case: Case, values: Sequence[float], folder: Path) -> str:
-    """Return a scenario file: the case's scenario with the fitted values.
-
-    Args:
-        problem: what was fitted.
-        case: one of its cases.
-        values: of the problem's parameters.
-        folder: where the file is to be.
-    """
+    """Return a scenario file for a folder: the case's scenario with the values of the problem's parameters."""
     own = problem.values_of(case, values)
     fitted = with_values(case.loaded, own)
     tops = {path.rsplit(".", 1)[0] if _is_below_distribution(fitted, path) else path for path in own}

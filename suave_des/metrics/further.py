@@ -140,14 +140,7 @@ def satisfaction_degrees(
     measured: Mapping[str, Measured],
     now_s: float,
 ) -> dict[str, float | None]:
-    """Compute the degree to which each requirement is satisfied, from 0 to 1; None if there is no value.
-
-    Args:
-        requirements: by name.
-        metrics, further: of the mission.
-        measured: what monitors have measured, by quality attribute.
-        now_s: mission time.
-    """
+    """Compute the degree to which each requirement is satisfied as of now, from 0 to 1; None if there is no value."""
     found: dict[str, float | None] = {}
     for name, requirement in requirements.items():
         if requirement.attribute is not None:

@@ -227,11 +227,7 @@ def _shown(value: object) -> str:
 
 
 def adaptation_rules(folder: Path, record: MissionRecord) -> Mapping[tuple[float, str], tuple[str, ...]]:
-    """Find the rules that fired in the reasoning cycle from which each adaptation comes.
-
-    Args:
-        folder: of the mission.
-        record: what its files say.
+    """Find the rules that fired in the reasoning cycle from which each adaptation in a mission's folder comes.
 
     Returns:
         Names of rules, by mission time (s) and function of the adaptation; empty for a manager that does not reason.

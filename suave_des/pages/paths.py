@@ -61,11 +61,7 @@ class Paths:
 def paths_of(folder: Path, frame: pandas.DataFrame, groups: Sequence[str], runs: int) -> Paths:
     """Run some missions of a campaign again, to have their ways: the first runs, and the quickest, median and slowest.
 
-    Args:
-        folder: the campaign's.
-        frame: its missions.
-        groups: managers in the order of the page's groups.
-        runs: how many runs of each manager; 0: none.
+    `groups` are managers in the order of the page's groups; `runs` is how many runs of each: 0 for none.
     """
     if runs == 0:
         return Paths(note="Paths and timelines are left out; suave-des report --paths N adds those of N runs")

@@ -293,8 +293,7 @@ def _letter_rows(marks: Sequence[_Mark], end_s: float) -> list[int]:
 def draw_paths(records: Sequence[MissionRecord]) -> style.Picture:
     """Draw the paths of missions, a panel for each manager, over the part of the sea bed that they search.
 
-    Args:
-        records: of missions; the pipeline is that of the first.
+    The pipeline is that of the first.
     """
     managers = list(dict.fromkeys(str(record.metrics["manager"]) for record in records))
     columns = min(len(managers), 3)

@@ -170,15 +170,7 @@ def balanced(real: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequ
 
 @dataclass(frozen=True, slots=True)
 class ConditionComparison:
-    """A metric of one manager under one condition.
-
-    Attributes:
-        manager: managing subsystem.
-        metric: what is compared.
-        condition: its number, from 1.
-        real: estimates from the real missions.
-        simulated: estimates from the simulated ones.
-    """
+    """A metric of one manager under one condition, counted from 1: estimates from real and simulated missions."""
 
     manager: str
     metric: str

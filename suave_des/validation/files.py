@@ -32,12 +32,7 @@ Record = dict[str, object]
 
 
 def texts(validation: Validation, provenance: Mapping[str, object]) -> dict[str, str]:
-    """Write each text file, by its name.
-
-    Args:
-        validation: what was found.
-        provenance: from what; goes into the JSON file.
-    """
+    """Write each text file, by its name; the JSON file says from what the validation comes (provenance)."""
     import pandas
 
     tables = {name: [_rounded(row) for row in rows] for name, rows in _tables(validation).items()}

@@ -140,12 +140,7 @@ def read_varied(campaign: str | Path, **replacements: Unpack[Replacements]) -> t
 def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) -> Conditions | None:
     """Read the conditions that a campaign file sweeps; none of another file, or if it sweeps none.
 
-    Args:
-        campaign: path of the file, or name of a shipped one.
-        replacements: of the scenario's files, as of load_scenario.
-
-    Raises:
-        InputError: the file cannot be used.
+    Arguments and errors are those of read_varied.
     """
     file = read_campaign_file(campaign)
     if file is None or not file.settings.sweep:
@@ -154,11 +149,7 @@ def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) 
 
 
 def published_for(scenario: str | Path) -> Path | None:
-    """Return the file of the real missions that were published for a scenario or campaign file, if there are any.
-
-    Args:
-        scenario: path of the file, or its name.
-    """
+    """Return the file of the real missions that were published for a scenario or campaign file, if there are any."""
     own = shipped_folder("scenarios/published") / f"{Path(scenario).stem.removesuffix('_campaign')}_runs.csv"
     return own if own.is_file() else None
 

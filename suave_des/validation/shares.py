@@ -96,12 +96,7 @@ def shares_beside(data: Path) -> Path | None:
 
 @dataclass(frozen=True, slots=True)
 class Proportion:
-    """How many of some missions are in a region.
-
-    Attributes:
-        count: missions in the region.
-        n: all missions.
-    """
+    """How many of n missions are in a region."""
 
     count: int
     n: int
@@ -154,12 +149,7 @@ def compare_shares(
 
 
 def count(share: Share, runs: pandas.DataFrame) -> Proportion:
-    """Count a share.
-
-    Args:
-        share: what to count.
-        runs: a row for each mission, with the columns of report.runs.COLUMNS.
-    """
+    """Count a share in missions, a row for each with the columns of report.runs.COLUMNS."""
     own = runs[runs["manager"] == share.manager]
     if share.of == "detections":
         own = own[own["detection_x_m"].notna()]
@@ -180,14 +170,7 @@ def _inside(runs: pandas.DataFrame, region: Region) -> pandas.Series[bool]:
 
 @dataclass(frozen=True, slots=True)
 class DetectionPlace:
-    """How many of a manager's detections with a known place are at one place.
-
-    Attributes:
-        manager: managing subsystem.
-        detection_x_m: the place, to the nearest POSITION_STEP_M.
-        published: of the published detections.
-        simulated: of the simulated ones.
-    """
+    """How many of a manager's detections with a known place are at one place, to the nearest POSITION_STEP_M."""
 
     manager: str
     detection_x_m: float

@@ -99,12 +99,7 @@ def superiority(first: Sample, second: Sample, *, lower_is_better: bool) -> floa
 
 @dataclass(frozen=True, slots=True)
 class OneSidedTests:
-    """One-sided Mann-Whitney tests of two samples, one in each direction.
-
-    Attributes:
-        first_better_p: p of the test that the first is better.
-        second_better_p: p of the test that the second is better.
-    """
+    """One-sided Mann-Whitney tests of two samples, one in each direction."""
 
     first_better_p: float
     second_better_p: float

@@ -247,12 +247,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def defaults_of(release: Release, *, battery: bool) -> dict[str, tuple[str, Any]]:
-    """Return the defaults of the exemplar's nodes, by the scenario's key path: parameter name and value.
-
-    Args:
-        release: of the exemplar.
-        battery: whether the mission has one.
-    """
+    """Return the defaults of the exemplar's nodes, by the scenario's key path: parameter name and value."""
     visibility, metrics = "water_visibility_observer_node", "mission_metrics"
     manager = "task_bridge" if release.has_task_bridge else "mission_node"
     period = "task_bridge" if release.has_task_bridge else "random_reasoner_node"
