@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas
@@ -105,22 +106,15 @@ def _path(group: int, run: int, result: MissionResult) -> Way:
     points = result.trajectory
     period_s = points[1].t_s - points[0].t_s if len(points) > 1 else _PERIOD_S
     some = points[:: max(1, round(_PERIOD_S / period_s))]
-    modes: list[tuple[float, str]] = []
-    for point in some:
-        if not modes or modes[-1][1] != point.mode:
-            modes.append((point.t_s, point.mode))
+    x_m, y_m, altitude_m = np.round([(each.x_m, each.y_m, each.z_m - SEA_BED_Z_M) for each in some], 2).T.tolist()
     return Way(
         group,
         run,
         [round(each.t_s, 1) for each in some],
-        _rounded([each.x_m for each in some]),
-        _rounded([each.y_m for each in some]),
-        _rounded([each.z_m - SEA_BED_Z_M for each in some]),
+        x_m,
+        y_m,
+        altitude_m,
         [None if each.visibility_m is None else round(each.visibility_m, 2) for each in some],
-        modes,
+        [(next(same).t_s, mode) for mode, same in groupby(some, attrgetter("mode"))],
         [(round(each.t_s, 1), each.event, each.detail) for each in result.events if each.event in _EVENTS],
     )
-
-
-def _rounded(values: Sequence[Any]) -> list[float]:
-    return [float(value) for value in np.round(np.asarray(values, dtype=float), 2)]

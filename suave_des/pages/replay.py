@@ -95,7 +95,6 @@ def mission_on_page(mission: Recorded) -> MissionOnPage:
     events = record.events[["t_s", "source", "event", "detail"]].itertuples(index=False, name=None)
     way = _way(mission)
     x_m, y_m, seen_s = (metrics.get(name) for name in ("detection_x_m", "detection_y_m", "detection_time_s"))
-    is_seen = isinstance(seen_s, float) and isinstance(x_m, float | int) and isinstance(y_m, float | int)
     return MissionOnPage(
         name=record.name,
         metrics=metrics,
@@ -105,7 +104,7 @@ def mission_on_page(mission: Recorded) -> MissionOnPage:
         events=[(round(t_s, 2), *words) for t_s, *words in events],
         inspected=_inspected(mission, way, modes.get(FOLLOW_PIPELINE, ())),
         way=[] if way is None else [(round(x, _DECIMALS), round(y, _DECIMALS)) for x, y, _ in way.points_m.tolist()],
-        seen=(seen_s, x_m, y_m) if is_seen else None,  # type: ignore[arg-type]
+        seen=None if seen_s is None or x_m is None or y_m is None else (seen_s, x_m, y_m),
         cycles=explained(mission),
     )
 

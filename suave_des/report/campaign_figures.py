@@ -191,12 +191,10 @@ def running_means(values: NDArray[np.float64]) -> tuple[NDArray[np.int_], NDArra
     if len(values) > _CURVE_POINTS:
         half = _CURVE_POINTS // 2
         n = np.unique(np.r_[np.geomspace(1, len(values), half), np.linspace(1, len(values), half)].round().astype(int))
-    centred = values - values.mean() if len(values) else values  # else squares would lose the digits that count
-    sums, squares = centred.cumsum()[n - 1], (centred**2).cumsum()[n - 1]
-    with np.errstate(divide="ignore", invalid="ignore"):  # a single value has no interval
-        variances = np.maximum(squares - sums**2 / n, 0.0) / (n - 1)
-        halves = np.array([t_quantile(int(each) - 1) for each in n]) * np.sqrt(variances / n)
-    return n, values.cumsum()[n - 1] / n, halves
+    first = pandas.Series(values).expanding()
+    stds = first.std().to_numpy()[n - 1]  # nan for a single value, which has no interval
+    halves = np.array([t_quantile(int(each) - 1) for each in n]) * stds / np.sqrt(n)
+    return n, first.mean().to_numpy()[n - 1], halves
 
 
 def draw_detections(groups: Sequence[Group]) -> style.Picture:
