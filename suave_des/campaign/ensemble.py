@@ -151,7 +151,7 @@ def _overlap(one: str, other: str) -> bool:
     return f"{one}.".startswith(f"{other}.") or f"{other}.".startswith(f"{one}.")
 
 
-# What survives.
+# How managers differ, over the members.
 
 
 @dataclass(frozen=True, slots=True)

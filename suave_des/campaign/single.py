@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import chdir, closing, contextmanager
 from dataclasses import astuple, dataclass, fields
@@ -149,7 +148,7 @@ def train(
     check_seed(seed)
     loaded = load_scenario(scenario, **replacements)
     inputs = check_inputs(loaded, [manager], given=False)
-    learned: dict[str, Any] = {} if start is None else json.loads(json.dumps(read_file(Path(start)).learned))
+    learned: dict[str, Any] = {} if start is None else dict(read_file(Path(start)).learned)
     simulator = Simulator(loaded, training={manager: learned})
     for run in range(1, missions + 1):
         on_mission(simulator.run(manager, run, seed).metrics)

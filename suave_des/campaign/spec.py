@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -63,6 +63,15 @@ _DEFAULTS = CampaignSettings(campaign=FORMAT, scenario="")
 _FILE_KEYS = tuple(name for name in CampaignSettings.model_fields if name not in ("campaign", "scenario"))
 _NOT_STORED = ("out", "workers", "scheduler", "overwrite", "confirmed")
 """How and where a campaign runs, which does not decide its results; it may differ when it is resumed."""
+
+
+_CONVERSIONS: Mapping[str, Callable[[Any], Any]] = {
+    **dict.fromkeys(("ontologies", "rules"), lambda paths: tuple(map(str, paths))),
+    **dict.fromkeys(("managers", "disabled_rules", "command"), tuple),
+    **dict.fromkeys(("modes_file", "ensemble"), str),
+    "out": Path,
+}
+"""Of options that may be given in several forms."""
 
 
 @dataclass(frozen=True)
@@ -142,16 +151,7 @@ class CampaignSpec:
     def of(cls, scenario: str | Path, **options: Any) -> CampaignSpec:
         """Make a specification from options by name; None leaves one to the campaign file, or to the defaults."""
         given = {name: value for name, value in options.items() if value is not None}
-        for name in ("ontologies", "rules"):
-            given[name] = tuple(map(str, given.get(name, ())))
-        for name in ("managers", "disabled_rules", "command"):
-            if name in given:
-                given[name] = tuple(given[name])
-        for name in ("modes_file", "ensemble"):
-            if name in given:
-                given[name] = str(given[name])
-        if "out" in given:
-            given["out"] = Path(given["out"])
+        given |= {name: convert(given[name]) for name, convert in _CONVERSIONS.items() if name in given}
         left_out = tuple(name for name in _FILE_KEYS if name not in given)
         return cls(str(scenario), **given, from_file=left_out, folder=str(Path.cwd()))
 

@@ -203,7 +203,7 @@ def manager_options(words: Sequence[str] | None, managers: Sequence[str]) -> dic
         if named is None and ":" in key:
             remedy = did_you_mean(key.rpartition(".")[0], managers, "its managers")
             raise InputError(f"{shown(key)} is for none of the managers", place="--manager-option", remedy=remedy)
-        targets = own or (list(managers) if len(managers) == 1 else []) if named is None else [named]
+        targets = [named] if named is not None else managers if len(managers) == 1 else own
         if not targets:
             remedy = (
                 f"give the manager too, for instance {managers[0]}.{word}" if managers else "name the managers, too"
