@@ -16,12 +16,12 @@ from rich.table import Table
 from suave_des.cli.console import counted, errors, fits, output, plain_table, print_table, print_trimmed
 from suave_des.cli.kb.options import (
     AsFormat,
-    Asked,
-    AskedInState,
     Format,
+    KnowledgeAndStateOptions,
     MaxFailed,
-    SourcesInState,
-    StateParts,
+    ReasonerAndStateOptions,
+    ReasonerOptions,
+    StateOptions,
     TimeLimitS,
     print_json,
     state_lines,
@@ -41,7 +41,7 @@ _WIDE = 300
 
 
 @grouped_options
-def infer(knowledge: AskedInState, parts: StateParts, form: AsFormat = Format.TEXT) -> None:
+def infer(knowledge: ReasonerAndStateOptions, parts: StateOptions, form: AsFormat = Format.TEXT) -> None:
     """Show what the reasoner infers in a state, and what Metacontrol would do."""
     bench = knowledge.bench()
     conclusion = bench.infer(parts.build(bench, knowledge.measured))
@@ -74,8 +74,8 @@ def infer(knowledge: AskedInState, parts: StateParts, form: AsFormat = Format.TE
 
 @grouped_options
 def explain(
-    knowledge: AskedInState,
-    parts: StateParts,
+    knowledge: ReasonerAndStateOptions,
+    parts: StateOptions,
     question: Annotated[
         str,
         typer.Argument(
@@ -96,7 +96,7 @@ def explain(
 
 @grouped_options
 def policy(
-    knowledge: Asked,
+    knowledge: ReasonerOptions,
     max_failed: MaxFailed = 2,
     csv: Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="Write all rows of the table.")] = None,
     png: Annotated[
@@ -215,8 +215,8 @@ class TableFormat(StrEnum):
 
 @grouped_options
 def query(
-    knowledge: AskedInState,
-    parts: StateParts,
+    knowledge: ReasonerAndStateOptions,
+    parts: StateOptions,
     text: Annotated[
         str, typer.Argument(metavar="QUERY", help="SPARQL; the prefixes suave, tomasys, mros and owl are known.")
     ],
@@ -246,7 +246,7 @@ def query(
 
 
 @dataclass(frozen=True)
-class StateAnywhere(StateParts):
+class AnyStateOptions(StateOptions):
     """Options that describe a state, or say where it is recorded."""
 
     at: Annotated[
@@ -267,8 +267,8 @@ class StateAnywhere(StateParts):
 
 @grouped_options
 def why_not(
-    sources: SourcesInState,
-    parts: StateAnywhere,
+    sources: KnowledgeAndStateOptions,
+    parts: AnyStateOptions,
     names: Annotated[
         list[str] | None, typer.Argument(metavar="RULE", help="Names of rules; by default all that do not fire.")
     ] = None,

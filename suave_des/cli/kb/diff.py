@@ -11,7 +11,7 @@ import typer
 from rich.table import Table
 
 from suave_des.cli.console import counted, errors, output, plain_table, print_trimmed, progress
-from suave_des.cli.kb.options import AsFormat, Asked, Format, MaxFailed, print_json
+from suave_des.cli.kb.options import AsFormat, Format, MaxFailed, ReasonerOptions, print_json
 from suave_des.cli.options import Quiet, Seed, Workers, grouped_options
 from suave_des.estimates import interval_text
 
@@ -23,7 +23,7 @@ _MOST_RUNS = 10
 
 
 @dataclass(frozen=True)
-class Flown:
+class MissionOptions:
     """Options of the missions that are run with both."""
 
     missions: Annotated[
@@ -37,8 +37,8 @@ class Flown:
 
 @grouped_options
 def diff(
-    knowledge: Asked,
-    flown: Flown,
+    knowledge: ReasonerOptions,
+    options: MissionOptions,
     one: Annotated[
         Path,
         typer.Argument(metavar="A", help="An ontology, or a .swrl file of rules to add to the ontologies."),
@@ -58,7 +58,7 @@ def diff(
     axioms = compare_axioms(benches[0].base, benches[1].base)
     with counted("states", errors()) as on_count:
         difference = benches[0].diff(benches[1], max_failed, on_count)
-    missions = None if flown.missions is None else _missions(knowledge, (one, other), flown)
+    missions = None if options.missions is None else _missions(knowledge, (one, other), options)
     if form is Format.JSON:
         print_json({"axioms": axioms, **_decisions(difference), "missions": missions})
         return
@@ -69,13 +69,13 @@ def diff(
         print(*_mission_lines(missions), sep="\n")
 
 
-def _missions(knowledge: Asked, files: tuple[Path, Path], flown: Flown) -> MissionDifference:
+def _missions(knowledge: ReasonerOptions, files: tuple[Path, Path], options: MissionOptions) -> MissionDifference:
     from suave_des.workbench.difference import MissionsToCompare, compare_missions
 
-    assert flown.missions is not None
-    which = MissionsToCompare(knowledge.scenario, flown.missions, flown.seed, flown.workers)
+    assert options.missions is not None
+    which = MissionsToCompare(knowledge.scenario, options.missions, options.seed, options.workers)
     one, other = (knowledge.with_file(file).replacements for file in files)
-    with progress("missions with A, then with B", quiet=flown.quiet) as on_progress:
+    with progress("missions with A, then with B", quiet=options.quiet) as on_progress:
         return compare_missions(which, one, other, on_progress)
 
 

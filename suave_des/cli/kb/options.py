@@ -50,7 +50,7 @@ ScenarioOption = Annotated[
 
 
 @dataclasses.dataclass(frozen=True)
-class Sources(KnowledgeFiles):
+class KnowledgeOptions(KnowledgeFiles):
     """Options that name a scenario, ontologies and rules."""
 
     scenario: ScenarioOption = "seams2023"
@@ -63,7 +63,7 @@ class Sources(KnowledgeFiles):
 
 
 @dataclasses.dataclass(frozen=True)
-class Asked(Sources):
+class ReasonerOptions(KnowledgeOptions):
     """Options that name ontologies, rules and a reasoner to ask."""
 
     reasoner: Reasoner = None
@@ -83,7 +83,7 @@ class Asked(Sources):
             time_limit_s=self.time_limit,
         )
 
-    def with_file(self, file: Path) -> Asked:
+    def with_file(self, file: Path) -> ReasonerOptions:
         """Add an ontology, or a .swrl file of rules."""
         if file.suffix == ".swrl":
             return dataclasses.replace(self, rules=[*(self.rules or ()), file])
@@ -91,7 +91,7 @@ class Asked(Sources):
 
 
 @dataclasses.dataclass(frozen=True)
-class InState(KnowledgeFiles):
+class MeasuredValueOptions(KnowledgeFiles):
     """Options of which one is for values of the scenario and for measured values of a state."""
 
     set: Annotated[
@@ -115,17 +115,17 @@ class InState(KnowledgeFiles):
 
 
 @dataclasses.dataclass(frozen=True)
-class SourcesInState(InState, Sources):
+class KnowledgeAndStateOptions(MeasuredValueOptions, KnowledgeOptions):
     """Options that name a scenario, ontologies and rules, and measured values of a state."""
 
 
 @dataclasses.dataclass(frozen=True)
-class AskedInState(InState, Asked):
+class ReasonerAndStateOptions(MeasuredValueOptions, ReasonerOptions):
     """Options that name ontologies, rules and a reasoner to ask about a state, and its measured values."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Replayed(KnowledgeFiles):
+class ReplayOptions(KnowledgeFiles):
     """Options that replace or add to the knowledge base of recorded missions."""
 
     scenario: Annotated[
@@ -137,8 +137,8 @@ class Replayed(KnowledgeFiles):
 
 
 @dataclasses.dataclass(frozen=True)
-class StateParts:
-    """Options that describe a state, besides its measured values: see `InState`."""
+class StateOptions:
+    """Options that describe a state, besides its measured values: see `MeasuredValueOptions`."""
 
     state: Annotated[
         Path | None,

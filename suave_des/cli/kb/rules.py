@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli.kb.options import AsFormat, Format, Replayed, Sources, TimeLimitS, print_json
+from suave_des.cli.kb.options import AsFormat, Format, KnowledgeOptions, ReplayOptions, TimeLimitS, print_json
 from suave_des.cli.options import Modes, grouped_options
 from suave_des.errors import number_of
 from suave_des.resources import shipped_folder
@@ -40,7 +40,7 @@ class FailOn(StrEnum):
 
 @grouped_options
 def check(
-    sources: Sources,
+    sources: KnowledgeOptions,
     modes: Modes = None,
     shapes: Annotated[
         list[Path] | None,
@@ -95,7 +95,7 @@ def check(
 
 
 @grouped_options
-def rules(sources: Sources, form: AsFormat = Format.TEXT) -> None:
+def rules(sources: KnowledgeOptions, form: AsFormat = Format.TEXT) -> None:
     """List all rules as text, in the format that --rules reads."""
     from suave_des.scenario_knowledge import open_base
 
@@ -166,7 +166,7 @@ def _switch(file: Path, name: str, *, enabled: bool) -> None:
 
 @grouped_options
 def try_(
-    knowledge: Replayed,
+    knowledge: ReplayOptions,
     on: Annotated[
         Path,
         typer.Option(

@@ -36,7 +36,7 @@ _WIDTH = 80
 
 
 @dataclass(frozen=True)
-class Tested(KnowledgeFiles):
+class TestOptions(KnowledgeFiles):
     """Options that replace or add to what the files of tests say of their knowledge base."""
 
     scenario: Annotated[
@@ -46,7 +46,7 @@ class Tested(KnowledgeFiles):
 
 @grouped_options
 def test(
-    knowledge: Tested,
+    knowledge: TestOptions,
     files: Annotated[
         list[Path] | None, typer.Argument(metavar="FILE", help="Tests in YAML; by default those of the shipped rules.")
     ] = None,
@@ -118,7 +118,7 @@ def test(
         raise typer.Exit(FAILED)
 
 
-def _write_mission(folder: Path, file: Path | None, knowledge: Tested, time_limit_s: float) -> None:
+def _write_mission(folder: Path, file: Path | None, knowledge: TestOptions, time_limit_s: float) -> None:
     """Write a recorded mission's decisions as tests, or print them."""
     from suave_des.workbench.prover import Prover
     from suave_des.workbench.testing.writing import mission_knowledge, mission_states, tests_text
@@ -193,7 +193,7 @@ class Suite:
     tests: tuple[RuleTest, ...]
 
 
-def _suites(knowledge: Tested, files: Sequence[Path], time_limit_s: float) -> list[Suite]:
+def _suites(knowledge: TestOptions, files: Sequence[Path], time_limit_s: float) -> list[Suite]:
     """Read all files before anything runs, so that a mistake in the last one comes first."""
     from suave_des.workbench.testing.reading import TestFile, shipped_tests
 
