@@ -87,7 +87,7 @@ def full(name: str) -> str:
         (
             "A: B(?x) -> sqwrl:select(?x)",
             "line 1, column 13",
-            "Pellet has no built-ins of the prefix sqwrl: (known are",
+            "Pellet has no built-ins of the prefix sqwrl: (kb query asks questions, in SPARQL)",
         ),
         ("A: B(?x) ^ swrlm:sqrt(?y, 4) -> C(?x)", "line 1, column 12", "of swrlb: abs, add, anyURI, "),
         ("A: B(<no iri>) -> C(?x)", "line 1, column 6", "expected an argument"),
@@ -102,6 +102,35 @@ def test_mistakes_are_told_with_line_and_column(text: str, place: str, problem: 
     assert error.place == place
     assert problem in str(error)
     assert "\n" not in str(error)
+
+
+@pytest.mark.parametrize(
+    ("text", "column", "problem"),
+    [
+        ("A: not B(?x) -> C(?x)", 4, "SWRL has no negation (say what holds instead)"),
+        ("A: B(?x) -> not C(?x)", 13, "SWRL has no negation"),
+        ("A: B(?x) -> C(?x) or D(?x)", 19, "SWRL has no 'or'"),
+        ("A: B(?x) ^ ¬C(?x) -> D(?x)", 12, "SWRL has no negation (say what holds instead)"),
+        ("A: B(?x) or C(?x) -> D(?x)", 10, "SWRL has no 'or' (write a rule for each case)"),
+        ("A: B(?x) v C(?x) -> D(?x)", 10, "instead of v (a rule is"),
+        ("A: B(?x) ∨ C(?x) -> D(?x)", 10, "SWRL has no 'or' (write a rule for each case)"),
+        ("A: B(?x) and C(?x) -> D(?x)", 10, "expected ^ or -> instead of and (write ^)"),
+        ("A: B(?x) && C(?x) -> D(?x)", 10, "instead of && (write ^)"),
+        ("A: B(?x) => C(?x)", 10, "expected ^ or -> instead of => (write ->)"),
+        ("A: B(?x) ⇒ C(?x)", 10, "instead of ⇒ (write ->)"),
+        ("A: b(?x, ?v) ^ ?v < 3.5 -> C(?x)", 16, "instead of ?v (write lessThan(?v, ...))"),
+        ("A: b(?x, ?v) ^ ?v>=3.5 -> C(?x)", 16, "instead of ?v (write greaterThanOrEqual(?v, ...))"),
+        ("A: b(?x, ‘FALSE’) -> C(?x)", 10, 'instead of ‘FALSE’ (write texts as "text")'),
+        ("A: b(?x, 'FALSE') -> C(?x)", 10, "instead of 'FALSE' (write texts as \"text\")"),
+        ("A: B(?x) -> or(?x)", 0, ""),
+        ("not: not(?x) -> and(?x)", 0, ""),
+    ],
+)
+def test_what_swrl_does_not_have_or_writes_differently(text: str, column: int, problem: str) -> None:
+    errors = parse_rules(text).errors
+    if column:
+        assert str(errors[0]).startswith(f"line 1, column {column}: ") and problem in str(errors[0])
+    assert len(errors) == (column > 0)
 
 
 def test_after_a_mistake_the_other_rules_are_read() -> None:
@@ -133,6 +162,14 @@ def test_after_a_mistake_the_other_rules_are_read() -> None:
         ("Role(?x) -> lessThan(1, 2)", 16, "occurs in the head"),
         ("<http://x.org/#a>(?x) -> Role(?x)", 4, "class a is not defined"),
         ("Role(<http://x.org/#i>) -> Role(energy)", 9, "individual i is not defined"),
+        (
+            "c_status(?c, FALSE) -> Role(?c)",
+            17,
+            'FALSE is not defined (write "FALSE" for a text, ?FALSE for a variable)',
+        ),
+        ("Role(?r) -> fd_realisability(fd_spiral_low, False)", 48, "False is not defined (write false)"),
+        ('c_status(c, "FALSE") -> Role(c)', 13, "c is not defined (write ?c for a variable)"),
+        ("hasValue(?q, ?v) ^ lessThan(?v, 3,5) -> Role(?q)", 23, "not 3 (write decimals with a point)"),
     ],
 )
 def test_rules_that_pellet_would_ignore_are_refused(rule: str, column: int, words: str, tmp_path: Path) -> None:

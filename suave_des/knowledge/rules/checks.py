@@ -236,7 +236,9 @@ def _check_builtin(atom: Atom, name: str, *, is_head: bool) -> Iterator[RuleProb
     least, most = counts
     if not least <= len(atom.arguments) <= most:
         wanted = str(least) if least == most else f"{least} or more" if most == 99 else f"{least} to {most}"
-        yield RuleProblem(f"{name} takes {wanted} arguments, not {len(atom.arguments)}", atom.place())
+        has_comma = [isinstance(term, Lit) and term.datatype == XSD + "integer" for term in atom.arguments[-2:]]
+        remedy = "write decimals with a point" if has_comma == [True, True] else None
+        yield RuleProblem(f"{name} takes {wanted} arguments, not {len(atom.arguments)}", atom.place(), remedy)
     for number, term in enumerate(atom.arguments):
         if isinstance(term, Named):
             problem = f"{name}: {local_name(term.iri)} is an individual where a value is needed"

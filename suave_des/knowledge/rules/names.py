@@ -145,7 +145,7 @@ def _resolved(atom: Atom, vocabulary: Vocabulary, file: Path) -> Atom:
     kinds: tuple[str, ...] = ("class", "object property", "data property", "builtin")
     predicate = _iri(atom.predicate, atom.place(), vocabulary, file, kinds)
     arguments = tuple(
-        Named(_iri(term.iri, atom.place(number), vocabulary, file, ("individual",)))
+        Named(_iri(term.iri, atom.place(number), vocabulary, file, ("individual",), _not_a_name(term.iri, number)))
         if isinstance(term, Named)
         else term
         for number, term in enumerate(atom.arguments)
@@ -153,7 +153,16 @@ def _resolved(atom: Atom, vocabulary: Vocabulary, file: Path) -> Atom:
     return replace(atom, kind=_kind(predicate, arguments, vocabulary), predicate=predicate, arguments=arguments)
 
 
-def _iri(name: str, place: Place | None, vocabulary: Vocabulary, file: Path, kinds: Collection[str]) -> str:
+def _not_a_name(word: str, number: int) -> str:
+    """Say how to write what is perhaps no individual's name, but a truth value, a text or a variable."""
+    if word in ("True", "False"):
+        return f"write {word.lower()}"
+    return f"write ?{word} for a variable" if number == 0 else f'write "{word}" for a text, ?{word} for a variable'
+
+
+def _iri(
+    name: str, place: Place | None, vocabulary: Vocabulary, file: Path, kinds: Collection[str], otherwise: str = ""
+) -> str:
     if ":" in name:
         return name
     if name in ("sameAs", "differentFrom") and "class" in kinds:
@@ -167,7 +176,8 @@ def _iri(name: str, place: Place | None, vocabulary: Vocabulary, file: Path, kin
     where = str(place) if place else None
     if found:
         raise RuleError(f"{name} is ambiguous", file=file, place=where, remedy=f"write {' or '.join(map(str, found))}")
-    raise RuleError(f"{name} is not defined", file=file, place=where, remedy=vocabulary.guess(name, kinds))
+    remedy = vocabulary.guess(name, kinds) or otherwise
+    raise RuleError(f"{name} is not defined", file=file, place=where, remedy=remedy)
 
 
 def _kind(predicate: str, arguments: tuple[Term, ...], vocabulary: Vocabulary) -> AtomKind:

@@ -89,12 +89,27 @@ _EXPECTED: Final = (
     ("_LPAR", "(", None),
     ("_COLON", ":", "a rule is name: body -> head"),
 )
+#: Signs and words of other languages: what SWRL does not have, if that is so, and what would be right.
+_FOREIGN: Final = (
+    (re.compile(r"=>|⇒"), None, "write ->"),
+    (re.compile(r"&&?|(and|AND)\b"), None, "write ^"),
+    (re.compile(r"\|\|?|∨|(or|OR)\b"), "'or'", "write a rule for each case"),
+    (re.compile(r"[¬!~]|(not|NOT)\b"), "negation", "say what holds instead"),
+    (re.compile(r"[‘’“”']"), None, 'write texts as "text"'),
+)
+_COMPARISON: Final = re.compile(r"(\?[\w-]+)\s*(<=|>=|!=|==?|[<>≤≥≠])")
+_COMPARING: Final = (
+    dict.fromkeys(("=", "=="), "equal")
+    | dict.fromkeys(("!=", "≠"), "notEqual")
+    | {"<": "lessThan", "<=": "lessThanOrEqual", "≤": "lessThanOrEqual"}
+    | {">": "greaterThan", ">=": "greaterThanOrEqual", "≥": "greaterThanOrEqual"}
+)
 _HEADER: Final = re.compile(rf'^(?:disabled\s+)?(?:{_WORD}|"[^"\n]*")\s*:(?![:/])|^prefix\s', re.MULTILINE)
 _ESCAPE: Final = re.compile(r"\\(?:u([0-9A-Fa-f]{4})|U([0-9A-Fa-f]{8})|(.))", re.DOTALL)
 _ESCAPED: Final = {"n": "\n", "t": "\t", "r": "\r", '"': '"', "\\": "\\"}
 #: What no text may contain: control characters, and halves of surrogate pairs, which no file can encode.
 _FORBIDDEN: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
-_FOUND: Final = re.compile(r"[^\s\"<>(),^?]+|.", re.DOTALL)
+_FOUND: Final = re.compile(r"=>|\??[^\s\"<>(),^?]+|.", re.DOTALL)
 _BLANK: Final = re.compile(r"(?:\s|#[^\n]*)*")
 _lock: Final = threading.Lock()
 
@@ -161,11 +176,16 @@ def _parser() -> tuple[Lark, _Builder]:
 
 def _error(text: str, at: int, accepted: set[str], file: Path | str | None) -> RuleError:
     """Describe the token that was found, and those that were expected."""
+    before = text[:at].split()[-1:] if len(accepted) == 1 else []
+    if before and accepted <= {"_COLON", "_LPAR"} and before[0].lower() in ("and", "or", "not"):
+        at = text.rindex(before[0], 0, at)  # it was taken for a name
     place = str(Place(text.count("\n", 0, at) + 1, at - text.rfind("\n", 0, at)))
+    lacking, right = _foreign(text, at)
+    if lacking is not None:
+        return RuleError(f"SWRL has no {lacking}", file=file, place=place, remedy=right)
     if text.startswith('"', at) and "STRING" in accepted:
         return RuleError("this text has no closing quote on its line", file=file, place=place)
     expected, remedy = next((words, right) for name, words, right in _EXPECTED if name in accepted)
-    before = text[:at].split()[-1:] if len(accepted) == 1 else []
     if before == ["^^"] or text[:at].endswith("^^"):
         expected = "a datatype, such as xsd:decimal,"
     elif accepted & {"_COLON", "_LPAR"} and before:
@@ -180,7 +200,15 @@ def _error(text: str, at: int, accepted: set[str], file: Path | str | None) -> R
     else:
         shown = found.group() if len(found.group()) <= 30 else found.group()[:27] + "..."
         instead = f"instead of {shown if shown.isprintable() else ascii(shown)}"
-    return RuleError(f"expected {expected} {instead}", file=file, place=place, remedy=remedy)
+    return RuleError(f"expected {expected} {instead}", file=file, place=place, remedy=right or remedy)
+
+
+def _foreign(text: str, at: int) -> tuple[str | None, str | None]:
+    """Recognize what other languages have: what SWRL does not have, if so, and what would be right."""
+    if comparison := _COMPARISON.match(text, at):
+        variable, operator = comparison.groups()
+        return None, f"write {_COMPARING[operator]}({variable}, ...)"
+    return next(((lacking, right) for word, lacking, right in _FOREIGN if word.match(text, at)), (None, None))
 
 
 class _Builder:
@@ -237,7 +265,8 @@ class _Builder:
         prefix, _, local = token.partition(":")
         if prefix in _FOREIGN_BUILTINS and prefix not in self._prefixes:
             known = f"known are those of swrlb: {', '.join(sorted(map(local_name, BUILTINS)))}"
-            raise self._wrong(token, f"Pellet has no built-ins of the prefix {prefix}:", known)
+            remedy = "kb query asks questions, in SPARQL" if prefix == "sqwrl" else known
+            raise self._wrong(token, f"Pellet has no built-ins of the prefix {prefix}:", remedy)
         if prefix not in self._prefixes:
             remedy = f"declare it: prefix {prefix}: <...>; known: {', '.join(sorted(self._prefixes))}"
             raise self._wrong(token, f"unknown prefix {prefix}:", nearest(prefix, self._prefixes) or remedy)
