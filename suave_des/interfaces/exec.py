@@ -75,7 +75,7 @@ class _Program:
 
     def ask(self, message: Mapping[str, Any], time_out_s: float) -> dict[str, Any]:
         """Send a message, and return its answer."""
-        line = json.dumps(message, separators=(",", ":")).encode() + b"\n"
+        line = json.dumps(message, separators=(",", ":"), default=dict).encode() + b"\n"  # of mappings of other types
         try:
             while line:
                 line = line[os.write(self._in, line) :]
@@ -161,7 +161,7 @@ class ExecManager(ManagingSubsystem):
             time_limit_s=system.scenario.mission.time_limit_s,
             seed=system.stream("exec").getrandbits(48),
             settings=settings,
-            learned=_plain(system.learned),
+            learned=system.learned,
             attributes=list(system.measurements),
             functions={function: system.modes.available_modes(function) for function in system.modes.nodes},
             lasting_functions=system.lasting_functions,
@@ -246,12 +246,6 @@ class ExecManager(ManagingSubsystem):
 
     def _error(self, problem: str) -> ProgramError:
         return ProgramError(f"{self._command[0]} {problem}")
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _plain(each) for key, each in value.items()}
-    return [_plain(each) for each in value] if isinstance(value, tuple | list) else value
 
 
 @cache
