@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from suave_des.errors import InputError, number_of
 from suave_des.estimates import Estimate, Interval, estimate, interval_columns, interval_text
+from suave_des.files import csv_text
 from suave_des.report.compared_metrics import PAPER_METRICS
 from suave_des.report.result_files import PAPER_ORDER
 from suave_des.report.runs import read_runs
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
 _CLAIMS = {"search_time_s": ("find the pipeline sooner", -1.0), "distance_inspected_m": ("inspect more of it", 1.0)}
 """What the paper says that metacontrol does on average, and the sign of what is better."""
-_DECIMALS = 6
 
 MARK = "*"
 """Marks figures outside the paper's interval."""
@@ -131,9 +131,7 @@ class PaperComparison:
 
     def csv(self) -> str:
         """Write the comparison as CSV, with six decimals; missing values are empty."""
-        import pandas
-
-        rows = [
+        rows: list[dict[str, object]] = [
             {
                 "manager": figure.manager,
                 "metric": figure.metric,
@@ -147,7 +145,7 @@ class PaperComparison:
             }
             for figure in self.figures
         ]
-        return pandas.DataFrame(rows, dtype=object).map(_rounded).to_csv(index=False, lineterminator="\n")
+        return csv_text(list(rows[0]), (list(row.values()) for row in rows))
 
 
 def published_runs() -> Path:
@@ -202,7 +200,3 @@ def _sizes(estimates: Estimates) -> str:
     if len(set(sizes.values())) == 1:
         return f"{number_of(next(iter(sizes.values())), 'mission')} for each manager"
     return ", ".join(f"{number_of(n, 'mission')} of {manager}" for manager, n in sizes.items())
-
-
-def _rounded(value: object) -> object:
-    return round(value, _DECIMALS) if isinstance(value, float) else value
