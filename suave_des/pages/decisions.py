@@ -240,7 +240,7 @@ def adaptation_rules(folder: Path, record: MissionRecord) -> Mapping[tuple[float
     for each in adaptations(record):
         cycle = _decided_in(known.cycles, each.t_s, each.function, each.after)
         if cycle is not None and cycle.inferred >= 0:
-            found[each.t_s, each.function] = tuple(_rules(known, cycle, each.function, each.before))
+            found[each.t_s, each.function] = _rules(known, cycle, each.function, each.before)
     return found
 
 
@@ -253,14 +253,11 @@ def _decided_in(cycles: Sequence[Cycle], t_s: float, function: str, design: str)
     return next((cycle for cycle in reversed(cycles) if cycle.t_s <= t_s and chose(cycle)), None)
 
 
-def _rules(known: Cycles, cycle: Cycle, function: str, before: str) -> Iterator[str]:
-    """Yield the rules behind what was inferred of a function's objective or of the design that it had."""
+def _rules(known: Cycles, cycle: Cycle, function: str, before: str) -> tuple[str, ...]:
+    """Return the rules behind what was inferred of a function's objective or of the design that it had."""
     words = before.removeprefix("fd_"), function.removeprefix("f_")
-    rules: dict[str, None] = {}
-    for step in known.inferences[cycle.inferred].facts:
-        if any(word in step.fact for word in words):
-            rules |= dict.fromkeys(_rules_of(step))
-    yield from rules
+    steps = [step for step in known.inferences[cycle.inferred].facts if any(word in step.fact for word in words)]
+    return tuple(dict.fromkeys(rule for step in steps for rule in _rules_of(step)))
 
 
 def _rules_of(step: Step) -> Iterator[str]:
