@@ -82,13 +82,16 @@ function momentOf(play, asked) {
     roll: between(track.roll), pitch: between(track.pitch), yaw: track.yaw[index] + share * turn,
   };
   const visibility = track.visibility[index];
+  const altitude = Math.max(0, pose.z - BED);
   const thrusters = Array(DATA.scenario.thrusters).fill(null);
   for (const [time, number, works] of mission.thrusters) if (time <= t) thrusters[number - 1] = works;
   const inspected = play.inspected[lastAt(play.inspected, t, (each) => each.t)];
   const spread = play.clearest - play.murkiest;
   const atEnd = t >= play.duration - 0.3;
   return {
-    t, index, pose, visibility, thrusters, further: Object.fromEntries(play.further.map((name) => [name, mission.track[name][index]])), altitude: Math.max(0, pose.z - BED), mode: track.mode[index],
+    t, index, pose, altitude, visibility, thrusters, mode: track.mode[index],
+    sees: visibility !== null && altitude <= visibility,
+    further: Object.fromEntries(play.further.map((name) => [name, mission.track[name][index]])),
     clarity: visibility === null || spread < 0.05 ? 1 : clamp((visibility - play.murkiest) / spread, 0, 1),
     inspectedFrom: inspected?.from ?? Infinity, inspectedTo: inspected?.to ?? -Infinity,
     distance: atEnd ? mission.metrics.distance_inspected_m : (inspected?.distance ?? 0),
@@ -150,7 +153,7 @@ function drawPane({ play, box, parts, panel }, t) {
   }
   parts.altitude.textContent = `${moment.altitude.toFixed(1)} m`;
   parts.visibility.textContent = moment.visibility === null ? '–' : `${moment.visibility.toFixed(1)} m`;
-  parts.seeing.classList.toggle('blind', moment.visibility !== null && moment.altitude > moment.visibility);
+  parts.seeing.classList.toggle('blind', moment.visibility !== null && !moment.sees);
   parts.distance.textContent = `${moment.distance.toFixed(1)} m`;
   parts.mode.replaceChildren(element('i'), moment.mode || 'no mode yet');
   parts.mode.firstChild.style.color = seaColour(moment.mode);

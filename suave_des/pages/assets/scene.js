@@ -264,8 +264,7 @@ function drawShadow({ d, camera, moment }) {
 
 /** The camera's view: a pyramid down to the sea bed, or as far as the water lets it see. */
 function drawFootprint({ d, camera, moment }) {
-  const { pose, altitude, visibility } = moment;
-  const sees = visibility !== null && altitude <= visibility;
+  const { pose, altitude, visibility, sees } = moment;
   const depth = sees || visibility === null ? altitude : Math.max(0.2, visibility);
   const eye = [pose.x, pose.y, pose.z - 0.12];
   const base = square(pose.x, pose.y, depth * TANGENT, pose.z - depth);

@@ -108,9 +108,8 @@ function drawSide({ drawing: d, width, height }, play, moment) {
     d.strokeStyle = seaColour(track.mode[i]);
     strokeLine(d, [across(track.t[i - 1]), up(track.z[i - 1] - BED)], [across(track.t[i]), up(track.z[i] - BED)]);
   }
-  const { altitude, visibility } = moment;
+  const { altitude, visibility, sees } = moment;
   const [x, y] = [across(moment.t), up(altitude)];
-  const sees = visibility !== null && altitude <= visibility;
   const deep = sees || visibility === null ? altitude : visibility;
   d.fillStyle = withStops(d.createLinearGradient(0, y, 0, up(altitude - deep) + 1),
     [0, sees ? 'rgba(255,248,210,0.75)' : 'rgba(255,236,210,0.6)'], [1, sees ? 'rgba(255,248,210,0.22)' : 'rgba(255,236,210,0)']);
