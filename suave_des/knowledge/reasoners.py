@@ -6,7 +6,7 @@ An inference is a pure function of ontology and state, so it is cached.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Final, Protocol
 
 from suave_des.errors import InputError
@@ -81,20 +81,19 @@ def _owlready2(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Rea
     from suave_des.knowledge.pellet.stock import StockPellet
 
     stock = StockPellet(ontology, terms)
-    checker: list[InProcessPellet] = []
+    in_process = cache(lambda: InProcessPellet(ontology, terms))
 
     def entailed(state: KnowledgeState, assertions: tuple[Triple, ...]) -> Iterable[Triple]:
         # owlready2 discards Pellet's log, which alone reports dropped rules and explains contradictions. The Pellet
         # in this process does so: once at the start, and for contradictions.
-        if not checker:
-            checker.append(limit.run(lambda: InProcessPellet(ontology, terms), reasoning_on(state), ontology.rules))
+        checker = limit.run(in_process, reasoning_on(state), ontology.rules)
         try:
             found = stock.infer(assertions, limit.seconds)
         except TimeoutError:
             raise limit.exceeded(reasoning_on(state), ontology.rules) from None
         if found is not None:
             return found
-        return limit.run(lambda: checker[0].infer(assertions), reasoning_on(state), ontology.rules)
+        return limit.run(lambda: checker.infer(assertions), reasoning_on(state), ontology.rules)
 
     return _StateCache("owlready2", ontology, entailed)
 

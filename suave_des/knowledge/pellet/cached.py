@@ -15,7 +15,7 @@ import platform
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from decimal import Decimal
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -25,7 +25,7 @@ from suave_des.caches import private_cache
 from suave_des.knowledge.content import Terms
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.limit import TimeLimit, reasoning_on
-from suave_des.knowledge.rdf import Triple, facts_of
+from suave_des.knowledge.rdf import facts_of
 from suave_des.knowledge.regions import Key, regions_of
 from suave_des.knowledge.state import Fact, Inference, KnowledgeState, Value
 
@@ -69,10 +69,14 @@ class CachedPellet:
         self._terms = terms
         self._limit = limit or TimeLimit()
         self.regions = regions_of(ontology)
-        self._key = self.regions.key
         self._disk = InferenceCache(cache_digest(ontology, terms), folder)
         self._cached: dict[Key, frozenset[Fact]] = self._disk.load()
-        self._pellet: InProcessPellet | None = None
+
+    @cached_property
+    def _pellet(self) -> InProcessPellet:
+        from suave_des.knowledge.pellet.in_process import InProcessPellet
+
+        return InProcessPellet(self._ontology, self._terms)
 
     def infer(self, state: KnowledgeState) -> Inference:
         """Return the cached inference of a state, or ask Pellet.
@@ -81,14 +85,14 @@ class CachedPellet:
             KnowledgeError: state and ontologies contradict one another, Pellet does not use one of the rules, or it
                 takes too long.
         """
-        key = self._key(state)
+        key = self.regions.key(state)
         facts = self._cached.get(key)
         return self._ask(state, key) if facts is None else Inference(state, self._ontology.asserted, facts)
 
     def _ask(self, state: KnowledgeState, key: Key) -> Inference:
         ontology = self._ontology
         assertions, asserted = ontology.assertions(state), ontology.asserted(state)
-        entailed = self._limit.run(lambda: self._entailed(assertions), reasoning_on(state), ontology.rules)
+        entailed = self._limit.run(lambda: self._pellet.infer(assertions), reasoning_on(state), ontology.rules)
         facts = frozenset(facts_of(entailed, ontology.names)) - asserted
         if not self._mentions_measured(state, facts):
             self._cached[key] = facts
@@ -96,13 +100,6 @@ class CachedPellet:
                 del self._cached[next(iter(self._cached))]
             self._disk.add(key, facts)
         return Inference(state, asserted, facts)
-
-    def _entailed(self, assertions: tuple[Triple, ...]) -> frozenset[Triple]:
-        if self._pellet is None:
-            from suave_des.knowledge.pellet.in_process import InProcessPellet
-
-            self._pellet = InProcessPellet(self._ontology, self._terms)
-        return self._pellet.infer(assertions)
 
     def _mentions_measured(self, state: KnowledgeState, facts: frozenset[Fact]) -> bool:
         """Whether a measured value is among the inferred ones, so that it would be wrong for another state."""

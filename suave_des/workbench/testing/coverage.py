@@ -73,7 +73,7 @@ def _questions(rules: Iterable[Rule]) -> Iterator[_Question]:
             before, text = atoms[:number], write_atom(atom)
             if atom.predicate in COMPARISONS and len(atom.arguments) == 2:
                 for order, builtin in ORDERS.items():
-                    compared = replace(atom, predicate=builtin, places=())
+                    compared = replace(atom, predicate=builtin)
                     yield _Question(Goal(rule.name, number, order, text), (*before, compared))
             else:
                 yield _Question(Goal(rule.name, number, HOLDS, text), (*before, atom))

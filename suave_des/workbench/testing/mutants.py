@@ -54,24 +54,19 @@ class Mutant:
     Attributes:
         operator: name of the kind of change.
         text: what is changed, in one line.
-        old: the rule that is replaced; None for a change of data.
-        new: the rule in its place; None where the rule is removed, or for a change of data.
-        removed, added: the fact that is replaced, and the one in its place.
+        old: the rule or the fact that is replaced.
+        new: the rule or the fact in its place; None where a rule is removed.
     """
 
     operator: str
     text: str
-    old: Rule | None = field(default=None, repr=False)
-    new: Rule | None = field(default=None, repr=False)
-    removed: Triple | None = None
-    added: Triple | None = None
+    old: Rule | Triple = field(repr=False)
+    new: Rule | Triple | None = field(repr=False)
 
     @property
     def name(self) -> str:
         """The rule, or the individual, that is changed."""
-        if self.old is not None:
-            return self.old.name
-        return local_name(self.removed[0]) if self.removed is not None else ""
+        return self.old.name if isinstance(self.old, Rule) else local_name(self.old[0])
 
     def __str__(self) -> str:
         """As reports have it."""
@@ -79,21 +74,11 @@ class Mutant:
 
     def applied(self, base: Ontology) -> Ontology:
         """The knowledge base with the change."""
-        if self.old is not None:
-            changed = (self.new if rule is self.old else rule for rule in base.rules)
-            return base.with_rules(rule for rule in changed if rule is not None)
-        changed_triples = (self.added if triple == self.removed else triple for triple in base.content.triples)
-        return base.with_triples(triple for triple in changed_triples if triple is not None)
-
-    @property
-    def generalises(self) -> bool:
-        """Whether the new rule fires wherever the old one does, with the same head."""
-        return (
-            self.old is not None
-            and self.new is not None
-            and self.new.head == self.old.head
-            and set(self.new.body) <= set(self.old.body)
-        )
+        if isinstance(self.old, Rule):
+            rules = (self.new if rule is self.old else rule for rule in base.rules)
+            return base.with_rules(rule for rule in rules if isinstance(rule, Rule))
+        facts = (self.new if fact == self.old else fact for fact in base.content.triples)
+        return base.with_triples(fact for fact in facts if isinstance(fact, tuple))
 
 
 def mutants_of(base: Ontology) -> tuple[Mutant, ...]:
@@ -102,14 +87,16 @@ def mutants_of(base: Ontology) -> tuple[Mutant, ...]:
     for name, operator in OPERATORS.items():
         for mutant in operator(base):
             new, old = mutant.new, mutant.old
-            if new is not None and any(problem.is_fatal for problem in check_rule(new, base.vocabulary)):
-                continue
-            if new is not None and old is not None and (set(new.body), new.head) == (set(old.body), old.head):
-                continue
-            body = None if new is None else (new.body, new.head)
-            found.setdefault((mutant.name, body, mutant.removed, mutant.added), replace(mutant, operator=name))
+            if isinstance(new, Rule) and isinstance(old, Rule):
+                is_same = new.head == old.head and set(new.body) == set(old.body)
+                if is_same or any(problem.is_fatal for problem in check_rule(new, base.vocabulary)):
+                    continue
+            before = mutant.name if isinstance(old, Rule) else old
+            after = (new.body, new.head) if isinstance(new, Rule) else new
+            found.setdefault((before, after), replace(mutant, operator=name))
     order = list(OPERATORS)
-    return tuple(sorted(found.values(), key=lambda one: (one.old is None, one.name, order.index(one.operator))))
+    ordered = sorted(found.values(), key=lambda one: (one.name, order.index(one.operator)))
+    return tuple(sorted(ordered, key=lambda one: not isinstance(one.old, Rule)))
 
 
 def _changed(rule: Rule, body: Sequence[Atom], head: Sequence[Atom], text: str) -> Mutant:
@@ -121,7 +108,7 @@ def _with_atom(rule: Rule, number: int, atom: Atom) -> Mutant:
     """The rule with another atom in a place of its body or head."""
     atoms = list(rule.atoms)
     text = f"{write_atom(atoms[number])} becomes {write_atom(atom)}"
-    atoms[number] = replace(atom, places=())
+    atoms[number] = atom
     return _changed(rule, atoms[: len(rule.body)], atoms[len(rule.body) :], text)
 
 
@@ -140,7 +127,7 @@ def _with_value(fact: Triple, value: str | Lit) -> Mutant:
         return literal_text(value) if isinstance(value, Lit) else local_name(value)
 
     text = f"{local_name(fact[1])} {shown(fact[2])} becomes {shown(value)}"
-    return Mutant("", text, removed=fact, added=(*fact[:2], value))
+    return Mutant("", text, fact, (*fact[:2], value))
 
 
 def _arguments(base: Ontology) -> Iterator[tuple[Rule, int, int, Term]]:
@@ -225,7 +212,7 @@ def _statuses(base: Ontology) -> Iterator[Mutant]:
 
 def _removed(base: Ontology) -> Iterator[Mutant]:
     for rule in base.content.enabled_rules:
-        yield Mutant("", "the rule is removed", rule)
+        yield Mutant("", "the rule is removed", rule, None)
 
 
 def _moved(base: Ontology) -> Iterator[Mutant]:
@@ -289,23 +276,21 @@ def sample(mutants: Sequence[Mutant], most: int | None) -> tuple[Mutant, ...]:
 
 def touching(base: Ontology, mutant: Mutant) -> Iterator[Body]:
     """Conjunctions of which one holds wherever a mutant can infer something else."""
-    if mutant.old is not None:
-        yield _plain(mutant.old.body)
-        if mutant.new is not None:
-            yield _plain(mutant.new.body)
-        return
-    for triple in (mutant.removed, mutant.added):
-        assert triple is not None
-        for rule in base.content.enabled_rules:
-            for number, atom in enumerate(rule.body):
-                binding = matched(atom, triple, {}) if atom.kind in FACT_KINDS else None
-                if binding is not None:
-                    rest = (*rule.body[:number], *rule.body[number + 1 :])
-                    yield tuple(instance(each, binding) for each in rest)
+    for changed in (mutant.old, mutant.new):
+        if isinstance(changed, Rule):
+            yield changed.body
+        elif changed is not None:
+            yield from _matching(base, changed)
 
 
-def _plain(body: Body) -> Body:
-    return tuple(replace(atom, places=()) for atom in body)
+def _matching(base: Ontology, fact: Triple) -> Iterator[Body]:
+    """What is left of each body with an atom that a fact matches."""
+    for rule in base.content.enabled_rules:
+        for number, atom in enumerate(rule.body):
+            binding = matched(atom, fact, {})
+            if binding is not None:
+                rest = (*rule.body[:number], *rule.body[number + 1 :])
+                yield tuple(instance(each, binding) for each in rest)
 
 
 def follows_anyway(bench: KnowledgeBase, mutant: Mutant) -> bool:
@@ -313,14 +298,15 @@ def follows_anyway(bench: KnowledgeBase, mutant: Mutant) -> bool:
 
     The other atoms are asserted of individuals of which nothing else is known; what follows then, follows of all.
     """
-    if mutant.old is None or mutant.new is None or not mutant.generalises:
+    old, new = mutant.old, mutant.new
+    if not (isinstance(old, Rule) and isinstance(new, Rule) and new.head == old.head and {*new.body} <= {*old.body}):
         return False
-    dropped = next((atom for atom in mutant.old.body if atom not in mutant.new.body), None)
+    dropped = next((atom for atom in old.body if atom not in new.body), None)
     if dropped is None or dropped.kind not in FACT_KINDS:
         return False
-    individuals = {name: f"{_FROZEN}{name}" for atom in mutant.old.body for name in atom.variables()}
+    individuals = {name: f"{_FROZEN}{name}" for atom in old.body for name in atom.variables()}
     facts = []
-    for atom in mutant.new.body:
+    for atom in new.body:
         binding: dict[str, str | Lit] = dict(individuals)
         if atom.kind == "data" and isinstance(last := atom.arguments[-1], Variable):
             if atom.predicate != HAS_VALUE:

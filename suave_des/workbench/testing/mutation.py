@@ -25,6 +25,7 @@ from suave_des.knowledge.pellet.limit import ReasonerTimeoutError
 from suave_des.knowledge.planning import plan
 from suave_des.knowledge.rdf import DECISION_PROPERTIES, HAS_VALUE, IS_QA_TYPE, local_name
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
+from suave_des.knowledge.rules.syntax import Rule
 from suave_des.knowledge.state import ContradictionError, Fact, Inference, KnowledgeState
 from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.policy.cases import PolicyCase, kinds_of_states
@@ -238,8 +239,8 @@ def mutate(
 
 def _killer(changed: _Changed, tests: Iterable[RuleTest]) -> str | None:
     """The test that fails, or why the mutant cannot be used; None if all pass."""
-    runner = Runner(changed.original.bench, changed)
     try:
+        runner = Runner(changed.original.bench, changed.base, changed.outcome)
         for test in tests:
             if not all(map(changed.is_same, test.situations)) and not runner.passes(test):
                 return test.name
@@ -315,12 +316,10 @@ def _space(bench: KnowledgeBase, mutants: Iterable[_Changed]) -> PolicySpace:
     measured = {bench.base.model.attributes[name] for name in space.attributes}
     numbers = set(space.numbers)
     for changed in mutants:
-        removed = changed.mutant.removed
-        if removed is None:
+        old = changed.mutant.old
+        if isinstance(old, Rule):
             numbers |= set(numbers_in(changed.base))
-        elif removed[1] != HAS_VALUE or any(
-            (removed[0], IS_QA_TYPE, each) in bench.base.content.triples for each in measured
-        ):
+        elif old[1] != HAS_VALUE or any((old[0], IS_QA_TYPE, each) in bench.base.content.triples for each in measured):
             space = space.common(PolicySpace.of(changed.base, bench.settings))
             numbers |= set(space.numbers)
     return replace(space, numbers=tuple(sorted(numbers)))

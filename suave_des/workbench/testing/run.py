@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final, Protocol
+from typing import Final
 
 from lxml import etree
 
@@ -65,28 +65,14 @@ class TestResult:
         return not self.failures
 
 
-class Concluder(Protocol):
-    """Concludes what follows in situations, as a Prover does.
-
-    Attributes:
-        base: ontologies and rules.
-    """
-
-    @property
-    def base(self) -> Ontology: ...  # noqa: D102
-
-    def outcome(self, situation: Situation) -> Outcome:
-        """Conclude what follows."""
-        ...
-
-
 @dataclass(frozen=True)
 class Runner:
     """Runs tests on one knowledge base.
 
     Attributes:
         bench: the knowledge base.
-        prover: the same, or a changed form of it, in Pellet.
+        base: its ontologies and rules, or a changed form of them.
+        outcome: concludes from these what follows in a situation.
 
     Example:
         >>> runner = Runner.of(KnowledgeBase.load())
@@ -95,7 +81,8 @@ class Runner:
     """
 
     bench: KnowledgeBase
-    prover: Concluder
+    base: Ontology = field(repr=False)
+    outcome: Callable[[Situation], Outcome] = field(repr=False)
     _without: dict[tuple[str, ...], Prover] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -105,7 +92,8 @@ class Runner:
         Raises:
             KnowledgeError: Pellet cannot use it.
         """
-        return cls(bench, Prover.of(bench, base))
+        prover = Prover.of(bench, base)
+        return cls(bench, prover.base, prover.outcome)
 
     def run(self, test: RuleTest) -> TestResult:
         """Run a test, and explain what fails.
@@ -129,7 +117,7 @@ class Runner:
 
     def _problems(self, test: RuleTest, situation: Situation) -> Iterator[Failure]:
         """Each expectation that does not hold in a situation."""
-        outcome = self.prover.outcome(situation)
+        outcome = self.outcome(situation)
         if outcome.conclusion is None:
             if not test.contradicts:
                 yield Failure(f"the situation contradicts itself: {outcome.contradiction}", situation)
@@ -165,15 +153,14 @@ class Runner:
     def _prover_without(self, names: tuple[str, ...]) -> Prover:
         """The knowledge base without some rules."""
         if names not in self._without:
-            base = self.prover.base
-            kept = (rule for rule in base.rules if rule.name not in names)
-            self._without[names] = Prover.of(self.bench, base.with_rules(kept))
+            kept = (rule for rule in self.base.rules if rule.name not in names)
+            self._without[names] = Prover.of(self.bench, self.base.with_rules(kept))
         return self._without[names]
 
     def _because(self, failure: Failure) -> Iterator[str]:
         """Why something follows or does not, or is decided as it is."""
         fact, function = failure.fact, failure.function
-        base = self.prover.base.with_facts(failure.situation.facts)
+        base = self.base.with_facts(failure.situation.facts)
         state, improves = failure.situation.state, self.bench.settings.improves_exceeded
         try:
             if fact is not None and failure.what.endswith("does not follow"):
