@@ -94,10 +94,13 @@ class OntologyFile:
         return None
 
     def line_of_rule(self, name: str) -> int | None:
-        """The line of a rule's label, else the first line that describes a thing of its name."""
+        """The line of a rule's label, else the first line that describes a thing of its name.
+
+        Of several things with that label it is the last one: editors write rules at the end.
+        """
         text = text_of(self.content)
-        found = re.search(rf"label[^<>]*>\s*{re.escape(name)}\s*<", text)
-        return self.line_of(name) if found is None else text.count("\n", 0, found.start()) + 1
+        labels = [found.start() for found in re.finditer(rf"label[^<>]*>\s*{re.escape(name)}\s*<", text)]
+        return text.count("\n", 0, labels[-1]) + 1 if labels else self.line_of(name)
 
 
 def place_of(name: str, sources: Sequence[OntologyFile]) -> tuple[Path, int | None]:

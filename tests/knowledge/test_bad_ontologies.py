@@ -171,6 +171,17 @@ def test_an_ontology_whose_rules_contradict_it_is_told(suave_copy: MakeOntology,
     assert str(path) in problem
 
 
+@pytest.mark.parametrize("name", ["odd", "fd_spiral_high"])
+def test_a_contradictions_rule_is_not_looked_for_where_an_individual_of_its_name_is(
+    suave_copy: MakeOntology, name: str
+) -> None:
+    odd = '<owl:NamedIndividual rdf:about="http://example.org/#odd"/>\n'
+    path = suave_copy(odd + rule(name, "QAvalue(?q) ^ isQAtype(?q, :water_visibility) -> hasValue(?q, 3.25)"))
+    problem = problem_of(lambda: make_reasoner("pellet", Ontology.load([path])).infer(searching()))
+    labels = [line for line, text in enumerate(path.read_text().splitlines(), 1) if f"label>{name}<" in text]
+    assert f"by the rule {name} (suave.owl, line {labels[-1]})" in problem
+
+
 @pytest.mark.parametrize("name", ["pellet", "owlready2"])
 def test_a_conclusion_outside_its_propertys_range_is_told(suave_copy: MakeOntology, name: str) -> None:
     path = suave_copy(rule("odd", "FunctionGrounding(?g) -> fg_status(?g, 3.5)"))
