@@ -36,7 +36,6 @@ def plan(ontology: Ontology, inference: Inference, *, improve_exceeded: bool = F
     """Decide on every objective that is ungrounded, in error, updatable or always to be improved.
 
     Args:
-        ontology: the ontology.
         inference: what the reasoner added to the state that was analyzed.
         improve_exceeded: whether an objective is also adapted when a measured value exceeds what its current function
             design expects (the exemplar's revision 2023 does so in code).

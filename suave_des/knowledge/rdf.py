@@ -179,7 +179,6 @@ def n_triple_with_nodes(triple: RdfTriple, scope: str, renamed: Mapping[Node, st
     """Write one line of N-Triples with blank nodes.
 
     Args:
-        triple: the triple.
         scope: begins the names of blank nodes, so that those of different files differ.
         renamed: names that some nodes get instead.
     """

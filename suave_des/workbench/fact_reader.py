@@ -25,7 +25,6 @@ class FactReader:
     member of a class: Binding(b1).
 
     Attributes:
-        base: the ontologies.
         new: IRIs of the new individuals, by name.
     """
 

@@ -70,7 +70,6 @@ class ReplayedCycle:
 
     Attributes:
         t_s: mission time.
-        state: the state.
         firings: of the rule.
         decisions: those that would have been different.
         contradiction: for a state that would contradict itself, what contradicts what.

@@ -54,7 +54,6 @@ class CachedPellet:
     A state that contradicts the ontologies is never cached: the error names its values, so Pellet is asked again.
 
     Args:
-        ontology: the ontology.
         folder: of the cache on disk, in place of the user's cache folder.
         limit: of the time that Pellet may take for one state; None: a minute.
         terms: what to read after an inference; None: what decisions depend on, and what rules assert.

@@ -65,7 +65,6 @@ class InProcessPellet:
         pellet.infer(ontology.assertions(state))  # values and members, as triples
 
     Args:
-        ontology: the ontology.
         terms: what to read after an inference; None: what decisions depend on, and what rules assert.
 
     Raises:

@@ -37,7 +37,6 @@ class StockPellet:
     """owlready2, which starts Pellet in a Java process of its own.
 
     Args:
-        ontology: the ontology.
         terms: what to read after an inference; None: what decisions depend on, and what rules assert.
         options: of Java.
     """

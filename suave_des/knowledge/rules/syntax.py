@@ -102,7 +102,6 @@ class ParsedRule:
     """A rule as text, before its names are looked up.
 
     Attributes:
-        name: its name.
         body: atoms that must hold.
         head: atoms that then hold.
         enabled: whether it is enabled.

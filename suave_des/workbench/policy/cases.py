@@ -132,7 +132,6 @@ def make_policy(
     """Decide every kind of state.
 
     Args:
-        base: the ontologies.
         settings: measured attributes, and behaviour of the managing subsystem that is not in the rules.
         infer: analyzes a state and plans on it.
         max_failed: maximum number of components that report a status.

@@ -37,7 +37,6 @@ def describe_failure(base: Ontology, atom: Atom, binding: Binding, facts: Facts)
     """Describe why an atom does not hold.
 
     Args:
-        base: the ontologies.
         atom: of the body of a rule.
         binding: what variables stand for.
         facts: all that follows.

@@ -149,7 +149,6 @@ class NearestFinder:
     """Finds the nearest match of one rule in one state.
 
     Attributes:
-        rule: the rule.
         facts: all that follows in the state.
         start: what variables must stand for.
     """

@@ -100,7 +100,6 @@ class Tracer:
     """Derives the facts of one state.
 
     Attributes:
-        base: the ontology.
         state: whose facts are derived.
         pellet: made by `pellet_for`, for who asks about many states; None: one of its own.
     """

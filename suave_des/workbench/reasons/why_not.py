@@ -43,7 +43,6 @@ class UnusableRule:
     """A rule of a text file that no knowledge base can be loaded with.
 
     Attributes:
-        name: its name.
         reason: what is wrong with it, where, and what would be right.
     """
 
@@ -143,8 +142,6 @@ class RuleQuestions:
         """Say why a rule, which may have the name of another one, does not fire in a state.
 
         Args:
-            rule: the rule.
-            state: the state.
             start: what variables must stand for.
         """
         if not rule.enabled:
@@ -211,7 +208,6 @@ class RuleQuestions:
         Args:
             fact: which does not follow.
             subject: IRI of its subject.
-            state: the state.
         """
         found = []
         for rule in self.base.content.enabled_rules:

@@ -44,7 +44,6 @@ class Verdict:
     """What became of a mutant.
 
     Attributes:
-        mutant: the mutant.
         result: "killed", "equivalent" or "survived".
         reason: the test that kills it, why it is equivalent, or what differs.
         state: for a survivor, a state that tells it apart.
@@ -139,7 +138,6 @@ class _Original:
         Args:
             base: the knowledge base.
             known: of its facts those that planning reads.
-            situation: the situation.
         """
         found = self.entailed(situation)
         if found is None:

@@ -49,7 +49,6 @@ class TestResult:
     """What came of a test.
 
     Attributes:
-        test: the test.
         failures: none if it passed.
         duration_s: how long it took, explanations included.
     """

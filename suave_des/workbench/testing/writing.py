@@ -25,7 +25,6 @@ class NamedState:
 
     Attributes:
         name: of the test.
-        state: the state.
     """
 
     name: str
