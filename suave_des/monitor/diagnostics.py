@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
+from suave_des.domain import THRUSTER_NAMES
+
 if TYPE_CHECKING:  # or looking a manager up would load the compiler
     from suave_des.vehicle.frames import Pose
 
@@ -32,6 +34,8 @@ EXEMPLAR_KINDS = (Kind.QA_STATUS, Kind.COMPONENT_STATUS)
 FAILED = "FALSE"
 RECOVERED = "RECOVERED"
 HULL, LEAK = "hull", "LEAK"
+REPORTED_STATUSES = {**dict.fromkeys(THRUSTER_NAMES, (FAILED, RECOVERED)), HULL: (LEAK,)}
+"""The statuses that monitors report of each component."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,8 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
-from itertools import islice
+from difflib import get_close_matches
+from itertools import chain, islice
 from pathlib import Path
 from typing import Final
 
@@ -36,6 +37,7 @@ from suave_des.workbench.model_checks import (
     undefined_names,
     unmeasured_rules,
     unreported_components,
+    unreported_statuses,
     unused_individuals,
 )
 from suave_des.workbench.policy.space import has_effect
@@ -58,7 +60,7 @@ class Subject:
         modes: names of the modes by function; None skips the checks against them.
         needed: functions that the mission cannot do without.
         operators: qa_comparison_operator that the revision assumes of quality attribute types that have none, by name.
-        reported: components whose status something in the simulation reports; None: that is not checked.
+        reported: the statuses that the simulation reports, by component; None: that is not checked.
         time_limit_s: for Pellet.
     """
 
@@ -70,7 +72,7 @@ class Subject:
     modes: Mapping[str, Collection[str]] | None = None
     needed: Collection[str] = ()
     operators: Mapping[str, str] = field(default_factory=dict)
-    reported: Collection[str] | None = None
+    reported: Mapping[str, Collection[str]] | None = None
     time_limit_s: float = TIME_LIMIT_S
 
 
@@ -112,11 +114,13 @@ def check(subject: Subject) -> tuple[Finding, ...]:
     findings += _replacing_rules(content.rules, groups)
     findings += _check_rules(whole, vocabulary, by_path)
     if model is not None:
-        findings += _dead_rules(whole, model, {path.resolve() for path in (*given, *subject.rules)}, by_path)
+        own = {path.resolve() for path in (*given, *subject.rules)}
+        findings += _dead_rules(whole, model, own, by_path)
         findings += check_designs(whole, model, sources, subject.modes, subject.needed)
         findings += unused_individuals(whole, model, sources)
         if subject.reported is not None:
             findings += unreported_components(whole, model, sources, subject.reported)
+            findings += _unreported_statuses(whole, subject.reported, own, by_path)
         for name, sign in assumed.items():
             findings.append(finding_about(name, sources, Level.INFO, assumption(name, sign)))
         if values_are_right:
@@ -180,6 +184,26 @@ def _dead_rules(
     for rule, atom, message, remedy in found:
         level = Level.WARN if rule.file.resolve() in given else Level.INFO
         yield _about(rule, sources, level, message, remedy or None, atom.place())
+
+
+def _unreported_statuses(
+    content: Content,
+    reported: Mapping[str, Collection[str]],
+    given: Collection[Path],
+    sources: Mapping[Path, OntologyFile],
+) -> Iterator[Finding]:
+    """Find the rules that ask for a component's status that nothing reports: a warning where it is misspelt."""
+    known = sorted({*chain.from_iterable(reported.values())})
+    for rule, atom, status in unreported_statuses(content, known):
+        if rule.file.resolve() in given:
+            meant = next((each for each in known if each.casefold() == status.casefold()), None)
+            meant = meant or next(iter(get_close_matches(status, known)), None)
+            level, remedy = Level.WARN, f'did you mean "{meant}"?'
+            if meant is None:
+                texts = ", ".join(f'"{each}"' for each in known)
+                level, remedy = Level.INFO, f"reported are {texts}; a function of your own can report others"
+            message = f'nothing in the simulation reports c_status "{status}"'
+            yield _about(rule, sources, level, message, remedy, atom.place(1))
 
 
 def _about(

@@ -12,9 +12,11 @@ from pathlib import Path
 import pytest
 
 from suave_des.cli.main import main
+from suave_des.domain import THRUSTER_NAMES
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import InProcessPellet
+from suave_des.monitor.diagnostics import REPORTED_STATUSES
 from suave_des.resources import shipped_folder
 from suave_des.workbench.check import MAX_STATES, Subject, check, combined, simple_states
 from suave_des.workbench.findings import Finding, Level, folded, has_level
@@ -207,13 +209,31 @@ def individual(name: str, kind: str, inside: str = "") -> str:
 def test_a_component_that_nothing_reports_is_noted(tmp_path: Path) -> None:
     status = '<tomasys:c_status xmlns:tomasys="http://metacontrol.org/tomasys#">FALSE</tomasys:c_status>'
     extra = individual("c_camera", "Component") + individual("c_broken", "Component", status)
-    reported = [f"c_thruster_{number}" for number in range(1, 7)]
+    reported = dict.fromkeys(THRUSTER_NAMES, ("FALSE",))
     findings = found(tmp_path, extra=extra, reported=reported)
     assert [one.message for one in findings if "reports the status" in one.message] == [
         "nothing in the simulation reports the status of component c_camera, so missions never have one"
     ]
     assert only(findings, "c_camera, so").level is Level.INFO
     assert not any("reports the status" in one.message for one in found(tmp_path, extra=extra))
+
+
+@pytest.mark.parametrize(
+    ("status", "level", "remedy"),
+    [
+        ("FALSE", None, ""),
+        ("LEAK", None, ""),
+        ("WORN", None, ""),  # concluded by another rule
+        ("False", Level.WARN, 'did you mean "FALSE"?'),
+        ("RECOVERD", Level.WARN, 'did you mean "RECOVERED"?'),
+        ("stuck", Level.INFO, 'reported are "FALSE", "LEAK", "RECOVERED"; a function of your own can report others'),
+    ],
+)
+def test_a_component_status_that_nothing_reports(tmp_path: Path, status: str, level: Level, remedy: str) -> None:
+    rules = f'A: c_status(?c, "{status}") -> Role(?c)\nB: Role(?c) -> c_status(?c, "WORN")\n'
+    findings = found(tmp_path, rules, reported=REPORTED_STATUSES)
+    named = [(one.level, one.rule, one.column, one.remedy) for one in findings if "reports c_status" in one.message]
+    assert named == ([] if level is None else [(level, "A", 17, remedy)])
 
 
 def link(name: str, target: str) -> str:

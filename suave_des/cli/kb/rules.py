@@ -57,8 +57,8 @@ def check(
 
     Exit status: 0 no findings at the level of --fail-on or above; 1 such findings; 2 something cannot be read.
     """
-    from suave_des.domain import MISSION_FUNCTIONS, THRUSTER_NAMES
-    from suave_des.monitor.diagnostics import HULL
+    from suave_des.domain import MISSION_FUNCTIONS
+    from suave_des.monitor.diagnostics import REPORTED_STATUSES
     from suave_des.scenario.loader import load_scenario
     from suave_des.workbench.check import Subject
     from suave_des.workbench.check import check as run_checks
@@ -74,7 +74,7 @@ def check(
             shapes=shapes or (),
             modes={name: loaded.modes.modes(name) for name in loaded.modes.functions},
             needed=MISSION_FUNCTIONS,
-            reported=(*THRUSTER_NAMES, HULL),
+            reported=REPORTED_STATUSES,
             operators=loaded.scenario.revision.comparison_operators,
             time_limit_s=time_limit,
         )
