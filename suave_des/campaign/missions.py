@@ -39,10 +39,10 @@ def plan(
     points: int,
     managers: int,
     runs: int,
-    settled: Callable[[MissionGroup], Collection[int]] = lambda group: (),
-    is_over: Callable[[MissionGroup, int], bool] = lambda group, run: False,
+    settled: Callable[[MissionGroup], Collection[int]],
+    is_over: Callable[[MissionGroup, int], bool],
     *,
-    run_by_run: bool = False,
+    run_by_run: bool,
 ) -> Iterator[MissionKey]:
     """Yield the missions that have yet to be run, in order.
 

@@ -180,8 +180,8 @@ class OpenedCampaign:
     loaded: LoadedScenario
     variation: Variation
 
-    def at_point(self, point: int, run: int | None = None) -> LoadedScenario:
-        """Return the scenario at a point of the sweep, 0 without one; with a run, as its member of the ensemble has it.
+    def simulator(self, point: int = 0, run: int | None = None) -> Simulator:
+        """Make what runs the missions of a point of the sweep, 0 without one; with an ensemble, those of a run.
 
         Raises:
             InputError: there is no such point.
@@ -189,11 +189,8 @@ class OpenedCampaign:
         if not 0 <= point < self.variation.sweep.points:
             remedy = f"its sweep has the points 0 to {self.variation.sweep.points - 1}"
             raise InputError(f"the campaign has no point {point}", remedy=remedy)
-        return self.variation.scenario(self.loaded, point, None if run is None else self.variation.member(run))
-
-    def simulator(self, point: int = 0, run: int | None = None) -> Simulator:
-        """Make what runs the missions of a point; with an ensemble, those of a run."""
-        return Simulator(self.at_point(point, run), dict.fromkeys(self.variation.drawn, self.spec.runs_per_draw))
+        loaded = self.variation.scenario(self.loaded, point, None if run is None else self.variation.member(run))
+        return Simulator(loaded, dict.fromkeys(self.variation.drawn, self.spec.runs_per_draw))
 
     def run(self, manager: str, run: int, point: int = 0, *, simulator: Simulator | None = None) -> MissionResult:
         """Run a mission of the campaign again, with its record.

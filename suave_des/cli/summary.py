@@ -120,15 +120,12 @@ def print_stops(console: Console, result: CampaignResult) -> None:
 
 def _print_pairs(console: Console, result: CampaignResult, until: UntilCi) -> None:
     """Print how well the difference of two managers is known, at each point."""
-    name = " - ".join(until.pair or ())
+    name, limit = " - ".join(until.pair or ()), f"less than {until.half_width:g}"
     for pair in result.pairs[:_STOPS_LISTED]:
-        values = result.variation.sweep.values(pair.point)
-        where = "".join(f" {key}={cell_of(value)}" for key, value in values.items())
+        what = f"{name}{_swept(result, pair.point)}: {until.metric}"
         known = "no run in both" if pair.difference is None else estimated(pair.difference, pair.half_width)
-        verdict = (
-            f"less than {until.half_width:g}" if pair.is_narrow else f"not reached: not less than {until.half_width:g}"
-        )
-        console.print(f"{name}{where}: {until.metric} {known} ({pair.n} runs in pairs; ± {verdict})")
+        verdict = limit if pair.is_narrow else f"not reached: not {limit}"
+        console.print(f"{what} {known} ({pair.n} runs in pairs; ± {verdict})")
     if len(result.pairs) > _STOPS_LISTED:
         console.print(f"{len(result.pairs) - _STOPS_LISTED} more are in {result.folder}/manifest.json")
     if not all(pair.is_narrow for pair in result.pairs):
@@ -136,8 +133,11 @@ def _print_pairs(console: Console, result: CampaignResult, until: UntilCi) -> No
 
 
 def _group(result: CampaignResult, stop: GroupProgress) -> str:
-    values = result.variation.sweep.values(stop.point)
-    return " ".join([stop.manager, *(f"{name}={cell_of(value)}" for name, value in values.items())])
+    return f"{stop.manager}{_swept(result, stop.point)}"
+
+
+def _swept(result: CampaignResult, point: int) -> str:
+    return "".join(f" {name}={cell_of(value)}" for name, value in result.variation.sweep.values(point).items())
 
 
 def print_differences(console: Console, result: CampaignResult) -> None:

@@ -31,7 +31,7 @@ _TITLES = {**METRIC_TITLES, "mean_reaction_time_s": "reaction, s"}
 _Rows = Iterable[Sequence[str | Text]]
 
 
-def print_validation(console: Console, validation: Validation, real: str = "published") -> None:
+def print_validation(console: Console, validation: Validation, real: str) -> None:
     """Print every table that has rows, then how many targets are met.
 
     Args:
