@@ -100,7 +100,7 @@ class Store:
         path: the database's file, made by make_store; None for a temporary one, which is gone when this is closed.
 
     Raises:
-        InputError: it is not there, is damaged, or is another version's.
+        InputError: it is damaged, or is another version's.
     """
 
     def __init__(self, path: Path | None) -> None:
@@ -108,8 +108,6 @@ class Store:
         self._committed_s = time.monotonic()
         self._inode = 0
         self._cursors: WeakSet[sqlite3.Cursor] = WeakSet()
-        if path is not None and not path.is_file():
-            raise InputError("there is no campaign to resume", file=path.parent, remedy="start one with --out")
         with _user_errors(path):
             self._db = sqlite3.connect("" if path is None else path, isolation_level=None)
             try:

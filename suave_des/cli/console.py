@@ -27,8 +27,7 @@ _ERRORS = "suave-des-in-ascii"
 
 
 def _replaced(error: UnicodeError) -> tuple[str, int]:
-    if not isinstance(error, UnicodeEncodeError):
-        raise error
+    assert isinstance(error, UnicodeEncodeError)  # it is registered for output alone
     return "".join(_IN_ASCII.get(char, "?") for char in error.object[error.start : error.end]), error.end
 
 
