@@ -206,7 +206,7 @@ def draw_detections(groups: Sequence[Group]) -> style.Picture:
     rows = math.ceil(len(groups) / columns)
     width = style.WIDTH_IN if columns > 1 else style.WIDTH_IN / 2
     figure = style.Picture(figsize=(width, 2.6 * rows + 0.1), layout="constrained")
-    parts = np.atleast_1d(np.array(figure.subfigures(rows, columns, squeeze=False))).ravel()
+    parts = figure.subfigures(rows, columns, squeeze=False).ravel()
     known = pandas.concat([group.frame.loc[group.frame["detection_x_m"].notna()] for group in groups])
     ends = (
         [float(known["detection_x_m"].min()) - 0.7, float(known["detection_x_m"].max()) + 0.7] if len(known) else [0, 1]

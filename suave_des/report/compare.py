@@ -301,16 +301,15 @@ def _paired(first: Group, second: Group, metric: str, *, unpaired: bool) -> tupl
         return Pairing(False, "not paired: as asked"), *apart
     if x is None or y is None:
         return Pairing(False, "not paired: real missions, or missions without seed, share no random numbers"), *apart
-    is_same = x.index.equals(y.index)
-    common = x.index if is_same else x.index.intersection(y.index)
-    if not len(common):
+    common = pandas.concat({"x": x, "y": y}, axis=1, join="inner")
+    if common.empty:
         seeds = [", ".join(each.index.unique("seed")[:3]) for each in (x, y)]
         if seeds[0] != seeds[1]:
             why = f"not paired: the seeds {seeds[0]} and {seeds[1]} differ, so no random numbers are shared"
         else:
             why = "not paired: they have no run number in common"
         return Pairing(False, why), *apart
-    both = pandas.DataFrame({"x": x, "y": y} if is_same else {"x": x[common], "y": y[common]}).dropna()
+    both = common.dropna()
     if len(both) < 2 <= min(map(len, apart)):
         return Pairing(False, "not paired: fewer than two runs have a value under both"), *apart
     left = max(map(len, apart)) - len(both)

@@ -51,11 +51,8 @@ def draw(record: MissionRecord) -> style.Picture:
     colours = mode_colours(record)
     marks = list(_marks(record))
     figure = style.Picture(figsize=(style.WIDTH_IN, 5.2), layout="constrained")
-    whole, zoom, time = (
-        figure.add_subplot(place)
-        for grid in [figure.add_gridspec(2, 2, height_ratios=(1.15, 1.0), width_ratios=(1.0, 1.75))]
-        for place in (grid[0, :], grid[1, 0], grid[1, 1])
-    )
+    panels = figure.subplot_mosaic("aa;bc", height_ratios=(1.15, 1.0), width_ratios=(1.0, 1.75))
+    whole, zoom, time = panels["a"], panels["b"], panels["c"]
     search = _search_frame(record)
     _draw_map(whole, record, colours, search)
     _draw_zoom(zoom, record, colours, marks, search)

@@ -11,7 +11,7 @@ import warnings
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any, Literal
 
@@ -203,18 +203,12 @@ def search_times(times_s: Sample, found: NDArray[np.bool_], horizon_s: float) ->
         half = 0.5 + _ROUNDING
         median_s = utilities.qth_survival_time(half, fitted)
         ends = utilities.qth_survival_times(half, fitted.confidence_interval_).to_numpy().ravel()
-    interval, method = None, ""
+    restricted = Estimated(restricted_s)
     if not (~found & (times_s < horizon_s)).any():
         # None is censored before the horizon, so the restricted mean is that of a sample.
-        estimated = mean_interval(np.minimum(times_s, horizon_s))
-        interval, method = estimated.interval, estimated.method
+        restricted = replace(mean_interval(np.minimum(times_s, horizon_s)), value=restricted_s)
     low, high = sorted(map(_reached, ends), key=lambda end: math.inf if end is None else end)
-    return SearchTimes(
-        horizon_s,
-        Estimated(restricted_s, interval, method),
-        _reached(median_s),
-        (low, high),
-    )
+    return SearchTimes(horizon_s, restricted, _reached(median_s), (low, high))
 
 
 def _reached(time_s: float) -> float | None:
