@@ -201,7 +201,7 @@ def replay(
     """
     from suave_des.files import check_output_file
     from suave_des.pages.page import write_page
-    from suave_des.pages.recorded import Chosen, missions_in, missions_run
+    from suave_des.pages.recorded import MissionSelection, missions_in, missions_run
     from suave_des.pages.replay import replay_page
     from suave_des.scenario.loader import load_scenario
 
@@ -214,7 +214,7 @@ def replay(
     else:
         check_no_use({"--point": point}, "without a campaign's folder")
     page_file = out or (folders[0] if folders else Path()) / "replay.html"
-    chosen = Chosen(
+    chosen = MissionSelection(
         comma_separated(managers),
         run=_RUN if run_number is None else run_number,
         seed=_SEED if seed is None else seed,

@@ -14,7 +14,7 @@ from suave_des.knowledge.pellet.limit import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.planning import performance
 from suave_des.knowledge.rdf import local_name
 from suave_des.knowledge.rules.writer import write_rule
-from suave_des.knowledge.state import KnowledgeState
+from suave_des.metrics.result import KnowledgeRecord
 from suave_des.pages.recorded import Recorded, read_recorded
 from suave_des.report.mission_record import MissionRecord, adaptations
 from suave_des.resources import find
@@ -24,7 +24,7 @@ from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.reasons.tracing import Derivation
 from suave_des.workbench.state_input import ManagingSettings
 
-_FEWEST_DIGITS = 2
+_TIME_DIGITS = 2
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Design:
 
 
 @dataclass(frozen=True)
-class Decided:
+class FunctionDecision:
     """A decision about a function: the design grounded before and the one chosen, why, and all designs."""
 
     function: str
@@ -86,7 +86,7 @@ class Cycle:
     components: Mapping[str, str]
     measured: Mapping[str, float]
     inferred: int
-    decided: tuple[Decided, ...]
+    decided: tuple[FunctionDecision, ...]
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ class Cycles:
     note: str = ""
 
 
-def explained(mission: Recorded) -> Cycles:
+def explain_cycles(mission: Recorded) -> Cycles:
     """Reason about the recorded states again, and explain what follows and what is decided.
 
     Where the ontologies are not there any more, only the states are given, with a note.
@@ -126,7 +126,7 @@ def explained(mission: Recorded) -> Cycles:
         settings, reasoner = ManagingSettings.of(mission.scenario), mission.scenario.knowledge.reasoner
         knowledge = KnowledgeBase.of(base, settings, reasoner, TimeLimit(TIME_LIMIT_S, "the reasoner"))
     except InputError as error:
-        cycles = tuple(_cycle(record.t_s, record.state, -1, ()) for record in mission.knowledge)
+        cycles = tuple(_cycle(record, -1, ()) for record in mission.knowledge)
         return Cycles(cycles, note=f"Decisions are not explained: {error}")
     return _Explainer(knowledge).cycles(mission, note)
 
@@ -165,7 +165,7 @@ class _Explainer:
             except KnowledgeError as error:
                 note = note or f"At {record.t_s:.1f} s the knowledge base gives no conclusion: {error.problem}"
                 inferred, decided = -1, ()
-            cycles.append(_cycle(record.t_s, record.state, inferred, decided))
+            cycles.append(_cycle(record, inferred, decided))
         base = self.knowledge.base
         texts = {
             rule.name: write_rule(rule.name, rule.body, rule.head, local_name).strip()
@@ -188,7 +188,7 @@ class _Explainer:
             self.inferences.append(Inferred(t_s, tuple(map(_step, derived))))
         return self.index[key]
 
-    def _decided(self, conclusion: Conclusion) -> Iterator[Decided]:
+    def _decided(self, conclusion: Conclusion) -> Iterator[FunctionDecision]:
         base, inference = self.knowledge.base, conclusion.inference
         for decision in conclusion.plan.decisions:
             rejected = {each.design: each.reason for each in decision.rejected}
@@ -200,12 +200,13 @@ class _Explainer:
                 designs.append(Design(name, verdict, expected, rejected.get(name, "")))
             designs.sort(key=lambda each: (-each.performance, each.name))
             before = inference.state.grounded(decision.function)
-            yield Decided(decision.function, before, decision.design, decision.reason, tuple(designs))
+            yield FunctionDecision(decision.function, before, decision.design, decision.reason, tuple(designs))
 
 
-def _cycle(t_s: float, state: KnowledgeState, inferred: int, decided: Sequence[Decided]) -> Cycle:
+def _cycle(record: KnowledgeRecord, inferred: int, decided: Sequence[FunctionDecision]) -> Cycle:
+    state = record.state
     return Cycle(
-        t_s=round(t_s, _FEWEST_DIGITS),
+        t_s=round(record.t_s, _TIME_DIGITS),
         objectives={each.function: each.status for each in state.objectives},
         groundings=dict(state.groundings),
         components=dict(state.components),
@@ -235,7 +236,7 @@ def adaptation_rules(folder: Path, record: MissionRecord) -> Mapping[tuple[float
     Raises:
         InputError: the mission's files cannot be read.
     """
-    known = explained(read_recorded(folder))
+    known = explain_cycles(read_recorded(folder))
     found = {}
     for each in adaptations(record):
         cycle = _decided_in(known.cycles, each.t_s, each.function, each.after)

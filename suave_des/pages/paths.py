@@ -22,7 +22,7 @@ _EVENTS = ("mode_requested", "component_status", "pipeline_detected")
 
 
 @dataclass(frozen=True)
-class Way:
+class MissionPath:
     """The way of one mission.
 
     Attributes:
@@ -55,7 +55,7 @@ class Paths:
     """
 
     pipeline: Sequence[tuple[float, float]] = ()
-    paths: Sequence[Way] = ()
+    paths: Sequence[MissionPath] = ()
     note: str = ""
 
 
@@ -75,9 +75,11 @@ def paths_of(folder: Path, frame: pandas.DataFrame, groups: Sequence[str], runs:
         return Paths(note=f"Paths and timelines are left out: {error}")
 
 
-def _paths(campaign: OpenedCampaign, frame: pandas.DataFrame, groups: Sequence[str], runs: int) -> Iterator[Way]:
+def _paths(
+    campaign: OpenedCampaign, frame: pandas.DataFrame, groups: Sequence[str], runs: int
+) -> Iterator[MissionPath]:
     simulator = campaign.simulator(0)
-    wanted = telling_runs(frame, groups, runs)
+    wanted = representative_runs(frame, groups, runs)
     known = frame.drop_duplicates(["manager", "run"]).set_index(["manager", "run"])["search_time_s"]
     for number, manager in enumerate(groups):
         for run in wanted:
@@ -90,7 +92,7 @@ def _paths(campaign: OpenedCampaign, frame: pandas.DataFrame, groups: Sequence[s
                     yield _path(number, run, result)
 
 
-def telling_runs(frame: pandas.DataFrame, groups: Sequence[str], runs: int) -> list[int]:
+def representative_runs(frame: pandas.DataFrame, groups: Sequence[str], runs: int) -> list[int]:
     """Choose runs to look at: those in which each manager was quickest, in the middle and slowest, and the first."""
     chosen: dict[int, None] = {}
     for manager in groups:
@@ -102,12 +104,12 @@ def telling_runs(frame: pandas.DataFrame, groups: Sequence[str], runs: int) -> l
     return sorted(list(chosen)[:runs])
 
 
-def _path(group: int, run: int, result: MissionResult) -> Way:
+def _path(group: int, run: int, result: MissionResult) -> MissionPath:
     points = result.trajectory
     period_s = points[1].t_s - points[0].t_s if len(points) > 1 else _PERIOD_S
     some = points[:: max(1, round(_PERIOD_S / period_s))]
     x_m, y_m, altitude_m = np.round([(each.x_m, each.y_m, each.z_m - SEA_BED_Z_M) for each in some], 2).T.tolist()
-    return Way(
+    return MissionPath(
         group,
         run,
         [round(each.t_s, 1) for each in some],

@@ -79,7 +79,7 @@ def read_recorded(folder: Path) -> Recorded:
 
 
 @dataclass(frozen=True)
-class Chosen:
+class MissionSelection:
     """Which missions of a scenario or campaign are wanted.
 
     Attributes:
@@ -95,7 +95,7 @@ class Chosen:
     point: int = 0
 
 
-def missions_in(folders: Sequence[Path], chosen: Chosen) -> list[Recorded]:
+def missions_in(folders: Sequence[Path], chosen: MissionSelection) -> list[Recorded]:
     """Read the missions in folders: a recorded one of each, or those chosen of a campaign, which are run again.
 
     Raises:
@@ -120,7 +120,7 @@ def missions_in(folders: Sequence[Path], chosen: Chosen) -> list[Recorded]:
     return missions
 
 
-def missions_of(campaign: OpenedCampaign, chosen: Chosen) -> list[Recorded]:
+def missions_of(campaign: OpenedCampaign, chosen: MissionSelection) -> list[Recorded]:
     """Run missions of a campaign again.
 
     Raises:
@@ -136,7 +136,7 @@ def missions_of(campaign: OpenedCampaign, chosen: Chosen) -> list[Recorded]:
     ]
 
 
-def missions_run(loaded: LoadedScenario, chosen: Chosen) -> list[Recorded]:
+def missions_run(loaded: LoadedScenario, chosen: MissionSelection) -> list[Recorded]:
     """Run missions of a scenario.
 
     Raises:

@@ -12,7 +12,7 @@ from suave_des import __version__
 from suave_des.domain import FOLLOW_PIPELINE, SEA_BED_Z_M, THRUSTERS, UNGROUND_MODE
 from suave_des.managed.follow import InspectionPath
 from suave_des.monitor.diagnostics import FAILED
-from suave_des.pages.decisions import Cycles, explained
+from suave_des.pages.decisions import Cycles, explain_cycles
 from suave_des.pages.page import page
 from suave_des.pages.recorded import Recorded
 from suave_des.report.mission_record import details, mode_spans
@@ -105,7 +105,7 @@ def mission_on_page(mission: Recorded) -> MissionOnPage:
         inspected=_inspected(mission, way, modes.get(FOLLOW_PIPELINE, ())),
         way=[] if way is None else [(round(x, _DECIMALS), round(y, _DECIMALS)) for x, y, _ in way.points_m.tolist()],
         seen=None if seen_s is None or x_m is None or y_m is None else (seen_s, x_m, y_m),
-        cycles=explained(mission),
+        cycles=explain_cycles(mission),
     )
 
 

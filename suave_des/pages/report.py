@@ -88,7 +88,7 @@ class ChartColumns:
 
 
 @dataclass(frozen=True)
-class Made:
+class Provenance:
     """How a campaign was made.
 
     Attributes:
@@ -151,7 +151,7 @@ def report_page(folders: Sequence[Path], runs: int = PATHS) -> str:
         "version": __version__,
         "title": ", ".join(scenarios) or ", ".join(str(folder) for folder in folders),
         "folders": [str(folder) for folder in folders],
-        "made": [asdict(made_from(folder)) for folder in folders],
+        "made": [asdict(provenance_of(folder)) for folder in folders],
         "results": asdict(results),
         "ways": asdict(ways),
     }
@@ -196,7 +196,7 @@ def results_of(missions: Missions) -> ReportContent:
     found = compare(missions, Choices())
     needed = runs_table(found) if found.differences else None
     sections = [_section(found, metric.name) for metric in found.metrics]
-    return ReportContent(found.conclusion, found.notes, sections, needed, remarks(found), drawn(missions))
+    return ReportContent(found.conclusion, found.notes, sections, needed, remarks(found), chart_columns(missions))
 
 
 def _section(found: Comparison, name: str) -> Section:
@@ -210,7 +210,7 @@ def _section(found: Comparison, name: str) -> Section:
     return Section(capital(metric.heading), tables, [each.conclusion for each in differences])
 
 
-def drawn(missions: Missions) -> ChartColumns:
+def chart_columns(missions: Missions) -> ChartColumns:
     """Put missions into columns, at most MOST_DRAWN of them."""
     groups, _ = grouped(missions)
     numbers = missions.frame.groupby(["manager", "source"], sort=False).ngroup()  # as grouped() orders them
@@ -243,11 +243,11 @@ def _plain(column: pandas.Series) -> list[Any]:
     return [None if not math.isfinite(value) else int(value) if value.is_integer() else value for value in values]
 
 
-def made_from(folder: Path) -> Made:
+def provenance_of(folder: Path) -> Provenance:
     """Read how the campaign in a folder was made; little is known of other folders."""
     try:
         manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-        return Made(
+        return Provenance(
             str(folder),
             list(_facts(manifest)),
             shlex.join(map(str, manifest.get("command", ()))),
@@ -255,7 +255,7 @@ def made_from(folder: Path) -> Made:
             dict(manifest.get("versions", {})),
         )
     except (OSError, ValueError, AttributeError, TypeError):
-        return Made(str(folder))
+        return Provenance(str(folder))
 
 
 def _facts(manifest: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

@@ -7,7 +7,7 @@ import pytest
 from suave_des.campaign.campaign import run_campaign
 from suave_des.campaign.single import run_mission
 from suave_des.cli.main import main
-from suave_des.pages.recorded import Chosen, missions_in, read_recorded
+from suave_des.pages.recorded import MissionSelection, missions_in, read_recorded
 from suave_des.pages.replay import mission_on_page
 
 
@@ -32,7 +32,7 @@ def campaign(tmp_path_factory):
 
 
 def test_a_mission_of_a_campaign_is_the_one_that_run_records(campaign, mission):
-    (again,) = missions_in([campaign], Chosen(("bt",), run=2))
+    (again,) = missions_in([campaign], MissionSelection(("bt",), run=2))
     recorded = read_recorded(mission)
     assert again.record.metrics["search_time_s"] == recorded.record.metrics["search_time_s"]
     assert again.record.trajectory["x_m"].tolist() == pytest.approx(
