@@ -90,32 +90,27 @@ class _Episodes:
         self.period_s = period_s
         loaded = self.simulator.loaded
         self.limit_s = loaded.scenario.mission.time_limit_s
-        self.attributes = tuple(sorted(loaded.scenario.signals))
         has_battery = loaded.scenario.battery is not None
-        self.attributes += (BATTERY_LEVEL,) * has_battery
+        self.attributes = (*sorted(loaded.scenario.signals), *((BATTERY_LEVEL,) if has_battery else ()))
         self.choices = {
             function: modes
             for function in loaded.modes.functions
             if (function in MISSION_FUNCTIONS or (function == GENERATE_RECHARGE_PATH and has_battery))
             and len(modes := grounding_modes(loaded.modes.modes(function))) > 1
         }
-        self.names = (
-            *self.attributes,
-            *THRUSTER_NAMES,
-            "inspects",
-            "distance_inspected_m",
-            "time_share",
-            *self.choices,
+        entries = (
+            *((name, -_GREATEST, _GREATEST) for name in self.attributes),
+            *((name, 0.0, 1.0) for name in (*THRUSTER_NAMES, "inspects")),
+            ("distance_inspected_m", 0.0, _GREATEST),
+            ("time_share", 0.0, 2.0),
+            *((function, -1.0, len(modes) - 1.0) for function, modes in self.choices.items()),
         )
+        self.names, low, high = zip(*entries, strict=True)
+        self.observation_space = spaces.Box(np.array(low, np.float32), np.array(high, np.float32), dtype=np.float32)
+        self.action_space = spaces.MultiDiscrete([len(modes) for modes in self.choices.values()])
         self.indices: list[tuple[str, dict[str | None, float]]] = [
             (function, {mode: float(n) for n, mode in enumerate(modes)}) for function, modes in self.choices.items()
         ]
-        sizes = [len(modes) for modes in self.choices.values()]
-        low = [-_GREATEST] * len(self.attributes) + [0.0] * (THRUSTERS + 3) + [-1.0] * len(sizes)
-        high = [_GREATEST] * len(self.attributes) + [1.0] * (THRUSTERS + 1)
-        high += [_GREATEST, 2.0, *(size - 1.0 for size in sizes)]
-        self.observation_space = spaces.Box(np.array(low, np.float32), np.array(high, np.float32), dtype=np.float32)
-        self.action_space = spaces.MultiDiscrete(sizes)
 
 
 class _Episode:
