@@ -230,8 +230,6 @@ def compare_conditions(
 
 
 def _by_condition(runs: pandas.DataFrame, manager: str, metric: str) -> Mapping[int, list[float]]:
-    if metric not in runs:
-        return {}
     own = runs[(runs["manager"] == manager) & runs[metric].notna()]
     numbers = own[CONDITION].unique().tolist()
     return {number: own.loc[own[CONDITION] == number, metric].tolist() for number in numbers}

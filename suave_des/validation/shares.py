@@ -125,16 +125,11 @@ def found_shares(
     published: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequence[str]
 ) -> tuple[ShareComparison, ...]:
     """Compare the share of missions that found the pipeline, of the managers for which both sides tell it."""
-    found = []
-    for manager in managers:
-        share = Share(manager=manager, name="pipeline found", where={"pipeline_found": ((1.0, 1.0),)})
-        sides = []
-        for runs in (published, simulated):
-            known = runs[runs["pipeline_found"].notna()] if "pipeline_found" in runs else runs[:0]
-            sides.append(count(share, known) if len(known) else Proportion(0, 0))
-        if all(side.n for side in sides):
-            found.append(ShareComparison(share, *sides))
-    return tuple(found)
+    where: Region = {"pipeline_found": ((1.0, 1.0),)}
+    shares = [Share(manager=manager, name="pipeline found", where=where) for manager in managers]
+    theirs, ours = (runs[runs["pipeline_found"].notna()] for runs in (published, simulated))
+    compared = compare_shares(shares, theirs, ours, managers)
+    return tuple(each for each in compared if each.published.n and each.simulated.n)
 
 
 def compare_shares(

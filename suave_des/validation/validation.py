@@ -258,15 +258,11 @@ def with_limit(runs: pandas.DataFrame, limit_s: float | None) -> pandas.DataFram
 
 def _found(runs: pandas.DataFrame) -> pandas.Series[bool]:
     """Whether missions found the pipeline, or may have."""
-    import pandas
-
-    if "pipeline_found" not in runs:
-        return pandas.Series(True, index=runs.index)
     return runs["pipeline_found"].astype("boolean").fillna(True).astype(bool)
 
 
 def _has_values(sides: Sequence[pandas.DataFrame], manager: str, metric: str) -> bool:
-    return all(metric in side and len(sample(side, manager, metric)) for side in sides)
+    return all(len(sample(side, manager, metric)) for side in sides)
 
 
 def sample(runs: pandas.DataFrame, manager: str, metric: str) -> Sample:
