@@ -143,6 +143,27 @@ def test_all_mistakes_of_a_file_are_told_at_once(tmp_path: Path) -> None:
 TWO_FAILED = 'two: c_status(?a, "FALSE") ^ c_status(?b, "FALSE") ^ differentFrom(?a, ?b) -> Role(?a)\n'
 
 
+@pytest.mark.parametrize(
+    ("body", "argument", "message"),
+    [
+        ('c_status(?c, ?s) ^ matches(?s, "F[A")', '"F[A"', '"F[A" is not a regular expression'),
+        ('c_status(?c, ?s) ^ matches(?s, "(FALSE")', '"(FALSE"', '"(FALSE" is not a regular expression'),
+        ('c_status(?c, ?s) ^ tokenize(?t, ?s, "*")', '"*"', '"*" is not a regular expression'),
+        ("hasValue(?c, ?v) ^ divide(?x, ?v, 0)", "0", "divide by 0 has no result"),
+        ("hasValue(?c, ?v) ^ mod(?x, ?v, 0.0)", "0.0", "mod by 0.0 has no result"),
+    ],
+)
+def test_a_built_in_that_never_holds(tmp_path: Path, body: str, argument: str, message: str) -> None:
+    rule = f"A: {body} -> Role(?c)"
+    warning = only(found(tmp_path, rule), message)
+    assert (warning.level, warning.rule, warning.column) == (Level.WARN, "A", rule.index(argument) + 1)
+
+
+def test_regular_expressions_of_java_pass(tmp_path: Path) -> None:
+    findings = found(tmp_path, r'A: c_status(?c, ?s) ^ matches(?s, "\\p{Lu}[A-Z&&[^B]]++") -> Role(?c)')
+    assert not any("regular expression" in one.message for one in findings)
+
+
 def test_different_names_alone_do_not_make_individuals_different(tmp_path: Path) -> None:
     warning = only(found(tmp_path, TWO_FAILED), "differentFrom(?a, ?b)")
     assert (warning.level, warning.rule, warning.column) == (Level.WARN, "two", 54)

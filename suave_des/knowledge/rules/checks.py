@@ -6,6 +6,7 @@ Which mistakes Pellet ignores was found by giving it each of them (owlready2 0.5
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from decimal import Decimal
@@ -36,6 +37,9 @@ _DECLARED_AS: Final = {"class": "class", "object": "object property", "data": "d
 _ARGUMENTS: Final = {"class": 1, "range": 1, "object": 2, "data": 2, "same": 2, "different": 2}
 #: What a comparison with a number says of the value on its left, by its sign.
 _BOUNDS: Final = {"=": (">=", "<="), "<": ("<",), "<=": ("<=",), ">": (">",), ">=": (">=",)}
+#: Arguments of built-ins that are regular expressions, and divisors, by the built-in and the argument's number.
+_PATTERNS: Final = {("matches", 1), ("tokenize", 2)}
+_DIVISORS: Final = {("divide", 2), ("integerDivide", 2), ("mod", 2)}
 _DOUBLE: Final = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?INF|NaN")
 _LEXICAL: Final = {
     XSD + "boolean": re.compile(r"true|false|0|1"),
@@ -243,6 +247,23 @@ def _check_builtin(atom: Atom, name: str, *, is_head: bool) -> Iterator[RuleProb
         if isinstance(term, Named):
             problem = f"{name}: {local_name(term.iri)} is an individual where a value is needed"
             yield RuleProblem(problem, atom.place(number))
+        elif isinstance(term, Lit) and (name, number) in _PATTERNS and _is_broken(term.text):
+            problem = f"{name}: {literal_text(term)} is not a regular expression, so it never holds"
+            yield RuleProblem(problem, atom.place(number), is_fatal=False)
+        elif isinstance(term, Lit) and (name, number) in _DIVISORS and re.fullmatch(r"[+-]?[0.]+", term.text):
+            problem = f"{name} by {term.text} has no result, so it never holds"
+            yield RuleProblem(problem, atom.place(number), is_fatal=False)
+
+
+def _is_broken(pattern: str) -> bool:
+    """Whether a regular expression is wrong in any language; Pellet uses Java's."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about what Java has and Python may have one day
+            re.compile(pattern)
+    except re.error as error:
+        return error.msg.startswith(("unterminated character set", "missing )", "unbalanced", "nothing to repeat"))
+    return False
 
 
 def _uses(atoms: Iterable[Atom]) -> Iterator[tuple[Atom, int, str]]:
