@@ -134,8 +134,7 @@ class FirstFailures:
 
     def __init__(self, managers: Sequence[str]) -> None:
         self._managers = managers
-        self._causes: dict[int, list[str]] = {}
-        self._works: set[int] = set()
+        self._causes: dict[int, list[str | None]] = {}
 
     def check(self, finished: Iterable[Finished]) -> None:
         """Take outcomes.
@@ -144,16 +143,9 @@ class FirstFailures:
             WorkerError: the first ALIKE missions of a manager have failed with the same error.
         """
         for key, outcome in finished:
-            if key.manager in self._works:
-                continue
             causes = self._causes.setdefault(key.manager, [])
-            if (
-                not isinstance(outcome, MissionFailure)
-                or not outcome.lasting
-                or (causes and outcome.cause != causes[0])
-            ):
-                self._works.add(key.manager)
-                continue
-            causes.append(outcome.cause)
-            if len(causes) == ALIKE:
-                raise WorkerError(f"manager {self._managers[key.manager]} fails in each mission: {outcome.cause}")
+            if len(causes) < ALIKE:
+                cause = outcome.cause if isinstance(outcome, MissionFailure) and outcome.lasting else None
+                causes.append(cause)
+                if cause is not None and causes == [cause] * ALIKE:
+                    raise WorkerError(f"manager {self._managers[key.manager]} fails in each mission: {cause}")
