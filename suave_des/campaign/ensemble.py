@@ -88,27 +88,27 @@ def read_ensemble(name: str | Path, beside: Path | None = None) -> tuple[Ensembl
     path = find(name, _KIND, beside=beside)
     header, numbered, digest = read_csv(path, _SIZE_LIMIT_BYTES, "a row for each member")
     rows = list(numbered)
-    places = [place for place, each in enumerate(header) if each not in _NO_PARAMETERS]
-    if not places or not all(header):
+    paths = tuple(name for name in header if name not in _NO_PARAMETERS)
+    if not paths or not all(header):
         raise line_error(path, 1, "has no columns of parameters", "name each by its key path in the scenario")
     if repeated := next((each for each in header if header.count(each) > 1), None):
         raise line_error(path, 1, f"has column {shown(repeated)} twice", "name each parameter once")
     if len(rows) < 2:
         raise line_error(path, 1, f"has {number_of(len(rows), 'member')}", "an ensemble has two or more")
-    members = tuple(tuple(_number(path, line, header, row, place) for place in places) for line, row in rows)
-    ensemble = Ensemble(path.stem, tuple(header[place] for place in places), members)
-    return ensemble, path, digest
+    members = tuple(_member(path, line, header, row) for line, row in rows)
+    return Ensemble(path.stem, paths, members), path, digest
 
 
-def _number(path: Path, line: int, header: Sequence[str], row: Sequence[str], place: int) -> float:
+def _member(path: Path, line: int, header: Sequence[str], row: Sequence[str]) -> tuple[float, ...]:
     if len(row) != len(header):
         raise line_error(
             path, line, f"has {number_of(len(row), 'value')}, but the header has {len(header)}", "give each column one"
         )
-    number = as_number(row[place])
-    if not math.isfinite(number):
-        raise line_error(path, line, f"{header[place]}: expected a number, got {shown(row[place])}", "give it a value")
-    return number
+    cells = {name: cell for name, cell in zip(header, row, strict=True) if name not in _NO_PARAMETERS}
+    for name, cell in cells.items():
+        if not math.isfinite(as_number(cell)):
+            raise line_error(path, line, f"{name}: expected a number, got {shown(cell)}", "give it a value")
+    return tuple(map(float, cells.values()))
 
 
 def with_ensemble(loaded: LoadedScenario, variation: Variation, ensemble: Ensemble, path: Path) -> Variation:
