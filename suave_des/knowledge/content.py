@@ -34,6 +34,7 @@ from suave_des.knowledge.rdf import (
     Triple,
     is_fact,
     local_name,
+    memberships,
     n_triple,
     n_triple_with_nodes,
     reached,
@@ -109,11 +110,10 @@ class Content:
         for subject, predicate, value in self.triples:
             if predicate == RDF_TYPE and isinstance(value, str):
                 kinds.setdefault(value, set()).add(subject)
-        facts = [triple for triple in self.triples if is_fact(triple)]
         decisions = self.decision_terms()
-        properties = {*decisions.properties, *(name for _, name, _ in facts)}
+        properties = {*decisions.properties, *(name for _, name, _ in filter(is_fact, self.triples))}
         properties = properties.union(*(kinds.get(kind, ()) for kind in _PROPERTIES))
-        classes = {*decisions.classes, *(str(kind) for _, name, kind in facts if name == RDF_TYPE)}
+        classes = {*decisions.classes, *(name for _, name in memberships(self.triples))}
         classes = classes.union(*(kinds.get(kind, ()) for kind in _CLASSES))
         return Terms(_named(properties - kinds.get(OWL + "AnnotationProperty", set())), _named(classes))
 

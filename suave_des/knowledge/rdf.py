@@ -239,6 +239,11 @@ def is_fact(triple: Triple) -> bool:
     return isinstance(term, str) and not term.startswith(LANGUAGE_NAMESPACES)
 
 
+def memberships(triples: Iterable[Triple]) -> Iterator[tuple[str, str]]:
+    """(individual, class) of each triple that says membership; the classes of OWL, RDF and SWRL do not count."""
+    return ((subject, str(value)) for subject, predicate, value in filter(is_fact, triples) if predicate == RDF_TYPE)
+
+
 def fact_of(triple: Triple, names: Names) -> Fact:
     """Convert a triple that describes an individual."""
     subject, predicate, value = triple

@@ -18,7 +18,7 @@ from typing import Any, Final
 
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import HAS_VALUE, OWL, RDF_TYPE, RDFS, XSD, Lit, local_name, reached
-from suave_des.knowledge.rules.syntax import COMPARISONS, EXPRESSION, Rule, Variable
+from suave_des.knowledge.rules.syntax import COMPARISONS, EXPRESSION
 from suave_des.knowledge.state import MAX_EXPONENT, KnowledgeState
 
 #: Objectives, groundings, components and measurements of a state, the last as regions or as exact values.
@@ -119,18 +119,9 @@ def _of_rules(ontology: Ontology, carriers: frozenset[str]) -> Iterator[str]:
                 yield f"rule {rule.name} asks for a datatype or a class expression"
             if any(isinstance(term, Lit) and term.datatype in _BINARY for term in atom.arguments):
                 yield f"rule {rule.name} has a binary number, which is compared inexactly"
-        copied = _measured_variables(rule, carriers) & {name for atom in rule.head for name in atom.variables()}
-        for name in sorted(copied):
+        measured = {name for name, predicate in rule.read_values() if predicate in carriers}
+        for name in sorted(measured.intersection(name for atom in rule.head for name in atom.variables())):
             yield f"rule {rule.name} copies the value ?{name} to its head"
-
-
-def _measured_variables(rule: Rule, carriers: frozenset[str]) -> set[str]:
-    values = [
-        atom.arguments[1]
-        for atom in rule.body
-        if atom.kind == "data" and atom.predicate in carriers and len(atom.arguments) == 2
-    ]
-    return {term.name for term in values if isinstance(term, Variable)}
 
 
 def _of_ontologies(ontology: Ontology, carriers: frozenset[str]) -> Iterator[str]:

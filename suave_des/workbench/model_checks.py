@@ -32,6 +32,7 @@ from suave_des.knowledge.rdf import (
     Lit,
     canonical,
     local_name,
+    memberships,
     namespace,
 )
 from suave_des.knowledge.rules.names import Vocabulary
@@ -150,11 +151,7 @@ def unused_individuals(content: Content, model: Model, sources: Sequence[Ontolog
     holders = {subject for subject, name, _ in content.triples if not name.startswith(LANGUAGE_NAMESPACES)}
     mentioned |= holders & {*model.components.values()}
     mentioned |= {*model.designs.values(), *(individual.iri for individual in model.individuals())}
-    individuals = {
-        subject
-        for subject, predicate, value in content.triples
-        if predicate == RDF_TYPE and isinstance(value, str) and not value.startswith(LANGUAGE_NAMESPACES)
-    }
+    individuals = {individual for individual, _ in memberships(content.triples)}
     for name in sorted(local_name(iri) for iri in individuals - mentioned if not iri.startswith(TOMASYS)):
         yield finding_about(name, sources, Level.INFO, f"nothing refers to {name}")
 
@@ -219,7 +216,7 @@ def _shape_finding(report: Graph, result: Node, sources: Sequence[OntologyFile])
     def value(name: str) -> str:
         return str(report.value(result, _SH[name]) or "")
 
-    name, path = local_name(value("focusNode")), local_name(value("resultPath") or "")
+    name, path = local_name(value("focusNode")), local_name(value("resultPath"))
     level = _LEVELS.get(URIRef(value("resultSeverity")), Level.ERROR)
     focus = report.value(result, _SH.focusNode)
     described = [source for source in sources if source.line_of(name)]
@@ -262,13 +259,12 @@ class _Possible:
 
     def __init__(self, content: Content, model: Model) -> None:
         self.structure = "".join(content.structure)
-        self.classes: set[str] = {OWL + "Thing", *(TOMASYS + name for name in ("Objective", "FunctionGrounding"))}
+        self.classes = {OWL + "Thing", *(TOMASYS + name for name in ("Objective", "FunctionGrounding"))}
+        self.classes |= {name for _, name in memberships(content.triples)}
         self.values: dict[str, set[object]] = {}
         self.axioms = [triple for triple in content.triples if triple[1].startswith(LANGUAGE_NAMESPACES)]
         for _, predicate, value in content.triples:
-            if predicate == RDF_TYPE and isinstance(value, str) and not value.startswith(LANGUAGE_NAMESPACES):
-                self.classes.add(value)
-            elif not predicate.startswith(LANGUAGE_NAMESPACES):
+            if not predicate.startswith(LANGUAGE_NAMESPACES):
                 self.values.setdefault(predicate, set()).add(canonical(value))
         for name in ("typeF", "typeFD", "solvesO", "o_always_improve"):
             self.values[TOMASYS + name] = {_ANY}

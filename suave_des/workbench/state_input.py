@@ -29,7 +29,8 @@ _NOUNS: Final = {
     "components": "component",
     "measurements": "quality attribute",
 }
-_KEYS: Final = tuple(_NOUNS)
+#: Keys of a state in a YAML file.
+STATE_KEYS: Final = tuple(_NOUNS)
 
 
 @dataclass(frozen=True)
@@ -143,8 +144,8 @@ class StateBuilder:
         """
         document = read_yaml(path)
         for key, content in document.data.items():
-            if key not in _KEYS:
-                raise document.error(f"{shown(key)} is not a key of a state", (key,), did_you_mean(key, _KEYS))
+            if key not in STATE_KEYS:
+                raise document.error(f"{shown(key)} is not a key of a state", (key,), did_you_mean(key, STATE_KEYS))
             if isinstance(content, list) and key == "objectives":
                 entries: list[tuple[Any, Any, KeyPath]] = [(name, None, (key, at)) for at, name in enumerate(content)]
             elif isinstance(content, Mapping):

@@ -78,12 +78,16 @@ def check_rule(rule: Rule, vocabulary: Vocabulary) -> list[RuleProblem]:
     return sorted(problems, key=lambda problem: (problem.place or Place(0, 0), problem.message))
 
 
-def first_error(rule: Rule, problems: Iterable[RuleProblem]) -> RuleError | None:
+def fatal_problems(rule: Rule, vocabulary: Vocabulary) -> list[RuleProblem]:
+    """Find the problems with which a rule cannot work, in the order of its text."""
+    return [problem for problem in check_rule(rule, vocabulary) if problem.is_fatal]
+
+
+def first_error(rule: Rule, vocabulary: Vocabulary) -> RuleError | None:
     """The first fatal problem of a rule of a text file, as an error."""
-    for problem in problems:
-        if problem.is_fatal:
-            place = str(problem.place) if problem.place else rule.place
-            return RuleError(f"rule {rule.name}: {problem.message}", file=rule.file, place=place, remedy=problem.remedy)
+    for problem in fatal_problems(rule, vocabulary):
+        place = str(problem.place) if problem.place else rule.place
+        return RuleError(f"rule {rule.name}: {problem.message}", file=rule.file, place=place, remedy=problem.remedy)
     return None
 
 
@@ -192,11 +196,7 @@ def _check_argument(
 
 def _check_comparisons(rule: Rule, vocabulary: Vocabulary) -> Iterator[RuleProblem]:
     """Find comparisons that no value satisfies, alone or together, so that the rule never fires."""
-    holders = {
-        atom.arguments[1].name: atom.predicate
-        for atom in rule.body
-        if atom.kind == "data" and len(atom.arguments) == 2 and isinstance(atom.arguments[1], Variable)
-    }
+    holders = dict(rule.read_values())
     least: dict[str, tuple[Decimal, bool, str]] = {}  # number, whether it is excluded, how it is written
     most: dict[str, tuple[Decimal, bool, str]] = {}
     for atom in rule.body:

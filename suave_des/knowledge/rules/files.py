@@ -10,7 +10,7 @@ from typing import Final
 
 from suave_des.errors import InputError
 from suave_des.files import decode, read_bytes
-from suave_des.knowledge.rules.checks import check_rule, first_error
+from suave_des.knowledge.rules.checks import first_error
 from suave_des.knowledge.rules.names import Vocabulary, rule_from_text
 from suave_des.knowledge.rules.parser import ParsedRules, parse_rule, parse_rules
 from suave_des.knowledge.rules.syntax import Rule, RuleError
@@ -63,7 +63,7 @@ class RulesFile:
             raise self.parsed.errors[0]
         for name, rule in self.looked_up(vocabulary):
             if isinstance(rule, Rule) and rule.enabled:
-                yield name, first_error(rule, check_rule(rule, vocabulary)) or rule
+                yield name, first_error(rule, vocabulary) or rule
             else:
                 yield name, rule
 
@@ -93,7 +93,7 @@ def read_rule(text: str, vocabulary: Vocabulary, file: Path) -> Rule:
         RuleError: it is not one rule, or cannot be used.
     """
     rule = rule_from_text(parse_rule(text, file), vocabulary, file)
-    error = first_error(rule, check_rule(rule, vocabulary))
+    error = first_error(rule, vocabulary)
     if error is not None:
         raise error
     return rule

@@ -146,6 +146,12 @@ class Rule:
         """Body and head."""
         return (*self.body, *self.head)
 
+    def read_values(self) -> Iterator[tuple[str, str]]:
+        """(variable, data property) of each atom of the body that reads a value."""
+        for atom in self.body:
+            if atom.kind == "data" and len(atom.arguments) == 2 and isinstance(atom.arguments[1], Variable):
+                yield atom.arguments[1].name, atom.predicate
+
     @property
     def properties(self) -> frozenset[tuple[str, bool]]:
         """(property, whether it is used as a data property) of all atoms."""

@@ -15,7 +15,7 @@ from suave_des.knowledge.content import with_rules
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.limit import TimeLimit
 from suave_des.knowledge.rdf import HAS_QA_VALUE, Lit, Triple, fact_of, facts_of, value_of
-from suave_des.knowledge.rules.checks import RuleProblem, check_rule
+from suave_des.knowledge.rules.checks import fatal_problems
 from suave_des.knowledge.rules.files import RulesFile
 from suave_des.knowledge.rules.syntax import Atom, Rule, RuleError
 from suave_des.knowledge.rules.writer import write_atom
@@ -148,7 +148,7 @@ class RuleQuestions:
             return WhyNot(
                 rule.name, f"never fires: it is disabled (kb enable-rule {rule.name}, or remove --disable-rule)"
             )
-        problem = next(iter(self._problems(rule)), None)
+        problem = next(iter(fatal_problems(rule, self.base.vocabulary)), None)
         if problem is not None:
             remedy = f"; {problem.remedy}" if problem.remedy else ""
             return WhyNot(rule.name, f"never fires: {problem.message}{remedy}")
@@ -182,15 +182,15 @@ class RuleQuestions:
     @cached_property
     def _usable(self) -> Ontology:
         """The knowledge base without the rules that Pellet would drop."""
-        return self.base.with_rules(rule for rule in self.base.rules if not rule.enabled or not self._problems(rule))
+        known = self.base.vocabulary
+        return self.base.with_rules(
+            each for each in self.base.rules if not (each.enabled and fatal_problems(each, known))
+        )
 
     @cached_property
     def _unmeasured(self) -> dict[int, str]:
         """Attributes of which no grounding can have a value, by the identities of the rules that need one."""
         return {id(rule): attribute for rule, _, attribute in unmeasured_rules(self.base.content, self.base.model)}
-
-    def _problems(self, rule: Rule) -> list[RuleProblem]:
-        return [problem for problem in check_rule(rule, self.base.vocabulary) if problem.is_fatal]
 
     def _known(self, state: KnowledgeState) -> Facts | str:
         """All that follows in a state, or what contradicts what in it."""

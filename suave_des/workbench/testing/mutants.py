@@ -15,7 +15,6 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import (
     EXACT,
     HAS_VALUE,
-    LANGUAGE_NAMESPACES,
     OWL,
     QA_OPERATOR,
     RDF_TYPE,
@@ -25,8 +24,9 @@ from suave_des.knowledge.rdf import (
     Lit,
     Triple,
     local_name,
+    memberships,
 )
-from suave_des.knowledge.rules.checks import check_rule
+from suave_des.knowledge.rules.checks import fatal_problems
 from suave_des.knowledge.rules.rdf import with_triples
 from suave_des.knowledge.rules.syntax import COMPARISON_OF, COMPARISONS, Atom, Named, Rule, Term, Variable, mirrored
 from suave_des.knowledge.rules.writer import literal_text, write_atom
@@ -89,7 +89,7 @@ def mutants_of(base: Ontology) -> tuple[Mutant, ...]:
             new, old = mutant.new, mutant.old
             if isinstance(new, Rule) and isinstance(old, Rule):
                 is_same = new.head == old.head and set(new.body) == set(old.body)
-                if is_same or any(problem.is_fatal for problem in check_rule(new, base.vocabulary)):
+                if is_same or fatal_problems(new, base.vocabulary):
                     continue
             before = mutant.name if isinstance(old, Rule) else old
             after = (new.body, new.head) if isinstance(new, Rule) else new
@@ -235,9 +235,8 @@ def _tenths(value: Lit) -> Iterator[Lit]:
 def _individuals(base: Ontology) -> Iterator[Mutant]:
     """Each individual that a rule names, and each one that a fact leads to, exchanged for the next of its class."""
     classes: dict[str, list[str]] = {}
-    for subject, predicate, value in base.content.triples:
-        if predicate == RDF_TYPE and isinstance(value, str) and not value.startswith(LANGUAGE_NAMESPACES):
-            classes.setdefault(value, []).append(subject)
+    for individual, name in memberships(base.content.triples):
+        classes.setdefault(name, []).append(individual)
 
     def other(iri: str) -> str | None:
         groups = (members for members in classes.values() if iri in members and len(members) > 1)

@@ -30,13 +30,12 @@ from suave_des.workbench.fact_reader import FactReader
 from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.prover import Situation
 from suave_des.workbench.ranges import ValueRange, measurements_in, parse_region
-from suave_des.workbench.state_input import StateBuilder, recorded_state, recorded_states
+from suave_des.workbench.state_input import STATE_KEYS, StateBuilder, recorded_state, recorded_states
 
 _FILE_KEYS: Final = ("scenario", "ontologies", "rules", "disabled_rules", "tests")
 _TEST_KEYS: Final = ("name", "given", "follows", "follows_not", "decides", "contradiction", "without", "changes")
 _EXPECTATIONS: Final = ("follows", "follows_not", "decides", "contradiction", "changes")
-_STATE_KEYS: Final = ("objectives", "groundings", "components", "measurements")
-_GIVEN_KEYS: Final = (*_STATE_KEYS, "facts", "mission", "run", "at_s")
+_GIVEN_KEYS: Final = (*STATE_KEYS, "facts", "mission", "run", "at_s")
 
 
 @dataclass(frozen=True)
@@ -318,7 +317,7 @@ class TestReader:
         elif stray := given.keys() & {"run", "at_s"}:
             raise self.error(f"{min(stray)} without a mission", ("given", min(stray)), "mission: FOLDER")
         regions: dict[str, ValueRange] = {}
-        for kind in _STATE_KEYS:
+        for kind in STATE_KEYS:
             content = given.get(kind) or {}
             if isinstance(content, list) and kind == "objectives":
                 content = dict.fromkeys(content)

@@ -44,11 +44,9 @@ def tests_text(about: TestedKnowledge, prover: Prover, states: Iterable[NamedSta
         KnowledgeError: the reasoner takes too long.
     """
     head = [f"# {comment}", f"scenario: {json.dumps(about.scenario)}"]
-    for key, files in (("ontologies", about.ontologies), ("rules", about.rules)):
-        if files:
-            head.append(f"{key}: {json.dumps([str(file) for file in files])}")
-    if about.disabled_rules:
-        head.append(f"disabled_rules: {json.dumps(list(about.disabled_rules))}")
+    for key in ("ontologies", "rules", "disabled_rules"):
+        if names := getattr(about, key):
+            head.append(f"{key}: {json.dumps(list(map(str, names)))}")
     lines = [*head, "tests:"]
     for each in states:
         lines += _test_lines(each, prover)
