@@ -139,7 +139,7 @@ def _cover(console: Console, suites: Sequence[Suite], max_failed: int, file: Pat
     """Show what the tests of each knowledge base cover, and write tests of what they do not."""
     from suave_des.workbench.prover import Prover
     from suave_des.workbench.testing.coverage import measure_coverage
-    from suave_des.workbench.testing.writing import NamedState, tests_text
+    from suave_des.workbench.testing.writing import tests_text
 
     benches = _together(suites)
     if file is not None and len(benches) > 1:
@@ -150,7 +150,7 @@ def _cover(console: Console, suites: Sequence[Suite], max_failed: int, file: Pat
         found = measure_coverage(suite.bench, situations, max_failed)
         print_coverage(console, found)
         if file is not None:
-            states = [NamedState(str(goals[0]), state) for state, goals in found.proposed]
+            states = [(str(goals[0]), state) for state, goals in found.proposed]
             text = tests_text(suite.about, Prover.of(suite.bench), states, "States that other tests do not cover.")
             if states:
                 write_files(file.parent, {file.name: text})

@@ -145,14 +145,13 @@ def columns_of(policy: Policy) -> tuple[str, ...]:
 def rows_of(policy: Policy) -> Iterator[tuple[object, ...]]:
     """Rows of the CSV file: every case."""
     for case in policy.cases:
-        asked = [function in case.asked for function in policy.functions]
         yield (
             *map(str, case.ranges),
             "; ".join(f"{name}={status}" for name, status in case.reports.components),
             case.reports.combinations,
-            *(case.present(name) if is_asked else "" for name, is_asked in zip(policy.functions, asked, strict=True)),
+            *(case.present(name) if name in case.asked else "" for name in policy.functions),
             "; ".join(case.statuses),
-            *(case.outcome(name) if is_asked else "" for name, is_asked in zip(policy.functions, asked, strict=True)),
+            *(case.outcome(name) if name in case.asked else "" for name in policy.functions),
             "; ".join(case.marks),
             case.problem or "",
         )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,25 +18,15 @@ from suave_des.workbench.state_input import recorded_states, state_dict
 from suave_des.workbench.testing.reading import TestedKnowledge
 
 
-@dataclass(frozen=True)
-class NamedState:
-    """A state to be written as a test.
-
-    Attributes:
-        name: of the test.
-    """
-
-    name: str
-    state: KnowledgeState
-
-
-def tests_text(about: TestedKnowledge, prover: Prover, states: Iterable[NamedState], comment: str) -> str:
+def tests_text(
+    about: TestedKnowledge, prover: Prover, states: Iterable[tuple[str, KnowledgeState]], comment: str
+) -> str:
     """Write tests that expect what follows in states now.
 
     Args:
         about: the knowledge base, as the file names it.
         prover: the same, in Pellet.
-        states: a test for each.
+        states: each with the name of its test.
         comment: for the head of the file.
 
     Raises:
@@ -48,16 +37,16 @@ def tests_text(about: TestedKnowledge, prover: Prover, states: Iterable[NamedSta
         if names := getattr(about, key):
             head.append(f"{key}: {json.dumps(list(map(str, names)))}")
     lines = [*head, "tests:"]
-    for each in states:
-        lines += _test_lines(each, prover)
+    for name, state in states:
+        lines += _test_lines(name, state, prover)
     return "\n".join(lines) + "\n"
 
 
-def _test_lines(named: NamedState, prover: Prover) -> Iterator[str]:
-    outcome = prover.outcome(Situation(named.state))
-    yield f"- name: {json.dumps(named.name, ensure_ascii=False)}"
+def _test_lines(name: str, state: KnowledgeState, prover: Prover) -> Iterator[str]:
+    outcome = prover.outcome(Situation(state))
+    yield f"- name: {json.dumps(name, ensure_ascii=False)}"
     yield "  given:"
-    for kind, content in state_dict(named.state).items():
+    for kind, content in state_dict(state).items():
         if content:
             yield f"    {kind}: {_flow(content)}"
     if outcome.conclusion is None:
@@ -67,7 +56,7 @@ def _test_lines(named: NamedState, prover: Prover) -> Iterator[str]:
     if facts:
         yield "  follows:"
         yield from (f"  - {json.dumps(fact, ensure_ascii=False)}" for fact in facts)
-    asked = [each.function for each in named.state.objectives]
+    asked = [each.function for each in state.objectives]
     yield f"  decides: {_flow({function: outcome.choice(function) for function in asked})}"
 
 
@@ -82,19 +71,19 @@ def _scalar(value: Any) -> str:
     return value if value.replace(".", "", 1).replace("_", "").isalnum() else json.dumps(value, ensure_ascii=False)
 
 
-def mission_states(folder: Path, bench: KnowledgeBase, run: int | None = None) -> Iterator[NamedState]:
-    """Return the states of a recorded mission, one for each kind that the rules can tell apart.
+def mission_states(folder: Path, bench: KnowledgeBase) -> Iterator[tuple[str, KnowledgeState]]:
+    """Return the states of a recorded mission, named, one for each kind that the rules can tell apart.
 
     Raises:
         InputError: there is no recorded mission.
     """
     regions = regions_of(bench.base)
     seen = set()
-    for record in recorded_states(folder, run):
+    for record in recorded_states(folder):
         key = regions.key(record.state)
         if key not in seen:
             seen.add(key)
-            yield NamedState(f"{folder.name} at {record.t_s:.2f} s", record.state)
+            yield f"{folder.name} at {record.t_s:.2f} s", record.state
 
 
 def mission_knowledge(folder: Path) -> TestedKnowledge:
