@@ -77,13 +77,12 @@ class Regions:
 
     def key(self, state: KnowledgeState) -> Key:
         """Return what the rules can distinguish of a state: states with equal keys entail the same."""
-        measured = state.measurements
-        if self.reasons:
-            return state.objectives, state.groundings, state.components, measured
-        where = [(name, self.region(value)) for name, value in measured]
-        if len(measured) > 1 and len({number for _, number in where}) < len(where):
-            return state.objectives, state.groundings, state.components, _ranked(state, where)
-        return state.objectives, state.groundings, state.components, tuple(where)
+        measured: tuple[object, ...] = state.measurements
+        if not self.reasons:
+            where = [(name, self.region(value)) for name, value in state.measurements]
+            is_shared = len(where) > 1 and len({number for _, number in where}) < len(where)
+            measured = _ranked(state, where) if is_shared else tuple(where)
+        return state.objectives, state.groundings, state.components, measured
 
 
 def _ranked(state: KnowledgeState, where: list[tuple[str, int]]) -> tuple[tuple[str, int | tuple[int, int]], ...]:

@@ -58,11 +58,9 @@ class FactReader:
         if kind == "class":
             return subject, RDF_TYPE, predicate
         value = atom.arguments[1]
-        return (
-            subject,
-            predicate,
-            self._individual(value) if kind == "object property" else self._value(predicate, value),
-        )
+        if kind == "object property":
+            return subject, predicate, self._individual(value)
+        return subject, predicate, self._value(predicate, value)
 
     def fact(self, text: str) -> Fact:
         """Read one fact, in the form in which inferences have it."""

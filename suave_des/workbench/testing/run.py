@@ -101,13 +101,9 @@ class Runner:
             KnowledgeError: the reasoner takes too long.
         """
         began = time.perf_counter()
-        failures: tuple[Failure, ...] = ()
-        for situation in test.situations:
-            failures = tuple(
-                replace(each, because=tuple(self._because(each))) for each in self._problems(test, situation)
-            )
-            if failures:
-                break
+        problems = (list(self._problems(test, situation)) for situation in test.situations)
+        first = next(filter(None, problems), [])
+        failures = tuple(replace(each, because=tuple(self._because(each))) for each in first)
         return TestResult(test, failures, time.perf_counter() - began)
 
     def passes(self, test: RuleTest) -> bool:
