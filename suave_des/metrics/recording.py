@@ -82,19 +82,7 @@ class Recorder:
         mode_times = [t_s for t_s, _ in self._modes]
         for row in range(0, int(self.env.now / STEP_S) + 1, TRAJECTORY_PERIOD_ROWS):
             t_s = round(row * STEP_S, 6)
-            pose = vehicle.pose(t_s)
-            points.append(
-                TrajectoryPoint(
-                    t_s,
-                    pose.x_m,
-                    pose.y_m,
-                    pose.z_m,
-                    pose.roll_rad,
-                    pose.pitch_rad,
-                    pose.yaw_rad,
-                    self._modes[bisect_right(mode_times, t_s) - 1][1],
-                    visibility.value(t_s),
-                    {name: measured.value(t_s) for name, measured in further.items()},
-                )
-            )
+            mode = self._modes[bisect_right(mode_times, t_s) - 1][1]
+            others = {name: measured.value(t_s) for name, measured in further.items()}
+            points.append(TrajectoryPoint(t_s, *vehicle.pose(t_s), mode, visibility.value(t_s), others))
         return tuple(points)
