@@ -120,8 +120,9 @@ def profiles(problem: Problem, best: Evaluation, threshold: float, workers: int)
     found = []
     for parameter, value, grid in zip(problem.parameters, best.values, grids, strict=True):
         along = tuple(next(losses) for _ in grid)
-        low = _crossing(value, best.loss, grid[::-1], along[::-1], threshold)
-        high = _crossing(value, best.loss, grid, along, threshold)
+        points = list(zip(grid, along, strict=True))
+        low = _crossing(value, best.loss, [point for point in points[::-1] if point[0] < value], threshold)
+        high = _crossing(value, best.loss, [point for point in points if point[0] > value], threshold)
         found.append(Profile(parameter, value, grid, along, low, high))
     return found
 
@@ -134,13 +135,10 @@ def _grid(parameter: FreeParameter, best: float) -> tuple[float, ...]:
     return tuple(sorted({*below.tolist(), *above.tolist()}))
 
 
-def _crossing(best: float, loss: float, grid: tuple[float, ...], losses: tuple[float, ...], threshold: float) -> float:
-    """Going outwards from the best value along the grid's order, where the loss first exceeds the threshold."""
-    rising = grid[-1] > grid[0]
+def _crossing(best: float, loss: float, outwards: Sequence[tuple[float, float]], threshold: float) -> float:
+    """Going outwards from the best value over values with their losses, where the loss first exceeds the threshold."""
     before, loss_before = best, loss
-    for value, here in zip(grid, losses, strict=True):
-        if (value > best) != rising or value == best:
-            continue
+    for value, here in outwards:
         if here > threshold:
             share = (threshold - loss_before) / (here - loss_before) if here > loss_before else 0.0
             return before + max(0.0, share) * (value - before)

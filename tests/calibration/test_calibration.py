@@ -149,8 +149,8 @@ def test_a_fitted_scenario_loads_with_the_fitted_values(tmp_path: Path) -> None:
 
 
 def test_the_admitted_interval_ends_where_the_loss_crosses_the_threshold() -> None:
-    assert _crossing(1.0, 0.0, (1.5, 2.0, 3.0), (0.05, 0.2, 0.9), 0.1) == pytest.approx(1.5 + 0.5 / 3.0)
-    assert _crossing(1.0, 0.0, (0.5, 0.0), (0.05, 0.06), 0.1) == 0.0  # never crossed: the bound
+    assert _crossing(1.0, 0.0, [(1.5, 0.05), (2.0, 0.2), (3.0, 0.9)], 0.1) == pytest.approx(1.5 + 0.5 / 3.0)
+    assert _crossing(1.0, 0.0, [(0.5, 0.05), (0.0, 0.06)], 0.1) == 0.0  # never crossed: the bound
 
 
 def test_profiles_become_a_table_and_a_picture() -> None:
