@@ -27,6 +27,7 @@ from suave_des.knowledge.rules.writer import write_atom
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.resources import shipped_folder
 from suave_des.workbench.findings import Finding, Level, finding_about, finding_from, has_level, ordered, relative_path
+from suave_des.workbench.mission_checks import measured_attributes, unreported_components, unreported_statuses
 from suave_des.workbench.model_checks import (
     check_designs,
     check_shapes,
@@ -36,8 +37,6 @@ from suave_des.workbench.model_checks import (
     undeclared_differences,
     undefined_names,
     unmeasured_rules,
-    unreported_components,
-    unreported_statuses,
     unused_individuals,
 )
 from suave_des.workbench.policy.space import has_effect
@@ -61,6 +60,7 @@ class Subject:
         needed: functions that the mission cannot do without.
         operators: qa_comparison_operator that the revision assumes of quality attribute types that have none, by name.
         reported: the statuses that the simulation reports, by component; None: that is not checked.
+        measured: the quality attributes that the scenario measures; None: that is not checked.
         time_limit_s: for Pellet.
     """
 
@@ -73,6 +73,7 @@ class Subject:
     needed: Collection[str] = ()
     operators: Mapping[str, str] = field(default_factory=dict)
     reported: Mapping[str, Collection[str]] | None = None
+    measured: Collection[str] | None = None
     time_limit_s: float = TIME_LIMIT_S
 
 
@@ -121,6 +122,8 @@ def check(subject: Subject) -> tuple[Finding, ...]:
         if subject.reported is not None:
             findings += unreported_components(whole, model, sources, subject.reported)
             findings += _unreported_statuses(whole, subject.reported, own, by_path)
+        if subject.measured is not None:
+            findings += measured_attributes(whole, model, sources, subject.measured)
         for name, sign in assumed.items():
             findings.append(finding_about(name, sources, Level.INFO, assumption(name, sign)))
         if values_are_right:

@@ -18,7 +18,6 @@ from suave_des.knowledge.content import Content
 from suave_des.knowledge.model import Model, expectations
 from suave_des.knowledge.ontology_file import OntologyFile, without_log
 from suave_des.knowledge.rdf import (
-    C_STATUS,
     HAS_QA_VALUE,
     IS_QA_TYPE,
     LANGUAGE_NAMESPACES,
@@ -36,7 +35,7 @@ from suave_des.knowledge.rdf import (
     namespace,
 )
 from suave_des.knowledge.rules.names import Vocabulary
-from suave_des.knowledge.rules.syntax import EXPRESSION, Atom, Named, Rule, Variable
+from suave_des.knowledge.rules.syntax import EXPRESSION, Atom, Named, Rule
 from suave_des.resources import shipped_folder
 from suave_des.workbench.findings import Finding, Level, finding_about
 
@@ -223,35 +222,6 @@ def _shape_finding(report: Graph, result: Node, sources: Sequence[OntologyFile])
     mentioning = [source for source in sources if focus in source.graph.all_nodes()]
     message = ": ".join(filter(None, (name, path, value("resultMessage"))))
     return finding_about(name, described or mentioning or sources, level, message)
-
-
-def unreported_components(
-    content: Content, model: Model, sources: Sequence[OntologyFile], reported: Collection[str]
-) -> Iterator[Finding]:
-    """Find the components whose status no mission can have: nothing reports, asserts or concludes it."""
-    if C_STATUS in content.head_properties():
-        return
-    asserted = {subject for subject, predicate, _ in content.triples if predicate == C_STATUS}
-    for name, iri in sorted(model.components.items()):
-        if name not in reported and iri not in asserted:
-            message = f"nothing in the simulation reports the status of component {name}, so missions never have one"
-            yield finding_about(name, sources, Level.INFO, message, f"reported are {', '.join(reported)}")
-
-
-def unreported_statuses(content: Content, reported: Collection[str]) -> list[tuple[Rule, Atom, str]]:
-    """Find the rules that ask for a component's status that nothing reports, asserts or concludes: the status, last."""
-    asserted = [value for _, predicate, value in content.triples if predicate == C_STATUS]
-    rules = content.enabled_rules
-    concluded = [atom.arguments[-1] for rule in rules for atom in rule.head if atom.predicate == C_STATUS]
-    known = {*reported, *(value.text for value in (*asserted, *concluded) if isinstance(value, Lit))}
-    if any(isinstance(value, Variable) for value in concluded):
-        return []
-    asked = [(rule, atom, atom.arguments[-1]) for rule in rules for atom in rule.body if atom.predicate == C_STATUS]
-    return [
-        (rule, atom, status.text)
-        for rule, atom, status in asked
-        if isinstance(status, Lit) and status.datatype == XSD + "string" and status.text not in known
-    ]
 
 
 class _Possible:

@@ -257,6 +257,17 @@ def test_a_component_status_that_nothing_reports(tmp_path: Path, status: str, le
     assert named == ([] if level is None else [(level, "A", 17, remedy)])
 
 
+def test_a_measured_attribute_that_the_ontology_calls_something_else(tmp_path: Path) -> None:
+    text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
+    path = tmp_path / "mine.owl"
+    path.write_text(text.replace('water_visibility"', 'water_visability"'), encoding="utf-8")
+    findings = check(Subject([path], measured=["water_visibility"]))
+    unknown = only(findings, "missions measure water_visibility, but no ontology has")
+    assert (unknown.level, unknown.file, unknown.remedy) == (Level.WARN, str(path), "did you mean water_visability?")
+    assert only(findings, "do not measure water_visability").level is Level.INFO
+    assert not [each for each in found(tmp_path, measured=["water_visibility"]) if "measure" in each.message]
+
+
 def link(name: str, target: str) -> str:
     return f'<tomasys:{name} rdf:resource="{SUAVE}{target}"/>'
 

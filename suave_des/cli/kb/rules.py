@@ -63,6 +63,7 @@ def check(
     from suave_des.workbench.check import Subject
     from suave_des.workbench.check import check as run_checks
     from suave_des.workbench.findings import Level, folded, has_level, summary
+    from suave_des.workbench.state_input import ManagingSettings
 
     loaded = load_scenario(sources.scenario, **(sources.replacements | {"modes_file": modes}))
     findings = run_checks(
@@ -75,6 +76,7 @@ def check(
             modes={name: loaded.modes.modes(name) for name in loaded.modes.functions},
             needed=MISSION_FUNCTIONS,
             reported=REPORTED_STATUSES,
+            measured=ManagingSettings.of(loaded.scenario).measured,
             operators=loaded.scenario.revision.comparison_operators,
             time_limit_s=time_limit,
         )

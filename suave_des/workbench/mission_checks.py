@@ -1,0 +1,57 @@
+"""Check an ontology and its rules against missions: what monitors report of components, and what they measure."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+
+from suave_des.errors import nearest
+from suave_des.knowledge.content import Content
+from suave_des.knowledge.model import Model
+from suave_des.knowledge.ontology_file import OntologyFile
+from suave_des.knowledge.rdf import C_STATUS, PERFORMANCE, TOMASYS, XSD, Lit, local_name
+from suave_des.knowledge.rules.syntax import Atom, Rule, Variable
+from suave_des.workbench.findings import Finding, Level, finding_about
+
+
+def unreported_components(
+    content: Content, model: Model, sources: Sequence[OntologyFile], reported: Collection[str]
+) -> Iterator[Finding]:
+    """Find the components whose status no mission can have: nothing reports, asserts or concludes it."""
+    if C_STATUS in content.head_properties():
+        return
+    asserted = {subject for subject, predicate, _ in content.triples if predicate == C_STATUS}
+    for name, iri in sorted(model.components.items()):
+        if name not in reported and iri not in asserted:
+            message = f"nothing in the simulation reports the status of component {name}, so missions never have one"
+            yield finding_about(name, sources, Level.INFO, message, f"reported are {', '.join(reported)}")
+
+
+def unreported_statuses(content: Content, reported: Collection[str]) -> list[tuple[Rule, Atom, str]]:
+    """Find the rules that ask for a component's status that nothing reports, asserts or concludes: the status, last."""
+    asserted = [value for _, predicate, value in content.triples if predicate == C_STATUS]
+    rules = content.enabled_rules
+    concluded = [atom.arguments[-1] for rule in rules for atom in rule.head if atom.predicate == C_STATUS]
+    known = {*reported, *(value.text for value in (*asserted, *concluded) if isinstance(value, Lit))}
+    if any(isinstance(value, Variable) for value in concluded):
+        return []
+    asked = [(rule, atom, atom.arguments[-1]) for rule in rules for atom in rule.body if atom.predicate == C_STATUS]
+    return [
+        (rule, atom, status.text)
+        for rule, atom, status in asked
+        if isinstance(status, Lit) and status.datatype == XSD + "string" and status.text not in known
+    ]
+
+
+def measured_attributes(
+    content: Content, model: Model, sources: Sequence[OntologyFile], measured: Collection[str]
+) -> Iterator[Finding]:
+    """Find quality attributes that missions measure and no ontology has, and those that designs require, unmeasured."""
+    for name in sorted(set(measured).difference(model.attributes)):
+        message = f"missions measure {name}, but no ontology has a quality attribute type of this name"
+        yield Finding(Level.WARN, message, file=str(sources[0].path), remedy=nearest(name, model.attributes))
+    compared = {subject for subject, predicate, _ in content.triples if predicate == TOMASYS + "qa_comparison_operator"}
+    required = {name for names in model.estimated.values() for name in names} - {local_name(PERFORMANCE)}
+    for name in sorted(required.difference(measured)):
+        if model.attributes[name] in compared:
+            message = f"missions do not measure {name}, so what designs expect of it is compared with nothing"
+            yield finding_about(name, sources, Level.INFO, message)
