@@ -6,12 +6,12 @@ import importlib
 import inspect
 import re
 import sys
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from difflib import get_close_matches
 from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 from weakref import WeakSet
 
 from suave_des.errors import InputError, did_you_mean, nearest, shown
@@ -42,18 +42,49 @@ _FAMILIES = {
 }
 """Managers that are named with an argument after a colon: what makes the class of one, and how it is written."""
 _checked: WeakSet[type] = WeakSet()  # a class that is kept would keep its module open at the end of a worker
-_HOOKS = {
-    "__init__": "(self, system)",
-    "mission_started": "(self)",
-    "mission_ended": "(self, metrics)",
-    "task_requested": "(self, task)",
-    "task_cancelled": "(self, task)",
-    "diagnostic": "(self, diagnostic)",
-    "adapt": "(self)",
-}
-_CLASS_METHODS = {"check": "(cls, loaded)", "input_files": "(cls, settings)"}
-"""What is asked of a class, before there is a mission."""
-_LETS_TIME_PASS = "adapt may let time pass: with yield self.system.env.timeout(seconds)"
+
+
+class _Hooks(NamedTuple):
+    """The hooks of managers, or those of functions: their arguments, by name.
+
+    Attributes:
+        hooks: those of an instance.
+        class_methods: what is asked of a class, before there is a mission.
+        generators: those that may yield.
+        lets_time_pass: says how mission time can pass.
+    """
+
+    hooks: Mapping[str, str]
+    class_methods: Mapping[str, str]
+    generators: Collection[str]
+    lets_time_pass: str
+
+
+_MANAGER_HOOKS = _Hooks(
+    hooks={
+        "__init__": "(self, system)",
+        "mission_started": "(self)",
+        "mission_ended": "(self, metrics)",
+        "task_requested": "(self, task)",
+        "task_cancelled": "(self, task)",
+        "diagnostic": "(self, diagnostic)",
+        "adapt": "(self)",
+    },
+    class_methods={"check": "(cls, loaded)", "input_files": "(cls, settings)"},
+    generators=("adapt", "input_files"),
+    lets_time_pass="adapt may let time pass: with yield self.system.env.timeout(seconds)",
+)
+_FUNCTION_HOOKS = _Hooks(
+    hooks={
+        "__init__": "(self, context)",
+        "configure": "(self, mode)",
+        "activated": "(self)",
+        "deactivated": "(self)",
+    },
+    class_methods={},
+    generators=(),
+    lets_time_pass="what takes mission time is a process: self.env.process(self.another_method())",
+)
 
 
 def is_built_in(name: str) -> bool:
@@ -111,8 +142,10 @@ def manager_class(name: str) -> type[ManagingSubsystem]:
         hint = nearest(name, manager_names()) or f"known: {', '.join(manager_names())}"
         raise InputError(f"there is no manager {name!r}", remedy=f"{hint}; your own is given as package.module:Class")
     found = _load(f"manager {name!r}", target, ManagingSubsystem)
-    if not is_built_in(name):
-        _check_hooks(name, found)
+    if not is_built_in(name) and found not in _checked:
+        _check_hooks(f"manager {name!r}", found, ManagingSubsystem, _MANAGER_HOOKS)
+        _check_subscriptions(name, found)
+        _checked.add(found)
     return found
 
 
@@ -125,20 +158,25 @@ def _member(family: str, argument: str) -> type[ManagingSubsystem]:
     return make(argument)
 
 
-def _check_hooks(name: str, kind: type[ManagingSubsystem]) -> None:
-    """Check that each hook that a class has can be called as hooks are called, and its subscriptions.
+def _check_hooks(what: str, kind: type, root: type, expected: _Hooks) -> None:
+    """Check that each hook that a class has can be called as hooks are called.
+
+    Args:
+        what: names the class in errors.
+        kind: the class.
+        root: its base that defines the hooks.
+        expected: the hooks.
 
     Raises:
-        InputError: one takes other arguments, or would only make a generator or coroutine; none is there, but something
-            that resembles one; or the class subscribes to what is no kind of diagnostics.
+        InputError: one takes other arguments, or would only make a generator or coroutine; or none is there, but
+            something that resembles one.
     """
-    if kind in _checked:
-        return
 
     def wrong(problem: str, remedy: str) -> InputError:
-        return InputError(f"manager {name!r}{problem}", remedy=remedy)
+        return InputError(f"{what}{problem}", remedy=remedy)
 
-    for hook, form in (_HOOKS | _CLASS_METHODS).items():
+    hooks, class_methods, generators, lets_time_pass = expected
+    for hook, form in (*hooks.items(), *class_methods.items()):
         function = getattr(kind, hook)
         arguments = [object()] * (form.count(",") + form.startswith("(self"))
         if not callable(function):
@@ -147,53 +185,64 @@ def _check_hooks(name: str, kind: type[ManagingSubsystem]) -> None:
             inspect.signature(function).bind(*arguments)
         except TypeError as error:
             problem = f": {hook}{inspect.signature(function)} cannot be called as a hook: {error}"
-            decorator = "@classmethod " if hook in _CLASS_METHODS else ""
+            decorator = "@classmethod " if hook in class_methods else ""
             raise wrong(problem, f"write {decorator}def {hook}{form}") from None
         except ValueError:  # no signature: compiled
             continue
         if inspect.iscoroutinefunction(function) or inspect.isasyncgenfunction(function):
-            raise wrong(f": {hook} is async, and nothing would run it", f"write def {hook}{form}; {_LETS_TIME_PASS}")
-        if inspect.isgeneratorfunction(function) and hook not in ("adapt", "input_files"):
-            raise wrong(f": {hook} yields, and nothing would run it", f"return from {hook} at once; {_LETS_TIME_PASS}")
-    own = {each for base in kind.__mro__ if base is not object and base is not ManagingSubsystem for each in vars(base)}
-    if not own & _HOOKS.keys():
-        resembling = {each: near for each in own for near in get_close_matches(each, _HOOKS, n=1, cutoff=0.75)}
+            raise wrong(f": {hook} is async, and nothing would run it", f"write def {hook}{form}; {lets_time_pass}")
+        if inspect.isgeneratorfunction(function) and hook not in generators:
+            raise wrong(f": {hook} yields, and nothing would run it", f"return from {hook} at once; {lets_time_pass}")
+    own = {each for base in kind.__mro__[: kind.__mro__.index(root)] for each in vars(base)}
+    if not own & hooks.keys():
+        resembling = {each: near for each in own for near in get_close_matches(each, hooks, n=1, cutoff=0.75)}
         for each, hook in sorted(resembling.items()):
-            raise wrong(f" has no hook, but {each}", f"did you mean {hook}{_HOOKS[hook]}?")
-    for each, hook in _misspelt_hooks(kind):
-        remedy = f"did you mean {hook}{_HOOKS[hook]}? give a method of your own a name that differs more"
+            raise wrong(f" has no hook, but {each}", f"did you mean {hook}{hooks[hook]}?")
+    for each, hook in _misspelt_hooks(kind, root, hooks):
+        remedy = f"did you mean {hook}{hooks[hook]}? give a method of your own a name that differs more"
         raise wrong(f": {each} is not a hook, and nothing calls it", remedy)
+
+
+def _check_subscriptions(name: str, kind: type[ManagingSubsystem]) -> None:
+    """Check what a manager subscribes to.
+
+    Raises:
+        InputError: it is no kind of diagnostics.
+    """
     subscribed = kind.subscribes_to
     is_collection = isinstance(subscribed, Collection) and not isinstance(subscribed, str)
     unknown = [each for each in subscribed if each not in list(Kind)] if is_collection else []
     if unknown or not (is_collection or isinstance(subscribed, property)):
         remedy = f"give a tuple of some of {', '.join(f'Kind.{known.name}' for known in Kind)}"
         what = f"has {shown(unknown[0])}" if unknown else f"is {shown(subscribed)}"
-        raise wrong(f": subscribes_to {what}", remedy)
-    _checked.add(kind)
+        raise InputError(f"manager {name!r}: subscribes_to {what}", remedy=remedy)
 
 
-def _misspelt_hooks(kind: type) -> Iterator[tuple[str, str]]:
+def _misspelt_hooks(kind: type, root: type, hooks: Collection[str]) -> Iterator[tuple[str, str]]:
     """Yield methods that are most likely misspelt hooks, each with the hook.
 
     The name of such a method is very similar to a hook that its class lacks; the method overrides nothing, and its name
     occurs nowhere else in its module.
     """
-    classes = kind.__mro__[: kind.__mro__.index(ManagingSubsystem)]
+    classes = kind.__mro__[: kind.__mro__.index(root)]
     for base in (each for each in classes if not each.__module__.startswith("suave_des.")):
         for each in sorted(name for name, member in vars(base).items() if inspect.isfunction(member)):
-            near = get_close_matches(each, _HOOKS, n=1, cutoff=0.8)
+            near = get_close_matches(each, hooks, n=1, cutoff=0.8)
             inherits = any(hasattr(parent, each) for parent in base.__bases__)
-            if near and near[0] not in vars(base) and not inherits and not _is_named_elsewhere(each, base):
+            if near and near[0] not in vars(base) and not inherits and not is_named_elsewhere(each, base):
                 yield each, near[0]
 
 
-def _is_named_elsewhere(method: str, kind: type) -> bool:
-    """Return whether a method's name occurs in its module besides its definition; True if there is no source."""
+def is_named_elsewhere(method: str, kind: type) -> bool:
+    """Return whether a method's name occurs in its module besides its definition; True if there is no source.
+
+    Imports do not count: a manager that imports from suave_des.monitor.diagnostics does not call its `diagnostics`.
+    """
     try:
         source = inspect.getsource(sys.modules[kind.__module__])
     except (OSError, TypeError, KeyError):
         return True
+    source = re.sub(r"^\s*(from|import) .*$", "", source, flags=re.MULTILINE)
     return re.search(rf"(?<!def )\b{re.escape(method)}\b", source) is not None
 
 
@@ -210,7 +259,7 @@ def function_class(function: str, name: str) -> type[OwnFunction]:
         name: module:Class, or a registered name.
 
     Raises:
-        InputError: there is no such class, or it is no subclass of OwnFunction.
+        InputError: there is no such class, it is no subclass of OwnFunction, or a hook is wrong.
     """
     from suave_des.managed.own import OwnFunction  # loads the vehicle
 
@@ -218,7 +267,12 @@ def function_class(function: str, name: str) -> type[OwnFunction]:
     if target is None:
         hint = did_you_mean(name, registered_functions(), "registered")
         raise InputError(f"function {function}: no package registers {name!r}", remedy=f"{hint}; or give module:Class")
-    return _load(f"function {function}, {name!r}", target, OwnFunction)
+    what = f"function {function}, {name!r}"
+    found = _load(what, target, OwnFunction)
+    if found not in _checked:
+        _check_hooks(what, found, OwnFunction, _FUNCTION_HOOKS)
+        _checked.add(found)
+    return found
 
 
 @cache

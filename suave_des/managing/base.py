@@ -83,6 +83,7 @@ class ManagedSystem:
         learned: the training result. In `suave-des train` a dict that is kept from mission to mission; otherwise
             the content of the file that the setting `learned` names, which cannot be changed, empty without one.
         training: whether the mission is one of `suave-des train`.
+        unmeasured: names that `measured` was called with, and that nothing measures.
     """
 
     env: simpy.Environment
@@ -104,6 +105,7 @@ class ManagedSystem:
     files: Mapping[str, Path] = field(default_factory=dict)
     learned: Mapping[str, Any] = field(default_factory=dict)
     training: bool = False
+    unmeasured: set[str] = field(default_factory=set)
 
     @property
     def now_s(self) -> float:
@@ -116,7 +118,10 @@ class ManagedSystem:
         None if there is none; a repetition of the value before is not a publication.
         """
         measurements = self.measurements.get(attribute)
-        return None if measurements is None else measurements.value(self.env.now, since_s)
+        if measurements is None:
+            self.unmeasured.add(attribute)
+            return None
+        return measurements.value(self.env.now, since_s)
 
     def first_cycle_s(self) -> float:
         """Find when metacontrol's first cycle is due: in step with other timers, or with a phase drawn for the run."""
@@ -172,10 +177,7 @@ class ManagingSubsystem:
     Example:
         >>> class HighInClearWater(ManagingSubsystem):
         ...     depends_on = {"water_visibility": (3.25,)}
-        ...
-        ...     def __init__(self, system):
-        ...         super().__init__(system)
-        ...         self.period_s = 2.0
+        ...     period_s = 2.0
         ...
         ...     def adapt(self):
         ...         is_clear = (self.system.measured("water_visibility") or 0.0) >= 3.25
@@ -185,6 +187,8 @@ class ManagingSubsystem:
 
     needs_knowledge: ClassVar[bool] = False
     subscribes_to: ClassVar[Collection[Kind]] = EXEMPLAR_KINDS
+    period_s: float | None = None
+    starts_s: float = 0.0
 
     @classmethod
     def input_files(cls, settings: Mapping[str, Any]) -> Collection[str]:
@@ -204,8 +208,6 @@ class ManagingSubsystem:
 
     def __init__(self, system: ManagedSystem) -> None:
         self.system = system
-        self.period_s: float | None = None
-        self.starts_s = 0.0
 
     @property
     def depends_on(self) -> Dependencies | None:

@@ -13,7 +13,7 @@ from suave_des.errors import InputError, MissionError, SuaveDesError, did_you_me
 from suave_des.managing.base import AdaptationProcess, Dependencies, ManagedSystem, ManagingSubsystem
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus
-from suave_des.registry import is_built_in
+from suave_des.registry import is_built_in, is_named_elsewhere
 
 RAISED = (Exception, SystemExit)
 """Exceptions of a manager: sys.exit must neither end a campaign, nor end a mission without an error."""
@@ -69,7 +69,10 @@ class ManagerHost:
         except RAISED as error:
             raise self.mission_error(error) from error
         if not is_built_in(self.name):
-            self.remarks = tuple(_unmeasured(declared or (), self.system.measurements))
+            self.remarks = (
+                *_unmeasured("depends_on has {}, which nothing measures", declared or (), self.system.measurements),
+                *_uncalled_adapt(self.manager),
+            )
         self._is_event_triggered = declared is not None and self.skips_idle_calls
         thresholds = (declared or {}) if self._is_event_triggered else {}
         measured = self.system.measurements
@@ -92,7 +95,13 @@ class ManagerHost:
         declared = self.manager.depends_on
         if declared is None:
             return None
-        return {name: tuple(sorted(map(float, each))) for name, each in declared.items()}
+        try:
+            return {name: tuple(sorted(map(float, each))) for name, each in declared.items()}
+        except (AttributeError, TypeError, ValueError):
+            problem = (
+                f"depends_on is {shown(declared)}; it must be like {{'{WATER_VISIBILITY}': (2.25, 3.25)}}, or None"
+            )
+            raise ValueError(problem) from None
 
     def start(self) -> None:
         """Tell the manager that the mission begins."""
@@ -101,6 +110,9 @@ class ManagerHost:
     def end(self, metrics: MissionMetrics) -> None:
         """Tell the manager how the mission ended."""
         self._guarded(self.manager.mission_ended, metrics)
+        if not is_built_in(self.name):
+            text = "measured({}) is always None: nothing measures it"
+            self.remarks += tuple(_unmeasured(text, self.system.unmeasured, self.system.measurements))
 
     def request(self, task: Task) -> None:
         """Pass a task that begins to the manager."""
@@ -222,8 +234,16 @@ def _tick_at_or_after(t_s: float, due_s: float, period_s: float) -> float:
     return due_s
 
 
-def _unmeasured(names: Iterable[str], measured: Iterable[str]) -> Iterator[str]:
-    """Yield a remark for each name in depends_on that nothing measures."""
+def _unmeasured(text: str, names: Iterable[str], measured: Iterable[str]) -> Iterator[str]:
+    """Yield a remark, in which the name replaces {}, for each name that nothing measures."""
     known = sorted({*measured, *_MEASURED_SOMEWHERE})
     for name in sorted(set(names).difference(known), key=str):
-        yield f"depends_on has {shown(name)}, which nothing measures ({did_you_mean(name, known)})"
+        yield f"{text.format(shown(name))} ({did_you_mean(name, known)})"
+
+
+def _uncalled_adapt(manager: ManagingSubsystem) -> Iterator[str]:
+    """Yield a remark if the manager's author has written an `adapt` that nothing calls."""
+    author = next(base for base in type(manager).__mro__ if "adapt" in vars(base))
+    is_own = not author.__module__.startswith("suave_des.")
+    if is_own and manager.period_s is None and not is_named_elsewhere("adapt", author):
+        yield "adapt is never called: period_s is None (set it in the class, such as period_s = 2.0)"

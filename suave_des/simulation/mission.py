@@ -10,14 +10,14 @@ from suave_des import domain
 from suave_des.chance import Chance
 from suave_des.clock import advance, stop_at
 from suave_des.compiling import Array
-from suave_des.errors import SuaveDesError
+from suave_des.errors import MissionError, SuaveDesError
 from suave_des.managed.coordinator import MissionCoordinator, MissionTiming
 from suave_des.managed.detection import PipelineDetector
 from suave_des.managed.follow import NO_PATH, FollowPipeline, InspectionPath
 from suave_des.managed.mode_manager import ModeManager
 from suave_des.managed.motion import MaintainMotion
 from suave_des.managed.node import FunctionNode
-from suave_des.managed.own import FunctionContext
+from suave_des.managed.own import FunctionContext, OwnFunction
 from suave_des.managed.recharge import GenerateRechargePath
 from suave_des.managed.search import GenerateSearchPath
 from suave_des.managed.surface import Surface
@@ -222,8 +222,18 @@ class MissionRun:
             self._surface = Surface(env, make_sender(domain.SURFACE))
             nodes[domain.SURFACE] = self._surface
         for name, function_type in self._prepared.own_functions.items():
-            nodes[name] = function_type(self._function_context(name, make_sender(name)))
+            nodes[name] = self._make_own_function(function_type, self._function_context(name, make_sender(name)))
         return nodes
+
+    def _make_own_function(self, function_type: type[OwnFunction], context: FunctionContext) -> OwnFunction:
+        try:
+            node = function_type(context)
+            if not hasattr(node, "context"):
+                raise TypeError(f"{function_type.__name__}.__init__ does not begin with super().__init__(context)")
+        except RAISED as error:
+            cause = f"function {context.name}: {type(error).__name__}: {error}"
+            raise MissionError(self._spec.manager, self._spec.run, self.env.now, cause) from error
+        return node
 
     def _function_context(self, name: str, sender: SetPointSender) -> FunctionContext:
         settings = self._scenario.functions.get(name)

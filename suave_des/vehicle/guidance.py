@@ -90,7 +90,13 @@ class SetPointSender:
         self._before_loss = self._draw()
 
     def send(self, x_m: float, y_m: float, z_m: float) -> None:
-        """Send a set-point in the world frame; the sender is not told whether it arrived."""
+        """Send a set-point in the world frame; the sender is not told whether it arrived.
+
+        Raises:
+            ValueError: a coordinate is not a finite number.
+        """
+        if not (math.isfinite(x_m) and math.isfinite(y_m) and math.isfinite(z_m)):
+            raise ValueError(f"the set-point ({x_m}, {y_m}, {z_m}) is not finite")
         if not self._is_lost():
             x_error_m, y_error_m, z_error_m = self.frame_error_m
             self.vehicle.command(self.now_s(), x_m + x_error_m, y_m + y_error_m, z_m + z_error_m)

@@ -93,10 +93,22 @@ def test_a_class_that_keeps_nothing_is_not() -> None:
 
 
 def test_modes_that_there_are_not_are_counted_and_reported(tmp_path: Path) -> None:
-    with pytest.warns(UserWarning, match="f_generate_search_path has no mode fd_spiral_hihg"):
+    with pytest.warns(UserWarning, match="f_generate_search_path has no mode 'fd_spiral_hihg' .did you mean"):
         run_campaign("seams2023", [f"{AWKWARD}:Misspells"], 5, out=tmp_path / "out")
     (remark,) = json.loads((tmp_path / "out" / "manifest.json").read_text())["remarks"]
     assert remark.endswith("(5 times)")
+
+
+def test_an_unknown_function_is_reported_with_the_nearest_one() -> None:
+    words = "the modes file has no function 'generate_search_path' .did you mean 'f_generate_search_path'"
+    with pytest.warns(UserWarning, match=words):
+        run_campaign("seams2023", [f"{AWKWARD}:MisspellsFunction"], 1)
+
+
+def test_a_misspelt_measured_attribute_is_reported() -> None:
+    (remark,) = run_mission("seams2023", f"{AWKWARD}:ReadsNothing").remarks
+    assert "measured('visibility') is always None" in remark
+    assert "water_visibility" in remark
 
 
 @pytest.mark.parametrize("workers", [1, 2])

@@ -55,6 +55,28 @@ class Broken(Lights):
         raise ZeroDivisionError("no lamp")
 
 
+class Unmakeable(Lights):
+    """Needs a setting that is not there."""
+
+    def __init__(self, context):
+        super().__init__(context)
+        self.bulbs = context.settings["bulbs"]
+
+
+class Forgetful(Lights):
+    """Does not call its base's __init__."""
+
+    def __init__(self, context):
+        self.power_w = 0.0
+
+
+class Lost(Lights):
+    """Sends a set-point that is nowhere."""
+
+    def activated(self):
+        self.context.sender.send(float("nan"), 0.0, -18.0)
+
+
 @pytest.fixture
 def fly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Flies a mission of a scenario given as text, under the manager none."""
@@ -136,6 +158,38 @@ def test_what_is_missing_is_said(fly, text: str, problem: str, remedy: str) -> N
 def test_a_hook_that_raises_fails_its_mission_and_names_the_function(fly) -> None:
     with pytest.raises(MissionError, match="function f_lights: ZeroDivisionError: no lamp"):
         fly(NAMED.replace("Lights'", "Broken'"))
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ("def activate(self): pass", "has no hook, but activate .did you mean activated.self."),
+        ("def activated(self): pass\n    def configured(self, mode): pass", "configured is not a hook"),
+        ("def activated(self): yield self.env.timeout(1.0)", "activated yields, .*self.env.process"),
+        ("async def activated(self): pass", "activated is async"),
+        ("def configure(self): pass", "write def configure.self, mode."),
+        ("def __init__(self): pass", "write def __init__.self, context."),
+    ],
+)
+def test_a_wrong_hook_is_bad_input(fly, tmp_path: Path, body: str, words: str) -> None:
+    module = f"lights_{tmp_path.name}"
+    text = f"from suave_des.managed.own import OwnFunction\n\n\nclass Lights(OwnFunction):\n    {body}\n"
+    (tmp_path / f"{module}.py").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=words):
+        fly(NAMED.replace("tests.managed.test_own_functions", module))
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("Unmakeable", "function f_lights: KeyError: 'bulbs'"),
+        ("Forgetful", "function f_lights: .*does not begin with super...__init__.context."),
+        ("Lost", "function f_lights: ValueError: the set-point .nan, 0.0, -18.0. is not finite"),
+    ],
+)
+def test_a_function_that_cannot_be_used_fails_its_mission_and_is_named(fly, name: str, words: str) -> None:
+    with pytest.raises(MissionError, match=words):
+        fly(NAMED.replace("Lights'", f"{name}'"))
 
 
 def test_a_mode_of_a_function_without_node_is_neither_offered_nor_set(fly) -> None:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from suave_des.errors import InputError
+from suave_des import run_mission
+from suave_des.errors import InputError, MissionError
 from suave_des.managing.base import ManagingSubsystem
 from suave_des.registry import manager_class, manager_names
 
@@ -95,16 +96,17 @@ def test_ctrl_c_while_a_manager_is_imported_is_ctrl_c(tmp_path: Path, monkeypatc
 
 DERIVED = """
 from suave_des.managing.metacontrol import Metacontrol
+from suave_des.managing.simple import NoManager
 
-class Mine(Metacontrol):
+class Mine({}):
     {}
 """
 
 
-def derived(method: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+def derived(method: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, base: str = "Metacontrol") -> str:
     """A manager derived from one that has hooks, with another method."""
     module = f"derived_{tmp_path.name}"
-    (tmp_path / f"{module}.py").write_text(DERIVED.format(method))
+    (tmp_path / f"{module}.py").write_text(DERIVED.format(base, method))
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     return f"{module}:Mine"
@@ -119,6 +121,10 @@ def derived(method: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str
             "task_request is not a hook, .* .did you mean task_requested.self, task.",
         ),
         ("def diagnostics(self, diagnostic): pass", "did you mean diagnostic.self, diagnostic."),
+        (
+            "from suave_des.monitor.diagnostics import Kind\n\n    def diagnostics(self, diagnostic): pass",
+            "did you mean diagnostic.self, diagnostic.",
+        ),
     ],
 )
 def test_a_misspelt_hook_of_a_manager_that_inherits_hooks_is_bad_input(
@@ -140,3 +146,45 @@ def test_a_misspelt_hook_of_a_manager_that_inherits_hooks_is_bad_input(
 )
 def test_an_ordinary_method_is_no_misspelt_hook(methods: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert manager_class(derived(methods, tmp_path, monkeypatch)).__name__ == "Mine"
+
+
+def remarks_of(methods: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
+    """What is reported of a manager derived from none, with other methods."""
+    return run_mission("seams2023", derived(methods, tmp_path, monkeypatch, base="NoManager")).remarks
+
+
+def test_an_adapt_that_is_never_called_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (remark,) = remarks_of("def adapt(self): pass", tmp_path, monkeypatch)
+    assert "adapt is never called: period_s is None" in remark
+
+
+@pytest.mark.parametrize(
+    "methods",
+    [
+        "def adapt(self): pass\n    def task_requested(self, task): self.adapt()",
+        "period_s = 2.0\n    def adapt(self): pass",
+        "pass",
+    ],
+)
+def test_an_adapt_that_is_called_or_inherited_is_not(
+    methods: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert remarks_of(methods, tmp_path, monkeypatch) == ()
+
+
+@pytest.mark.parametrize("before", ["period_s = 60.0", "pass"])
+def test_the_period_is_given_in_the_class_or_in_init(
+    before: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    adapt = "def adapt(self): raise ValueError(f'at {self.system.now_s:g} s')"
+    init = "def __init__(self, system): self.period_s = 60.0; super().__init__(system)" if before == "pass" else ""
+    name = derived(f"{before}\n    starts_s = 7.0\n    {adapt}\n    {init}", tmp_path, monkeypatch, base="NoManager")
+    with pytest.raises(MissionError, match="ValueError: at 7 s"):
+        run_mission("seams2023", name)
+
+
+@pytest.mark.parametrize("value", ["['water_visibility']", "{'water_visibility': 3.25}", "{'water_visibility': 'x'}"])
+def test_a_depends_on_of_another_form_is_said(value: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    methods = f"period_s = 1.0\n    depends_on = {value}\n    def adapt(self): pass"
+    with pytest.raises(MissionError, match=r"depends_on is .*; it must be like .'water_visibility': .2.25, 3.25.."):
+        run_mission("seams2023", derived(methods, tmp_path, monkeypatch, base="NoManager"))

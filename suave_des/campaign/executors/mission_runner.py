@@ -25,10 +25,11 @@ from suave_des.campaign.missions import (
     row_of,
 )
 from suave_des.campaign.variation import cell_of, short_mission
-from suave_des.errors import MissionError
+from suave_des.errors import MissionError, did_you_mean, shown
 from suave_des.interrupts import alarm, handled
 from suave_des.metrics.result import MissionResult
 from suave_des.registry import is_built_in
+from suave_des.scenario.modes import ModeTable
 from suave_des.simulation.simulator import Simulator
 
 NOT_REPEATABLE = (
@@ -112,7 +113,8 @@ class MissionRunner:
         members = () if member is None else (member,)
         known = (self._knowledge(key, result),) if job.record_knowledge else ()
         row = (*row_of(result.metrics), *self._swept, *drawn, *members, *further_of(result), *known)
-        remarks = [Remark(manager, f"{name} has no mode {mode}", n) for (name, mode), n in result.refused.items()]
+        modes = simulator.loaded.modes
+        remarks = [Remark(manager, _refusal(modes, *request), n) for request, n in result.refused.items()]
         return row, [*remarks, *(Remark(manager, text, 0) for text in result.remarks)]
 
     def _knowledge(self, key: MissionKey, result: MissionResult) -> str:
@@ -139,6 +141,16 @@ class MissionRunner:
 
 
 # Time limits, so that a manager that never returns costs its own mission only.
+
+
+def _refusal(modes: ModeTable, function: object, mode: object) -> str:
+    """Say why the mode manager refused a mode."""
+    if function not in modes.functions:
+        return f"the modes file has no function {shown(function)} ({did_you_mean(function, modes.functions)})"
+    known = modes.modes(str(function))
+    if mode in known:
+        return f"{function} has no node here (name its class under functions: in the scenario)"
+    return f"{function} has no mode {shown(mode)} ({did_you_mean(mode, known)})"
 
 
 class MissionTimeOut(BaseException):
