@@ -28,7 +28,7 @@ class MissionTiming(NamedTuple):
 
 @dataclass(eq=False)
 class MissionCoordinator:
-    """Requests search_pipeline, then, when the pipeline is detected, inspect_pipeline.
+    """Requests search_pipeline, then, when the pipeline is detected, inspect_pipeline; after a leak, surface.
 
     Attributes:
         ended: the event of the mission's end: the time limit, or the end of the path.
@@ -90,15 +90,6 @@ class MissionCoordinator:
         except simpy.Interrupt:
             yield from self._surface()
 
-    def _surface(self) -> Process:
-        self._end("task_cancelled")
-        self._cancel(Task("lasting_functions", self.lasting_functions))
-        self._begin(Task("surface", (SURFACE,)))
-        yield self._surfaced
-        yield self._next_poll()
-        self._end("task_done")
-        self._finish("the vehicle has surfaced")
-
     def _search_and_inspect(self) -> Process:
         yield until(self.env, self.timing.start_delay_s)
         self._begin(self._search)
@@ -113,6 +104,15 @@ class MissionCoordinator:
         yield self._next_poll()
         self._end("task_done")
         self._finish("the end of the path is reached")
+
+    def _surface(self) -> Process:
+        self._end("task_cancelled")
+        self._cancel(Task("lasting_functions", self.lasting_functions))
+        self._begin(Task("surface", (SURFACE,)))
+        yield self._surfaced
+        yield self._next_poll()
+        self._end("task_done")
+        self._finish("the vehicle has surfaced")
 
     def _watch_time_limit(self) -> Process:
         timing, period_s = self.timing, self.revision.limit_check_period_s

@@ -60,7 +60,7 @@ class ProcessNode(FunctionNode):
         self._process = self.env.process(self._until_interrupted())
 
     def deactivated(self) -> None:
-        """Leave the autopilot to other functions."""
+        """Interrupt the activity; the autopilot keeps the last set-point until another function sends one."""
         if self._process is not None and self._process.is_alive:
             self._process.interrupt()
 

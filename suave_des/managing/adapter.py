@@ -41,7 +41,7 @@ class Adapter:
 
     def __init__(self, system: ManagedSystem) -> None:
         self._system = system
-        self._without_design: frozenset[str] = frozenset()  # functions, as far as that is recorded
+        self._without_design: frozenset[str] = frozenset()  # functions for which the last plan had no design
 
     def is_in_force(self, plan: Plan) -> bool:
         """Return whether carrying a plan out would neither change a mode nor record anything."""
@@ -51,12 +51,12 @@ class Adapter:
                 return False
         return plan.without_design == self._without_design
 
-    def carry_out(self, plan: Plan, present: dict[str, str], functions: Collection[str]) -> dict[str, str]:
+    def carry_out(self, plan: Plan, groundings: dict[str, str], functions: Collection[str]) -> dict[str, str]:
         """Request the modes of a plan.
 
         Args:
             plan: the decisions.
-            present: the function designs in use, by function.
+            groundings: the function designs in use, by function.
             functions: those that still have an objective; decisions on others are dropped.
 
         Returns:
@@ -72,7 +72,7 @@ class Adapter:
                     self._log("no_design_left", function, decision)
             elif self._system.change_mode(function, design):
                 grounded[function] = design
-                before = present.get(function, "ungrounded")
+                before = groundings.get(function, "ungrounded")
                 if before != design:
                     self._log("adaptation", f"{function}: {before} -> {design}", decision)
         self._without_design = plan.without_design

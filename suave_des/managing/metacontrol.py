@@ -27,8 +27,8 @@ _MAX_CACHED: Final = 16384
 class Metacontrol(ManagingSubsystem):
     """The metacontrol manager.
 
-    What the reasoner infers is never written back, so nothing has to be retracted; a status persists only as a
-    transition of the state that is kept here.
+    What the reasoner infers is never written back, so nothing has to be retracted: the state below changes only by
+    tasks, diagnostics, measurements and executed plans.
 
     Attributes:
         objectives: the status of the objective of each required function; None while the objective is met.
@@ -85,6 +85,7 @@ class Metacontrol(ManagingSubsystem):
         latency_s = self._latency_s
         if callable(latency_s):
             return self.execute(conclusion, latency_s())
+        # A longer latency must pass in any case: the cycles that come due meanwhile are skipped.
         if latency_s < self.period_s and self._changes_nothing(conclusion):
             self._recorded_statuses = conclusion.statuses
             return None

@@ -31,11 +31,11 @@ def battery_monitor(env: simpy.Environment, bus: DiagnosticsBus, level: BatteryL
         yield env.timeout(level.timing.period_s)
 
 
-def leak_monitor(env: simpy.Environment, bus: DiagnosticsBus, time_s: float, detected: Callable[[], None]) -> Process:
-    """Publish the leak at its time, and call `detected`."""
+def leak_monitor(env: simpy.Environment, bus: DiagnosticsBus, time_s: float, leak: Callable[[], None]) -> Process:
+    """Publish the leak at its time, and call `leak`."""
     yield until(env, time_s)
     bus.publish(Diagnostic(env.now, Kind.COMPONENT_STATUS, HULL, LEAK))
-    detected()
+    leak()
 
 
 def detection_monitor(env: simpy.Environment, bus: DiagnosticsBus, detected: simpy.Event) -> Process:
@@ -64,7 +64,7 @@ def thruster_monitor(
     env: simpy.Environment,
     publish: Callable[[Diagnostic], None],
     events: Sequence[ScheduledEvent],
-    happens: Callable[[float, ScheduledEvent], None],
+    inject: Callable[[float, ScheduledEvent], None],
     timing: MonitorTiming,
     after_previous: bool,
 ) -> Process:
@@ -77,7 +77,7 @@ def thruster_monitor(
         env: the mission's clock.
         publish: publishes a diagnostic.
         events: the schedule.
-        happens: called with mission time and event.
+        inject: makes an event happen to the vehicle; called with mission time and event.
         timing: when the monitor checks.
         after_previous: whether each time counts from the event before it (rev 2023) or from the start (rev 1.5).
     """
@@ -86,7 +86,7 @@ def thruster_monitor(
         due_s = max(counted_from_s + event.time_s, earliest_s)
         tick_s = tick_at_or_after(due_s, timing.phase_s, timing.period_s)
         yield until(env, tick_s)
-        happens(env.now, event)
+        inject(env.now, event)
         status = FAILED if event.fails else RECOVERED
         publish(Diagnostic(env.now, Kind.COMPONENT_STATUS, thruster_name(event.thruster), status))
         earliest_s = tick_s + timing.period_s

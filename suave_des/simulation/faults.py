@@ -48,7 +48,7 @@ class ThrusterFaults:
         """Apply one of the scenario's events at mission time t."""
         is_first_failure = event.fails and not self._had_failure
         self._had_failure |= event.fails
-        if is_first_failure and self._is_lost(t_s):
+        if is_first_failure and self._has_no_effect(t_s):
             self.log("thruster_monitor", "failure_without_effect", thruster_name(event.thruster))
             return
         if event.fails and not event.recoverable:
@@ -63,7 +63,7 @@ class ThrusterFaults:
         for listener in self.listeners:
             listener()
 
-    def _is_lost(self, t_s: float) -> bool:
+    def _has_no_effect(self, t_s: float) -> bool:
         """Decide whether the mission's first failure, at mission time t, has no effect on the vehicle."""
         failures = self.scenario.revision.thruster_failures
         if t_s < failures.effective_from_s:

@@ -155,14 +155,6 @@ class MissionRun:
         remarks = self._host.remarks
         return MissionResult(metrics, events, trajectory, knowledge, drawn, self.modes.refused, further, remarks)
 
-    def _guarded(self, run: Callable[..., object], *arguments: object) -> None:
-        try:
-            run(*arguments)
-        except SuaveDesError:
-            raise
-        except RAISED as error:  # in a process that the manager started by itself
-            raise self._host.mission_error(error) from error
-
     def metrics(self) -> MissionMetrics:
         """Compute the metrics, as of now if the mission is not over."""
         coordinator, detector = self._coordinator, self._detector
@@ -185,6 +177,14 @@ class MissionRun:
             detection_x_m=x_m,
             detection_y_m=y_m,
         )
+
+    def _guarded(self, run: Callable[..., object], *arguments: object) -> None:
+        try:
+            run(*arguments)
+        except SuaveDesError:
+            raise
+        except RAISED as error:  # in a process that the manager started by itself
+            raise self._host.mission_error(error) from error
 
     # The parts.
 
@@ -273,8 +273,8 @@ class MissionRun:
         if self._battery is not None and battery is not None and battery.mission_ends_at_level is not None:
             coordinator.end_at_battery_level(self._battery, battery.mission_ends_at_level)
         if self._scenario.leak is not None:
-            detected = coordinator.leak_handler(self._surface.surfaced)
-            self.env.process(leak_monitor(self.env, self.bus, self._chance.value("leak.time_s"), detected))
+            leak = coordinator.leak_handler(self._surface.surfaced)
+            self.env.process(leak_monitor(self.env, self.bus, self._chance.value("leak.time_s"), leak))
         return coordinator
 
     def _make_reaction_meter(self) -> ReactionMeter:

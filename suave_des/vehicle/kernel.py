@@ -1,7 +1,8 @@
 """The vehicle's motion: rigid body, thrusters and guided autopilot, stepped on a fixed grid by one compiled loop.
 
-One row of the track holds everything that the next step needs. Attitude is a quaternion (Handbook, 2.2.2): no
-trigonometry in the loop, and no singularity for a vehicle that tumbles.
+One row of the track holds everything that the next step needs. Attitude is a quaternion (Fossen, Handbook of Marine
+Craft Hydrodynamics and Motion Control, 2.2.2): no trigonometry in the loop, and no singularity for a vehicle that
+tumbles. The other numbers after "Handbook" are sections or equations of that book.
 """
 
 import math
