@@ -295,8 +295,10 @@ def _load(what: str, target: str, base: type[_Base]) -> type[_Base]:
         ) from error
     found = getattr(module, attribute, None)
     if not (isinstance(found, type) and issubclass(found, base)):
+        classes = {name for name, each in vars(module).items() if isinstance(each, type) and issubclass(each, base)}
         raise InputError(
             f"{what}: {module_name} has no subclass of {base.__name__} named {attribute!r}",
-            remedy=f"derive your class from {base.__module__}.{base.__name__}",
+            remedy=(nearest(attribute, classes) if found is None else None)
+            or f"derive your class from {base.__module__}.{base.__name__}",
         )
     return found

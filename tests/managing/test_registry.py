@@ -148,6 +148,12 @@ def test_an_ordinary_method_is_no_misspelt_hook(methods: str, tmp_path: Path, mo
     assert manager_class(derived(methods, tmp_path, monkeypatch)).__name__ == "Mine"
 
 
+def test_a_misspelt_class_is_answered_with_the_near_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    name = derived("pass", tmp_path, monkeypatch).replace(":Mine", ":Mien")
+    with pytest.raises(InputError, match=r"no subclass of ManagingSubsystem named 'Mien' .did you mean Mine.."):
+        manager_class(name)
+
+
 def remarks_of(methods: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
     """What is reported of a manager derived from none, with other methods."""
     return run_mission("seams2023", derived(methods, tmp_path, monkeypatch, base="NoManager")).remarks
