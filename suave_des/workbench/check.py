@@ -27,6 +27,7 @@ from suave_des.knowledge.rules.writer import write_atom
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.resources import shipped_folder
 from suave_des.workbench.findings import Finding, Level, finding_about, finding_from, has_level, ordered, relative_path
+from suave_des.workbench.kind_checks import Kinds, misused_properties, mixed_terms
 from suave_des.workbench.mission_checks import measured_attributes, unreported_components, unreported_statuses
 from suave_des.workbench.model_checks import (
     check_designs,
@@ -39,7 +40,7 @@ from suave_des.workbench.model_checks import (
     unmeasured_rules,
     unused_individuals,
 )
-from suave_des.workbench.policy.space import has_effect
+from suave_des.workbench.policy.space import component_statuses, has_effect, interchangeable_components
 from suave_des.workbench.ranges import numbers_in, ranges_between
 
 #: States that Pellet is asked about; `kb policy` goes through all.
@@ -110,6 +111,9 @@ def check(subject: Subject) -> tuple[Finding, ...]:
     vocabulary = Vocabulary.of(content.triples, individuals, enumerated_texts(sources))
     findings += undefined_names(content, model, vocabulary, sources)
     groups = [_rules_from_text(file, vocabulary, findings) for file in files]
+    for file in files:
+        if not file.parsed.rules and not file.parsed.errors:
+            findings.append(Finding(Level.INFO, "there is no rule in this file", file=str(file.path)))
     whole = with_rules(content, groups, subject.disabled_rules)
     by_path = {source.path: source for source in sources}
     findings += _replacing_rules(content.rules, groups)
@@ -117,6 +121,7 @@ def check(subject: Subject) -> tuple[Finding, ...]:
     if model is not None:
         own = {path.resolve() for path in (*given, *subject.rules)}
         findings += _dead_rules(whole, model, own, by_path)
+        findings += misused_properties(whole, Kinds(whole, model), sources)
         findings += check_designs(whole, model, sources, subject.modes, subject.needed)
         findings += unused_individuals(whole, model, sources)
         if subject.reported is not None:
@@ -181,6 +186,7 @@ def _dead_rules(
         if id(rule) not in known:
             dead.append((rule, atom, *no_estimate(attribute)))
     found = [(rule, atom, f"can never fire: {message}", remedy) for rule, atom, message, remedy in dead]
+    found += mixed_terms(content, Kinds(content, model))
     for rule, atom in undeclared_differences(content):
         message = f"{write_atom(atom)} needs individuals that are declared different; different names are not enough"
         found.append((rule, atom, message, "add owl:AllDifferent to the ontology (Protégé: Different Individuals)"))
@@ -245,7 +251,7 @@ def _ask_pellet(subject: Subject, before: Sequence[Finding]) -> Iterator[Finding
     try:
         # What is in its cache has been asked with this very knowledge base, without a contradiction or a dropped rule.
         pellet = make_reasoner("cached", base, TimeLimit(subject.time_limit_s, "--time-limit"))
-        states = tuple(islice(simple_states(base), MAX_STATES)) or (KnowledgeState(),)
+        states = tuple(islice(simple_states(base, subject.measured), MAX_STATES)) or (KnowledgeState(),)
         try:
             for state in combined(states):
                 pellet.infer(state)
@@ -254,6 +260,7 @@ def _ask_pellet(subject: Subject, before: Sequence[Finding]) -> Iterator[Finding
         except KnowledgeError:
             for state in states:  # the first that contradicts itself is the easiest to understand
                 pellet.infer(state)
+            raise  # only a combination does
     except InputError as error:
         found = finding_from(error)
         if found.rule not in {one.rule for one in before if one.rule and one.level is Level.ERROR}:
@@ -270,19 +277,20 @@ def combined(states: Sequence[KnowledgeState]) -> tuple[KnowledgeState, ...]:
 
     A contradiction occurs in every state that contains it: Pellet's reasoning is monotonic.
     """
-    joined: list[tuple[dict[str, str], dict[str, Decimal]]] = []
+    joined: list[tuple[dict[str, str], dict[str, str], dict[str, Decimal]]] = []
     for state in states:
-        groundings, measurements = dict(state.groundings), dict(state.measurements)
-        for designs, values in joined:
-            if _agree(designs, groundings) and _agree(values, measurements):
+        groundings, components, measurements = dict(state.groundings), dict(state.components), dict(state.measurements)
+        for designs, reports, values in joined:
+            if _agree(designs, groundings) and _agree(reports, components) and _agree(values, measurements):
                 designs.update(groundings)
+                reports.update(components)
                 values.update(measurements)
                 break
         else:
-            joined.append((groundings, measurements))
+            joined.append((groundings, components, measurements))
     return tuple(
-        KnowledgeState.of(map(ObjectiveState, designs), groundings=designs, measurements=values)
-        for designs, values in joined
+        KnowledgeState.of(map(ObjectiveState, designs), groundings=designs, components=reports, measurements=values)
+        for designs, reports, values in joined
     )
 
 
@@ -290,16 +298,27 @@ def _agree(one: Mapping[str, object], other: Mapping[str, object]) -> bool:
     return all(one.get(name, value) == value for name, value in other.items())
 
 
-def simple_states(base: Ontology) -> Iterator[KnowledgeState]:
-    """Each design in use, without a measurement and with one in each range of each attribute that has an effect."""
+def simple_states(base: Ontology, measured: Collection[str] | None = None) -> Iterator[KnowledgeState]:
+    """Each design in use, alone, with a report of a component, and with a value in each range of each attribute.
+
+    Only attributes that have an effect and, if those are given, are measured count, and one component of those that
+    are treated alike.
+    """
     ranges = ranges_between(numbers_in(base))
-    measurements: list[dict[str, Decimal]] = [{}]
-    for name in base.quality_attributes:
-        if has_effect(base, name):
-            measurements += [{name: value} for one in ranges if (value := one.value()) is not None]
-    for measured in measurements:
+    reports = [{group[0]: status} for group in interchangeable_components(base) for status in component_statuses(base)]
+    measurements = [
+        {name: value}
+        for name in base.quality_attributes
+        if has_effect(base, name) and (measured is None or name in measured)
+        for one in ranges
+        if (value := one.value()) is not None
+    ]
+    for reported, values in (({}, {}), *((each, {}) for each in reports), *(({}, each) for each in measurements)):
         for function in base.functions:
             for design in base.designs(function):
                 yield KnowledgeState.of(
-                    [ObjectiveState(function)], groundings={function: design}, measurements=measured
+                    [ObjectiveState(function)],
+                    groundings={function: design},
+                    components=reported,
+                    measurements=values,
                 )

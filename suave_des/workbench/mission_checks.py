@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
+from typing import Final
 
 from suave_des.errors import nearest
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.model import Model
 from suave_des.knowledge.ontology_file import OntologyFile
 from suave_des.knowledge.rdf import C_STATUS, PERFORMANCE, TOMASYS, XSD, Lit, local_name
-from suave_des.knowledge.rules.syntax import Atom, Rule, Variable
+from suave_des.knowledge.rules.syntax import COMPARISON_OF, Atom, Rule, Variable
 from suave_des.workbench.findings import Finding, Level, finding_about
+
+_EQUAL: Final = COMPARISON_OF["="]
 
 
 def unreported_components(
@@ -35,6 +38,10 @@ def unreported_statuses(content: Content, reported: Collection[str]) -> list[tup
     if any(isinstance(value, Variable) for value in concluded):
         return []
     asked = [(rule, atom, atom.arguments[-1]) for rule in rules for atom in rule.body if atom.predicate == C_STATUS]
+    for rule, _, status in tuple(asked):  # and in a comparison
+        if isinstance(status, Variable):
+            equals = [each for each in rule.body if each.predicate == _EQUAL and status in each.arguments]
+            asked += [(rule, atom, term) for atom in equals for term in atom.arguments]
     return [
         (rule, atom, status.text)
         for rule, atom, status in asked

@@ -50,6 +50,9 @@ _ANY: Final = "any value"
 _MAKE_DIFFERENT: Final = re.compile(OWL + "(different|AllDifferent|AllDisjoint|disjoint|propertyDisjoint|complement)")
 _ANY_TEXT: Final = "any text"
 _SUBCLASS: Final = RDFS + "subClassOf"
+_ABOUT_CLASSES: Final = frozenset(
+    (_SUBCLASS, RDFS + "domain", RDFS + "range", OWL + "equivalentClass", OWL + "disjointWith")
+)
 _SPREADS: Final = (RDFS + "subPropertyOf", OWL + "inverseOf", OWL + "equivalentProperty")
 
 
@@ -79,6 +82,11 @@ def undefined_names(
         if predicate == RDF_TYPE:
             if own_value and "class" not in vocabulary.kinds.get(str(value), ()):
                 yield undefined(subject, f"class {local_name(str(value))}", str(value), "class")
+        elif predicate in _ABOUT_CLASSES:
+            if own_value and "class" not in vocabulary.kinds.get(str(value), ()):
+                what = f"{local_name(predicate)} {local_name(str(value))}"
+                if predicate != RDFS + "range" or "datatype" not in vocabulary.kinds.get(str(value), ()):
+                    yield undefined(subject, what, str(value), "class")
         elif not predicate.startswith(LANGUAGE_NAMESPACES):
             if predicate not in described:
                 yield undefined(subject, f"property {local_name(predicate)}", predicate, *_PROPERTIES)

@@ -572,3 +572,115 @@ def test_a_rule_that_never_comes_to_an_end_is_named(tmp_path: Path) -> None:
     assert ended.returncode == 2
     assert "mine.swrl: line 1: " in ended.stderr
     assert "rule ever computes ever new values from what it concludes itself" in ended.stderr
+
+
+@pytest.mark.parametrize(
+    "rule",
+    [
+        'A: Component(?c) ^ c_status(?c, "FALSE") ^ requiredBy(?c, ?d) -> fd_realisability(?d, true)',
+        'A: c_status(?c, "FALSE") ^ Objective(?o) -> o_status(?o, "IN_ERROR_COMPONENT")',  # if visibility is low, too
+    ],
+)
+def test_rules_that_clash_once_a_component_fails(tmp_path: Path, rule: str) -> None:
+    (error,) = errors(found(tmp_path, rule, states=MAX_STATES))
+    assert "more than one value" in error.message
+    assert "c_status(c_thruster_1, FALSE)" in error.message
+
+
+def test_contradictions_are_not_looked_for_in_values_that_missions_do_not_measure(tmp_path: Path) -> None:
+    rule = 'A: hasQAvalue(?g, ?q) ^ isQAtype(?q, performance) -> fg_status(?g, "IN_ERROR_FR")'
+    assert errors(found(tmp_path, rule, states=MAX_STATES))
+    assert not errors(found(tmp_path, rule, states=MAX_STATES, measured={"water_visibility"}))
+
+
+@pytest.mark.parametrize(
+    ("body", "column", "message"),
+    [
+        (
+            "hasQAvalue(?q, ?g) ^ hasValue(?q, 2.0)",
+            25,
+            "?q is a FunctionGrounding in hasQAvalue, but a QAvalue in hasValue",
+        ),
+        (
+            "FunctionDesign(?d) ^ hasQAvalue(?d, ?q)",
+            25,
+            "?d is a FunctionDesign, but a FunctionGrounding in hasQAvalue",
+        ),
+        (
+            'fg_status(fd_spiral_low, "IN_ERROR_NFR")',
+            4,
+            "fd_spiral_low is a FunctionDesign, but a FunctionGrounding in fg_status",
+        ),
+    ],
+)
+def test_a_thing_of_two_kinds_in_a_rule(tmp_path: Path, body: str, column: int, message: str) -> None:
+    finding = only(found(tmp_path, f"A: {body} -> Role(fd_spiral_low)"), message)
+    assert (finding.level, finding.rule, finding.column) == (Level.WARN, "A", column)
+    assert str(finding.remedy).startswith(
+        ("hasValue is a property of", "hasQAvalue leads from", "fg_status is a property of")
+    )
+
+
+def test_a_thing_may_be_of_two_kinds_if_the_ontology_or_a_rule_says_so(tmp_path: Path) -> None:
+    rule = "A: Component(?c) ^ fd_realisability(?c, false) -> Role(?c)\n"
+    assert any("?c is a Component" in one.message for one in found(tmp_path, rule))
+    both = individual("c_and_fd", "Component", f'<rdf:type rdf:resource="{TOMASYS}FunctionDesign"/>')
+    below = "".join(f'<rdfs:subClassOf rdf:resource="{TOMASYS}{name}"/>' for name in ("Component", "FunctionDesign"))
+    subclass = f'<owl:Class rdf:about="{SUAVE}Module">{below}</owl:Class>'
+    for more, extra in (("", both), ("", subclass), ("B: Role(?c) -> FunctionDesign(?c)", "")):
+        assert not any("?c is a Component" in one.message for one in found(tmp_path, rule + more, extra))
+
+
+def test_a_fact_about_a_thing_of_another_kind(tmp_path: Path) -> None:
+    inside = f'<tomasys:hasNFR xmlns:tomasys="{TOMASYS}" rdf:resource="{SUAVE}qa_water_visibility_low"/>'
+    finding = only(found(tmp_path, extra=individual("f_new", "Function", inside)), "hasNFR of f_new")
+    assert finding.level is Level.WARN
+    assert finding.message.endswith("f_new is a Function, but an Objective is needed")
+
+
+def test_two_domains_are_both_concluded(tmp_path: Path) -> None:
+    domain = f'<rdfs:domain rdf:resource="{TOMASYS}FunctionDesign"/>'
+    extra = f'<owl:ObjectProperty rdf:about="{TOMASYS}hasQAvalue">{domain}</owl:ObjectProperty>'
+    finding = only(found(tmp_path, extra=extra), "hasQAvalue has 2 domains")
+    assert finding.level is Level.WARN
+    assert "FunctionDesign and FunctionGrounding at once" in finding.message
+
+
+def test_a_class_that_an_axiom_misspells(tmp_path: Path) -> None:
+    below = f'<rdfs:subClassOf rdf:resource="{TOMASYS}Compnent"/>'
+    error = only(
+        found(tmp_path, extra=f'<owl:Class rdf:about="{SUAVE}Pump">{below}</owl:Class>'), "subClassOf Compnent"
+    )
+    assert (error.level, error.remedy) == (Level.ERROR, "did you mean Component?")
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ("hasQAvalue(?g, ?q) ^ isQAtype(?Q, ?t)", "?Q occurs only here, and is another variable than ?q"),
+        ('o_status(?o, ?s) ^ equal(?s, "OK")', '"OK" is not among the values of o_status: the comparison never holds'),
+        ('o_status(?o, ?s) ^ notEqual("OK", ?s)', "the comparison always holds"),
+        ('c_status(?c, ?s) ^ equal(?s, "False")', 'nothing in the simulation reports c_status "False"'),
+    ],
+)
+def test_slips_of_variables_and_texts(tmp_path: Path, body: str, message: str) -> None:
+    findings = found(tmp_path, f"A: {body} -> Role(fd_spiral_low)", reported=REPORTED_STATUSES)
+    assert only(findings, message).level is Level.WARN
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "hasValue(?q, ?v) ^ hasValue(?Q, ?V) ^ isQAtype(?q, ?t) ^ isQAtype(?Q, ?t) ^ lessThan(?v, ?V)",
+        'o_status(?o, ?s) ^ equal(?s, "UNGROUNDED")',
+        'c_status(?c, ?s) ^ equal("LEAK", ?s)',
+        'c_status(?c, ?s) ^ notEqual(?s, "TRUE")',
+    ],
+)
+def test_right_variables_and_texts(tmp_path: Path, body: str) -> None:
+    findings = found(tmp_path, f"A: {body} -> Role(fd_spiral_low)", reported=REPORTED_STATUSES)
+    assert not has_level(findings, Level.WARN)
+
+
+def test_a_file_without_rules_is_noted(tmp_path: Path) -> None:
+    assert only(found(tmp_path, "# nothing yet\n"), "there is no rule in this file").level is Level.INFO

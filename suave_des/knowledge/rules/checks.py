@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from decimal import Decimal
@@ -201,12 +202,20 @@ def _check_comparisons(rule: Rule, vocabulary: Vocabulary) -> Iterator[RuleProbl
     most: dict[str, tuple[Decimal, bool, str]] = {}
     for atom in rule.body:
         sign = COMPARISONS.get(atom.predicate, "")
-        if sign not in _BOUNDS or len(atom.arguments) != 2:
+        if not sign or len(atom.arguments) != 2:
             continue
         one, other = atom.arguments
         if isinstance(one, Lit) and isinstance(other, Variable):
             one, other, sign = other, one, mirrored(sign)
         if not (isinstance(one, Variable) and isinstance(other, Lit)):
+            continue
+        values = vocabulary.enumerations.get(holders.get(one.name, ""))
+        if values is not None and sign in ("=", "!=") and other.text not in values:
+            where, consequence = local_name(holders[one.name]), "never" if sign == "=" else "always"
+            problem = f"{literal_text(other)} is not among the values of {where}: the comparison {consequence} holds"
+            remedy = nearest(other.text, values) or f"one of {', '.join(sorted(values))}"
+            yield RuleProblem(problem, atom.place(), remedy, is_fatal=False)
+        if sign not in _BOUNDS:
             continue
         ranges = vocabulary.ranges.get(holders.get(one.name, ""), frozenset())
         if ranges and ranges <= NUMERIC and other.datatype not in NUMERIC:
@@ -283,6 +292,13 @@ def _check_variables(rule: Rule) -> Iterator[RuleProblem]:
     for name in sorted(individuals.keys() & values.keys()):
         place = max(individuals[name], values[name])
         yield RuleProblem(f"?{name} stands for an individual and for a value", place)
+    uses = [(name, atom.place(number)) for atom, number, name in _uses(rule.atoms)]
+    counts = Counter(name for name, _ in uses)
+    for name, at in uses:
+        others = [each for each in counts if each != name and each.casefold() == name.casefold()]
+        if counts[name] == 1 and others:
+            problem = f"?{name} occurs only here, and is another variable than ?{others[0]}"
+            yield RuleProblem(problem, at, f"did you mean ?{others[0]}?", is_fatal=False)
     bound = {
         name for atom in rule.body if atom.kind in ("class", "object", "data", "same") for name in atom.variables()
     }
