@@ -22,6 +22,9 @@ MISSION_FUNCTIONS = (MAINTAIN_MOTION, GENERATE_SEARCH_PATH, FOLLOW_PIPELINE)
 DEFAULT_MODE, UNGROUND_MODE = "__DEFAULT__", "fd_unground"
 """The mode that a function's node starts with, and the one that a cancelled task sets; no function designs."""
 
+MANAGER_GROUP = "suave_des.managers"
+"""Entry point group in which packages register their managers."""
+
 WATER_VISIBILITY, BATTERY_LEVEL = "water_visibility", "battery_level"
 """Quality attributes that the exemplar's monitors measure."""
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 from weakref import WeakSet
 
+from suave_des.domain import MANAGER_GROUP
 from suave_des.errors import InputError, did_you_mean, nearest, shown
 from suave_des.managing.base import ManagingSubsystem
 from suave_des.monitor.diagnostics import Kind
@@ -25,7 +26,6 @@ _Base = TypeVar("_Base")
 ManagerLike = str | type[ManagingSubsystem]
 """A manager's name, module:Class, or its class."""
 
-ENTRY_POINT_GROUP = "suave_des.managers"
 FUNCTION_GROUP = "suave_des.functions"
 _BUILT_IN = {
     "none": "suave_des.managing.simple:NoManager",
@@ -276,7 +276,7 @@ def function_class(function: str, name: str) -> type[OwnFunction]:
 
 
 @cache
-def _registered(group: str = ENTRY_POINT_GROUP) -> dict[str, str]:
+def _registered(group: str = MANAGER_GROUP) -> dict[str, str]:
     return {point.name: point.value for point in entry_points(group=group)}
 
 

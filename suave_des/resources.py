@@ -7,6 +7,8 @@ from pathlib import Path
 
 from suave_des.errors import InputError
 
+DEFAULT_SCENARIO = "seams2023"
+"""The paper's, where none is named."""
 _PACKAGE = Path(__file__).resolve().parent
 _KINDS = {
     "ontology": ".owl",

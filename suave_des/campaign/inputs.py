@@ -21,7 +21,7 @@ from suave_des.campaign.variation import Variation, vary
 from suave_des.errors import InputError, shown
 from suave_des.managing.learned import read_file
 from suave_des.registry import is_built_in, is_installed, manager_class, takes_argument
-from suave_des.scenario.layers import Files, sha256_of
+from suave_des.scenario.layers import InputFiles, sha256_of
 from suave_des.scenario.loader import LoadedScenario, load_scenario
 from suave_des.simulation.functions import own_functions
 
@@ -44,7 +44,7 @@ def read_inputs(
         loaded, variation = vary(loaded, spec.sweep, spec.perturbations, spec.runs_per_draw, spec.seed)
     except InputError as error:
         raise error if file is None else file.located(error) from None
-    files = Files()
+    files = InputFiles()
     if spec.ensemble is not None:
         is_from_file = file is not None and "ensemble" in spec.from_file
         beside = file.layer.place(("ensemble",)).file.parent if file is not None and is_from_file else None
@@ -79,7 +79,7 @@ def check_inputs(
             file, or is inconsistent; a manager refuses the scenario, or a file of it cannot be read.
     """
     found = own_modules((), own_functions(loaded))
-    files = Files()
+    files = InputFiles()
     if given or any(manager_class(name).needs_knowledge for name in managers):
         from suave_des.knowledge.state import KnowledgeState
         from suave_des.scenario_knowledge import open_knowledge

@@ -16,7 +16,7 @@ from suave_des.campaign.stopping import UntilCi, parse_until_ci
 from suave_des.errors import InputError, shown
 from suave_des.registry import is_built_in, manager_class
 from suave_des.resources import find
-from suave_des.scenario.layers import Files, find_named
+from suave_des.scenario.layers import InputFiles, find_named
 from suave_des.scenario.loader import Replacements
 from suave_des.scenario.problems import validated
 from suave_des.scenario.quantities import Number, Strict
@@ -294,7 +294,7 @@ def read_campaign_file(name: str | Path) -> CampaignFile | None:
     Raises:
         InputError: it cannot be read, is of another version, or has an impossible value.
     """
-    files = Files()
+    files = InputFiles()
     layer = files.yaml(find(name, "scenarios"))
     if "campaign" not in layer.data:
         return None

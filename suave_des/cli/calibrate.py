@@ -13,7 +13,7 @@ from suave_des.cli.console import output
 from suave_des.cli.options import Files, ManagersInData, Overwrite, Seed, Workers, command_line, grouped_options
 from suave_des.errors import InputError
 from suave_des.files import check_output_folder, make_output_folder, write_files
-from suave_des.resources import find, shipped_folder
+from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -143,7 +143,7 @@ def _parameters_file(given: str | None, cases: Sequence[Case]) -> Path:
     """Return the file of free parameters: the one given, or that of the scenario, or what several share."""
     if given is None:
         own = shipped_folder("scenarios/calibration") / f"{cases[0].name}.yaml"
-        given = ("seams2023" if not own.is_file() else cases[0].name) if len(cases) == 1 else "shared"
+        given = (DEFAULT_SCENARIO if not own.is_file() else cases[0].name) if len(cases) == 1 else "shared"
     return find(given, "scenarios/calibration")
 
 

@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from suave_des.cli.console import errors, fits, output, plain_table, print_table, progress
+from suave_des.cli.console import TEXT_WIDTH, errors, fits, output, plain_table, print_table, progress
 from suave_des.cli.options import (
     CampaignWorkers,
     Files,
@@ -30,6 +30,7 @@ from suave_des.cli.options import (
 )
 from suave_des.errors import InputError, number_of
 from suave_des.files import write_files
+from suave_des.resources import DEFAULT_SCENARIO
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -220,10 +221,6 @@ def exit_telling_failures(result: CampaignResult) -> None:
     raise typer.Exit(3)
 
 
-SCENARIO = "seams2023"
-_TEXT_WIDTH = 95
-
-
 @grouped_options
 def reproduce(
     runs: Annotated[int, typer.Option(help="Missions for each manager; the paper has 20.")] = 200,
@@ -249,7 +246,7 @@ def reproduce(
     managers = list(dict.fromkeys(manager for manager, _ in published))
     with progress("reproduce", quiet=quiet) as show:
         result = run_campaign(
-            SCENARIO,
+            DEFAULT_SCENARIO,
             managers,
             runs,
             seed,
@@ -284,11 +281,10 @@ def print_comparison(console: Console, comparison: PaperComparison) -> None:
         print_table(console, title, table)
         console.print()
     for line in comparison.remarks():
-        console.print(fill(line, min(console.width, _TEXT_WIDTH)))
+        console.print(fill(line, min(console.width, TEXT_WIDTH)))
 
 
 def _table(figures: Sequence[PaperFigure], *, is_narrow: bool) -> Table:
-
     table = plain_table()
     table.add_column("manager", min_width=12)
     table.add_column("", min_width=5)

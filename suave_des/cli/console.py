@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from suave_des.campaign.progress import OnProgress
     from suave_des.metrics.result import Event, MissionMetrics, MissionResult
 
+TEXT_WIDTH = 95
+"""Columns of text at most, which is hard to read in longer lines."""
 _IN_ASCII = {"±": "+-", "–": "-", "—": "-", "…": "...", "×": "x", "≥": ">=", "≤": "<=", "−": "-", "→": "->", "█": "#"}
 _ERRORS = "suave-des-in-ascii"
 

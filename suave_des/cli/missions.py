@@ -12,6 +12,7 @@ import typer
 from suave_des.cli.console import errors, mission_status, output, plain_table, print_table, print_timeline
 from suave_des.cli.options import Files, ManagerOptions, Overwrite, Scenario, Seed, command_line, grouped_options
 from suave_des.files import FAMILIES, check_output_file, json_text, write_files
+from suave_des.resources import DEFAULT_SCENARIO
 
 if TYPE_CHECKING:
     from suave_des.bench.bench import Bench
@@ -67,7 +68,7 @@ def train(
     manager: Annotated[str, typer.Argument(metavar="MODULE:CLASS", help="The manager.")],
     missions: Annotated[int, typer.Option(help="Number of training missions; they are runs 1 to NUMBER.")],
     out: Annotated[Path, typer.Option(metavar="FILE", help="File for the training result.")],
-    scenario: Annotated[str, typer.Option(metavar="SCENARIO", help="Scenario to train on.")] = "seams2023",
+    scenario: Annotated[str, typer.Option(metavar="SCENARIO", help="Scenario to train on.")] = DEFAULT_SCENARIO,
     seed: Annotated[int, typer.Option(help="Training seed; use a different one for the evaluation.")] = 0,
     start: Annotated[
         Path | None, typer.Option("--from", metavar="FILE", help="Continue from the file of an earlier training.")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli.console import output
+from suave_des.cli.console import TEXT_WIDTH, output
 from suave_des.cli.options import Files, Results, SeedIfNew, check_no_use, comma_separated, grouped_options
 from suave_des.errors import InputError
 from suave_des.files import check_output_file, write_files
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from suave_des.report.mission_record import MissionRecord
-
-_TEXT_WIDTH = 95
 
 
 class CompareFormat(StrEnum):
@@ -87,13 +85,12 @@ def compare(
         write_files(out.parent, {out.name: WRITERS[ENDINGS[out.suffix.lower()]](comparison)})
         print(f"compared in {out}")
     elif as_format is CompareFormat.TABLE:
-        print(plain_text(comparison, min(output().width, _TEXT_WIDTH)), end="")
+        print(plain_text(comparison, min(output().width, TEXT_WIDTH)), end="")
     else:
         print(WRITERS[as_format.value](comparison), end="")
 
 
 def _check_out(out: Path, endings: Iterable[str]) -> None:
-
     if out.suffix.lower() not in endings:
         problem = f"expected a table, got {out.suffix or 'a file without an ending'}"
         raise InputError(problem, file=out, remedy=f"one of {', '.join(endings)}")

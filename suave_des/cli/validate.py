@@ -22,7 +22,7 @@ from suave_des.cli.options import (
     grouped_options,
 )
 from suave_des.files import check_output_folder, make_output_folder, write_files
-from suave_des.resources import find, shipped_folder
+from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
 
 if TYPE_CHECKING:
     import pandas
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
 TARGETS_NOT_MET = 1
 """Exit status with --strict."""
-_SCENARIO = "seams2023"
 _RUNS = 2000
 
 _Data = Annotated[
@@ -56,7 +55,7 @@ def validate(
         typer.Argument(
             metavar="SCENARIO",
             help="A scenario or campaign file, or the name of a shipped scenario.",
-            show_default=_SCENARIO,
+            show_default=DEFAULT_SCENARIO,
         ),
     ] = None,
     data: _Data = None,
@@ -97,7 +96,7 @@ def validate(
     from suave_des.validation.real import read_conditions, read_real, targets_of
     from suave_des.validation.validation import validate as compare
 
-    name = scenario or _SCENARIO
+    name = scenario or DEFAULT_SCENARIO
     if runs_file is not None:
         check_no_use(files.given, "with --runs-file", "leave one of them out")
     wants_conditions = runs_file is None or scenario is not None
@@ -230,5 +229,4 @@ def _shown(path: Path) -> str:
 
 
 def _is_shipped(path: Path) -> bool:
-
     return path.is_relative_to(shipped_folder("scenarios/published"))

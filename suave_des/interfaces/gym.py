@@ -26,6 +26,7 @@ from suave_des.errors import InputError
 from suave_des.interfaces.mission import CALLER, CallerManages
 from suave_des.managing.base import ManagedSystem
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
+from suave_des.resources import DEFAULT_SCENARIO
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.modes import grounding_modes
 from suave_des.simulation.simulator import Simulator
@@ -76,7 +77,7 @@ class _Episodes:
 
     def __init__(
         self,
-        scenario: str | Path | Simulator = "seams2023",
+        scenario: str | Path | Simulator = DEFAULT_SCENARIO,
         period_s: float = 2.0,
         reward: Reward | dict[str, float] | None = None,
     ) -> None:
@@ -236,7 +237,7 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
 
     def __init__(
         self,
-        scenario: str | Path | Simulator = "seams2023",
+        scenario: str | Path | Simulator = DEFAULT_SCENARIO,
         period_s: float = 2.0,
         reward: Reward | dict[str, float] | None = None,
         render_mode: str | None = None,
@@ -306,7 +307,7 @@ class PipelineInspectionVector(VectorEnv[Observation, NDArray[np.int64], NDArray
     def __init__(
         self,
         num_envs: int = 1,
-        scenario: str | Path | Simulator = "seams2023",
+        scenario: str | Path | Simulator = DEFAULT_SCENARIO,
         period_s: float = 2.0,
         reward: Reward | dict[str, float] | None = None,
         render_mode: str | None = None,

@@ -13,6 +13,7 @@ from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.managing.simple import NoManager
 from suave_des.metrics.result import MissionMetrics, MissionResult
 from suave_des.monitor.diagnostics import Diagnostic, Kind
+from suave_des.resources import DEFAULT_SCENARIO
 from suave_des.scenario.loader import Replacements, load_scenario
 from suave_des.simulation.simulator import Simulator
 
@@ -61,7 +62,7 @@ class Mission:
 
     def __init__(
         self,
-        scenario: str | Path | Simulator = "seams2023",
+        scenario: str | Path | Simulator = DEFAULT_SCENARIO,
         manager: str | None = None,
         *,
         run: int = 1,

@@ -18,7 +18,7 @@ from suave_des.metrics.result import KnowledgeRecord
 from suave_des.pages.recorded import Recorded, read_recorded
 from suave_des.report.mission_record import MissionRecord, adaptations
 from suave_des.resources import find
-from suave_des.scenario.layers import Files
+from suave_des.scenario.layers import InputFiles
 from suave_des.scenario_knowledge import open_base, read_base
 from suave_des.workbench.knowledge_base import KnowledgeBase
 from suave_des.workbench.reasons.tracing import Derivation
@@ -136,7 +136,7 @@ def _base(mission: Recorded) -> tuple[Ontology, str]:
     if mission.loaded is not None:
         return open_base(mission.loaded), ""
     base = read_base(mission.scenario)
-    files = Files()
+    files = InputFiles()
     for name in (*mission.scenario.knowledge.ontologies, *mission.scenario.knowledge.rules):
         files.ontology(find(name, "ontology"))
     before = {Path(name).name: digest for name, digest in mission.inputs.items()}

@@ -72,7 +72,7 @@ _NAMED_PARTS = (
 )
 
 
-class Files:
+class InputFiles:
     """Reads files and keeps the hash of each, for a manifest.
 
     Attributes:
@@ -110,7 +110,7 @@ def _shown_name(path: Path) -> str:
     return path.as_posix()
 
 
-def scenario_layer(files: Files, path: Path, above: tuple[Path, ...] = ()) -> Layer:
+def scenario_layer(files: InputFiles, path: Path, above: tuple[Path, ...] = ()) -> Layer:
     """Merge a scenario file over its base, with its revision and its vehicle written out in full.
 
     Args:
@@ -161,7 +161,7 @@ def _check_chain(layer: Layer, key_path: KeyPath, chain: tuple[Path, ...]) -> No
         raise layer.error(f"the bases never end: {names}", key_path, "a file must not be its own base")
 
 
-def _with_whole_part(files: Files, layer: Layer, part: _NamedPart, depth: int, *, inherited: bool) -> Layer:
+def _with_whole_part(files: InputFiles, layer: Layer, part: _NamedPart, depth: int, *, inherited: bool) -> Layer:
     """Return the layer with its revision or vehicle in full; differences from an inherited one stay as they are."""
     key = part.key
     if key not in layer.data:
@@ -179,7 +179,7 @@ def _with_whole_part(files: Files, layer: Layer, part: _NamedPart, depth: int, *
 
 
 def _part_layer(
-    files: Files,
+    files: InputFiles,
     named: Layer,
     key_path: KeyPath,
     name: object,

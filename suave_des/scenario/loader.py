@@ -9,19 +9,15 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, Protocol, TypedDict, Unpack
 
-from suave_des.domain import GENERATE_SEARCH_PATH, UNGROUND_MODE
+from suave_des.domain import GENERATE_SEARCH_PATH, MANAGER_GROUP, UNGROUND_MODE
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown
 from suave_des.resources import find
-from suave_des.scenario.layers import Files, find_named, holder_of, scenario_layer
+from suave_des.scenario.layers import InputFiles, find_named, holder_of, scenario_layer
 from suave_des.scenario.models import REASONERS, ManagerSettings, Scenario
 from suave_des.scenario.modes import ModeTable, modes_of
 from suave_des.scenario.problems import validated
 from suave_des.scenario.signal_kinds import SignalTable, TableSignal, read_table
 from suave_des.scenario.yamlfile import Layer, Location
-
-MANAGER_GROUP = "suave_des.managers"
-"""Entry point group in which packages register their managers."""
-
 
 _FILE_NAMES = "return a list of file names as text"
 
@@ -176,12 +172,12 @@ def load_scenario(name: str | Path | LoadedScenario, **replacements: Unpack[Repl
     if reasoner is not None and reasoner not in REASONERS:
         remedy = did_you_mean(reasoner, REASONERS)
         raise InputError(f"there is no reasoner {shown(reasoner)}", place="--reasoner", remedy=remedy)
-    files = Files()
+    files = InputFiles()
     path = find(name, "scenarios")
     return load_layer(files, scenario_layer(files, path), path, **replacements)
 
 
-def load_layer(files: Files, layer: Layer, path: Path, **replacements: Unpack[Replacements]) -> LoadedScenario:
+def load_layer(files: InputFiles, layer: Layer, path: Path, **replacements: Unpack[Replacements]) -> LoadedScenario:
     """Check a scenario that is merged over its base already, and read the other files that it names.
 
     Args:

@@ -143,7 +143,7 @@ class ReactionMetric(Strict):
         return self
 
 
-class Knowledge(Strict):
+class KnowledgeSettings(Strict):
     """The knowledge base."""
 
     ontologies: Annotated[tuple[FileName, ...], Field(min_length=1)] = ("suave.owl",)
@@ -314,7 +314,7 @@ class Scenario(Strict):
     """Mode that the manager none sets for each function; functions that are not listed keep their default."""
     functions: dict[Name, FunctionSettings] = Field(default_factory=dict)
     """User-defined functions, by their name in the modes file."""
-    knowledge: Knowledge = Knowledge()
+    knowledge: KnowledgeSettings = KnowledgeSettings()
     """The knowledge base."""
     managers: ManagerSettings = ManagerSettings()
     """Settings of managing subsystems, by name, including those of managers that are not built in."""

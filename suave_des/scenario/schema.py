@@ -70,7 +70,7 @@ def _partial(schema: Any) -> Any:
 
 def _allow_removal(definitions: dict[str, Any]) -> None:
     """Over a base, a null removes a signal or a replaced value."""
-    for name, key in (("Scenario", "signals"), ("Knowledge", "values")):
+    for name, key in (("Scenario", "signals"), ("KnowledgeSettings", "values")):
         entries = definitions[_PARTIAL + name]["properties"][key]
         names = entries.get("patternProperties", {})
         for pattern, entry in names.items():

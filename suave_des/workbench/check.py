@@ -28,7 +28,7 @@ from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.resources import shipped_folder
 from suave_des.workbench.findings import Finding, Level, finding_about, finding_from, has_level, ordered, relative_path
 from suave_des.workbench.kind_checks import Kinds, misused_properties, mixed_terms
-from suave_des.workbench.mission_checks import measured_attributes, unreported_components, unreported_statuses
+from suave_des.workbench.mission_checks import mismatched_attributes, unreported_components, unreported_statuses
 from suave_des.workbench.model_checks import (
     check_designs,
     check_shapes,
@@ -128,7 +128,7 @@ def check(subject: Subject) -> tuple[Finding, ...]:
             findings += unreported_components(whole, model, sources, subject.reported)
             findings += _unreported_statuses(whole, subject.reported, own, by_path)
         if subject.measured is not None:
-            findings += measured_attributes(whole, model, sources, subject.measured)
+            findings += mismatched_attributes(whole, model, sources, subject.measured)
         for name, sign in assumed.items():
             findings.append(finding_about(name, sources, Level.INFO, assumption(name, sign)))
         if values_are_right:

@@ -13,6 +13,7 @@ from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.limit import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.reasoners import make_reasoner
 from suave_des.knowledge.state import KnowledgeState, Number
+from suave_des.resources import DEFAULT_SCENARIO
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario_knowledge import open_base
 from suave_des.workbench.difference import PolicyDifference, compare_policies
@@ -21,8 +22,6 @@ from suave_des.workbench.policy.space import PolicySpace
 from suave_des.workbench.query import QueryResult, answer, graph_of
 from suave_des.workbench.reasons.explain import Explanation, explain
 from suave_des.workbench.state_input import ManagingSettings, StateBuilder
-
-DEFAULT_SCENARIO = "seams2023"
 
 
 def _several(given: str | Path | Sequence[str | Path]) -> Sequence[str | Path]:

@@ -9,7 +9,7 @@ from suave_des.errors import nearest
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.model import Model
 from suave_des.knowledge.ontology_file import OntologyFile
-from suave_des.knowledge.rdf import C_STATUS, PERFORMANCE, TOMASYS, XSD, Lit, local_name
+from suave_des.knowledge.rdf import C_STATUS, PERFORMANCE, QA_OPERATOR, XSD, Lit, local_name
 from suave_des.knowledge.rules.syntax import COMPARISON_OF, Atom, Rule, Variable
 from suave_des.workbench.findings import Finding, Level, finding_about
 
@@ -49,14 +49,14 @@ def unreported_statuses(content: Content, reported: Collection[str]) -> list[tup
     ]
 
 
-def measured_attributes(
+def mismatched_attributes(
     content: Content, model: Model, sources: Sequence[OntologyFile], measured: Collection[str]
 ) -> Iterator[Finding]:
     """Find quality attributes that missions measure and no ontology has, and those that designs require, unmeasured."""
     for name in sorted(set(measured).difference(model.attributes)):
         message = f"missions measure {name}, but no ontology has a quality attribute type of this name"
         yield Finding(Level.WARN, message, file=str(sources[0].path), remedy=nearest(name, model.attributes))
-    compared = {subject for subject, predicate, _ in content.triples if predicate == TOMASYS + "qa_comparison_operator"}
+    compared = {subject for subject, predicate, _ in content.triples if predicate == QA_OPERATOR}
     required = {name for names in model.estimated.values() for name in names} - {local_name(PERFORMANCE)}
     for name in sorted(required.difference(measured)):
         if model.attributes[name] in compared:

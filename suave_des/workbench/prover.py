@@ -20,12 +20,12 @@ from suave_des.knowledge.rules.rdf import with_triples
 from suave_des.knowledge.rules.syntax import Atom, Named, Rule
 from suave_des.knowledge.state import ContradictionError, Fact, Inference, KnowledgeState
 from suave_des.workbench.policy.cases import PolicyCase
+from suave_des.workbench.reasons.matching import PROBE
 
 if TYPE_CHECKING:
     from suave_des.workbench.knowledge_base import KnowledgeBase
 
-_PROBE: Final = "urn:suave-des:probe"
-_HOLDS: Final = f"{_PROBE}#holds"
+_HOLDS: Final = f"{PROBE}#holds"
 
 Body = tuple[Atom, ...]
 
@@ -168,7 +168,7 @@ class Prover:
         if found is None:
             try:
                 triples = self._infer(situation.assertions(self.base), situation.state)
-                others = (each for each in triples if not each[0].startswith(_PROBE))
+                others = (each for each in triples if not each[0].startswith(PROBE))
                 facts = frozenset(facts_of(others, self.base.names))
                 found = Entailed(facts.difference(self.base.facts, situation.asserted(self.base)), _holding(triples))
             except ContradictionError as error:
@@ -229,4 +229,4 @@ def _holding(triples: frozenset[Triple]) -> frozenset[int]:
 
 
 def _head(number: int) -> Atom:
-    return Atom("data", _HOLDS, (Named(f"{_PROBE}#it"), Lit(str(number), XSD + "string")))
+    return Atom("data", _HOLDS, (Named(f"{PROBE}#it"), Lit(str(number), XSD + "string")))

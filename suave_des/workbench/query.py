@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 import rdflib
@@ -106,7 +107,7 @@ def answer(graph: rdflib.Graph, text: str) -> QueryResult:
         if result.type == "SELECT":
             columns = list(map(str, result.vars or ()))
             if _ALL_VARIABLES.search(text):  # which rdflib returns in any order
-                columns.sort(key=re.findall(r"[?$](\w+)", text).index)
+                columns.sort(key=partial(_first_place, text))
             rows = [tuple(_text(graph, row[name]) for name in columns) for row in result]  # type: ignore
             ordered = "OrderBy" in str(query.algebra)
             return QueryResult(tuple(columns), tuple(rows if ordered else sorted(rows, key=_sortable)))
@@ -116,6 +117,12 @@ def answer(graph: rdflib.Graph, text: str) -> QueryResult:
         raise
     except Exception as error:  # evaluation raises whatever the functions of the query raise
         raise InputError(f"the query cannot be answered: {' '.join(str(error).split())}") from None
+
+
+def _first_place(text: str, variable: str) -> int:
+    """Find where a query first mentions a variable; one that it writes with escapes comes last."""
+    found = re.search(rf"[?$]{re.escape(variable)}(?!\w)", text)
+    return len(text) if found is None else found.start()
 
 
 def _sortable(row: tuple[str | None, ...]) -> tuple[str, ...]:

@@ -30,7 +30,7 @@ from suave_des.knowledge.rdf import RDF as RDF_NS
 from suave_des.knowledge.rdf import RDFS, SWRL, SWRLA, XSD, RdfTriple, local_name
 from suave_des.knowledge.rules.files import read_rule
 from suave_des.knowledge.rules.parser import PREFIXES
-from suave_des.knowledge.rules.rdf import rules_of
+from suave_des.knowledge.rules.rdf import ENABLED, rules_of
 from suave_des.knowledge.rules.syntax import Rule
 
 #: Stands for the file of a rule that was given on the command line.
@@ -39,7 +39,6 @@ _INDENT: Final = "    "
 _TAG: Final = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
 _MARK: Final = re.compile(rb"(<[\w.-]*:?isRuleEnabled\b[^>]*>)[^<]*(?=</)")
 _NAMESPACES: Final = {name: PREFIXES[name] for name in ("rdf", "rdfs", "owl", "swrl", "swrla")}
-_ENABLED: Final = SWRLA + "isRuleEnabled"
 #: In these encodings, markup and references to characters are written in the bytes of ASCII.
 _ENCODINGS: Final = ("UTF-8", "US-ASCII", "ASCII", "ISO-8859-1")
 #: What a file says of a rule: its name, whether it is enabled, its body and head.
@@ -251,21 +250,21 @@ def _rule_xml(rule: Rule, prefixes: Mapping[str, str], declared: Collection[str]
     kinds = {
         **dict.fromkeys(variables, SWRL + "Variable"),
         **{URIRef(atom.predicate): SWRL + "Builtin" for atom in rule.body if atom.kind == "builtin"},
-        URIRef(_ENABLED): str(OWL.AnnotationProperty),
+        ENABLED: str(OWL.AnnotationProperty),
     }
     root = etree.Element(_clark(RDF_NS + "RDF"), nsmap=prefixes)
     for iri, kind in kinds.items():
         if str(iri) not in declared:
             _describe(root, iri, [(iri, RDF.type, URIRef(kind))])
     own = [triple for triple in rule.triples if triple[0] not in variables]
-    _describe(root, rule.node, [(rule.node, URIRef(_ENABLED), _mark(rule.enabled)), *own])
+    _describe(root, rule.node, [(rule.node, ENABLED, _mark(rule.enabled)), *own])
     return _inside(root)
 
 
 def _mark_xml(prefixes: Mapping[str, str], *, enabled: bool) -> bytes:
     """The mark swrla:isRuleEnabled, as a line to insert below the first tag of a rule."""
     root = etree.Element(_DESCRIPTION, nsmap=prefixes)
-    _add_property(root, URIRef(_ENABLED), _mark(enabled))
+    _add_property(root, ENABLED, _mark(enabled))
     return b"\n" + _INDENT.encode() + _inside(root).rstrip()
 
 

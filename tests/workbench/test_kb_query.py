@@ -39,6 +39,12 @@ def test_columns_of_all_variables_are_in_the_order_of_the_query(bench):
     assert found.columns == ("zone", "a", "m", "b", "z1", "c")
 
 
+@pytest.mark.parametrize("name", ["a·b", r"\u0061b"])
+def test_all_variables_may_have_names_of_any_letters(bench, name):
+    found = bench.query(f"SELECT * WHERE {{ ?{name} tomasys:solvesF ?f }}")
+    assert set(found.columns) == {name.replace(r"\u0061", "a"), "f"}
+
+
 def test_no_answer_is_told(command):
     assert command("query", "SELECT ?d WHERE { ?d tomasys:solvsF ?f }")[:2] == (0, "d\nno rows\n")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import importlib
 import os
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
 
 EXIT_AFTER_S = 30.0
 """A mission that is so much over its time, in code that cannot be interrupted, ends its worker."""
-_OUT_OF_MEMORY = 12
 _CAMPAIGNS_KEPT = 4
 """So many campaigns can share a cluster without being prepared anew for each chunk."""
 _MODULES = "modules"
@@ -179,7 +179,7 @@ def run(token: str, here: Mapping[str, str], parcel: bytes, chunk: bytes) -> byt
         finished = _outcomes(token, parcel, chunk, worker.local_directory)
         return pickle.dumps((time.monotonic() - began_s, finished))
     except MemoryError:
-        os._exit(_OUT_OF_MEMORY)  # as if it had been killed for it: a new worker begins with little
+        os._exit(errno.ENOMEM)  # as if it had been killed for it: a new worker begins with little
     except InputError as error:
         if error.file is not None:
             raise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import multiprocessing
 import os
 import signal
@@ -44,8 +45,6 @@ _MARGIN_S = 60.0
 """Added to the time that a chunk's missions may take, such as for starting Java, before its worker is killed."""
 _STOP_TIMEOUT_S = 5.0
 _SAFE_PATH = "PYTHONSAFEPATH"
-_OUT_OF_MEMORY = 12
-"""Exit status of a worker that could not get the memory it asked for (the system's number of that error)."""
 _RUNS_THE_SCRIPT = 10
 """Exit status of a worker in which the script began its campaign anew."""
 _NAME = "suave-des worker"
@@ -377,4 +376,4 @@ def _run(chunk: Chunk) -> list[Finished]:
     try:
         return list(_runner().each(chunk))
     except MemoryError:
-        os._exit(_OUT_OF_MEMORY)  # as if it had been killed for it: a new worker begins with little
+        os._exit(errno.ENOMEM)  # as if it had been killed for it: a new worker begins with little

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from suave_des.cli.options import KnowledgeFiles, Reasoner, key_and_value
+from suave_des.resources import DEFAULT_SCENARIO
 
 if TYPE_CHECKING:
     from suave_des.knowledge.state import KnowledgeState
@@ -53,7 +54,7 @@ ScenarioOption = Annotated[
 class KnowledgeOptions(KnowledgeFiles):
     """Options that name a scenario, ontologies and rules."""
 
-    scenario: ScenarioOption = "seams2023"
+    scenario: ScenarioOption = DEFAULT_SCENARIO
 
     def loaded(self) -> LoadedScenario:
         """Load the scenario, with the ontologies, rules and values that are given."""

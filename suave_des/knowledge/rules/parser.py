@@ -92,9 +92,9 @@ _EXPECTED: Final = (
 #: Signs and words of other languages: what SWRL does not have, if that is so, and what would be right.
 _FOREIGN: Final = (
     (re.compile(r"=>|⇒"), None, "write ->"),
-    (re.compile(r"&&?|(and|AND)\b"), None, "write ^"),
-    (re.compile(r"\|\|?|∨|(or|OR)\b"), "'or'", "write a rule for each case"),
-    (re.compile(r"[¬!~]|(not|NOT)\b"), "negation", "say what holds instead"),
+    (re.compile(r"&&?|(?i:and)\b"), None, "write ^"),
+    (re.compile(r"\|\|?|∨|(?i:or)\b"), "'or'", "write a rule for each case"),
+    (re.compile(r"[¬!~]|(?i:not)\b"), "negation", "say what holds instead"),
     (re.compile(r"[‘’“”']"), None, 'write texts as "text"'),
 )
 _COMPARISON: Final = re.compile(r"(\?[\w-]+)\s*(<=|>=|!=|==?|[<>≤≥≠])")
@@ -178,7 +178,8 @@ def _error(text: str, at: int, accepted: set[str], file: Path | str | None) -> R
     """Describe the token that was found, and those that were expected."""
     before = text[:at].split()[-1:] if len(accepted) == 1 else []
     if before and accepted <= {"_COLON", "_LPAR"} and before[0].lower() in ("and", "or", "not"):
-        at = text.rindex(before[0], 0, at)  # it was taken for a name
+        at = text.rindex(before[0], 0, at)  # it was taken for the name of a rule or of a predicate
+        before, accepted = [], {"_AND", "DISABLED"} if "_COLON" in accepted else {"PREFIXED"}
     place = str(Place(text.count("\n", 0, at) + 1, at - text.rfind("\n", 0, at)))
     lacking, right = _foreign(text, at)
     if lacking is not None:

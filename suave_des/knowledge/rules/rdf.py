@@ -31,7 +31,7 @@ from suave_des.knowledge.rules.writer import distinct_variables, line_of_rule
 
 IMP: Final = URIRef(SWRL + "Imp")
 _VARIABLE: Final = URIRef(SWRL + "Variable")
-_ENABLED: Final = URIRef(SWRLA + "isRuleEnabled")
+ENABLED: Final = URIRef(SWRLA + "isRuleEnabled")
 _PREDICATE_OF: Final = {
     "object": "propertyPredicate",
     "data": "propertyPredicate",
@@ -68,7 +68,7 @@ def _read_rules(path: Path, graph: Graph) -> tuple[Rule, ...]:
                 name=name,
                 text=text,
                 file=path,
-                enabled=str(graph.value(node, _ENABLED)).strip().lower() not in ("false", "0"),
+                enabled=str(graph.value(node, ENABLED)).strip().lower() not in ("false", "0"),
                 node=node,
                 triples=tuple(_closure(graph, node)),
                 body=body,

@@ -21,7 +21,7 @@ from suave_des.scenario.exemplar.files import (
     read_configuration,
 )
 from suave_des.scenario.exemplar.settings import RELEASES, Release, Setting, Settings, release_of, settings_of
-from suave_des.scenario.layers import Files, merge, scenario_layer
+from suave_des.scenario.layers import InputFiles, merge, scenario_layer
 from suave_des.scenario.loader import LoadedScenario, load_layer
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.yamlfile import Layer, Location
@@ -73,7 +73,7 @@ def import_config(files: Sequence[Path], out: Path, options: ImportOptions) -> I
     base_path = find(base, "scenarios")
     if base_path.resolve() == out.resolve():
         raise InputError("cannot be its own base", file=out, remedy="give --out another name")
-    reader = Files()
+    reader = InputFiles()
     below = scenario_layer(reader, base_path, (out,))
     release = _fitting_release(release, below)
     notes = list(configuration.notes)

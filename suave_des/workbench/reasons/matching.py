@@ -26,7 +26,7 @@ Binding = Mapping[str, str | Lit]
 FACT_KINDS: Final = ("class", "object", "data")
 #: Ways to bind variables that are looked at for each number of atoms that fail.
 MOST_WAYS: Final = 20_000
-_PROBE: Final = "urn:suave-des:probe"
+PROBE: Final = "urn:suave-des:probe"
 
 
 def bound(term: Term, binding: Binding) -> str | Lit | None:
@@ -271,8 +271,8 @@ def _inputs(atom: Atom) -> set[str]:
 def _ask_pellet(atom: Atom, *, computes: bool) -> tuple[Lit, ...]:
     """What Pellet computes for the first argument, or one value if the atom holds."""
     result = atom.arguments[0] if computes else Lit("true", XSD + "boolean")
-    head = Atom("data", f"{_PROBE}#value", (Named(f"{_PROBE}#it"), result))
+    head = Atom("data", f"{PROBE}#value", (Named(f"{PROBE}#it"), result))
     rule = with_triples(Rule("probe", "", Path(), True, BNode(), (), (atom,), (head,)))
-    known = ((f"{_PROBE}#it", RDF_TYPE, OWL + "Thing"),)
+    known = ((f"{PROBE}#it", RDF_TYPE, OWL + "Thing"),)
     found = entailed(Content(known, (), (rule,)).n_triples(), [head])
     return tuple(sorted(value for _, _, value in found if isinstance(value, Lit)))

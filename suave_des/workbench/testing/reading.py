@@ -23,7 +23,7 @@ from typing import Any, Final
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown
 from suave_des.knowledge.deliberation import NONE_LEFT, STAYS
 from suave_des.knowledge.state import Fact, KnowledgeState
-from suave_des.resources import find, shipped_folder
+from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
 from suave_des.scenario.loader import Replacements
 from suave_des.scenario.yamlfile import YamlDocument, read_yaml
 from suave_des.workbench.fact_reader import FactReader
@@ -49,7 +49,7 @@ class TestedKnowledge:
         disabled_rules: names of rules to disable.
     """
 
-    scenario: str = "seams2023"
+    scenario: str = DEFAULT_SCENARIO
     ontologies: tuple[Path, ...] = ()
     rules: tuple[Path, ...] = ()
     disabled_rules: tuple[str, ...] = ()
