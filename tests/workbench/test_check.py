@@ -159,8 +159,9 @@ def test_a_built_in_that_never_holds(tmp_path: Path, body: str, argument: str, m
     assert (warning.level, warning.rule, warning.column) == (Level.WARN, "A", rule.index(argument) + 1)
 
 
-def test_regular_expressions_of_java_pass(tmp_path: Path) -> None:
-    findings = found(tmp_path, r'A: c_status(?c, ?s) ^ matches(?s, "\\p{Lu}[A-Z&&[^B]]++") -> Role(?c)')
+@pytest.mark.parametrize("pattern", [r"\\p{Lu}[A-Z&&[^B]]++", "^*F.*", r"F.*\\b?$+"])
+def test_regular_expressions_of_java_pass(tmp_path: Path, pattern: str) -> None:
+    findings = found(tmp_path, f'A: c_status(?c, ?s) ^ matches(?s, "{pattern}") -> Role(?c)')
     assert not any("regular expression" in one.message for one in findings)
 
 

@@ -271,7 +271,9 @@ def _is_broken(pattern: str) -> bool:
             warnings.simplefilter("ignore")  # about what Java has and Python may have one day
             re.compile(pattern)
     except re.error as error:
-        return error.msg.startswith(("unterminated character set", "missing )", "unbalanced", "nothing to repeat"))
+        if error.msg == "nothing to repeat":  # Java repeats anchors, such as ^
+            return pattern[: error.pos][-1:] in ("", "(", "|")
+        return error.msg.startswith(("unterminated character set", "missing )", "unbalanced"))
     return False
 
 
