@@ -63,8 +63,23 @@ class FactReader:
         return subject, predicate, self._value(predicate, value)
 
     def fact(self, text: str) -> Fact:
-        """Read one fact, in the form in which inferences have it."""
-        return fact_of(self.triple(text), self.base.names)
+        """Read one fact, in the form in which inferences have it.
+
+        Raises:
+            InputError: it is not a fact, a name in it is unknown, or it can never follow, for its value.
+        """
+        triple = self.triple(text)
+        _, predicate, value = triple
+        values = self.base.vocabulary.enumerations.get(predicate)
+        if values is not None and isinstance(value, Lit) and value.text not in values:
+            remedy = nearest(value.text, values) or f"one of {', '.join(sorted(values))}"
+            raise InputError(f"{shown(value.text)} is not among the values of {local_name(predicate)}", remedy=remedy)
+        ranges = self.base.vocabulary.ranges.get(predicate)
+        if ranges is not None and isinstance(value, Lit) and value.datatype not in ranges:
+            wanted = " or ".join(sorted(map(local_name, ranges)))
+            problem = f"{shown(value.text)} is not a value of {local_name(predicate)}, whose range is {wanted}"
+            raise InputError(problem, remedy="write true or false" if ranges == {XSD + "boolean"} else None)
+        return fact_of(triple, self.base.names)
 
     def _predicate(self, name: str, kinds: tuple[str, ...]) -> tuple[str, str]:
         vocabulary = self.base.vocabulary

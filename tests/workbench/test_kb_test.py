@@ -166,6 +166,11 @@ def test_rules_of_the_file_are_tested_and_results_are_written_as_junit_xml(tmp_p
         ('- name: x\n  follows: ["fg_stats(fg_spiral_high, IN)"]', "no property 'fg_stats' (did you mean fg_status?)"),
         ('- name: x\n  follows: ["fg_status(fg_spiral_hig, IN)"]', "did you mean fg_spiral_high? or introduce it"),
         ('- name: x\n  follows: ["fg_status(?fg, IN)"]', "has a variable"),
+        (
+            '- name: x\n  follows_not: ["fg_status(fg_spiral_low, IN_EROR_NFR)"]',
+            "'IN_EROR_NFR' is not among the values of fg_status (did you mean IN_ERROR_NFR?)",
+        ),
+        ('- name: x\n  follows_not: ["fd_realisability(fd_spiral_low, False)"]', "whose range is boolean"),
         ("- name: x\n  decides: {f_generate_search_path: fd_spiral_hihg}", "did you mean 'fd_spiral_high'?"),
         ("- name: x\n  decides: {f_search: stays}", "there is no function 'f_search'"),
         ("- name: x\n  contradiction: 1", "1 is neither true nor false"),
