@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from traceback import walk_tb
 from typing import Any
 
 import simpy
@@ -43,10 +44,6 @@ class FunctionContext:
         return self.sender.vehicle.position(self.env.now)
 
 
-class FunctionError(Exception):
-    """An exception raised by a hook of a user-defined function, with the function's name."""
-
-
 class OwnFunction(FunctionNode):
     """Base of user-defined functions: override what happens on activation, deactivation and a change of parameters.
 
@@ -69,17 +66,6 @@ class OwnFunction(FunctionNode):
         super().__init__(context.env)
         self.context = context
 
-    def apply(self, mode: Mode) -> None:
-        """Change to a mode.
-
-        Raises:
-            FunctionError: a hook raised.
-        """
-        try:
-            super().apply(mode)
-        except Exception as error:
-            raise FunctionError(f"function {self.context.name}: {type(error).__name__}: {error}") from error
-
     def configure(self, mode: Mode) -> None:
         """Apply the mode's parameters, `mode.parameters`; also called before an activation."""
 
@@ -88,3 +74,13 @@ class OwnFunction(FunctionNode):
 
     def deactivated(self) -> None:
         """End the function's activity."""
+
+
+def function_that_raised(error: BaseException | None) -> OwnFunction | None:
+    """Find the user-defined function, if any, in whose methods an exception was raised, by its traceback."""
+    while error is not None:
+        for frame, _ in walk_tb(error.__traceback__):
+            if isinstance(owner := frame.f_locals.get("self"), OwnFunction):
+                return owner
+        error = error.__cause__  # SimPy raises a copy of what a process has raised
+    return None

@@ -17,7 +17,7 @@ from suave_des.managed.follow import NO_PATH, FollowPipeline, InspectionPath
 from suave_des.managed.mode_manager import ModeManager
 from suave_des.managed.motion import MaintainMotion
 from suave_des.managed.node import FunctionNode
-from suave_des.managed.own import FunctionContext, OwnFunction
+from suave_des.managed.own import FunctionContext, OwnFunction, function_that_raised
 from suave_des.managed.recharge import GenerateRechargePath
 from suave_des.managed.search import GenerateSearchPath
 from suave_des.managed.surface import Surface
@@ -183,8 +183,14 @@ class MissionRun:
             run(*arguments)
         except SuaveDesError:
             raise
-        except RAISED as error:  # in a process that the manager started by itself
+        except RAISED as error:  # in a user-defined function, or in a process that the manager started by itself
+            if (function := function_that_raised(error)) is not None:
+                raise self._function_error(function.context.name, error) from error
             raise self._host.mission_error(error) from error
+
+    def _function_error(self, name: str, error: BaseException) -> MissionError:
+        cause = f"function {name}: {type(error).__name__}: {error}"
+        return MissionError(self._spec.manager, self._spec.run, self.env.now, cause)
 
     # The parts.
 
@@ -231,8 +237,7 @@ class MissionRun:
             if not hasattr(node, "context"):
                 raise TypeError(f"{function_type.__name__}.__init__ does not begin with super().__init__(context)")
         except RAISED as error:
-            cause = f"function {context.name}: {type(error).__name__}: {error}"
-            raise MissionError(self._spec.manager, self._spec.run, self.env.now, cause) from error
+            raise self._function_error(context.name, error) from error
         return node
 
     def _function_context(self, name: str, sender: SetPointSender) -> FunctionContext:

@@ -55,6 +55,27 @@ class Broken(Lights):
         raise ZeroDivisionError("no lamp")
 
 
+class Flickering(Lights):
+    """Starts a process that raises."""
+
+    def activated(self):
+        self.env.process(self._flicker())
+
+    def _flicker(self):
+        yield self.env.timeout(0.5)
+        raise ZeroDivisionError("no lamp")
+
+
+class Deaf(Lights):
+    """Raises when a diagnostic is published."""
+
+    def activated(self):
+        self.context.bus.subscribe(self._heard)
+
+    def _heard(self, diagnostic):
+        raise ZeroDivisionError("no lamp")
+
+
 class Unmakeable(Lights):
     """Needs a setting that is not there."""
 
@@ -155,9 +176,10 @@ def test_what_is_missing_is_said(fly, text: str, problem: str, remedy: str) -> N
     assert remedy in str(caught.value.remedy)
 
 
-def test_a_hook_that_raises_fails_its_mission_and_names_the_function(fly) -> None:
-    with pytest.raises(MissionError, match="function f_lights: ZeroDivisionError: no lamp"):
-        fly(NAMED.replace("Lights'", "Broken'"))
+@pytest.mark.parametrize("node", ["Broken", "Flickering", "Deaf"])
+def test_what_a_function_raises_fails_its_mission_and_names_the_function(fly, node: str) -> None:
+    with pytest.raises(MissionError, match="s: function f_lights: ZeroDivisionError: no lamp"):
+        fly(NAMED.replace("Lights'", f"{node}'"))
 
 
 @pytest.mark.parametrize(
