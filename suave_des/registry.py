@@ -233,6 +233,7 @@ def _misspelt_hooks(kind: type, root: type, hooks: Collection[str]) -> Iterator[
                 yield each, near[0]
 
 
+@cache
 def is_named_elsewhere(method: str, kind: type) -> bool:
     """Return whether a method's name occurs in its module besides its definition; True if there is no source.
 
