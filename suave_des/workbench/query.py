@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
@@ -12,7 +12,7 @@ import rdflib
 from rdflib.compare import to_canonical_graph
 from rdflib.namespace import RDFS
 
-from suave_des.errors import InputError
+from suave_des.errors import InputError, nearest
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import InProcessPellet
 from suave_des.knowledge.rdf import Triple, n_triple
@@ -20,6 +20,7 @@ from suave_des.knowledge.rules.parser import PREFIXES
 from suave_des.knowledge.state import KnowledgeState
 
 _UNNAMED: Final = re.compile(r"(?<![^\s])_:([A-Za-z0-9]+)(?=\s)")
+_MODEL_NAME: Final = re.compile(r"\b(?:suave|tomasys|mros):\w(?:[\w.-]*\w)?")
 #: SELECT * as the first SELECT.
 _ALL_VARIABLES: Final = re.compile(
     r"\A(?:(?!\bselect\b).)*select(\s+(distinct|reduced))?\s*\*", re.IGNORECASE | re.DOTALL
@@ -34,10 +35,12 @@ class QueryResult:
     Attributes:
         columns: names of the variables; "answer" for ASK; subject, predicate, object for CONSTRUCT and DESCRIBE.
         rows: texts, sorted unless the query orders them; known namespaces as prefixes; None for an unbound variable.
+        unknown: names in the query that the knowledge base does not have, each with the nearest one in parentheses.
     """
 
     columns: tuple[str, ...]
     rows: tuple[tuple[str | None, ...], ...]
+    unknown: tuple[str, ...] = ()
 
 
 def graph_of(base: Ontology, state: KnowledgeState | None, *, inferred: bool) -> rdflib.Graph:
@@ -100,23 +103,32 @@ def answer(graph: rdflib.Graph, text: str) -> QueryResult:
         raise InputError(
             "SERVICE and FROM read from other sources", remedy="remove them: only the knowledge base can be queried"
         )
+    unknown = tuple(_unknown(graph, text))
     try:
         result = graph.query(query)
         if result.type == "ASK":
-            return QueryResult(("answer",), ((str(result.askAnswer).lower(),),))
+            return QueryResult(("answer",), ((str(result.askAnswer).lower(),),), unknown)
         if result.type == "SELECT":
             columns = list(map(str, result.vars or ()))
             if _ALL_VARIABLES.search(text):  # which rdflib returns in any order
                 columns.sort(key=partial(_first_place, text))
             rows = [tuple(_text(graph, row[name]) for name in columns) for row in result]  # type: ignore
             ordered = "OrderBy" in str(query.algebra)
-            return QueryResult(tuple(columns), tuple(rows if ordered else sorted(rows, key=_sortable)))
+            return QueryResult(tuple(columns), tuple(rows if ordered else sorted(rows, key=_sortable)), unknown)
         triples = [tuple(_text(graph, term) for term in triple) for triple in result.graph or ()]
-        return QueryResult(("subject", "predicate", "object"), tuple(sorted(triples, key=_sortable)))
+        return QueryResult(("subject", "predicate", "object"), tuple(sorted(triples, key=_sortable)), unknown)
     except InputError:
         raise
     except Exception as error:  # evaluation raises whatever the functions of the query raise
         raise InputError(f"the query cannot be answered: {' '.join(str(error).split())}") from None
+
+
+def _unknown(graph: rdflib.Graph, text: str) -> Iterator[str]:
+    """Yield the names of the models' namespaces in a query that no triple has, with the nearest one that some has."""
+    known = {str(_text(graph, each)) for each in (*graph.all_nodes(), *graph.predicates())}
+    for name in sorted({*_MODEL_NAME.findall(text)} - known):
+        near = nearest(name, known)
+        yield f"{name} ({near})" if near else name
 
 
 def _first_place(text: str, variable: str) -> int:

@@ -49,6 +49,32 @@ def test_no_answer_is_told(command):
     assert command("query", "SELECT ?d WHERE { ?d tomasys:solvsF ?f }")[:2] == (0, "d\nno rows\n")
 
 
+@pytest.mark.parametrize(
+    ("query", "notes"),
+    [
+        ("SELECT ?d WHERE { ?d tomasys:solvsF ?f }", ["tomasys:solvsF (did you mean tomasys:solvesF?)"]),
+        ("ASK { ?d a tomasys:FunctionDesing }", ["tomasys:FunctionDesing (did you mean tomasys:FunctionDesign?)"]),
+        ("ASK { ?g suave:fg_status 1 FILTER NOT EXISTS { suave:f_x a ?c } }", ["suave:f_x", "suave:fg_status"]),
+        (
+            "SELECT ?d WHERE { ?d tomasys:solvesF/tomasys:fg_stat ?f }",
+            ["tomasys:fg_stat (did you mean tomasys:fg_status?)"],
+        ),
+        ("SELECT ?d WHERE { ?d a tomasys:Wrench }", ["tomasys:Wrench"]),
+        ("SELECT ?d WHERE { ?d tomasys:solvesF ?f . ?d rdfs:seeAlso 2 . ?f a suave:fd_spiral_low. }", []),
+    ],
+)
+def test_names_that_the_knowledge_base_does_not_have_are_noted(bench, query, notes):
+    noted = bench.query(query).unknown
+    assert len(noted) == len(notes)
+    assert all(one.startswith(begin) for one, begin in zip(noted, notes, strict=True))
+
+
+def test_the_command_notes_unknown_names_on_its_error_stream(command):
+    status, answer, noted = command("query", "SELECT ?d WHERE { ?d tomasys:solvsF ?f }")
+    assert (status, answer) == (0, "d\nno rows\n")
+    assert noted == "suave-des: the knowledge base does not have tomasys:solvsF (did you mean tomasys:solvesF?)\n"
+
+
 def test_an_order_that_the_query_wants_is_kept(bench):
     found = bench.query(f"SELECT ?d WHERE {{ ?d tomasys:solvesF suave:{SEARCH} }} ORDER BY DESC(?d)")
     assert [row[0] for row in found.rows] == ["suave:fd_spiral_medium", "suave:fd_spiral_low", "suave:fd_spiral_high"]

@@ -232,6 +232,8 @@ def query(
     late = f"answering the query: not done after {knowledge.time_limit:g} s (allow more with --time-limit)"
     with ends_at_once(knowledge.time_limit, late):
         found = bench.query(text, state, inferred=inferred)
+    for name in found.unknown:
+        errors().print(f"suave-des: the knowledge base does not have {name}")
     if form is TableFormat.JSON:
         print_json([dict(zip(found.columns, row, strict=True)) for row in found.rows])
     elif form is TableFormat.CSV:
