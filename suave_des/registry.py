@@ -20,7 +20,7 @@ from suave_des.managing.base import ManagingSubsystem
 from suave_des.monitor.diagnostics import Kind
 
 if TYPE_CHECKING:
-    from suave_des.managed.own import OwnFunction
+    from suave_des.managed.custom import CustomFunction
 
 _Base = TypeVar("_Base")
 ManagerLike = str | type[ManagingSubsystem]
@@ -252,7 +252,7 @@ def registered_functions() -> tuple[str, ...]:
     return tuple(sorted(_registered(FUNCTION_GROUP)))
 
 
-def function_class(function: str, name: str) -> type[OwnFunction]:
+def function_class(function: str, name: str) -> type[CustomFunction]:
     """Find the class of a user-defined function.
 
     Args:
@@ -260,18 +260,18 @@ def function_class(function: str, name: str) -> type[OwnFunction]:
         name: module:Class, or a registered name.
 
     Raises:
-        InputError: there is no such class, it is no subclass of OwnFunction, or a hook is wrong.
+        InputError: there is no such class, it is no subclass of CustomFunction, or a hook is wrong.
     """
-    from suave_des.managed.own import OwnFunction  # loads the vehicle
+    from suave_des.managed.custom import CustomFunction  # loads the vehicle
 
     target = name if ":" in name else _registered(FUNCTION_GROUP).get(name)
     if target is None:
         hint = did_you_mean(name, registered_functions(), "registered")
         raise InputError(f"function {function}: no package registers {name!r}", remedy=f"{hint}; or give module:Class")
     what = f"function {function}, {name!r}"
-    found = _load(what, target, OwnFunction)
+    found = _load(what, target, CustomFunction)
     if found not in _checked:
-        _check_hooks(what, found, OwnFunction, _FUNCTION_HOOKS)
+        _check_hooks(what, found, CustomFunction, _FUNCTION_HOOKS)
         _checked.add(found)
     return found
 

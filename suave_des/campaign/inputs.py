@@ -15,15 +15,15 @@ from typing import Any
 
 from suave_des import __version__
 from suave_des.campaign.ensemble import read_ensemble, with_ensemble
-from suave_des.campaign.own_modules import own_modules
 from suave_des.campaign.spec import CampaignFile, CampaignSpec
+from suave_des.campaign.user_modules import user_modules
 from suave_des.campaign.variation import Variation, vary
 from suave_des.errors import InputError, shown
 from suave_des.managing.learned import read_file
 from suave_des.registry import is_built_in, is_installed, manager_class, takes_argument
 from suave_des.scenario.layers import InputFiles, sha256_of
 from suave_des.scenario.loader import LoadedScenario, load_scenario
-from suave_des.simulation.functions import own_functions
+from suave_des.simulation.functions import custom_functions
 
 TIME_OUT_S = 120.0
 TIME_OUTS_S = {"owlready2": 1800.0}
@@ -71,14 +71,14 @@ def check_inputs(
 
     Returns:
         SHA-256 of each input file, by its name as shown to the user, or its place among modules: also of ontologies
-        that are imported, if the knowledge base was opened, of the code of functions and managers of one's own, and of
+        that are imported, if the knowledge base was opened, of the code of user-defined functions and managers, and of
         files that managers declare.
 
     Raises:
         InputError: a function has no node; the knowledge base cannot be read, does not fit the mission or the modes
             file, or is inconsistent; a manager refuses the scenario, or a file of it cannot be read.
     """
-    found = own_modules((), own_functions(loaded))
+    found = user_modules((), custom_functions(loaded))
     files = InputFiles()
     if given or any(manager_class(name).needs_knowledge for name in managers):
         from suave_des.knowledge.state import KnowledgeState
@@ -123,7 +123,7 @@ def _modules(managers: Iterable[str]) -> Iterator[tuple[str, Path]]:
             is_package = path.stem == "__init__"
             yield f"{module.replace('.', '/')}{'/__init__' if is_package else ''}{path.suffix}", path
         if path.suffix == ".py":
-            yield from own_modules([manager]).items()
+            yield from user_modules([manager]).items()
 
 
 def default_time_out_s(loaded: LoadedScenario, variation: Variation) -> float:

@@ -15,6 +15,7 @@ from suave_des.knowledge.model import OPERATORS
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import PERFORMANCE, local_name
 from suave_des.knowledge.state import (
+    NO_GROUNDING,
     UNGROUNDED,
     Decision,
     Inference,
@@ -84,7 +85,7 @@ def _decide(ontology: Ontology, inference: Inference, function: str, call: str) 
     left = {design: performance(inference, design) for design, reason in objections.items() if reason is None}
     if not left:
         present = inference.state.grounded(function)
-        kept = f"{present} is kept" if present else "it stays ungrounded"
+        kept = f"{present} is kept" if present else f"it stays {NO_GROUNDING}"
         return Decision(function, None, f"{call}: no function design is left, {kept}", rejected)
     best = min(left, key=lambda design: (-left[design], design))
     reason = f"{call}: highest performance ({_show(left[best])}) among {len(left)} eligible of {len(designs)} designs"

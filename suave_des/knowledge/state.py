@@ -18,6 +18,8 @@ Value = str | bool | Decimal
 Number = Decimal | float | int | str
 #: Status of an objective whose function has no function design in use.
 UNGROUNDED: Final = "UNGROUNDED"
+#: What a record or a table shows in place of a function design where a function has none.
+NO_GROUNDING: Final = "ungrounded"
 #: Beyond this power of ten (floats end at 308) a number is a mistake, and its text would fill the memory.
 MAX_EXPONENT: Final = 400
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from suave_des.clock import Alarm, tick_at_or_after
 from suave_des.domain import Task
-from suave_des.knowledge.state import Decision, Plan
+from suave_des.knowledge.state import NO_GROUNDING, Decision, Plan
 from suave_des.managing.base import ManagedSystem
 
 
@@ -72,7 +72,7 @@ class Adapter:
                     self._log("no_design_left", function, decision)
             elif self._system.change_mode(function, design):
                 grounded[function] = design
-                before = groundings.get(function, "ungrounded")
+                before = groundings.get(function, NO_GROUNDING)
                 if before != design:
                     self._log("adaptation", f"{function}: {before} -> {design}", decision)
         self._without_design = plan.without_design

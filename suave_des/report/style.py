@@ -30,7 +30,7 @@ MODE_COLOURS = {
     "__DEFAULT__": PURPLE,
     "normal": GREEN,
 }
-"""The shipped modes: the higher the search, the darker the blue. A mode of one's own gets one of OTHER_MODES."""
+"""The shipped modes: the higher the search, the darker the blue. A user's mode gets one of OTHER_MODES."""
 MODE_WIDTHS = {"fd_spiral_low": 0.8, "fd_spiral_medium": 1.4, "fd_spiral_high": 2.0, "fd_follow_pipeline": 1.2}
 """Widths of lines, in points: the higher the search, the wider, so that they differ in print without colours, too."""
 OTHER_MODES = (VERMILION, "#6A3D9A", "#B8860B")

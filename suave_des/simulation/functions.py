@@ -11,7 +11,7 @@ from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import Scenario
 
 if TYPE_CHECKING:  # or a process that only hands out missions would load the vehicle
-    from suave_des.managed.own import OwnFunction
+    from suave_des.managed.custom import CustomFunction
 
 
 def built_in_functions(scenario: Scenario) -> tuple[str, ...]:
@@ -20,7 +20,7 @@ def built_in_functions(scenario: Scenario) -> tuple[str, ...]:
     return *MISSION_FUNCTIONS, *recharge, *(() if scenario.leak is None else (SURFACE,))
 
 
-def own_functions(loaded: LoadedScenario) -> dict[str, type[OwnFunction]]:
+def custom_functions(loaded: LoadedScenario) -> dict[str, type[CustomFunction]]:
     """Find the classes of a scenario's further functions, by the name of the function.
 
     They are named under `functions:`; one that a package registers under the function's own name needs no entry.

@@ -12,12 +12,12 @@ from suave_des.clock import advance, stop_at
 from suave_des.compiling import Array
 from suave_des.errors import MissionError, SuaveDesError
 from suave_des.managed.coordinator import MissionCoordinator, MissionTiming
+from suave_des.managed.custom import CustomFunction, FunctionContext, function_that_raised
 from suave_des.managed.detection import PipelineDetector
 from suave_des.managed.follow import NO_PATH, FollowPipeline, InspectionPath
 from suave_des.managed.mode_manager import ModeManager
 from suave_des.managed.motion import MaintainMotion
 from suave_des.managed.node import FunctionNode
-from suave_des.managed.own import FunctionContext, OwnFunction, function_that_raised
 from suave_des.managed.recharge import GenerateRechargePath
 from suave_des.managed.search import GenerateSearchPath
 from suave_des.managed.surface import Surface
@@ -227,11 +227,11 @@ class MissionRun:
         if self._scenario.leak is not None:
             self._surface = Surface(env, make_sender(domain.SURFACE))
             nodes[domain.SURFACE] = self._surface
-        for name, function_type in self._prepared.own_functions.items():
-            nodes[name] = self._make_own_function(function_type, self._function_context(name, make_sender(name)))
+        for name, function_type in self._prepared.custom_functions.items():
+            nodes[name] = self._make_custom_function(function_type, self._function_context(name, make_sender(name)))
         return nodes
 
-    def _make_own_function(self, function_type: type[OwnFunction], context: FunctionContext) -> OwnFunction:
+    def _make_custom_function(self, function_type: type[CustomFunction], context: FunctionContext) -> CustomFunction:
         try:
             node = function_type(context)
             if not hasattr(node, "context"):

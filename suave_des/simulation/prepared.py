@@ -15,7 +15,7 @@ from suave_des.managing.learned import read_learned
 from suave_des.registry import manager_class
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.physical import VehicleDescription
-from suave_des.simulation.functions import own_functions
+from suave_des.simulation.functions import custom_functions
 from suave_des.vehicle.model import Thruster, VehicleModel
 from suave_des.world.pipeline import sample_points, there_and_back
 
@@ -40,7 +40,7 @@ class PreparedScenario:
         self.path = InspectionPath.along(there_and_back(self.points), scenario.revision.follow.altitude_m)
         self.detection_points = self.points + np.array([0.0, 0.0, scenario.revision.monitors.detected_point_height_m])
         self.duration_s = scenario.mission.time_limit_s + scenario.revision.coordinator.limit_check_period_s
-        self.own_functions = own_functions(loaded)
+        self.custom_functions = custom_functions(loaded)
         self.vehicle_model = vehicle_model(scenario.vehicle)
         self.view_tangent = scenario.vehicle.camera.tangent
         self.spare_tracks: list[Array] = []  # to allocate one for each mission would fragment memory

@@ -16,7 +16,7 @@ from suave_des.campaign.executors import dask_worker
 from suave_des.campaign.executors.dask_worker import Parcel, Unpacked, pack
 from suave_des.campaign.executors.mission_runner import MissionRunner
 from suave_des.campaign.missions import Finished, JobSpec, MissionFailure, MissionKey
-from suave_des.campaign.own_modules import own_modules
+from suave_des.campaign.user_modules import user_modules
 from suave_des.campaign.variation import Variation
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.scenario.loader import load_scenario
@@ -64,7 +64,7 @@ class TestOwnModules:
             path = folder / place
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text)
-        found = own_modules(["mine.manager:M", "none", "metacontrol"])
+        found = user_modules(["mine.manager:M", "none", "metacontrol"])
         assert found == {place: folder / place for place in files if place != "mine/not_imported.py"}
 
     def test_a_class_from_another_module_brings_both(self, folder: Path) -> None:
@@ -72,14 +72,14 @@ class TestOwnModules:
         (folder / "behind.py").write_text(
             "from suave_des.managing.simple import NoManager\nclass M(NoManager):\n    pass\n"
         )
-        assert set(own_modules(["facade:M"])) == {"facade.py", "behind.py"}
+        assert set(user_modules(["facade:M"])) == {"facade.py", "behind.py"}
 
     def test_a_script_s_own_class_cannot_travel(self, monkeypatch: pytest.MonkeyPatch) -> None:
         from suave_des.managing.simple import NoManager
 
         monkeypatch.setattr(sys.modules["__main__"], "Mine", NoManager, raising=False)
         with pytest.raises(InputError, match="is defined in a script or a notebook, which workers do not have"):
-            own_modules(["__main__:Mine"])
+            user_modules(["__main__:Mine"])
 
 
 def test_files_that_managers_declare_travel_with_their_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from suave_des.simulation.simulator import Simulator
 
 py_trees = pytest.importorskip("py_trees")
 
-from suave_des.managing.own_trees import PyTreesManager  # noqa: E402
+from suave_des.managing.trees import PyTreesManager  # noqa: E402
 
 SEARCH, FOLLOW = "f_generate_search_path", "f_follow_pipeline"
 

@@ -1,4 +1,4 @@
-"""Managers of one's own, given as module:Class, and what happens when they fail."""
+"""User-defined managers, given as module:Class, and what happens when they fail."""
 
 import pickle
 

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 import suave_des
 from suave_des.campaign.inputs import declared_files, manager_code, scenarios_of, versions
 from suave_des.campaign.missions import Finished, JobSpec, MissionFailure, MissionKey, WorkerError
-from suave_des.campaign.own_modules import own_modules
+from suave_des.campaign.user_modules import user_modules
 from suave_des.errors import InputError, SuaveDesError
 
 if TYPE_CHECKING:
@@ -70,13 +70,13 @@ def pack(job: JobSpec) -> Parcel:
         InputError: a file cannot be read, or a manager is in a module that cannot be sent.
     """
     from suave_des.knowledge.ontology_file import collect
-    from suave_des.simulation.functions import own_functions
+    from suave_des.simulation.functions import custom_functions
 
     ontologies, rules = job.loaded.ontologies, job.loaded.rules
     with suppress(InputError):  # reported by the managers that reason with it, if there are any
         ontologies = tuple(sorted(source.path for source in collect(ontologies)))
     declared = declared_files(scenarios_of(job.loaded, job.variation), job.managers)
-    modules = own_modules(job.managers, own_functions(job.loaded))
+    modules = user_modules(job.managers, custom_functions(job.loaded))
     return Parcel(
         replace(job, loaded=replace(job.loaded, ontologies=ontologies, manager_files=declared)),
         files={str(path): path.read_bytes() for path in (*ontologies, *rules, *declared.values())},

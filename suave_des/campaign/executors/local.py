@@ -23,7 +23,7 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, Self
 
 from suave_des.campaign.missions import Chunk, Finished, JobSpec, MissionKey, WorkerError
-from suave_des.campaign.own_modules import define_in_main, main_classes
+from suave_des.campaign.user_modules import define_in_main, main_classes
 from suave_des.imports import main_hidden
 from suave_des.interrupts import INTERRUPTS, signals_deferred
 from suave_des.registry import is_built_in

@@ -11,7 +11,7 @@ from typing import Final
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.deliberation import NONE_LEFT, STAYS, Conclusion
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.state import ContradictionError, KnowledgeState
+from suave_des.knowledge.state import NO_GROUNDING, ContradictionError, KnowledgeState
 from suave_des.workbench.policy.space import (
     ComponentReports,
     PolicySpace,
@@ -25,7 +25,6 @@ from suave_des.workbench.state_input import LASTING, ManagingSettings
 #: Beyond this many inferences a policy is refused: at a millisecond and a half each it would take ten minutes.
 LARGEST: Final = 400_000
 INCONSISTENT, FLIP_FLOP = "inconsistent", "flip-flop"
-NO_GROUNDING: Final = "ungrounded"
 OnCount = Callable[[int, int], object]
 
 

@@ -10,9 +10,10 @@ from typing import Any
 
 from suave_des.errors import InputError
 from suave_des.knowledge.deliberation import NONE_LEFT, STAYS
+from suave_des.knowledge.state import NO_GROUNDING
 from suave_des.report.figures import check_picture, write_picture
 from suave_des.report.style import MODE_COLOURS, OTHER_MODES, VERMILION, WIDTH_IN, publication
-from suave_des.workbench.policy.cases import FLIP_FLOP, INCONSISTENT, NO_GROUNDING, Policy
+from suave_des.workbench.policy.cases import FLIP_FLOP, INCONSISTENT, Policy
 from suave_des.workbench.policy.table import FunctionTable, TableRow, function_table
 from suave_des.workbench.ranges import ValueRange
 

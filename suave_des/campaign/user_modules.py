@@ -23,14 +23,14 @@ _INSTALLED = (
 _FOLDERS_OF_PACKAGES = ("site-packages", "dist-packages")
 
 
-def own_modules(managers: Iterable[str], functions: Mapping[str, type] = MappingProxyType({})) -> dict[str, Path]:
+def user_modules(managers: Iterable[str], functions: Mapping[str, type] = MappingProxyType({})) -> dict[str, Path]:
     """Files that define managers and functions, and what these import: all that no package manager installed.
 
     Imports are read from the source, so that one inside a function counts too; one by a computed name does not.
 
     Args:
         managers: names, or module:Class.
-        functions: classes of functions of one's own, by the name of the function.
+        functions: classes of user-defined functions, by the name of the function.
 
     Returns:
         Each file by its place below a folder of modules, such as "package/module.py".
@@ -64,7 +64,7 @@ def _add(found: dict[str, Path], module: str) -> None:
     for depth in range(1, len(parts) + 1):
         name = ".".join(parts[:depth])
         spec = _spec(name)
-        if spec is None or not _is_own(spec):
+        if spec is None or not _is_users(spec):
             return
         if not spec.has_location or spec.origin is None:
             continue  # a folder without __init__.py
@@ -91,7 +91,7 @@ def _spec(name: str) -> ModuleSpec | None:
         return None
 
 
-def _is_own(spec: ModuleSpec) -> bool:
+def _is_users(spec: ModuleSpec) -> bool:
     if spec.has_location and spec.origin is not None:
         places = [spec.origin]
     else:

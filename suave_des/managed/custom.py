@@ -44,7 +44,7 @@ class FunctionContext:
         return self.sender.vehicle.position(self.env.now)
 
 
-class OwnFunction(FunctionNode):
+class CustomFunction(FunctionNode):
     """Base of user-defined functions: override what happens on activation, deactivation and a change of parameters.
 
     The hooks are called at the mission time at which a mode takes effect. They must not block; what takes mission time
@@ -54,7 +54,7 @@ class OwnFunction(FunctionNode):
         context: what can be seen and done.
 
     Example:
-        >>> class Lights(OwnFunction):
+        >>> class Lights(CustomFunction):
         ...     def configure(self, mode):
         ...         self.power_w = mode.parameters["power_w"]
         ...
@@ -76,11 +76,11 @@ class OwnFunction(FunctionNode):
         """End the function's activity."""
 
 
-def function_that_raised(error: BaseException | None) -> OwnFunction | None:
+def function_that_raised(error: BaseException | None) -> CustomFunction | None:
     """Find the user-defined function, if any, in whose methods an exception was raised, by its traceback."""
     while error is not None:
         for frame, _ in walk_tb(error.__traceback__):
-            if isinstance(owner := frame.f_locals.get("self"), OwnFunction):
+            if isinstance(owner := frame.f_locals.get("self"), CustomFunction):
                 return owner
         error = error.__cause__  # SimPy raises a copy of what a process has raised
     return None

@@ -1,4 +1,4 @@
-"""Functions of one's own: named in the scenario or registered by a package, needed by tasks, switched by modes."""
+"""User-defined functions: named in the scenario or registered by a package, needed by tasks, switched by modes."""
 
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -7,7 +7,7 @@ import pytest
 
 from suave_des import registry
 from suave_des.errors import InputError, MissionError
-from suave_des.managed.own import OwnFunction
+from suave_des.managed.custom import CustomFunction
 from suave_des.metrics.result import Event, MissionResult
 from suave_des.scenario.loader import load_scenario
 from suave_des.simulation.simulator import Simulator
@@ -32,10 +32,10 @@ modes_file: modes.yaml
 mission: {functions: {search_pipeline: [f_lights]}}
 default_modes: {f_lights: fd_dim}
 """
-NAMED = NEEDED + "functions: {f_lights: {node: 'tests.managed.test_own_functions:Lights', lamps: 2}}\n"
+NAMED = NEEDED + "functions: {f_lights: {node: 'tests.managed.test_custom_functions:Lights', lamps: 2}}\n"
 
 
-class Lights(OwnFunction):
+class Lights(CustomFunction):
     """Notes what happens to it."""
 
     def configure(self, mode):
@@ -134,7 +134,7 @@ def test_the_mission_itself_stays_the_same(fly) -> None:
 
 
 def test_a_package_registers_a_function_under_its_name(fly, monkeypatch: pytest.MonkeyPatch) -> None:
-    point = EntryPoint("f_lights", "tests.managed.test_own_functions:Lights", registry.FUNCTION_GROUP)
+    point = EntryPoint("f_lights", "tests.managed.test_custom_functions:Lights", registry.FUNCTION_GROUP)
     monkeypatch.setattr(registry, "entry_points", lambda group: [point] if group == registry.FUNCTION_GROUP else [])
     registry._registered.cache_clear()
     try:
@@ -148,9 +148,9 @@ def test_a_package_registers_a_function_under_its_name(fly, monkeypatch: pytest.
     [
         (NEEDED, "function f_lights has no node", "name its class: functions: {f_lights: {node: module:Class}}"),
         (NEEDED.replace("[f_lights]", "[f_light]"), "no function f_light, which the mission", "did you mean"),
-        (NAMED.replace("Lights'", "Lamps'"), "no subclass of OwnFunction named 'Lamps'", "suave_des.managed.own"),
+        (NAMED.replace("Lights'", "Lamps'"), "no subclass of CustomFunction named 'Lamps'", "suave_des.managed.custom"),
         (
-            NAMED.replace("tests.managed.test_own_functions:Lights", "lights"),
+            NAMED.replace("tests.managed.test_custom_functions:Lights", "lights"),
             "no package registers 'lights'",
             "module:",
         ),
@@ -195,10 +195,10 @@ def test_what_a_function_raises_fails_its_mission_and_names_the_function(fly, no
 )
 def test_a_wrong_hook_is_bad_input(fly, tmp_path: Path, body: str, words: str) -> None:
     module = f"lights_{tmp_path.name}"
-    text = f"from suave_des.managed.own import OwnFunction\n\n\nclass Lights(OwnFunction):\n    {body}\n"
+    text = f"from suave_des.managed.custom import CustomFunction\n\n\nclass Lights(CustomFunction):\n    {body}\n"
     (tmp_path / f"{module}.py").write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=words):
-        fly(NAMED.replace("tests.managed.test_own_functions", module))
+        fly(NAMED.replace("tests.managed.test_custom_functions", module))
 
 
 @pytest.mark.parametrize(
