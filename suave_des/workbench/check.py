@@ -58,6 +58,7 @@ class Subject:
         values: replaces the hasValue of named QAvalue individuals.
         shapes: files of SHACL shapes, in addition to the shipped ones.
         modes: names of the modes by function; None skips the checks against them.
+        effects: what modes do, by function and mode: one that does the same as one with a function design needs none.
         needed: functions that the mission cannot do without.
         operators: qa_comparison_operator that the revision assumes of quality attribute types that have none, by name.
         reported: the statuses that the simulation reports, by component; None: that is not checked.
@@ -71,6 +72,7 @@ class Subject:
     values: Mapping[str, Decimal] = field(default_factory=dict)
     shapes: Sequence[Path] = ()
     modes: Mapping[str, Collection[str]] | None = None
+    effects: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     needed: Collection[str] = ()
     operators: Mapping[str, str] = field(default_factory=dict)
     reported: Mapping[str, Collection[str]] | None = None
@@ -122,7 +124,7 @@ def check(subject: Subject) -> tuple[Finding, ...]:
         own = {path.resolve() for path in (*given, *subject.rules)}
         findings += _dead_rules(whole, model, own, by_path)
         findings += misused_properties(whole, Kinds(whole, model), sources)
-        findings += check_designs(whole, model, sources, subject.modes, subject.needed)
+        findings += check_designs(whole, model, sources, subject.modes, subject.needed, subject.effects)
         findings += unused_individuals(whole, model, sources)
         if subject.reported is not None:
             findings += unreported_components(whole, model, sources, subject.reported)

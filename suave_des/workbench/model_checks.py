@@ -101,6 +101,7 @@ def check_designs(
     sources: Sequence[OntologyFile],
     modes: Mapping[str, Collection[str]] | None,
     required: Collection[str],
+    effects: Mapping[str, Mapping[str, object]],
 ) -> Iterator[Finding]:
     """Check that functions have designs, and designs have modes.
 
@@ -110,6 +111,7 @@ def check_designs(
         sources: the files that they come from.
         modes: names of the modes by function; None: modes are not checked.
         required: functions that the mission cannot do without.
+        effects: what modes do, by function and mode.
     """
     designs: dict[str, set[str]] = {name: set() for name in model.functions}
     functions = {iri: name for name, iri in model.functions.items()}
@@ -136,7 +138,13 @@ def check_designs(
                 yield finding_about(design, sources, level, message, remedy)
             for mode in sorted(spare):
                 message = f"mode {mode} of {name} has no function design, so it is never chosen"
-                yield finding_about(name, sources, Level.WARN, message)
+                does = effects.get(name, {})
+                # Nothing is lost if another mode does the same, as with those that only behaviour trees set.
+                same = [
+                    each for each in sorted(solving | {UNGROUND_MODE}) if mode in does and does.get(each) == does[mode]
+                ]
+                use = f"mode {same[0]} does the same" if same else None
+                yield finding_about(name, sources, Level.INFO if same else Level.WARN, message, use)
 
 
 def designs_without_performance(content: Content, model: Model, sources: Sequence[OntologyFile]) -> Iterator[Finding]:

@@ -343,6 +343,32 @@ def test_a_rule_as_text_that_takes_the_place_of_another_is_told(tmp_path: Path) 
     assert not [one for one in findings if "replaces the rule of this name" in one.message]
 
 
+def test_a_mode_without_a_design_is_noted_only_if_another_does_the_same(tmp_path: Path) -> None:
+    modes = {"f_follow_pipeline": ["fd_follow_pipeline", "fd_unground", "fd_fast", "normal", "off"]}
+    effects = {
+        "f_follow_pipeline": {
+            "fd_follow_pipeline": 1,
+            "fd_unground": 0,
+            "fd_old": 2,
+            "normal": 1,
+            "off": 0,
+            "fd_fast": 2,
+        }
+    }
+    findings = found(tmp_path, modes=modes, effects=effects)
+    assert only(findings, "mode fd_fast of f_follow_pipeline has no function design").level is Level.WARN
+    for name, same in (("normal", "fd_follow_pipeline"), ("off", "fd_unground")):
+        one = only(findings, f"mode {name} of f_follow_pipeline has no function design")
+        assert (one.level, one.remedy) == (Level.INFO, f"mode {same} does the same")
+
+
+@pytest.mark.parametrize("scenario", ["seams2023", "release15", "extended", "planta_exp1", "paper_table_values"])
+def test_shipped_scenarios_have_no_warning(scenario: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["kb", "check", "--scenario", scenario, "--fail-on", "warn"])
+    assert not ended.value.code, capsys.readouterr().out
+
+
 def test_a_design_whose_name_is_nearly_that_of_a_mode(tmp_path: Path) -> None:
     findings = found(tmp_path, modes={"f_follow_pipeline": ["fd_folow_pipeline"]})
     assert only(findings, "fd_follow_pipeline has no mode").remedy == "did you mean fd_folow_pipeline?"

@@ -74,6 +74,10 @@ def check(
             values={name: Decimal(repr(value)) for name, value in loaded.scenario.knowledge.values.items()},
             shapes=shapes or (),
             modes={name: loaded.modes.modes(name) for name in loaded.modes.functions},
+            effects={
+                name: {mode: (each.active, each.parameters) for mode, each in modes.items()}
+                for name, modes in loaded.modes.table.items()
+            },
             needed=MISSION_FUNCTIONS,
             reported=REPORTED_STATUSES,
             measured=ManagingSettings.of(loaded.scenario).measured,
