@@ -78,7 +78,7 @@ def paired(ours: pandas.Series[float], theirs: pandas.Series[float]) -> dict[str
     """Estimate the mean of ours - theirs over the runs that both have.
 
     Returns:
-        n, mean_difference, low95 and high95 (BCa bootstrap), and first_difference, over the first runs.
+        n, mean_difference, low95 and high95 (Student's t), and first_difference, over the first runs.
     """
     difference = (ours - theirs).dropna()
     found = mean_interval(difference.to_numpy(float))

@@ -215,8 +215,9 @@ def conclude(rows: pandas.DataFrame) -> str:
     ideal_difference = apart["ideal_adapted_s"] - apart["ideal_fixed_s"]
     same = int((np.sign(ideal_difference) == np.sign(apart["mean_difference"])).sum())
     sentences.append(
-        f"- Of the {len(apart)} differences that are not chance, {same} have the same sign for a vehicle that is at"
-        " each set-point at once and decides without delay."
+        f"- Of the {len(apart)} differences whose 95% intervals do not contain 0, {same} have the same sign for a"
+        f" vehicle that is at each set-point at once and decides without delay. The {len(every)} intervals are not"
+        " corrected for their number."
     )
     return "\n".join(sentences)
 

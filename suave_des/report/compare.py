@@ -268,8 +268,11 @@ def _difference(
         return found
     is_share = metric.name == FOUND and first.is_of_missions and second.is_of_missions
     if pairing.is_paired:
-        difference = statistics.student_interval(x - y) if is_share else statistics.mean_interval(x - y)
-        tested = statistics.paired_shares_test(x > 0.0, y > 0.0) if is_share else statistics.signed_rank_test(x, y)
+        if is_share:
+            difference = statistics.paired_share_difference(x > 0.0, y > 0.0)
+            tested = statistics.paired_shares_test(x > 0.0, y > 0.0)
+        else:
+            difference, tested = statistics.mean_interval(x - y), statistics.signed_rank_test(x, y)
     elif is_share:
         counts = (int(x.sum()), len(x)), (int(y.sum()), len(y))
         difference, tested = statistics.share_difference(*counts), statistics.shares_test(*counts)
@@ -284,11 +287,13 @@ def _with_sizes(found: Difference, x: Sample, y: Sample, half_width: float) -> D
     if min(len(x), len(y)) < 2 or half_width <= 0.0:
         return found
     apart = float(x.var(ddof=1) + y.var(ddof=1))
+    if apart == 0.0:  # equal values say nothing about the spread of others
+        return found
     unpaired = statistics.runs_for(math.sqrt(apart), half_width)
     if not found.pairing.is_paired:
         return replace(found, runs_needed=RunsNeeded(half_width, None, unpaired))
     together = float((x - y).var(ddof=1))
-    paired = statistics.runs_for(math.sqrt(together), half_width)
+    paired = statistics.runs_for(math.sqrt(together), half_width) if together > 0.0 else None
     ratio = apart / together if together > 0.0 else None
     return replace(found, variance_ratio=ratio, runs_needed=RunsNeeded(half_width, paired, unpaired))
 

@@ -138,6 +138,7 @@ def _notes(groups: Sequence[Group], averaged: Sequence[str], frame: pandas.DataF
         yield f"the missions are of different scenarios: {', '.join(scenarios)}"
     few = min(len(group.frame) for group in groups)
     if few < 20:
-        yield f"the fewest runs of one of them are {few}: intervals from fewer than 20 are rough"
+        rough = "intervals and numbers of runs needed from fewer than 20 are rough"
+        yield f"the fewest runs of one of them are {few}: {rough}"
     if any(math.isnan(float(group.frame["pipeline_found"].mean())) for group in groups):
         yield "some files do not say which missions found the pipeline"

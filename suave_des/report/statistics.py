@@ -1,7 +1,6 @@
 """Statistics of a comparison, from SciPy, statsmodels and lifelines, in the form in which tables use them.
 
-A sample is a float array of shape (n,) without missing values. Intervals are 95% intervals. Resampling is seeded, so
-that equal samples give equal intervals.
+A sample is a float array of shape (n,) without missing values. Intervals are 95% intervals.
 """
 
 from __future__ import annotations
@@ -27,13 +26,9 @@ Statistic = Callable[..., NDArray[np.float64]]
 EXTRA = "compare"
 """The extra that installs statsmodels and lifelines."""
 SIGNIFICANCE = 0.05
-BCA, STUDENT, WILSON, NEWCOMBE = "BCa bootstrap", "Student's t", "Wilson", "Newcombe"
-_LARGEST_BOOTSTRAP = 5_000
-"""Of more values the interval of the mean is Student's: it agrees with the bootstrap's then, and takes no time."""
-RESAMPLES, _FEWER_RESAMPLES, _MANY_VALUES = 9_999, 1_999, 1_000
-_BATCH_VALUES = 1_000_000
-"""Resampled values in memory at a time."""
-_SEED = 20230209
+STUDENT, WELCH = "Student's t", "Welch's t"
+WILSON, NEWCOMBE, BONETT_PRICE = "Wilson", "Newcombe", "Bonett and Price"
+RESAMPLES = 9_999
 _MOST_RUNS = 10_000_000
 _ROUNDING = 1e-9
 """A share left of one half is often a little more after rounding."""
@@ -62,16 +57,11 @@ class Estimated:
 
 
 def mean_interval(sample: Sample) -> Estimated:
-    """Estimate the mean of a sample of one value or more, with its BCa interval (Efron 1987)."""
-    if len(sample) > _LARGEST_BOOTSTRAP:
-        return student_interval(sample)
-    return Estimated(math.fsum(sample) / len(sample), _bca(lambda x, axis: x.mean(axis=axis), sample), BCA)
+    """Estimate the mean of a sample of one value or more, with its interval by Student's t.
 
-
-def student_interval(sample: Sample) -> Estimated:
-    """Estimate the mean of a sample with its interval by Student's t.
-
-    It serves for differences of shares in pairs, too: few of them are not 0, so that a bootstrap is too narrow.
+    Differences of runs in pairs have heavy tails: most are small, a few are not, and a small sample has none of these.
+    A bootstrap, which knows nothing but the sample, is too narrow then. Where the values are all equal there is no
+    interval, because nothing is known of their spread.
     """
     found = estimate(sample.tolist())
     assert found.mean is not None
@@ -79,45 +69,29 @@ def student_interval(sample: Sample) -> Estimated:
 
 
 def difference_interval(first: Sample, second: Sample) -> Estimated:
-    """Estimate the difference of two independent samples' means, first - second, with its BCa interval."""
+    """Estimate the difference of two independent samples' means, first - second, with its interval by Welch (1947)."""
+    from scipy.stats import ttest_ind
+
     difference = math.fsum(first) / len(first) - math.fsum(second) / len(second)
-    if max(len(first), len(second)) > _LARGEST_BOOTSTRAP:
-        from scipy.stats import ttest_ind
-
-        if min(len(first), len(second)) < 2:
-            return Estimated(difference)
+    if min(len(first), len(second)) < 2 or np.ptp(first) == np.ptp(second) == 0.0:
+        return Estimated(difference)
+    with _quiet():  # of a sample without spread
         welch = ttest_ind(first, second, equal_var=False).confidence_interval(CONFIDENCE)
-        return Estimated(difference, _finite(welch.low, welch.high), STUDENT)
-    interval = _bca(lambda x, y, axis: x.mean(axis=axis) - y.mean(axis=axis), first, second)
-    return Estimated(difference, interval, BCA)
-
-
-def _bca(statistic: Statistic, *samples: Sample) -> Interval | None:
-    """Return the BCa interval; none for samples of one value, or without spread."""
-    if all(np.ptp(sample) == 0.0 for sample in samples):
-        return None
-    largest = max(map(len, samples))
-    resamples = RESAMPLES if largest <= _MANY_VALUES else _FEWER_RESAMPLES
-    batch = max(1, _BATCH_VALUES // largest)
-    return bootstrap_interval(statistic, samples, "BCa", np.random.default_rng(_SEED), resamples, batch)
+    return Estimated(difference, _finite(welch.low, welch.high), WELCH)
 
 
 def bootstrap_interval(
     statistic: Statistic,
     samples: Sequence[Sample],
-    method: Literal["BCa", "percentile"],
     rng: np.random.Generator,
-    resamples: int = RESAMPLES,
     batch: int | None = None,
 ) -> Interval | None:
-    """Return the bootstrap interval of a statistic of one sample or of several independent ones.
+    """Return the percentile bootstrap interval of a statistic of one sample or of several independent ones.
 
     Args:
         statistic: takes arrays of shape (k, n) and an axis.
         samples: are resampled with replacement.
-        method: as of scipy.stats.bootstrap.
         rng: to resample with.
-        resamples: how many.
         batch: resamples at a time, so that memory stays small.
 
     Returns:
@@ -132,11 +106,11 @@ def bootstrap_interval(
         found = bootstrap(
             samples,
             statistic,
-            n_resamples=resamples,
+            n_resamples=RESAMPLES,
             batch=batch,
             vectorized=True,
             confidence_level=CONFIDENCE,
-            method=method,
+            method="percentile",
             rng=rng,
         )
     if not np.isfinite(found.bootstrap_distribution).all():
@@ -168,6 +142,20 @@ def share_difference(first: tuple[int, int], second: tuple[int, int]) -> Estimat
         *first, *second, method="newcomb", compare="diff", alpha=1.0 - CONFIDENCE
     )
     return Estimated(first[0] / first[1] - second[0] / second[1], _finite(low, high), NEWCOMBE)
+
+
+def paired_share_difference(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> Estimated:
+    """Estimate the difference of two shares of the same runs, with its interval by Bonett and Price (2012).
+
+    It is Wald's with a run more of each kind in which the two differ, so that there is one if no run differs, too.
+    """
+    from scipy.special import ndtri
+
+    n = len(first)
+    change = first.astype(float) - second.astype(float)
+    extended = np.append(change, (1.0, -1.0))
+    middle, half = float(extended.mean()), float(ndtri((1.0 + CONFIDENCE) / 2.0) * extended.std()) / math.sqrt(n + 2)
+    return Estimated(math.fsum(change) / n, (max(-1.0, middle - half), min(1.0, middle + half)), BONETT_PRICE)
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,27 +31,14 @@ class SampleTest(NamedTuple):
     p: float
 
 
-def difference_interval(published: Sample, simulated: Sample, rng: np.random.Generator) -> Interval | None:
-    """95% percentile bootstrap interval of simulated - published mean; none for a sample of one value.
-
-    Both samples are resampled independently and with replacement (Efron and Tibshirani 1993, chapters 13 and 16).
-    """
-    return bootstrap_interval(
-        lambda x, y, axis: y.mean(axis=axis) - x.mean(axis=axis),
-        (published, simulated),
-        "percentile",
-        rng,
-        batch=_BATCH,
-    )
-
-
 def ratio_interval(published: Sample, simulated: Sample, rng: np.random.Generator) -> Interval | None:
-    """95% percentile bootstrap interval of simulated / published standard deviation; as difference_interval.
+    """95% percentile bootstrap interval of simulated / published standard deviation.
 
-    None, too, where a resample of the published values has no spread to divide by.
+    Both samples are resampled independently and with replacement (Efron and Tibshirani 1993, chapters 13 and 16). None
+    for a sample of one value, or where a resample of the published values has no spread to divide by.
     """
     return bootstrap_interval(
-        lambda x, y, axis: _std(y, axis) / _std(x, axis), (published, simulated), "percentile", rng, batch=_BATCH
+        lambda x, y, axis: _std(y, axis) / _std(x, axis), (published, simulated), rng, batch=_BATCH
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from suave_des.estimates import Estimate, Interval, estimate
 from suave_des.report.compared_metrics import KNOWN
-from suave_des.report.statistics import SIGNIFICANCE, Sample
+from suave_des.report.statistics import SIGNIFICANCE, Sample, difference_interval
 from suave_des.streams import Streams
 from suave_des.validation.conditions import (
     CONDITION,
@@ -37,7 +37,6 @@ from suave_des.validation.statistics import (
     agreement,
     anderson_darling,
     conclude,
-    difference_interval,
     kolmogorov_smirnov,
     ratio_interval,
     superiority,
@@ -64,7 +63,7 @@ class SampleComparison:
         published: estimates from the published sample, with 95% intervals.
         simulated: estimates from the simulated sample.
         difference: simulated - published mean, in the metric's unit.
-        difference_interval: its 95% bootstrap interval; none for a sample of one.
+        difference_interval: its 95% interval by Welch's t; none for a sample of one.
         std_ratio: simulated / published standard deviation; none where either is missing or the latter is zero.
         std_ratio_interval: its 95% bootstrap interval; none likewise.
         kolmogorov_smirnov: two-sample test.
@@ -283,7 +282,7 @@ def _compare_samples(
         theirs,
         ours,
         ours.mean - theirs.mean,
-        difference_interval(published, simulated, rng),
+        difference_interval(simulated, published).interval,
         ours.std / theirs.std if ours.std is not None and theirs.std else None,
         ratio_interval(published, simulated, rng),
         kolmogorov_smirnov(published, simulated),

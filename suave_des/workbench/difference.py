@@ -222,7 +222,7 @@ class PairedDifference:
         metric: column of runs.csv.
         one, other: means.
         difference: mean of other - one, run by run.
-        interval: its 95% interval (BCa bootstrap); None where no mission differs, or there is one.
+        interval: its 95% interval (Student's t); None where no mission differs, or there is one.
         changed: number of missions in which the metric differs.
     """
 

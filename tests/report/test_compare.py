@@ -160,9 +160,13 @@ class TestCampaign:
         assert found.tested is not None and found.difference is not None
         assert found.tested.p == pytest.approx(stats.wilcoxon(times["bt"], times["metacontrol"]).pvalue, abs=1e-12)
         assert found.difference.value == pytest.approx((times["bt"] - times["metacontrol"]).mean())
+        low, high = stats.ttest_rel(times["bt"], times["metacontrol"]).confidence_interval()
+        assert found.difference.interval == pytest.approx((low, high))
         apart = difference(compare_folders([campaign], Choices(unpaired=True)), "bt", "metacontrol")
         assert apart.tested is not None and apart.difference is not None
         assert apart.tested.p == pytest.approx(stats.mannwhitneyu(times["bt"], times["metacontrol"]).pvalue, abs=1e-12)
+        welch = stats.ttest_ind(times["bt"], times["metacontrol"], equal_var=False).confidence_interval()
+        assert apart.difference.interval == pytest.approx((welch.low, welch.high))
 
     def test_the_runs_needed_give_that_interval(self, campaign: Path) -> None:
         times = pandas.read_csv(campaign / "runs.csv").pivot(index="run", columns="manager", values="search_time_s")
@@ -243,6 +247,13 @@ class TestFewValues:
         assert found.mean is not None
         assert (found.mean.value, found.mean.interval, found.std) == (100.0, None, None)
         assert not any(each.is_significant for each in comparison.differences)
+
+    def test_equal_values_do_not_say_how_many_runs_are_needed(self) -> None:
+        found = difference(compare_frame(runs(a=[100.0] * 4, b=[120.0] * 4)), "a", "b", "pipeline_found")
+        assert found.runs_needed is None
+        assert found.difference is not None and found.difference.interval is not None
+        low, high = found.difference.interval
+        assert -1.0 <= low < 0.0 < high <= 1.0
 
     def test_missions_that_all_never_found_the_pipeline_have_no_median(self) -> None:
         comparison = compare_frame(runs(a=[300.0] * 25, b=[300.0] * 25))

@@ -20,7 +20,6 @@ from suave_des.report.campaign_figures import (
 )
 from suave_des.report.grouping import grouped
 from suave_des.report.result_files import missions_of
-from suave_des.report.statistics import student_interval
 
 
 def _times_s(n: int) -> np.ndarray:
@@ -84,9 +83,3 @@ def test_a_legend_of_long_names_stays_within_the_figure() -> None:
         box = figure.legends[0].get_window_extent()
         assert box.x0 >= 0.0
         assert box.x1 <= figure.bbox.x1
-
-
-def test_the_interval_of_many_values_is_that_of_the_estimates() -> None:
-    values = _times_s(6_000)
-    found, expected = student_interval(values), estimate(values.tolist())
-    assert (found.value, found.interval) == (expected.mean, expected.mean_interval)

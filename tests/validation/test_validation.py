@@ -113,7 +113,7 @@ def test_the_result_repeats_with_its_seed_and_ignores_the_other_managers(publish
     assert alone.samples == tuple(cell for cell in good.samples if cell.manager == "none")
     assert alone.pairs == ()
     other = validate(published, like_published, ("none",), seed=2)
-    assert other.samples[0].difference_interval != alone.samples[0].difference_interval
+    assert other.samples[0].std_ratio_interval != alone.samples[0].std_ratio_interval
 
 
 def test_what_cannot_be_judged_from_few_missions_is_not_met_and_says_so(published):
