@@ -1,17 +1,24 @@
 """Opens the knowledge base of a scenario, and checks that it fits the mission and the modes file."""
 
+from __future__ import annotations
+
 from collections.abc import Collection, Hashable, Sequence
 from decimal import Decimal
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
+from suave_des.domain import BATTERY_LEVEL, MISSION_FUNCTIONS
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.deliberation import Deliberation
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.reasoners import make_reasoner
+from suave_des.monitor.diagnostics import REPORTED_STATUSES
 from suave_des.resources import find
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import Scenario
+
+if TYPE_CHECKING:
+    from suave_des.knowledge.checks.static import Subject
 
 OPENED: Final = 4
 _opened: dict[Hashable, Deliberation] = {}
@@ -55,11 +62,42 @@ def read_base(
     texts = [find(each, "ontology") for each in knowledge.rules] if rules is None else rules
     return Ontology.load(
         named,
-        values={name: Decimal(repr(value)) for name, value in knowledge.values.items()},
+        values=_values(scenario),
         rules=[*texts, *more_rules],
         disabled_rules=[*knowledge.disabled_rules, *disabled_rules],
         operators=scenario.revision.comparison_operators,
     )
+
+
+def measured_attributes(scenario: Scenario) -> tuple[str, ...]:
+    """Return the quality attributes that a scenario's monitors measure, sorted."""
+    return tuple(sorted({*scenario.signals, *(() if scenario.battery is None else (BATTERY_LEVEL,))}))
+
+
+def subject_of(loaded: LoadedScenario) -> Subject:
+    """Return what `kb check` checks of a scenario: its knowledge base, and what missions have to do with it."""
+    from suave_des.knowledge.checks.static import Subject  # which missions do not need
+
+    knowledge = loaded.scenario.knowledge
+    return Subject(
+        ontologies=loaded.ontologies,
+        rules=loaded.rules,
+        disabled_rules=knowledge.disabled_rules,
+        values=_values(loaded.scenario),
+        modes={name: loaded.modes.modes(name) for name in loaded.modes.functions},
+        effects={
+            name: {mode: (each.active, each.parameters) for mode, each in modes.items()}
+            for name, modes in loaded.modes.table.items()
+        },
+        needed=MISSION_FUNCTIONS,
+        operators=loaded.scenario.revision.comparison_operators,
+        reported=REPORTED_STATUSES,
+        measured=measured_attributes(loaded.scenario),
+    )
+
+
+def _values(scenario: Scenario) -> dict[str, Decimal]:
+    return {name: Decimal(repr(value)) for name, value in scenario.knowledge.values.items()}
 
 
 def open_knowledge(loaded: LoadedScenario) -> Deliberation:

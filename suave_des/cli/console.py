@@ -5,10 +5,11 @@ Only characters that the terminal has reach it, and no control characters from f
 from __future__ import annotations
 
 import codecs
+import logging
 import os
 import sys
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
@@ -106,11 +107,18 @@ def errors() -> Console:
     return PlainConsole(stderr=True)
 
 
-def progress(label: str, *, quiet: bool) -> AbstractContextManager[OnProgress | None]:
-    """Show the progress of a campaign on standard error, unless `quiet`."""
+@contextmanager
+def progress(label: str, *, quiet: bool) -> Iterator[OnProgress | None]:
+    """Show the progress of a campaign on standard error, and warnings about its knowledge base, unless `quiet`."""
     from suave_des.campaign.display import shown
 
-    return shown(label, errors(), quiet=quiet)
+    logger = logging.getLogger("suave_des.mistakes")
+    logger.disabled = quiet
+    try:
+        with shown(label, errors(), quiet=quiet) as show:
+            yield show
+    finally:
+        logger.disabled = False
 
 
 @contextmanager

@@ -75,7 +75,7 @@ TimeOut = Annotated[
 ManagersInData = Annotated[
     str | None, typer.Option("--managers", metavar="NAME,...", help="Managers to compare; by default all in the data.")
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress, and no warnings about rules and ontologies.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace results of the same kind in the output folder.")]
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from suave_des.campaign.knowledge_records import CAMPAIGN_KNOWLEDGE_FILE, KNOWLEDGE_FILE, read_knowledge, read_missions
-from suave_des.domain import BATTERY_LEVEL, GENERATE_SEARCH_PATH, MAINTAIN_MOTION
+from suave_des.domain import GENERATE_SEARCH_PATH, MAINTAIN_MOTION
 from suave_des.errors import InputError, KeyPath, KnowledgeError, did_you_mean, nearest, shown
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.planning import calls
@@ -19,6 +19,7 @@ from suave_des.knowledge.state import UNGROUNDED, KnowledgeState, ObjectiveState
 from suave_des.metrics.result import KnowledgeRecord
 from suave_des.scenario.models import Scenario
 from suave_des.scenario.yamlfile import read_yaml
+from suave_des.scenario_knowledge import measured_attributes
 
 #: Functions that every task of the mission asks for.
 LASTING: Final = (MAINTAIN_MOTION,)
@@ -52,11 +53,10 @@ class ManagingSettings:
     def of(cls, scenario: Scenario) -> ManagingSettings:
         """Read the settings of a scenario's revision."""
         revision = scenario.revision.metacontrol
-        battery = (BATTERY_LEVEL,) if scenario.battery is not None else ()
         return cls(
             improves_exceeded=revision.search_improves_when_exceeded,
             always_improved=frozenset({GENERATE_SEARCH_PATH} if revision.search_always_improves else ()),
-            measured=tuple(sorted({*scenario.signals, *battery})),
+            measured=measured_attributes(scenario),
         )
 
     def objective(self, function: str, design: str | None, status: str | None = None) -> ObjectiveState:

@@ -14,12 +14,12 @@ import pytest
 from suave_des.cli.main import main
 from suave_des.domain import THRUSTER_NAMES
 from suave_des.errors import InputError, KnowledgeError
+from suave_des.knowledge.checks.findings import Finding, Level, folded, has_level
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import InProcessPellet
 from suave_des.monitor.diagnostics import REPORTED_STATUSES
 from suave_des.resources import shipped_folder
 from suave_des.workbench.check import MAX_STATES, Subject, check, combined, simple_states
-from suave_des.workbench.findings import Finding, Level, folded, has_level
 from tests.helpers.exemplar_files import write_as_owlready2_saves_it
 
 SUAVE = "http://www.metacontrol.org/suave#"

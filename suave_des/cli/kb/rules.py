@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from decimal import Decimal
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -57,34 +57,13 @@ def check(
 
     Exit status: 0 no findings at the level of --fail-on or above; 1 such findings; 2 something cannot be read.
     """
-    from suave_des.domain import MISSION_FUNCTIONS
-    from suave_des.monitor.diagnostics import REPORTED_STATUSES
+    from suave_des.knowledge.checks.findings import Level, folded, has_level, summary
     from suave_des.scenario.loader import load_scenario
-    from suave_des.workbench.check import Subject
+    from suave_des.scenario_knowledge import subject_of
     from suave_des.workbench.check import check as run_checks
-    from suave_des.workbench.findings import Level, folded, has_level, summary
-    from suave_des.workbench.state_input import ManagingSettings
 
     loaded = load_scenario(sources.scenario, **(sources.replacements | {"modes_file": modes}))
-    findings = run_checks(
-        Subject(
-            ontologies=loaded.ontologies,
-            rules=loaded.rules,
-            disabled_rules=loaded.scenario.knowledge.disabled_rules,
-            values={name: Decimal(repr(value)) for name, value in loaded.scenario.knowledge.values.items()},
-            shapes=shapes or (),
-            modes={name: loaded.modes.modes(name) for name in loaded.modes.functions},
-            effects={
-                name: {mode: (each.active, each.parameters) for mode, each in modes.items()}
-                for name, modes in loaded.modes.table.items()
-            },
-            needed=MISSION_FUNCTIONS,
-            reported=REPORTED_STATUSES,
-            measured=ManagingSettings.of(loaded.scenario).measured,
-            operators=loaded.scenario.revision.comparison_operators,
-            time_limit_s=time_limit,
-        )
-    )
+    findings = run_checks(replace(subject_of(loaded), shapes=shapes or (), time_limit_s=time_limit))
     shown = findings if verbose else folded(findings, shipped_folder("ontology"))
     if form is FindingsFormat.JSON:
         print_json(findings)

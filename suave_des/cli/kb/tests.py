@@ -240,7 +240,7 @@ def _run(console: Console, suites: Iterable[Suite], select: str | None) -> list[
 
 
 def _place(file: Path, line: int | None = None) -> str:
-    from suave_des.workbench.findings import relative_path
+    from suave_des.knowledge.checks.findings import relative_path
 
     shipped = shipped_folder("ontology")
     if file.is_relative_to(shipped):

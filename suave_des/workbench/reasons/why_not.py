@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.knowledge.checks.model import no_estimate, unmeasured_rules
 from suave_des.knowledge.content import with_rules
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.limit import TimeLimit
@@ -22,7 +23,6 @@ from suave_des.knowledge.rules.writer import write_atom
 from suave_des.knowledge.state import ContradictionError, Fact, KnowledgeState, Value, value_text
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario_knowledge import open_base
-from suave_des.workbench.model_checks import no_estimate, unmeasured_rules
 from suave_des.workbench.prover import Prover, Situation
 from suave_des.workbench.reasons.atom_failure import describe_failure
 from suave_des.workbench.reasons.matching import (

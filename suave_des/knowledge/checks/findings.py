@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 
@@ -84,12 +84,13 @@ def finding_about(
 
 
 def ordered(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Sort findings by severity, the worst first, then by place, and drop duplicates."""
+    """Sort findings by severity, the worst first, then by place; drop duplicates, and shorten paths."""
 
     def key(one: Finding) -> tuple[object, ...]:
         return _SEVERITY[one.level], one.file or "", one.line or 0, one.rule or "", one.column or 0, str(one)
 
-    return tuple(sorted(dict.fromkeys(findings), key=key))
+    shortened = (replace(one, file=relative_path(one.file) if one.file else None) for one in findings)
+    return tuple(sorted(dict.fromkeys(shortened), key=key))
 
 
 def has_level(findings: Sequence[Finding], least: Level) -> bool:

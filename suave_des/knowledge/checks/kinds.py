@@ -10,12 +10,12 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import Final
 
+from suave_des.knowledge.checks.findings import Finding, Level, finding_about
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.model import Model
 from suave_des.knowledge.ontology_file import OntologyFile
 from suave_des.knowledge.rdf import OWL, RDF_TYPE, RDFS, TOMASYS, Lit, local_name, memberships, reached
 from suave_des.knowledge.rules.syntax import Atom, Named, Rule, Term, Variable
-from suave_des.workbench.findings import Finding, Level, finding_about
 
 #: Classes of which nothing is a member of two, unless an ontology or a rule says so.
 _KINDS: Final = frozenset(

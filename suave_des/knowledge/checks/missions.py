@@ -6,12 +6,12 @@ from collections.abc import Collection, Iterator, Sequence
 from typing import Final
 
 from suave_des.errors import nearest
+from suave_des.knowledge.checks.findings import Finding, Level, finding_about
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.model import Model
 from suave_des.knowledge.ontology_file import OntologyFile
 from suave_des.knowledge.rdf import C_STATUS, PERFORMANCE, QA_OPERATOR, XSD, Lit, local_name
 from suave_des.knowledge.rules.syntax import COMPARISON_OF, Atom, Rule, Variable
-from suave_des.workbench.findings import Finding, Level, finding_about
 
 _EQUAL: Final = COMPARISON_OF["="]
 

@@ -1,0 +1,116 @@
+"""Check the rules of a knowledge base together: where they come from, and what they can match."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+from itertools import chain
+from pathlib import Path
+
+from suave_des.knowledge.checks.findings import Finding, Level, finding_from, relative_path
+from suave_des.knowledge.checks.kinds import Kinds, mixed_terms
+from suave_des.knowledge.checks.missions import unreported_statuses
+from suave_des.knowledge.checks.model import dead_rules, no_estimate, undeclared_differences, unmeasured_rules
+from suave_des.knowledge.content import Content
+from suave_des.knowledge.model import Model
+from suave_des.knowledge.ontology_file import OntologyFile
+from suave_des.knowledge.rules.checks import check_rule
+from suave_des.knowledge.rules.files import RulesFile
+from suave_des.knowledge.rules.names import Vocabulary
+from suave_des.knowledge.rules.syntax import Place, Rule
+from suave_des.knowledge.rules.writer import write_atom
+
+
+def rules_from_text(file: RulesFile, vocabulary: Vocabulary, findings: list[Finding]) -> list[Rule]:
+    """The rules of a file whose names are all known; the others, and syntax errors, become findings."""
+    findings += map(finding_from, file.parsed.errors)
+    rules = []
+    for name, rule in file.looked_up(vocabulary):
+        if isinstance(rule, Rule):
+            rules.append(rule)
+        else:
+            findings.append(replace(finding_from(rule), rule=name))
+    return rules
+
+
+def rule_problems(content: Content, vocabulary: Vocabulary, sources: Mapping[Path, OntologyFile]) -> Iterator[Finding]:
+    """Find what is wrong with each rule by itself, and rules that share a name."""
+    names = Counter(rule.name for rule in content.rules)
+    for rule in content.rules:
+        if names[rule.name] > 1:
+            yield _about(rule, sources, Level.WARN, f"{names[rule.name]} rules have this name", "rename one")
+        for problem in check_rule(rule, vocabulary):
+            if rule.enabled:
+                level, message = Level.ERROR if problem.is_fatal else Level.WARN, problem.message
+            else:
+                level, message = Level.INFO, f"switched off; {problem.message}"
+            yield _about(rule, sources, level, message, problem.remedy, problem.place)
+
+
+def replacing_rules(rules: Sequence[Rule], groups: Sequence[Sequence[Rule]]) -> Iterator[Finding]:
+    """Find the rules as text that replace a different rule of the same name."""
+    before = {rule.name: rule for rule in rules}
+    for group in groups:
+        for rule in group:
+            old = before.get(rule.name)
+            if old is not None and (old.text, old.enabled) != (rule.text, rule.enabled):
+                message = f"replaces the rule of this name in {relative_path(old.file)}"
+                yield _about(rule, {}, Level.WARN, message, "give it a different name, unless this is intended")
+        before |= {rule.name: rule for rule in group}
+
+
+def rules_that_cannot_fire(
+    content: Content, model: Model, given: Collection[Path], sources: Mapping[Path, OntologyFile]
+) -> Iterator[Finding]:
+    """Find the rules that cannot, or hardly can, fire: notes for imported ontologies, with rules for many models."""
+    dead = [(rule, atom, f"{write_atom(atom)} holds in no state", "") for rule, atom in dead_rules(content, model)]
+    known = {id(rule) for rule, *_ in dead}
+    for rule, atom, attribute in unmeasured_rules(content, model):
+        if id(rule) not in known:
+            dead.append((rule, atom, *no_estimate(attribute)))
+    found = [(rule, atom, f"can never fire: {message}", remedy) for rule, atom, message, remedy in dead]
+    found += mixed_terms(content, Kinds(content, model))
+    for rule, atom in undeclared_differences(content):
+        message = f"{write_atom(atom)} needs individuals that are declared different; different names are not enough"
+        found.append((rule, atom, message, "add owl:AllDifferent to the ontology (Protégé: Different Individuals)"))
+    for rule, atom, message, remedy in found:
+        level = Level.WARN if rule.file.resolve() in given else Level.INFO
+        yield _about(rule, sources, level, message, remedy or None, atom.place())
+
+
+def misspelt_statuses(
+    content: Content,
+    reported: Mapping[str, Collection[str]],
+    given: Collection[Path],
+    sources: Mapping[Path, OntologyFile],
+) -> Iterator[Finding]:
+    """Find the rules that ask for a component's status that nothing reports: a warning where it is misspelt."""
+    known = sorted({*chain.from_iterable(reported.values())})
+    for rule, atom, status in unreported_statuses(content, known):
+        if rule.file.resolve() in given:
+            meant = next((each for each in known if each.casefold() == status.casefold()), None)
+            meant = meant or next(iter(get_close_matches(status, known)), None)
+            level, remedy = Level.WARN, f'did you mean "{meant}"?'
+            if meant is None:
+                texts = ", ".join(f'"{each}"' for each in known)
+                level, remedy = Level.INFO, f"reported are {texts}; a function of your own can report others"
+            message = f'nothing in the simulation reports c_status "{status}"'
+            yield _about(rule, sources, level, message, remedy, atom.place(1))
+
+
+def _about(
+    rule: Rule,
+    sources: Mapping[Path, OntologyFile],
+    level: Level,
+    message: str,
+    remedy: str | None = None,
+    at: Place | None = None,
+) -> Finding:
+    """Make a finding about a rule, with the line where it begins, or where an atom of it is."""
+    if rule.place is None:
+        line = sources[rule.file].line_of_rule(rule.name) if rule.file in sources else None
+    else:
+        line = int(rule.place.removeprefix("line ")) if at is None else at.line
+    return Finding(level, message, str(rule.file), line, rule.name, at.column if at else None, remedy)

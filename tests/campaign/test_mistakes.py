@@ -1,0 +1,112 @@
+"""What `kb check` finds without a reasoner is told before missions run, once, on standard error."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+import pytest
+
+from suave_des import run_campaign
+from suave_des.campaign.mistakes import LOGGER, SHOWN
+from suave_des.resources import shipped_folder
+from tests.helpers.command import command_here, suave_des_command
+
+STATUS = 'nothing in the simulation reports c_status "False" (did you mean "FALSE"?)'
+
+
+@pytest.fixture(autouse=True)
+def told_nothing_yet(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("suave_des.campaign.mistakes._told", set())
+
+
+@pytest.fixture
+def wrong_rule(tmp_path: Path) -> str:
+    (tmp_path / "mine.swrl").write_text('Late: c_status(?c, "False") -> Role(?c)\n', encoding="utf-8")
+    return "mine.swrl"
+
+
+def campaign(tmp_path: Path, *options: str, scenario: str = "seams2023", managers: str = "none") -> None:
+    """Run a campaign of one run; what it tells is logged, which goes to standard error outside tests."""
+    (tmp_path / "out").mkdir()
+    arguments = ("campaign", scenario, "--runs", "1", "--managers", managers, "--workers", "1", "--out", "out")
+    done = command_here(*arguments, *options, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_mistaken_rule_is_told_in_the_words_of_kb_check(
+    tmp_path: Path, wrong_rule: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    campaign(tmp_path, "--rules", wrong_rule)
+    finding, pointer = caplog.messages
+    assert finding == f"WARN   mine.swrl: line 1, rule Late, column 20: {STATUS}"
+    assert finding in command_here("kb", "check", "--rules", wrong_rule, cwd=tmp_path).stdout.splitlines()
+    assert "suave-des kb check" in pointer
+
+
+def test_it_is_told_on_standard_error(tmp_path: Path, wrong_rule: str) -> None:
+    ran = suave_des_command("run", "seams2023", "--rules", wrong_rule, "--manager", "none", cwd=tmp_path)
+    assert STATUS in ran.stderr
+    assert "c_status" not in ran.stdout
+
+
+def test_it_changes_no_result(tmp_path: Path, wrong_rule: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    campaign(tmp_path, "--rules", wrong_rule, managers="metacontrol")
+    first = (tmp_path / "out" / "runs.csv").read_bytes()
+    monkeypatch.setattr("suave_des.campaign.mistakes.tell_mistakes", lambda *_: None)
+    (tmp_path / "out").rename(tmp_path / "before")
+    campaign(tmp_path, "--rules", wrong_rule, managers="metacontrol")
+    assert (tmp_path / "out" / "runs.csv").read_bytes() == first
+
+
+def test_quiet_campaigns_do_not_tell(tmp_path: Path, wrong_rule: str, caplog: pytest.LogCaptureFixture) -> None:
+    campaign(tmp_path, "--rules", wrong_rule, "--quiet")
+    assert not caplog.messages
+    assert not logging.getLogger(LOGGER).disabled
+
+
+def test_a_measured_attribute_that_is_misspelt(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    scenario = "base: seams2023\nname: mine\nsignals:\n  water_visiblity: {kind: constant, value: 2.0}\n"
+    (tmp_path / "mine.yaml").write_text(scenario, encoding="utf-8")
+    campaign(tmp_path, scenario="mine.yaml", managers="metacontrol")
+    assert "missions measure water_visiblity" in caplog.messages[0]
+
+
+def test_nothing_is_told_of_files_without_mistakes(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    (tmp_path / "right.swrl").write_text('Late: c_status(?c, "FALSE") -> Role(?c)\n', encoding="utf-8")
+    campaign(tmp_path, "--rules", "right.swrl")
+    assert not caplog.messages
+
+
+@pytest.mark.parametrize("scenario", ["seams2023", "extended"])
+def test_shipped_files_are_not_even_checked(scenario: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("suave_des.campaign.mistakes.static_findings", lambda *_: pytest.fail("checked"))
+    campaign(tmp_path, scenario=scenario, managers="metacontrol")
+
+
+def test_scripts_are_told_once_of_the_same_files(
+    tmp_path: Path, wrong_rule: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    for _ in range(2):
+        run_campaign("seams2023", "none", 1, rules=[tmp_path / wrong_rule])
+    assert [STATUS in message for message in caplog.messages] == [True, False]
+
+
+def test_many_mistakes_are_counted(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    rules = "".join(f'L{number}: c_status(?c, "False") -> Role(?c)\n' for number in range(SHOWN + 4))
+    (tmp_path / "mine.swrl").write_text(rules, encoding="utf-8")
+    campaign(tmp_path, "--rules", "mine.swrl")
+    *findings, last = caplog.messages
+    assert len(findings) == SHOWN
+    assert last.startswith("note: 4 more; ")
+
+
+def test_an_ontology_of_ones_own(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
+    design = "http://www.metacontrol.org/suave#fd_spare"
+    kind = "http://metacontrol.org/tomasys#FunctionDesgn"
+    extra = f'<owl:NamedIndividual rdf:about="{design}"><rdf:type rdf:resource="{kind}"/></owl:NamedIndividual>'
+    (tmp_path / "mine.owl").write_text(text.replace("</rdf:RDF>", extra + "</rdf:RDF>"), encoding="utf-8")
+    campaign(tmp_path, "--ontology", "mine.owl", managers="metacontrol")
+    assert caplog.messages[0].startswith("ERROR  mine.owl: line")
+    assert "fd_spare: class FunctionDesgn is not defined (did you mean FunctionDesign?)" in caplog.messages[0]
