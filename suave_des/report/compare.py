@@ -16,6 +16,7 @@ import pandas
 from suave_des.errors import InputError, did_you_mean, shown
 from suave_des.estimates import interval_columns
 from suave_des.report import statistics
+from suave_des.report.caveats import caveats
 from suave_des.report.compared_metrics import FOUND, SEARCH_TIME, ComparedMetric, chosen_metrics, parse_half_widths
 from suave_des.report.conclusions import conclusion, overall_conclusion
 from suave_des.report.grouping import Group, grouped, time_limit_s
@@ -224,7 +225,8 @@ def compare(missions: Missions, choices: Choices | None = None) -> Comparison:
     means = {(each.group, each.metric): each.mean.value for each in summaries if each.mean is not None}
     differences = [replace(each, conclusion=conclusion(each, known[each.metric])) for each in differences]
     sentence = overall_conclusion(metrics[0], differences, means, [group.name for group in groups])
-    return Comparison(sentence, summaries, tuple(differences), (*missions.notes, *notes), metrics)
+    notes = [*missions.notes, *notes, *caveats(groups, metrics)]
+    return Comparison(sentence, summaries, tuple(differences), tuple(notes), metrics)
 
 
 def _pairs(names: list[str], against: str | None) -> list[tuple[str, str]]:

@@ -114,6 +114,7 @@ def latex_text(comparison: Comparison) -> str:
     metrics = [each for each in comparison.metrics if each.name in PAPER_METRICS] or list(comparison.metrics)
     lines = [
         r"% needs \usepackage{booktabs}",
+        *(f"% Note: {note}." for note in comparison.notes),
         r"\begin{table}",
         r"  \centering",
         rf"  \caption{{{_latex(_sizes(comparison))}}}",

@@ -105,7 +105,15 @@ _METRICS = (
     ),
     ComparedMetric("adaptations", "adaptations", "", 0, "adapts {} times less than", "adapts {} times more than"),
     ComparedMetric("mission_duration_s", "mission duration", "s"),
-    ComparedMetric("detection_time_s", "time of the first sight", "s", -1),
+    ComparedMetric(
+        "detection_time_s",
+        "time of the first sight",
+        "s",
+        -1,
+        "first sees the pipeline {} sooner than",
+        "first sees the pipeline {} later than",
+        "first sees the pipeline soonest",
+    ),
 )
 _DEFAULTS = (SEARCH_TIME, "distance_inspected_m", FOUND, "mean_reaction_time_s")
 KNOWN = {metric.name: metric for metric in _METRICS}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from suave_des.errors import number_of
 from suave_des.estimates import interval_text
 from suave_des.report.compared_metrics import FOUND, ComparedMetric
 from suave_des.report.statistics import FISHER, MANN_WHITNEY, MCNEMAR, WILCOXON
@@ -13,15 +14,31 @@ if TYPE_CHECKING:
     from suave_des.report.compare import Difference
 
 
+_MOST_SENTENCES = 3
+"""Of a metric of which neither more nor less is better, in the conclusion from all differences."""
+
+
 def conclusion(found: Difference, metric: ComparedMetric) -> str:
-    """Write the conclusion from one difference."""
+    """Write the conclusion from one difference.
+
+    The test is one of ranks, the difference one of means: what only one of them shows is not said of the other.
+    """
     if found.difference is None or found.tested is None or found.p_holm is None:
         return f"{found.first} and {found.second} cannot be compared in {metric.title}: one of them has no value."
-    evidence = f"{_interval(found, metric)}{_basis(found)}, {p_text(found.p_holm)}"
+    test = f"{_basis(found)}, {p_text(found.p_holm)}"
     if not found.is_significant:
-        return f"No difference in {metric.title} is shown between {found.first} and {found.second} ({evidence})."
-    claim = difference_claim(found, metric)
+        text = f"No difference in {metric.title} is shown between {found.first} and {found.second}"
+        if not _contains_0(found):
+            text += " by the test, though the interval of the mean, which is not corrected, does not contain 0"
+        return f"{text} ({_mean_of(found, metric)}{_interval(found, metric)}{test})."
     ranks = _direction_of_ranks(found)
+    if ranks and _contains_0(found):
+        return (
+            f"By ranks, {_rank_claim(found, metric, ranks)} ({test.removeprefix('; ')}), but no"
+            f" difference of the means is shown ({_mean_of(found, metric)}{_interval(found, metric)})."
+        )
+    claim = difference_claim(found, metric)
+    evidence = f"{_interval(found, metric)}{test}"
     if ranks * found.difference.value < 0.0:
         greater = found.first if ranks > 0 else found.second
         return (
@@ -29,6 +46,34 @@ def conclusion(found: Difference, metric: ComparedMetric) -> str:
             " the distributions differ in shape, so look at them."
         )
     return f"{claim} ({evidence})."
+
+
+def _rank_claim(found: Difference, metric: ComparedMetric, ranks: float) -> str:
+    """Write which manager mostly has more or less in single runs, the better one first."""
+    greater, less = (found.first, found.second) if ranks > 0.0 else (found.second, found.first)
+    if metric.better < 0:
+        return f"{less} {metric.less.format('mostly')} {greater}"
+    if metric.better > 0:
+        return f"{greater} {metric.more.format('mostly')} {less}"
+    return f"{greater} mostly exceeds {less} in {metric.title}"
+
+
+def _mean_of(found: Difference, metric: ComparedMetric) -> str:
+    """Write the difference with its sign, and with what it is the difference of."""
+    assert found.difference is not None
+    return f"{found.first} - {found.second}: {metric.amount(found.difference.value)}, "
+
+
+def _contains_0(found: Difference) -> bool:
+    """Whether the interval of the difference contains 0, or there is none."""
+    assert found.difference is not None
+    low, high = found.difference.interval or (0.0, 0.0)
+    return low <= 0.0 <= high
+
+
+def _is_claimed(found: Difference) -> bool:
+    """Whether a difference of the means may be claimed."""
+    return found.is_significant and not (_contains_0(found) and _direction_of_ranks(found))
 
 
 def difference_claim(found: Difference, metric: ComparedMetric) -> str:
@@ -59,14 +104,31 @@ def overall_conclusion(
     if not own or len(known) < 2:
         return f"No two of them have a {metric.title} that could be compared."
     if not metric.better:
-        return " ".join(each.conclusion or conclusion(each, metric) for each in own[:1])
+        return " ".join(each.conclusion or conclusion(each, metric) for each in own[:_MOST_SENTENCES])
     best = max(known, key=lambda name: metric.better * known[name])
     against = [each for each in own if best in (each.first, each.second)]
-    shown = [each for each in against if each.is_significant]
+    shown = [each for each in against if _is_claimed(each) and _favours(each, best, metric)]
     open_ones = [_other(each, best) for each in against if not each.is_significant]
-    if not shown:
-        rest = _listed(open_ones)
-        return f"No difference in {metric.title} is shown between {best}, which has the best mean, and {rest}."
+    others = [conclusion(each, metric) for each in against if each.is_significant and each not in shown]
+    sentences = []
+    if shown:
+        sentences.append(_claims(best, metric, shown, open_ones))
+    elif open_ones:
+        has_best = "has" if list(known.values()).count(known[best]) == 1 else "has, with others,"
+        is_shown = f"No difference in {metric.title} is shown between {best}, which {has_best} the best mean,"
+        sentences.append(f"{is_shown} and {_listed(open_ones)}.")
+    return " ".join([*sentences, *others])
+
+
+def _favours(found: Difference, name: str, metric: ComparedMetric) -> bool:
+    """Whether a group is the better one in the runs that are compared, which need not be all that have a mean."""
+    assert found.difference is not None
+    sign = 1.0 if found.first == name else -1.0
+    return sign * metric.better * found.difference.value > 0.0
+
+
+def _claims(best: str, metric: ComparedMetric, shown: Sequence[Difference], open_ones: Sequence[str]) -> str:
+    """Write by how much the best is better than those from which it differs, and from which it does not."""
     parts = []
     for each in shown:
         assert each.difference is not None
@@ -97,7 +159,7 @@ def _interval(found: Difference, metric: ComparedMetric) -> str:
     if found.difference.interval is None:
         return "no interval"
     low, high = found.difference.interval
-    if found.difference.value < 0.0 and found.is_significant:
+    if found.difference.value < 0.0 and _is_claimed(found):
         low, high = -high, -low
     scale, decimals = (100.0, 1) if metric.name == FOUND else (1.0, metric.decimals)
     return f"95% interval {interval_text((scale * low, scale * high), f'.{decimals}f')}"
@@ -106,7 +168,7 @@ def _interval(found: Difference, metric: ComparedMetric) -> str:
 def _basis(found: Difference) -> str:
     names = {WILCOXON: "Wilcoxon", MANN_WHITNEY: "Mann-Whitney", FISHER: "Fisher", MCNEMAR: "McNemar"}
     assert found.tested is not None
-    pairing = f"{found.n[0]} pairs" if found.pairing.is_paired else "not paired"
+    pairing = number_of(found.n[0], "pair") if found.pairing.is_paired else "not paired"
     return f"; {pairing}, {names[found.tested.name]}"
 
 

@@ -280,6 +280,70 @@ def test_a_significant_difference_of_ranks_against_that_of_means_is_told() -> No
     assert "the distributions differ in shape" in found.conclusion
 
 
+class TestConclusions:
+    """What a sentence claims is what the figures beside it show."""
+
+    def test_ranks_alone_are_not_said_of_means(self) -> None:
+        a = np.random.default_rng(1).normal(100.0, 5.0, 60)
+        b = np.where(np.arange(60) < 6, a + 60.0, a - 5.0)
+        comparison = compare_frame(runs(a=list(a), b=list(b)), Choices(metrics=["search_time_s"]))
+        (found,) = comparison.differences
+        assert found.is_significant and found.difference is not None and found.difference.interval is not None
+        assert found.difference.interval[0] < 0.0 < found.difference.interval[1]
+        assert found.conclusion.startswith(
+            "By ranks, b finds the pipeline mostly sooner than a (60 pairs, Wilcoxon, p < 0.001)"
+        )
+        assert "no difference of the means is shown (a - b: " in found.conclusion
+        assert comparison.conclusion == found.conclusion
+
+    def test_the_best_mean_of_all_runs_is_not_called_better_where_its_pairs_are_worse(self) -> None:
+        chance = np.random.default_rng(1)
+        hard = chance.normal(200.0, 5.0, 20)  # b has only these runs, and is sooner in each
+        frame = runs(a=[*hard, *chance.normal(80.0, 5.0, 80)], b=list(hard - chance.normal(10.0, 1.0, 20)))
+        assert compare_frame(frame).conclusion.startswith("b finds the pipeline")
+
+    def test_an_interval_without_0_and_no_significance_are_both_told(self) -> None:
+        frame = runs(a=[100.0, 101.0, 102.0, 103.0], b=[150.0, 151.5, 152.0, 153.0])
+        found = difference(compare_frame(frame), "a", "b")
+        assert not found.is_significant
+        assert "does not contain 0 (a - b: -50.12 s, 95% interval -50.5" in found.conclusion
+
+    def test_one_pair_and_equal_means_are_named_so(self) -> None:
+        comparison = compare_frame(runs(a=[100.0], b=[100.0]))
+        assert "; 1 pair, Wilcoxon" in comparison.differences[0].conclusion
+        assert "which has, with others, the best mean" in comparison.conclusion
+
+    def test_the_time_of_the_first_sight_has_a_sentence(self) -> None:
+        a = list(np.linspace(90.0, 120.0, 30))
+        frame = runs(a=a, b=[each + 5.0 + each / 50.0 for each in a])
+        frame["detection_time_s"] = frame["search_time_s"]
+        found = compare_frame(frame, Choices(metrics=["detection_time_s"]))
+        assert found.conclusion.startswith("a first sees the pipeline soonest: 7.10 s sooner than b (95% interval")
+
+
+class TestCaveats:
+    """Missions that never found the pipeline, or have no value, are told of."""
+
+    def test_their_search_time_and_their_number_are_told(self) -> None:
+        notes = compare_frame(runs(a=[100.0, 300.0, 120.0], b=[90.0, 95.0, 110.0])).notes
+        (note,) = (each for each in notes if "never found" in each)
+        assert "(a 1 of 3) is the time at which they ended" in note
+        frame = runs(a=[100.0, 300.0, 120.0], b=[90.0, 95.0, 110.0])
+        assert f"% Note: {note}.\n" in latex_text(compare_frame(frame))
+
+    def test_limits_that_differ_are_told(self) -> None:
+        frame = runs(a=[100.0, 300.0, 120.0], b=[90.0, 95.0, 300.0])
+        frame.loc[(frame["manager"] == "b") & ~frame["pipeline_found"], "search_time_s"] = 400.0
+        notes = compare_frame(frame).notes
+        assert any("ended at different times (a after 300 s, b after 400 s)" in each for each in notes)
+
+    def test_missions_that_are_left_out_are_told(self) -> None:
+        frame = runs(a=[100.0, 110.0, 120.0], b=[90.0, 95.0, 110.0])
+        frame["mean_reaction_time_s"] = [1.0, float("nan"), 1.2, 0.5, 0.6, 0.7]
+        notes = compare_frame(frame).notes
+        assert any("without a mean reaction time (a 1 of 3) are left out" in each for each in notes)
+
+
 @pytest.mark.parametrize(
     ("choices", "words"),
     [
