@@ -1,6 +1,6 @@
 """Hosts a managing subsystem in a mission: calls its hooks; an exception fails only its mission."""
 
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from math import inf, isnan
 from typing import Any, SupportsFloat, TypeVar
@@ -8,19 +8,18 @@ from typing import Any, SupportsFloat, TypeVar
 import simpy
 
 from suave_des.clock import Process, exactly_at, until
-from suave_des.domain import BATTERY_LEVEL, WATER_VISIBILITY, Task
-from suave_des.errors import InputError, MissionError, SuaveDesError, did_you_mean, shown
+from suave_des.domain import WATER_VISIBILITY, Task
+from suave_des.errors import InputError, MissionError, SuaveDesError, shown
 from suave_des.managing.base import AdaptationProcess, Dependencies, ManagedSystem, ManagingSubsystem
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus
-from suave_des.registry import is_built_in, is_named_elsewhere
+from suave_des.registry import is_built_in
+from suave_des.simulation.remarks import remarks_at_end, remarks_at_start
 
 RAISED = (Exception, SystemExit)
 """Exceptions of a manager: sys.exit must neither end a campaign, nor end a mission without an error."""
 
 _T = TypeVar("_T")
-_MEASURED_SOMEWHERE = (WATER_VISIBILITY, BATTERY_LEVEL)
-"""Attributes that some shipped scenario measures: a manager may be written for all of them."""
 _MAY_RETURN = "it may return None, or yield events, such as system.env.timeout(1.0)"
 _MAX_YIELDS_AT_ONE_TIME = 10_000
 """How often `adapt` may yield while mission time stands still."""
@@ -69,10 +68,7 @@ class ManagerHost:
         except RAISED as error:
             raise self.mission_error(error) from error
         if not is_built_in(self.name):
-            self.remarks = (
-                *_unmeasured("depends_on has {}, which nothing measures", declared or (), self.system.measurements),
-                *_uncalled_adapt(self.manager),
-            )
+            self.remarks = remarks_at_start(self.manager, declared or ())
         self._is_event_triggered = declared is not None and self.skips_idle_calls
         thresholds = (declared or {}) if self._is_event_triggered else {}
         measured = self.system.measurements
@@ -111,8 +107,7 @@ class ManagerHost:
         """Tell the manager how the mission ended."""
         self._guarded(self.manager.mission_ended, metrics)
         if not is_built_in(self.name):
-            text = "measured({}) is always None: nothing measures it"
-            self.remarks += tuple(_unmeasured(text, self.system.unmeasured, self.system.measurements))
+            self.remarks += remarks_at_end(self.system)
 
     def request(self, task: Task) -> None:
         """Pass a task that begins to the manager."""
@@ -232,18 +227,3 @@ def _tick_at_or_after(t_s: float, due_s: float, period_s: float) -> float:
     while due_s < t_s:
         due_s += period_s
     return due_s
-
-
-def _unmeasured(text: str, names: Iterable[str], measured: Iterable[str]) -> Iterator[str]:
-    """Yield a remark, in which the name replaces {}, for each name that nothing measures."""
-    known = sorted({*measured, *_MEASURED_SOMEWHERE})
-    for name in sorted(set(names).difference(known), key=str):
-        yield f"{text.format(shown(name))} ({did_you_mean(name, known)})"
-
-
-def _uncalled_adapt(manager: ManagingSubsystem) -> Iterator[str]:
-    """Yield a remark if the manager's author has written an `adapt` that nothing calls."""
-    author = next(base for base in type(manager).__mro__ if "adapt" in vars(base))
-    is_own = not author.__module__.startswith("suave_des.")
-    if is_own and manager.period_s is None and not is_named_elsewhere("adapt", author):
-        yield "adapt is never called: period_s is None (set it in the class, such as period_s = 2.0)"
