@@ -23,6 +23,13 @@ def interval_text(interval: Interval | None, style: str) -> str:
     return "" if interval is None else f"{interval[0]:{style}} to {interval[1]:{style}}"
 
 
+def percent(share: float) -> str:
+    """Write a share in whole per cent: "100%" of all only, and "0%" of none only."""
+    if share > 0.995:
+        return "100%" if share == 1.0 else ">99%"
+    return "<1%" if 0.0 < share < 0.005 else f"{share:.0%}"
+
+
 @dataclass(frozen=True, slots=True)
 class Estimate:
     """Estimates from a sample; None where it has too few values.
@@ -66,6 +73,20 @@ def estimate(values: Sequence[float]) -> Estimate:
     return Estimate(n, mean, std, median, (mean - half, mean + half), (low, high))
 
 
+def interval_in_groups(values: Sequence[float], groups: Sequence[int]) -> Interval | None:
+    """Return the 95% interval of the mean of values of which those of a group are alike; None for one group.
+
+    Args:
+        values: group by group.
+        groups: number of each value's group.
+    """
+    found = GroupedMean()
+    for value, group in zip(values, groups, strict=True):
+        found.add(value, group)
+    half = found.half_width
+    return None if half is None else (found.mean - half, found.mean + half)
+
+
 def t_quantile(freedom: int) -> float:
     """Return half the width of the 95% interval of Student's t with that many degrees of freedom."""
     from scipy.special import stdtrit
@@ -82,12 +103,17 @@ class RunningMean:
         self.n = 0
         self.mean = self._squares = 0.0
 
-    def add(self, value: float) -> None:
-        """Count a value."""
+    def add(self, value: float, group: int = 0) -> None:
+        """Count a value; a GroupedMean takes the number of its group, too."""
         self.n += 1
         off = value - self.mean
         self.mean += off / self.n
         self._squares += off * (value - self.mean)
+
+    @property
+    def independent(self) -> int:
+        """Number of independent values."""
+        return self.n
 
     @property
     def half_width(self) -> float | None:
@@ -98,7 +124,52 @@ class RunningMean:
 
     def is_narrow(self, wanted: float | None, fewest: int) -> bool:
         """Return whether the half-width is below one that is wanted, and there are enough values to tell."""
-        if wanted is None or self.n < fewest:
+        if wanted is None or self.independent < fewest:
             return False
         half_width = self.half_width
         return half_width is not None and half_width < wanted
+
+
+class GroupedMean(RunningMean):
+    """Mean of values that come group by group, and its 95% interval: groups are independent, values are not.
+
+    It is that of a mean over clusters (Cochran, Sampling Techniques, 1977, chapter 9A) with Student's t, of as many
+    degrees of freedom as there are groups but one; of groups of one size, that of the groups' means.
+    """
+
+    __slots__ = ("_closed", "_first", "_groups", "_last", "_open")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._groups, self._last, self._first = 0, 0, 0.0
+        self._open = self._closed = (0.0, 0.0, 0.0)
+
+    def add(self, value: float, group: int = 0) -> None:
+        """Count a value of a group."""
+        super().add(value)
+        if self._groups == 0:
+            self._first = value  # sums are of differences from it, which are rounded less
+        if self._groups == 0 or group != self._last:
+            self._closed, self._open = self._sums(), (0.0, 0.0, 0.0)
+            self._groups, self._last = self._groups + 1, group
+        total, size, _ = self._open
+        self._open = (total + value - self._first, size + 1.0, 0.0)
+
+    def _sums(self) -> tuple[float, float, float]:
+        """Return the sums over the groups of total², total * size and size²."""
+        (a, b, c), (total, size, _) = self._closed, self._open
+        return a + total * total, b + total * size, c + size * size
+
+    @property
+    def independent(self) -> int:
+        """Number of groups."""
+        return self._groups
+
+    @property
+    def half_width(self) -> float | None:
+        """Half the width of the 95% interval of the mean, None for fewer than two groups."""
+        if self._groups < 2:
+            return None
+        off, (a, b, c) = self.mean - self._first, self._sums()
+        squares = max(0.0, a - 2.0 * off * b + off * off * c) * self._groups / (self._groups - 1)
+        return t_quantile(self._groups - 1) * math.sqrt(squares) / self.n

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from suave_des.campaign.missions import COLUMNS, Finished, MissionFailure, MissionGroup, MissionOutcome
 from suave_des.campaign.stopping import FEWEST_PAIRS, FEWEST_RUNS, SEARCH_TIME, UntilCi
-from suave_des.estimates import RunningMean
+from suave_des.estimates import GroupedMean, RunningMean
 
 PAIR_STEP = 10
 """Runs after which a difference is looked at."""
@@ -94,6 +94,11 @@ class PairProgress:
 OnProgress = Callable[[Progress], None]
 
 
+def running_mean(runs_alike: int) -> RunningMean:
+    """Return a mean of runs, of which so many in a row share a draw."""
+    return RunningMean() if runs_alike == 1 else GroupedMean()
+
+
 class PairTracker:
     """Tracks the difference of two managers in the order of the runs, until it is known precisely enough.
 
@@ -102,18 +107,19 @@ class PairTracker:
 
     Args:
         half_width: wanted.
+        runs_alike: consecutive runs that share a draw.
 
     Attributes:
         last_run: the run after which no more are needed; None until that is known.
         differences: mean of first - second, in the runs in which both have a value.
     """
 
-    def __init__(self, half_width: float) -> None:
-        self._half_width = half_width
+    def __init__(self, half_width: float, runs_alike: int = 1) -> None:
+        self._half_width, self._runs_alike = half_width, runs_alike
         self._waiting: tuple[dict[int, object], dict[int, object]] = ({}, {})
         self._next = 1
         self.last_run: int | None = None
-        self.differences = RunningMean()
+        self.differences = running_mean(runs_alike)
 
     def add(self, side: int, run: int, value: object) -> None:
         """Take the value of a manager in a run; anything but a number is a run without one.
@@ -129,9 +135,10 @@ class PairTracker:
         self._waiting[side][run] = value
         while self._next in first and self._next in second:
             x, y = first.pop(self._next), second.pop(self._next)
+            draw = (self._next - 1) // self._runs_alike
             self._next += 1
             if isinstance(x, float | int) and isinstance(y, float | int):
-                self.differences.add(x - y)
+                self.differences.add(x - y, draw)
             if (self._next - 1) % PAIR_STEP == 0 and self.differences.is_narrow(self._half_width, FEWEST_PAIRS):
                 self.last_run = self._next - 1
                 return
@@ -151,9 +158,18 @@ class GroupTracker:
         metric: column whose mean is followed.
         half_width: the group is over as soon as the interval's half-width is below this; None: after all runs.
         can_end_earlier: whether ended_at may be called, for which all values are kept.
+        runs_alike: consecutive runs that share a draw.
     """
 
-    def __init__(self, runs: int, metric: str, half_width: float | None, *, can_end_earlier: bool = False) -> None:
+    def __init__(
+        self,
+        runs: int,
+        metric: str,
+        half_width: float | None,
+        *,
+        can_end_earlier: bool = False,
+        runs_alike: int = 1,
+    ) -> None:
         self._values: dict[int, object] | None = {} if can_end_earlier else None
         self._metric, self._index = metric, COLUMNS.index(metric)
         self._half_width = half_width
@@ -162,7 +178,8 @@ class GroupTracker:
         self.done = self.failed = 0
         self.runs = runs
         self.is_narrow = False
-        self.values = RunningMean()
+        self._runs_alike = runs_alike
+        self.values = running_mean(runs_alike)
 
     def add(self, run: int, outcome: MissionOutcome) -> None:
         """Count an outcome, unless its run is counted already or lies beyond the last one."""
@@ -182,7 +199,7 @@ class GroupTracker:
             self._next += 1
             if not isinstance(value, float | int):
                 continue
-            self.values.add(value)
+            self.values.add(value, (self._next - 2) // self._runs_alike)
             if self.values.is_narrow(self._half_width, FEWEST_RUNS):
                 # The run before the next one is the last; what is known of later ones does not count.
                 self.is_narrow = True
@@ -193,7 +210,7 @@ class GroupTracker:
     def ended_at(self, run: int) -> GroupTracker:
         """Return a tracker that has the runs up to one that may be over already, and no others."""
         assert self._values is not None
-        ended = GroupTracker(run, self._metric, None)
+        ended = GroupTracker(run, self._metric, None, runs_alike=self._runs_alike)
         for number, found in self._values.items():
             ended._add(number, found)
         ended.is_narrow = True
@@ -218,10 +235,13 @@ class ProgressTracker:
         managers: names, in the campaign's order.
         runs: planned for each group.
         until: when a group is over before that, if at all.
+        runs_alike: consecutive runs that share a draw: the draws are independent, the runs are not.
     """
 
-    def __init__(self, points: int, managers: Sequence[str], runs: int, until: UntilCi | None) -> None:
-        self._managers, self._runs, self._until = managers, runs, until
+    def __init__(
+        self, points: int, managers: Sequence[str], runs: int, until: UntilCi | None, runs_alike: int = 1
+    ) -> None:
+        self._managers, self._runs, self._until, self._runs_alike = managers, runs, until, runs_alike
         self._groups_in_all = points * len(managers)
         self._under_way: dict[MissionGroup, GroupTracker] = {}
         self._complete: dict[MissionGroup, GroupProgress] = {}
@@ -259,7 +279,7 @@ class ProgressTracker:
         assert self._until is not None
         if manager not in self._sides:
             return
-        pair = self._pairs.setdefault(point, PairTracker(self._until.half_width))
+        pair = self._pairs.setdefault(point, PairTracker(self._until.half_width, self._runs_alike))
         if pair.last_run is not None:
             return
         value = None if isinstance(outcome, MissionFailure) else outcome[COLUMNS.index(self._until.metric)]
@@ -294,7 +314,13 @@ class ProgressTracker:
 
     def _new(self) -> GroupTracker:
         half_width = None if self._until is None or self._sides else self._until.half_width
-        return GroupTracker(self._runs, self._metric, half_width, can_end_earlier=bool(self._sides))
+        return GroupTracker(
+            self._runs,
+            self._metric,
+            half_width,
+            can_end_earlier=bool(self._sides),
+            runs_alike=self._runs_alike,
+        )
 
     @property
     def _metric(self) -> str:

@@ -16,7 +16,7 @@ from suave_des.campaign.progress import GroupProgress, PairProgress, ProgressTra
 from suave_des.campaign.spec import CampaignSpec
 from suave_des.campaign.stopping import FEWEST_PAIRS, FEWEST_RUNS, UntilCi
 from suave_des.campaign.variation import Variation, cell_of
-from suave_des.estimates import estimate
+from suave_des.estimates import estimate, interval_in_groups, percent
 from suave_des.files import rounded
 from suave_des.scenario.loader import LoadedScenario
 
@@ -191,7 +191,7 @@ def _shown_summary(record: Mapping[str, Any]) -> tuple[str, ...]:
     """Return a row of summary.csv as text; the point of a sweep stands with the manager."""
     swept = "".join(f", {name} {value}" for name, value in record.items() if name not in SUMMARY_COLUMNS)
     cells = [f"{record['manager']}{swept}", str(record["n"])]
-    cells.append("" if record["found_share"] is None else f"{record['found_share']:.0%}")
+    cells.append("" if record["found_share"] is None else percent(record["found_share"]))
     for metric in METRICS:
         mean, low, high = (record[f"{metric}_{figure}"] for figure in ("mean", "ci95_low", "ci95_high"))
         interval = "" if low is None else f" ({low:.1f} to {high:.1f})"
@@ -224,7 +224,7 @@ def gather(
     failures: list[MissionFailure] = []
     summary: list[Row] = []
     done = reached = 0
-    tally = _Tally()
+    tally = _Tally(variation.runs_alike)
 
     def summarise_before(group: MissionGroup) -> None:
         """Add the groups before this one that are not summarised yet; the tally is of the first of them."""
@@ -233,7 +233,7 @@ def gather(
             point, manager = next_group
             swept = map(cell_of, variation.sweep.values(point).values())
             summary.append((spec.managers[manager], *tally.figures(), *swept))
-            tally = _Tally()
+            tally = _Tally(variation.runs_alike)
 
     for key, outcome in tracker.counted(outcomes()):
         summarise_before((key.point, key.manager))
@@ -242,7 +242,7 @@ def gather(
             failures.append(outcome)
         else:
             done += 1
-            tally.add(outcome)
+            tally.add(key.run, outcome)
     summarise_before((reached + 1, 0))
     return CampaignResult(
         spec,
@@ -265,26 +265,33 @@ class _Tally:
     _FOUND = COLUMNS.index("pipeline_found")
     _INDICES = tuple(COLUMNS.index(metric) for metric in METRICS)
 
-    def __init__(self) -> None:
+    def __init__(self, runs_alike: int) -> None:
+        self._runs_alike = runs_alike
         self._rows = self._found = 0
         self._values = tuple(array("d") for _ in METRICS)
+        self._draws = tuple(array("q") for _ in METRICS)
 
-    def add(self, row: Row) -> None:
+    def add(self, run: int, row: Row) -> None:
         self._rows += 1
         self._found += bool(row[self._FOUND])
-        for values, index in zip(self._values, self._INDICES, strict=True):
+        for values, draws, index in zip(self._values, self._draws, self._INDICES, strict=True):
             if (value := row[index]) is not None:
                 values.append(float(value))
+                if self._runs_alike > 1:
+                    draws.append((run - 1) // self._runs_alike)
 
     def figures(self) -> Row:
         """Return the cells of summary.csv after the first; a figure that needs more missions than there are is None."""
         share = self._found / self._rows if self._rows else None
-        return (self._rows, share, *(figure for values in self._values for figure in _figures(values)))
+        figures = (_figures(*each) for each in zip(self._values, self._draws, strict=True))
+        return (self._rows, share, *(figure for own in figures for figure in own))
 
 
-def _figures(values: Sequence[float]) -> Row:
+def _figures(values: Sequence[float], draws: Sequence[int]) -> Row:
+    """Return the figures of a metric; where runs share draws, the draws are what is independent."""
     found = estimate(values)
-    return (found.mean, found.std, found.median, *(found.mean_interval or (None, None)))
+    interval = interval_in_groups(values, draws) if draws else found.mean_interval
+    return (found.mean, found.std, found.median, *(interval or (None, None)))
 
 
 def _until_ci(result: CampaignResult) -> dict[str, Any] | None:

@@ -171,6 +171,11 @@ class Variation:
         """Names of all that varies, as given, which are further columns of runs.csv."""
         return (*self.sweep.parameters, *self.drawn.values(), *((ENSEMBLE_COLUMN,) if self.ensemble else ()))
 
+    @property
+    def runs_alike(self) -> int:
+        """Number of consecutive runs that share a draw, and so are not independent; 1 where nothing is drawn."""
+        return self.runs_per_draw if self.drawn else 1
+
     def member(self, run: int) -> int | None:
         """Return the number, from 1, of the parameter set that a run has; none without an ensemble."""
         return None if self.ensemble is None else self.ensemble.member(run)

@@ -14,7 +14,7 @@ from suave_des.campaign.results import METRIC_TITLES, METRICS, SUMMARY_COLUMNS, 
 from suave_des.campaign.stopping import UntilCi
 from suave_des.campaign.variation import cell_of
 from suave_des.cli.console import fits, number, plain_table, print_table
-from suave_des.estimates import interval_text
+from suave_des.estimates import interval_text, percent
 
 _STOPS_LISTED = 8
 _ROWS_SHOWN = 40
@@ -56,6 +56,8 @@ def print_summary(console: Console, result: CampaignResult) -> None:
             break
     title = f"{result.loaded.scenario.name}, seed {result.spec.seed}: means ± half their 95% intervals"
     print_table(console, f"{title}, standard deviations" if look.has_std else title, table)
+    if (alike := result.variation.runs_alike) > 1:
+        console.print(f"{alike} runs share each draw: intervals take the draws for independent, not the runs")
     if len(result.summary) > _ROWS_SHOWN:
         more = len(result.summary) - _ROWS_SHOWN + 1
         where = "" if result.folder is None else f", all in {result.folder}/summary.csv"
@@ -81,7 +83,7 @@ def _summary(result: CampaignResult, look: _Look) -> Table:
             *map(look.shown, row[len(SUMMARY_COLUMNS) :]),
             look.broken(str(cells["manager"])),
             str(cells["n"]),
-            "" if share is None else f"{float(share):.0%}",
+            "" if share is None else percent(float(share)),
             *(text for metric in METRICS for text in _figures(cells, metric)[: 1 + look.has_std]),
         )
     return table

@@ -10,7 +10,7 @@ from rich.text import Text
 
 from suave_des.campaign.results import METRIC_TITLES
 from suave_des.cli.console import number, plain_table, print_table
-from suave_des.estimates import interval_text
+from suave_des.estimates import interval_text, percent
 
 if TYPE_CHECKING:
     from suave_des.estimates import Estimate
@@ -172,7 +172,7 @@ def _value(target: Target) -> tuple[str, str]:
 
 
 def _percent(share: float | None) -> str:
-    return "" if share is None else f"{share:.0%}"
+    return "" if share is None else percent(share)
 
 
 def _p(test: SampleTest | None) -> str:

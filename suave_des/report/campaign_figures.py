@@ -17,10 +17,10 @@ from matplotlib.textpath import TextPath
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 from numpy.typing import NDArray
 
-from suave_des.estimates import t_quantile
+from suave_des.estimates import GroupedMean, percent, t_quantile
 from suave_des.report import style
 from suave_des.report.compared_metrics import PAPER_METRICS
-from suave_des.report.grouping import Group, time_limit_s
+from suave_des.report.grouping import Group, first_alike, runs_alike, time_limit_s
 from suave_des.report.words import folded
 
 _ROW_IN = 0.62
@@ -165,7 +165,10 @@ def draw_convergence(groups: Sequence[Group]) -> style.Picture:
     for axes, metric, title in _metric_panels(figure):
         for number, group in enumerate(groups):
             frame = group.frame.sort_values("run", kind="stable")
-            n, means, halves = running_means(frame[metric].dropna().to_numpy(float))
+            known = frame[frame[metric].notna()]
+            alike = runs_alike(known)
+            draws = first_alike(known, alike).astype(int).tolist() if alike > 1 else None
+            n, means, halves = running_means(known[metric].to_numpy(float), draws)
             look = style.line(number)
             (line,) = axes.plot(n, means, label=_label(group), **look)
             if len(n) == 1:
@@ -181,11 +184,13 @@ def draw_convergence(groups: Sequence[Group]) -> style.Picture:
     return figure
 
 
-def running_means(values: NDArray[np.float64]) -> tuple[NDArray[np.int_], NDArray[np.float64], NDArray[np.float64]]:
+def running_means(
+    values: NDArray[np.float64], draws: Sequence[int] | None = None
+) -> tuple[NDArray[np.int_], NDArray[np.float64], NDArray[np.float64]]:
     """Return sample sizes n, the means of the first n values, and half their 95% intervals.
 
     Of many values only some numbers are there, the first and the last among them, as dense at the beginning as a
-    figure over all shows them.
+    figure over all shows them. If `draws` has the number of each value's draw, the draws are what is independent.
     """
     n = np.arange(1, len(values) + 1)
     if len(values) > _CURVE_POINTS:
@@ -194,7 +199,18 @@ def running_means(values: NDArray[np.float64]) -> tuple[NDArray[np.int_], NDArra
     first = pandas.Series(values).expanding()
     stds = first.std().to_numpy()[n - 1]  # nan for a single value, which has no interval
     halves = np.array([t_quantile(int(each) - 1) for each in n]) * stds / np.sqrt(n)
+    if draws is not None:
+        grouped = GroupedMean()
+        halves = np.array([_half_width_with(grouped, *each) for each in zip(values.tolist(), draws, strict=True)])[
+            n - 1
+        ]
     return n, first.mean().to_numpy()[n - 1], halves
+
+
+def _half_width_with(mean: GroupedMean, value: float, draw: int) -> float:
+    """Add a value; return half the width of the interval, nan for one draw."""
+    mean.add(value, draw)
+    return math.nan if mean.half_width is None else mean.half_width
 
 
 def draw_detections(groups: Sequence[Group]) -> style.Picture:
@@ -237,7 +253,7 @@ def _draw_detections(above: Axes, below: Axes, number: int, group: Group) -> Non
     areas = np.maximum(counts.to_numpy(float) / n * _LARGEST_AREA, 1.5)
     below.scatter(places[:, 0], places[:, 1], s=areas, color=colour, alpha=0.6, lw=0)
     lost = 1.0 - len(frame) / n
-    below.set_title(f"not found: {lost:.0%}", fontsize=7.5, fontweight="normal", pad=3)  # above all bubbles
+    below.set_title(f"not found: {percent(lost)}", fontsize=7.5, fontweight="normal", pad=3)  # above all bubbles
 
 
 def draw_reactions(groups: Sequence[Group]) -> style.Picture:

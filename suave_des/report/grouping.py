@@ -18,6 +18,9 @@ from suave_des.report.words import printable
 _MOST_GROUPS = 60
 """More make tables that nobody reads, and thousands of tests."""
 
+_MEMBER = "ensemble_member"
+"""Column of runs.csv: the parameter set of a run."""
+
 
 @dataclass(frozen=True, eq=False)
 class Group:
@@ -26,7 +29,7 @@ class Group:
     Attributes:
         name: the manager's, with its source or its value of a sweep where several have the same.
         frame: a row for each independent value: for each mission, or, where points of a sweep are averaged, for each
-            run, whose random numbers all points share.
+            run, whose random numbers all points share; or for each draw that several runs share.
         is_of_missions: whether each row is one mission.
     """
 
@@ -96,7 +99,7 @@ def grouped(
         raise InputError(problem, remedy=f"choose {_MOST_GROUPS} or fewer with managers and by")
     averaged = [name for name in missions.swept if averages and name not in by]
     names = _names([key for key, _ in found], by)
-    groups = [_group(name, part, averaged) for name, (_, part) in zip(names, found, strict=True)]
+    groups = [_group(name, part, averaged, averages=averages) for name, (_, part) in zip(names, found, strict=True)]
     return groups, list(_notes(groups, averaged, frame))
 
 
@@ -116,22 +119,54 @@ def _short(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else printable(str(value))
 
 
-def _group(name: str, frame: pandas.DataFrame, averaged: Sequence[str]) -> Group:
-    if not averaged or frame[["seed", "run"]].duplicated().sum() == 0:
-        return Group(name, frame, True)
+def _group(name: str, frame: pandas.DataFrame, averaged: Sequence[str], *, averages: bool) -> Group:
+    alike = runs_alike(frame) if averages else 1
+    has_points = bool(averaged) and bool(frame[["seed", "run"]].duplicated().any())
+    if has_points:
+        frame = _means_by_run(frame)
+    if alike > 1:
+        frame = _means_by_run(frame.assign(run=first_alike(frame, alike)), has_all=False)
+    return Group(name, frame, not has_points and alike == 1)
+
+
+def runs_alike(frame: pandas.DataFrame) -> int:
+    """Return how many runs in a row share their draws."""
+    return int(frame["runs_alike"].max()) if "runs_alike" in frame and frame["runs_alike"].notna().any() else 1
+
+
+def first_alike(frame: pandas.DataFrame, alike: int) -> pandas.Series[float]:
+    """Return of each mission the first run that shares its draws."""
+    return (frame["run"] - 1) // alike * alike + 1
+
+
+def _means_by_run(frame: pandas.DataFrame, *, has_all: bool = True) -> pandas.DataFrame:
+    """Average missions of the same run; of a sweep, only of runs that have all points."""
     numbers = list(frame.select_dtypes("number").columns.difference(["run"]))
     by_run = frame.groupby(["seed", "run"], sort=False, observed=True)
     sizes = by_run.size()
     means = by_run[numbers].mean()
-    means = means[sizes == sizes.max()]  # a run that lacks a point would be compared with others at other points
-    return Group(name, means.reset_index(), False)
+    if has_all:
+        means = means[sizes == sizes.max()]  # a run that lacks a point would be compared with others at other points
+    return means.reset_index()
 
 
 def _notes(groups: Sequence[Group], averaged: Sequence[str], frame: pandas.DataFrame) -> Iterator[str]:
-    if not all(group.is_of_missions for group in groups):
+    alike = runs_alike(frame)
+    if alike > 1:
+        yield (
+            f"the values of the {alike} runs that share each draw (runs_per_draw) are averaged: draws are independent,"
+            " and runs are not; n and the runs needed are numbers of draws"
+        )
+    if averaged and not all(group.is_of_missions for group in groups):
         yield (
             f"the values of a run are averaged over {', '.join(averaged)}: all points of a sweep share its random"
             " numbers, so that runs are independent and missions are not"
+        )
+    members = frame[_MEMBER].nunique() if _MEMBER in frame else 0
+    if members > 1:
+        yield (
+            f"runs have {members} sets of parameters (an ensemble): intervals and tests are for chance among runs with"
+            " these sets; how much the sets differ is in ensemble.csv"
         )
     scenarios = [name for name in dict.fromkeys(frame["scenario"]) if name]
     if len(scenarios) > 1:

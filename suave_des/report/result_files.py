@@ -30,7 +30,8 @@ class Missions:
     """Missions to compare, a row for each.
 
     Attributes:
-        frame: with `source`, `manager`, `scenario`, the columns of report.runs.COLUMNS, and those of a sweep.
+        frame: with `source`, `manager`, `scenario`, the columns of report.runs.COLUMNS, and those of a sweep; with
+            `runs_alike`, how many runs in a row share their draws, where that is known.
         swept: columns that a sweep varies: they differ between missions of one manager, seed and run.
         notes: caveats about the files for readers of the comparison.
     """
@@ -94,7 +95,7 @@ def missions_of(frame: pandas.DataFrame) -> Missions:
     for name in ("pipeline_found", "mean_reaction_time_s", "run"):
         plain[name] = _as_floats(plain[name])
     others = [name for name in frame.columns if name not in OWN_COLUMNS]
-    missions = Missions(plain, _varying(plain, others))
+    missions = Missions(plain.assign(runs_alike=int(frame.attrs.get("runs_alike", 1))), _varying(plain, others))
     _check_once(missions, None)
     return missions
 
@@ -110,7 +111,8 @@ def _read_source(path: Path) -> Missions:
     check_one_campaign(path)
     if (path / _RUNS_FILE).is_file():
         missions = _of_runs(path / _RUNS_FILE)
-        return Missions(missions.frame, missions.swept, tuple(_unfinished(path)))
+        frame = missions.frame.assign(runs_alike=_runs_alike(path))
+        return Missions(frame, missions.swept, tuple(_unfinished(path)))
     if (path / _STORE_FILE).is_file():
         remedy = f"suave-des campaign --resume {path} runs the rest and writes them"
         raise InputError("the campaign ended before its result files were written", file=path, remedy=remedy)
@@ -199,6 +201,15 @@ def _is_foreign(path: Path) -> bool:
         return not {"manager", "mission name", "mission_name"} & set(_header(path))
     except (OSError, ValueError):
         return False
+
+
+def _runs_alike(folder: Path) -> int:
+    """Return how many runs in a row share the draws of perturbations, from a campaign's manifest; 1 if none do."""
+    try:
+        manifest = json.loads((folder / _MANIFEST_FILE).read_text(encoding="utf-8"))
+        return max(1, int(manifest["runs_per_draw"])) if manifest["perturbations"] else 1
+    except (OSError, ValueError, KeyError, TypeError):
+        return 1
 
 
 def _unfinished(folder: Path) -> Iterator[str]:

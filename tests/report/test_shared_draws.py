@@ -1,0 +1,108 @@
+"""Where several runs share what is drawn, the draws are independent and the runs are not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas
+import pytest
+from scipy import stats
+
+from suave_des import api
+from suave_des.campaign.campaign import run_campaign
+from suave_des.campaign.progress import GroupTracker, PairTracker
+from suave_des.estimates import GroupedMean, RunningMean, estimate, interval_in_groups, percent
+from suave_des.report.campaign_figures import running_means
+from suave_des.report.compare import compare_folders, compare_frame
+
+VARIED = {
+    "runs_per_draw": 4,
+    "perturbations": {"start.y_m": {"distribution": "uniform", "minimum": 1.5, "maximum": 3.5}},
+}
+
+
+def of_draws(runs: pandas.DataFrame, metric: str) -> pandas.DataFrame:
+    """Return the means of draws, a column for each manager."""
+    draw = (runs["run"] - 1) // VARIED["runs_per_draw"]
+    return runs.groupby(["manager", draw], observed=True)[metric].mean().unstack(0)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("draws") / "out"
+    run_campaign("seams2023", ["none", "bt"], 24, 1, out=out, **VARIED)
+    return out
+
+
+def test_the_interval_is_that_of_the_means_of_groups_of_one_size() -> None:
+    values = np.random.default_rng(1).normal(100.0, 3.0, (7, 5)) + np.arange(7)[:, None]
+    means = values.mean(axis=1)
+    low, high = stats.t.interval(0.95, 6, means.mean(), stats.sem(means))
+    groups = np.repeat(np.arange(7), 5).tolist()
+    assert interval_in_groups(values.ravel().tolist(), groups) == pytest.approx((low, high))
+    assert interval_in_groups([1.0, 2.0], [0, 0]) is None
+    _, _, halves = running_means(values.ravel(), groups)
+    assert halves[-1] == pytest.approx((high - low) / 2.0)
+
+
+def test_groups_of_one_value_give_the_ordinary_interval() -> None:
+    grouped, ordinary = GroupedMean(), RunningMean()
+    for place, value in enumerate([1e6 + 3.0, 1e6 + 4.0, 1e6 + 7.5, 1e6 + 8.0]):
+        grouped.add(value, place)
+        ordinary.add(value)
+    assert grouped.half_width == pytest.approx(ordinary.half_width, rel=1e-9)
+    assert grouped.independent == ordinary.independent == 4
+
+
+def test_the_summary_has_the_interval_of_the_draws(folder: Path) -> None:
+    runs, summary = pandas.read_csv(folder / "runs.csv"), pandas.read_csv(folder / "summary.csv").set_index("manager")
+    means = of_draws(runs, "search_time_s")["none"]
+    low, high = stats.t.interval(0.95, len(means) - 1, means.mean(), stats.sem(means))
+    assert summary.loc["none", "search_time_s_ci95_low"] == pytest.approx(low, abs=1e-5)
+    assert summary.loc["none", "search_time_s_ci95_high"] == pytest.approx(high, abs=1e-5)
+    naive = estimate(runs.loc[runs["manager"] == "none", "search_time_s"].tolist())
+    assert summary.loc["none", "search_time_s_std"] == pytest.approx(naive.std, abs=1e-5)
+    assert naive.mean_interval is not None
+    assert high - low > 1.5 * (naive.mean_interval[1] - naive.mean_interval[0])
+
+
+def test_a_comparison_takes_the_draws_for_independent(folder: Path) -> None:
+    means = of_draws(pandas.read_csv(folder / "runs.csv"), "search_time_s")
+    comparison = compare_folders([folder])
+    found = comparison.differences[0]
+    assert found.n == (6,)
+    assert found.difference is not None
+    assert found.difference.interval == pytest.approx(
+        tuple(stats.ttest_rel(means["none"], means["bt"]).confidence_interval())
+    )
+    assert any("4 runs that share each draw" in note for note in comparison.notes)
+
+
+def test_so_does_that_of_a_data_frame() -> None:
+    frame = api.run_campaign("seams2023", ["none", "bt"], runs=8, progress=False, **VARIED)
+    assert frame.compare().differences[0].n == compare_frame(frame).differences[0].n == (2,)
+
+
+def test_runs_without_perturbations_are_independent(tmp_path: Path) -> None:
+    run_campaign("seams2023", ["none", "bt"], 8, 1, out=tmp_path / "out", runs_per_draw=4)
+    assert compare_folders([tmp_path / "out"]).differences[0].n == (8,)
+
+
+def test_until_ci_waits_for_enough_draws() -> None:
+    values = np.repeat(np.random.default_rng(2).normal(100.0, 5.0, 60), 10)
+    ordinary, grouped = (GroupTracker(600, "search_time_s", 4.0, runs_alike=alike) for alike in (1, 10))
+    pair = PairTracker(4.0, 10)
+    for run, value in enumerate(values.tolist(), 1):
+        for tracker in (ordinary, grouped):
+            tracker._add(run, value)
+        pair.add(0, run, value)
+        pair.add(1, run, 0.0)
+    assert ordinary.runs <= 30
+    assert grouped.is_narrow and grouped.runs >= 191  # the 20th draw begins
+    assert pair.last_run is None or pair.last_run >= 600
+
+
+def test_only_all_are_100_per_cent_and_none_are_0() -> None:
+    shares = [1.0, 0.9961, 0.994, 0.5, 0.006, 0.004, 0.0]
+    assert [percent(share) for share in shares] == ["100%", ">99%", "99%", "50%", "1%", "<1%", "0%"]
