@@ -39,6 +39,9 @@ _FEWEST_FOR_INTERVAL = 5
 _LARGEST_AREA = 900.0
 """Area of a marker, in square points, that would stand for all missions of a manager."""
 _TIME_BIN_S = 5.0
+_LEGEND_SHARE = 0.1
+_FAR_APART = 50.0
+"""Reaction times that differ by more than this factor are drawn on a logarithmic axis."""
 
 
 def draw_distributions(groups: Sequence[Group]) -> style.Picture:
@@ -221,21 +224,29 @@ def draw_detections(groups: Sequence[Group]) -> style.Picture:
     columns = min(len(groups), 3)
     rows = math.ceil(len(groups) / columns)
     width = style.WIDTH_IN if columns > 1 else style.WIDTH_IN / 2
-    figure = style.Picture(figsize=(width, 2.6 * rows + 0.1), layout="constrained")
+    figure = style.Picture(figsize=(width, 2.6 * rows + 0.4), layout="constrained")
     parts = figure.subfigures(rows, columns, squeeze=False).ravel()
     known = pandas.concat([group.frame.loc[group.frame["detection_x_m"].notna()] for group in groups])
     ends = (
         [float(known["detection_x_m"].min()) - 0.7, float(known["detection_x_m"].max()) + 0.7] if len(known) else [0, 1]
     )
     top_s = max(float(group.known_values("search_time_s").max()) for group in groups) * 1.2
+    bars = []
     for number, (part, group) in enumerate(zip(parts, groups, strict=False)):
         above, below = part.subplots(2, 1, sharex=True, height_ratios=(1.0, 3.0))
         _draw_detections(above, below, number, group)
+        bars.append(above)
         above.set_title(_label(group, 26), fontsize=8)
         below.set(xlim=ends, ylim=(0.0, top_s), xlabel="x of the point seen first (m)")
         if number % columns == 0:
             below.set_ylabel("search time (s)")
             above.set_ylabel("share")
+    top = max(above.get_ylim()[1] for above in bars)
+    for above in bars:
+        above.set_ylim(0.0, top)  # shares of one panel are to be compared with those of another
+    size = _LEGEND_SHARE**0.5 * _LARGEST_AREA**0.5
+    area = Line2D([], [], lw=0, marker="o", ms=size, color=style.GREY, alpha=0.6, mew=0)
+    figure.legend([area], [f"area: {percent(_LEGEND_SHARE)} of a manager's missions"], loc="outside lower right")
     return figure
 
 
@@ -265,7 +276,8 @@ def draw_reactions(groups: Sequence[Group]) -> style.Picture:
     for number, group in enumerate(groups):
         look = style.line(number)
         if "adaptations" in group.frame and len(counts := group.known_values("adaptations")):
-            numbers, missions = np.unique(counts, return_counts=True)
+            missions = np.bincount((counts - counts.min()).astype(int))  # 0 where no mission has a number
+            numbers = counts.min() + np.arange(len(missions))
             left.plot(numbers, missions / len(counts), marker=style.marker(number), ms=3.5, label=_label(group), **look)
         times_s = np.sort(group.known_values("mean_reaction_time_s"))
         if len(times_s):
@@ -281,7 +293,12 @@ def draw_reactions(groups: Sequence[Group]) -> style.Picture:
     right.set(
         xlabel="mean reaction time, where there was one (s)", ylabel="share of missions at or below", ylim=(0.0, 1.02)
     )
-    right.set_xlim(left=0.0)
+    known = np.concatenate([group.known_values("mean_reaction_time_s") for group in groups])
+    if len(known) and known.min() > 0.0 and known.max() > _FAR_APART * known.min():
+        right.set_xscale("log")  # else the curves of quick managers would all be at the left edge
+        right.xaxis.set_major_formatter("{x:g}")
+    else:
+        right.set_xlim(left=0.0)
     right.yaxis.set_major_formatter(PercentFormatter(1.0))
     right.set_title("b   Reaction time")
     _legend(figure, _handles(groups), [_label(group) for group in groups])

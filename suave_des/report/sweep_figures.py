@@ -9,6 +9,7 @@ from textwrap import fill
 import numpy as np
 import pandas
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from suave_des.errors import InputError
@@ -56,7 +57,8 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
     columns = min(len(parameters), _COLUMNS)
     blocks = math.ceil(len(parameters) / columns)
     width_in = style.WIDTH_IN if columns > 1 else style.WIDTH_IN / 2
-    figure = style.Picture(figsize=(width_in, 4.0 * blocks + 0.2 * math.ceil(len(managers) / 3)), layout="constrained")
+    height_in = 4.0 * blocks + 0.2 * math.ceil((len(managers) + 1) / 3)
+    figure = style.Picture(figsize=(width_in, height_in), layout="constrained")
     panels = figure.subplots(len(PAPER_METRICS) * blocks, columns, sharey="row", squeeze=False)
     for place, parameter in enumerate(parameters):
         block, column = divmod(place, columns)
@@ -75,6 +77,8 @@ def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Pict
     for axes in panels.ravel():
         axes.set_visible(bool(axes.has_data()))
     handles, labels = panels[0, 0].get_legend_handles_labels()
+    handles.append(Line2D([], [], lw=0, marker="|", ms=8, color=style.GREY))
+    labels.append("95% interval of the mean")
     ncols = min(3 if columns > 1 else 2, legend_columns(labels))
     figure.legend(handles, labels, loc="outside upper right", ncols=ncols, handlelength=2.8)
     return figure

@@ -17,7 +17,7 @@ from suave_des.campaign.single import run_mission
 from suave_des.errors import InputError
 from suave_des.estimates import estimate
 from suave_des.report import mission_map, style
-from suave_des.report.campaign_figures import draw_detections, draw_distributions, draw_rainclouds
+from suave_des.report.campaign_figures import draw_detections, draw_distributions, draw_rainclouds, draw_reactions
 from suave_des.report.figures import CAMPAIGN_KINDS, draw_folder, draw_frame, draw_results, write_picture
 from suave_des.report.grouping import grouped
 from suave_des.report.mission_record import (
@@ -122,7 +122,11 @@ def test_a_sweep_is_drawn_with_a_mean_for_each_manager_at_each_value(tmp_path: P
     figure = draw_sweep(missions)
     frame = result.frame()
     panel = figure.axes[0]
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["none", "random"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        "none",
+        "random",
+        "95% interval of the mean",
+    ]
     for manager, container in zip(("none", "random"), panel.containers, strict=True):
         own = frame[frame["manager"] == manager].groupby("visibility.period_s")["search_time_s"].mean()
         assert list(container[0].get_ydata()) == pytest.approx(list(own))
@@ -215,6 +219,17 @@ def test_detections_are_shares_of_all_missions(campaign: Path) -> None:
     above = figure.subfigs[0].axes[0]
     found = groups[0].frame["detection_x_m"].notna().mean()
     assert sum(bar.get_height() for bar in above.patches) == pytest.approx(found)
+    assert len({part.axes[0].get_ylim() for part in figure.subfigs}) == 1  # bars of two managers can be compared
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["area: 10% of a manager's missions"]
+
+
+def test_a_number_of_adaptations_that_no_mission_has_is_0_and_quick_reactions_are_seen() -> None:
+    frame = pandas.DataFrame({"manager": ["a"] * 4 + ["b"] * 4, "adaptations": [2, 2, 5, 5, 1, 1, 1, 1]})
+    frame = frame.assign(search_time_s=100.0, distance_inspected_m=1.0, run=[1, 2, 3, 4] * 2, seed=1)
+    frame["mean_reaction_time_s"] = [0.5, 0.5, 0.6, 0.6, 30.0, 60.0, 90.0, 200.0]
+    figure = draw_reactions(grouped(missions_of(frame))[0])
+    assert [list(each) for each in figure.axes[0].lines[0].get_data()] == [[2, 3, 4, 5], [0.5, 0.0, 0.0, 0.5]]
+    assert figure.axes[1].get_xscale() == "log"
 
 
 @pytest.mark.parametrize("kind", CAMPAIGN_KINDS)
