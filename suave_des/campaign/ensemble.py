@@ -192,12 +192,14 @@ class MemberDifferences:
     def range(self) -> tuple[float, float] | None:
         """Range in which the differences of 95 in 100 parameter sets lie; None for a single member.
 
-        It is the mean ± Student's t times the standard deviation of the members' means. The few runs of each member
+        It is the prediction interval for a further set: the mean ± Student's t times the standard deviation of the
+        members' means, times the root of 1 + 1 / their number. The few runs of each member
         make it wider than the parameters do; with more of them it becomes narrower, down to that.
         """
         if len(self.member_means) < 2:
             return None
-        half = t_quantile(len(self.member_means) - 1) * stdev(self.member_means)
+        members = len(self.member_means)
+        half = t_quantile(members - 1) * stdev(self.member_means) * math.sqrt(1.0 + 1.0 / members)
         return self.mean - half, self.mean + half
 
 

@@ -61,12 +61,28 @@ def _remarks(validation: Validation, real: str) -> Iterator[str]:
         f"Means must lie in the {real} mean's 95% t interval, standard deviations in the {real} one's"
         " 95% chi-square interval."
     )
+    yield from _power(validation, real)
     met = [target.met for target in validation.targets]
     yield f"{_are(met.count(True), len(met))} met, {_are(met.count(False))} not met."
     if None in met:
         yield (
             f"{met.count(None)} cannot be judged: too few missions. For conclusions the simulation needs at least as"
             f" many of each manager as there are {real} ones."
+        )
+
+
+def _power(validation: Validation, real: str) -> Iterator[str]:
+    """Say how far apart distributions are that the KS test tells apart: not rejecting them does not make them equal."""
+    from scipy.special import kolmogi
+
+    from suave_des.report.statistics import SIGNIFICANCE
+
+    sizes = [(each.published.n, each.simulated.n) for each in validation.samples]
+    if sizes:
+        apart = min(float(kolmogi(SIGNIFICANCE)) * (1.0 / n + 1.0 / m) ** 0.5 for n, m in sizes)
+        yield (
+            f"A KS p of {SIGNIFICANCE} or more does not show that distributions are equal: with so few {real} missions"
+            f" it is less only where the shares at or below some value differ by more than about {min(1.0, apart):.0%}."
         )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from suave_des.errors import InputError, number_of
-from suave_des.estimates import Estimate, Interval, estimate, interval_columns, interval_text
+from suave_des.estimates import CONFIDENCE, Estimate, Interval, estimate, interval_columns, interval_text
 from suave_des.files import csv_text
 from suave_des.report.compared_metrics import PAPER_METRICS
 from suave_des.report.result_files import PAPER_ORDER
@@ -106,16 +106,18 @@ class PaperComparison:
             " assumes normally distributed values."
         )
         for metric, (claim, sign) in _CLAIMS.items():
-            means = {manager: found.mean for (manager, name), found in self.ours.items() if name == metric}
-            best = means.pop("metacontrol", None)
-            others = [mean for mean in means.values() if mean is not None]
-            if best is None or not others:
+            ours = {manager: found for (manager, name), found in self.ours.items() if name == metric and found.n}
+            best = ours.pop("metacontrol", None)
+            if best is None or not ours:
                 continue
+            means = (best.mean or 0.0, [found.mean or 0.0 for found in ours.values()])
+            open_ones = [manager for manager, found in ours.items() if not _differ(best, found)]
+            rest = f"; the difference from {' and '.join(open_ones)} could be chance" if open_ones else ""
             verb, _, what = claim.partition(" ")
-            if all(sign * best > sign * mean for mean in others):
-                yield f"As in the paper, metacontrol {verb}s {what} than the others, on average."
+            if all(sign * means[0] > sign * mean for mean in means[1]):
+                yield f"As in the paper, metacontrol {verb}s {what} than the others, on average{rest}."
             else:
-                yield f"Unlike in the paper, metacontrol does not {claim} than all others, on average."
+                yield f"Unlike in the paper, metacontrol does not {claim} than all others, on average{rest}."
 
     def markdown(self) -> str:
         """Write the comparison as Markdown."""
@@ -192,6 +194,16 @@ def _figures(manager: str, metric: str, known: Estimate, ours: Estimate) -> Iter
         raise InputError(problem, place=metric, remedy="an interval needs two or more")
     yield PaperFigure(manager, metric, "mean", known.mean, known.mean_interval, ours.mean, ours.mean_interval)
     yield PaperFigure(manager, metric, "std", known.std, known.std_interval, ours.std, ours.std_interval)
+
+
+def _differ(one: Estimate, other: Estimate) -> bool:
+    """Whether Welch's test shows at 5% that two means differ."""
+    from scipy.stats import ttest_ind_from_stats
+
+    if not one.std or not other.std:
+        return False
+    sides = (one.mean, one.std, one.n, other.mean, other.std, other.n)
+    return bool(ttest_ind_from_stats(*sides, equal_var=False).pvalue < 1.0 - CONFIDENCE)
 
 
 def _sizes(estimates: Estimates) -> str:

@@ -146,7 +146,9 @@ def test_the_range_over_members_is_that_of_their_means():
     ensemble = Ensemble("three", ("x",), ((1.0,), (2.0,), (3.0,)))
     rows = rows_of({0: [0.0] * 6, 1: [0.0, 10.0, 20.0, 2.0, 12.0, 22.0]})
     (found,) = differences(rows, ["none", "bt"], {"search_time_s": 0}, ensemble)
-    assert found.range == pytest.approx((11.0 - 4.302653 * 10.0, 11.0 + 4.302653 * 10.0), rel=1e-6)
+    assert found.range == pytest.approx(
+        (11.0 - 4.302653 * 10.0 * (4 / 3) ** 0.5, 11.0 + 4.302653 * 10.0 * (4 / 3) ** 0.5), rel=1e-6
+    )
 
 
 @given(st.integers(1, 10_000), st.integers(2, 50))

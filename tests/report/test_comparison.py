@@ -155,3 +155,15 @@ def test_the_script_ends_with_one_line_and_status_2_when_its_input_is_bad(text: 
     assert ended.returncode == 2
     assert len(ended.stderr.splitlines()) == 1
     assert str(runs) in ended.stderr
+
+
+def test_what_could_be_chance_is_said_to_be_so() -> None:
+    values = {"none": [200.0, 150.0, 190.0], "random": [100.0, 300.0, 120.0], "metacontrol": [100.0, 90.0, 110.0]}
+    rows = [
+        {"manager": manager, "search_time_s": time_s, "distance_inspected_m": 0.0}
+        for manager, times_s in values.items()
+        for time_s in times_s
+    ]
+    found = compare(pandas.DataFrame(rows), published_estimates())
+    (remark,) = (each for each in found.remarks() if "sooner" in each)
+    assert remark.endswith("than the others, on average; the difference from random could be chance.")

@@ -91,6 +91,9 @@ def test_the_published_runs_against_themselves_meet_every_target(validate):
     assert ended.status == 0
     assert "28 of 28 targets are met, 0 are not met." in ended.out
     assert "NOT MET" not in ended.out
+    told = " ".join(ended.out.split())
+    assert "A KS p of 0.05 or more does not show that distributions are equal" in told
+    assert "differ by more than about 43%." in told  # 20 missions against 20: 1.358 * sqrt(2 / 20)
 
 
 def test_a_target_that_is_not_met_is_told_and_counts_only_when_strict(validate, tmp_path):
