@@ -15,6 +15,7 @@ from suave_des.cli.main import main
 from suave_des.domain import THRUSTER_NAMES
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.checks.findings import Finding, Level, folded, has_level
+from suave_des.knowledge.checks.slips import are_near
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import InProcessPellet
 from suave_des.monitor.diagnostics import REPORTED_STATUSES
@@ -265,7 +266,7 @@ def test_a_measured_attribute_that_the_ontology_calls_something_else(tmp_path: P
     findings = check(Subject([path], measured=["water_visibility"]))
     unknown = only(findings, "missions measure water_visibility, but no ontology has")
     assert (unknown.level, unknown.file, unknown.remedy) == (Level.WARN, str(path), "did you mean water_visability?")
-    assert only(findings, "do not measure water_visability").level is Level.INFO
+    assert only(findings, "do not measure water_visability, so what").level is Level.INFO
     assert not [each for each in found(tmp_path, measured=["water_visibility"]) if "measure" in each.message]
 
 
@@ -711,3 +712,119 @@ def test_right_variables_and_texts(tmp_path: Path, body: str) -> None:
 
 def test_a_file_without_rules_is_noted(tmp_path: Path) -> None:
     assert only(found(tmp_path, "# nothing yet\n"), "there is no rule in this file").level is Level.INFO
+
+
+def warned(tmp_path: Path, rule: str, **options: object) -> list[tuple[int | None, str, str | None]]:
+    """Column, message and remedy of the warnings about a rule."""
+    findings = found(tmp_path, rule, reported=REPORTED_STATUSES, **options)  # type: ignore[arg-type]
+    return [(one.column, one.message, one.remedy) for one in findings if one.rule == "A" and one.level is Level.WARN]
+
+
+WITHOUT_FIRING = {
+    "two values asked": (
+        'A: c_status(?c, "FALSE") ^ c_status(?c, "LEAK") -> Role(?c)',
+        (28, 'c_status(?c, "LEAK"): nothing has two values of c_status, so the rule never fires'),
+    ),
+    "two designs": (
+        "A: typeFD(?g, fd_spiral_low) ^ typeFD(?g, fd_spiral_high) -> Role(?g)",
+        (32, "typeFD(?g, fd_spiral_high): nothing has two values of typeFD, so the rule never fires"),
+    ),
+    "value replaced": (
+        "A: isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ lessThan(?v, 1.0) -> hasValue(?q, 1.0)",
+        (77, "hasValue(?q, 1.0) contradicts hasValue in the body, which holds as well"),
+    ),
+    "status replaced": (
+        'A: o_status(?o, "UNGROUNDED") -> o_status(?o, "IN_ERROR_FR")',
+        (34, 'o_status(?o, "IN_ERROR_FR") contradicts o_status in the body, which holds as well'),
+    ),
+    "compared with itself": (
+        "A: hasValue(?q, ?v) ^ greaterThan(?v, ?v) -> Role(?q)",
+        (23, "greaterThan(?v, ?v) compares ?v with itself: it never holds"),
+    ),
+    "compared with the same value": (
+        "A: hasValue(?q, ?v) ^ hasValue(?q, ?w) ^ lessThanOrEqual(?v, ?w) -> Role(?q)",
+        (42, "?v and ?w are the same hasValue: lessThanOrEqual(?v, ?w) always holds"),
+    ),
+    "nothing new": (
+        'A: fg_status(?g, "IN_ERROR_NFR") ^ solvesO(?g, ?o) -> fg_status(?g, "IN_ERROR_NFR")',
+        (55, "the rule concludes only what its body says"),
+    ),
+    "realisable": (
+        "A: hasValue(?q, ?v) ^ greaterThan(?v, 3.5) -> fd_realisability(fd_spiral_high, true)",
+        (47, "fd_realisability true has no effect: a design counts as realisable unless it is false"),
+    ),
+    "not connected": (
+        "A: hasQAvalue(?g, ?q) ^ isQAtype(?p, water_visibility) ^ hasValue(?p, ?v) -> Role(?g)",
+        (19, "?q occurs only here, and nothing connects it with ?p, which is a QAvalue, too"),
+    ),
+    "unmeasured": (
+        "A: hasQAvalue(?g, ?q) ^ isQAtype(?q, performance) -> Role(?g)",
+        (25, "can never fire: missions do not measure performance, so no grounding has a value of it"),
+    ),
+    "excluded text": (
+        'A: c_status(?c, ?s) ^ notEqual(?s, "False") -> Role(?c)',
+        (36, 'nothing in the simulation reports c_status "False"'),
+    ),
+    "text in any case": (
+        'A: c_status(?c, ?s) ^ stringEqualIgnoreCase(?s, "Fals") -> Role(?c)',
+        (49, 'nothing in the simulation reports c_status "Fals"'),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WITHOUT_FIRING)
+def test_a_rule_that_cannot_do_what_it_should(case: str, tmp_path: Path) -> None:
+    rule, finding = WITHOUT_FIRING[case]
+    assert [one[:2] for one in warned(tmp_path, rule, measured=["water_visibility"])] == [finding]
+
+
+@pytest.mark.parametrize(
+    "rule",
+    [
+        'A: c_status(?c, "FALSE") ^ c_status(?d, "RECOVERED") -> Role(?c)',
+        "A: hasValue(?q, 2.0) ^ hasValue(?q, 2.00) -> Role(?q)",
+        'A: o_status(?o, "UNGROUNDED") -> o_status(?o, "UNGROUNDED")',
+        'A: fg_status(?g, ?s) ^ equal(?s, "IN_ERROR_NFR") -> fg_status(?g, "IN_ERROR_NFR")',
+        'A: fg_status(?g, "IN_ERROR_NFR") ^ solvesO(?g, ?o) -> o_status(?o, "IN_ERROR_NFR")',
+        "A: hasValue(?q, ?v) ^ hasValue(?r, ?w) ^ lessThan(?v, ?w) -> Role(?q)",
+        "A: requiredBy(?c, ?d) -> fd_realisability(?d, true)\nB: fd_realisability(?d, true) -> Role(?d)",
+        'A: Component(?c) ^ c_status(?c, "RECOVERED") ^ Objective(?o) -> o_updatable(?o, true)',
+        "A: hasQAvalue(?g, ?q) ^ hasQAvalue(?h, ?q) ^ typeFD(?g, fd_spiral_low) -> Role(?h)",
+        "A: hasQAvalue(?g, ?q) ^ isQAtype(?q, water_visibility) -> Role(?g)",
+        'A: c_status(?c, ?s) ^ startsWith(?s, "REC") -> Role(?c)',
+        'A: c_status(?c, ?s) ^ stringEqualIgnoreCase(?s, "false") -> Role(?c)',
+    ],
+)
+def test_a_rule_that_can(rule: str, tmp_path: Path) -> None:
+    assert not warned(tmp_path, rule, measured=["water_visibility"])
+
+
+def test_a_misspelt_variable(tmp_path: Path) -> None:
+    rule = "A: hasQAvalue(?g, ?q) ^ hasValue(?q, ?vlaue) ^ hasValue(?other, ?value) ^ lessThan(?value, 2) -> Role(?g)"
+    finding = (38, "?vlaue occurs only here, and is another variable than ?value", "did you mean ?value?")
+    assert warned(tmp_path, rule) == [finding]
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "are"),
+    [
+        ("design", "desing", True),
+        ("design", "desgn", True),
+        ("design", "dessign", True),
+        ("statu", "status", False),
+        ("value", "valule", True),
+        ("obj", "objj", True),
+        ("speed1", "speed2", False),
+        ("speed12", "speed21", False),
+        ("xpos", "ypos", False),
+        ("goal_a", "goal_b", False),
+        ("goal", "goal2", False),
+        ("value", "qvalue", False),
+        ("fg", "fd", False),
+        ("q", "qq", False),
+        ("measured", "required", False),
+    ],
+)
+def test_names_that_are_misspelt_variants_of_each_other(one: str, other: str, are: bool) -> None:
+    assert are_near(one, other) is are
+    assert are_near(other, one) is are

@@ -75,7 +75,9 @@ def misused_properties(content: Content, kinds: Kinds, sources: Sequence[Ontolog
                 continue
             if all(kinds.exclude(wanted, kind) for kind in known):
                 fact = f"{local_name(predicate)} of {local_name(subject)}"
-                message = f"{fact}: {local_name(thing)} is {_a(min(known))}, but {_a(wanted)} is needed"
+                message = (
+                    f"{fact}: {local_name(thing)} is {with_article(min(known))}, but {with_article(wanted)} is needed"
+                )
                 yield finding_about(local_name(subject), sources, Level.WARN, message)
 
 
@@ -89,7 +91,7 @@ def mixed_terms(content: Content, kinds: Kinds) -> list[tuple[Rule, Atom, str, s
     for rule in content.enabled_rules:
         known: dict[Term, tuple[str, str]] = {}
         told: set[Term] = set()
-        for atom, term, kind in _uses(rule, kinds):
+        for atom, term, kind in uses(rule, kinds):
             name = local_name(atom.predicate)
             if isinstance(term, Named) and term not in known and (own := kinds.of.get(term.iri)):
                 known[term] = min(own), ""
@@ -97,12 +99,12 @@ def mixed_terms(content: Content, kinds: Kinds) -> list[tuple[Rule, Atom, str, s
             if kinds.exclude(before, kind) and term not in told:
                 told.add(term)
                 thing = f"?{term.name}" if isinstance(term, Variable) else local_name(getattr(term, "iri", ""))
-                first = _a(before) + (f" in {by}" if by else "")
-                found.append((rule, atom, f"{thing} is {first}, but {_a(kind)} in {name}", _use(atom, kinds)))
+                first = with_article(before) + (f" in {by}" if by else "")
+                found.append((rule, atom, f"{thing} is {first}, but {with_article(kind)} in {name}", _use(atom, kinds)))
     return found
 
 
-def _uses(rule: Rule, kinds: Kinds) -> Iterator[tuple[Atom, Term, str]]:
+def uses(rule: Rule, kinds: Kinds) -> Iterator[tuple[Atom, Term, str]]:
     """(atom, argument, kind) wherever a rule needs a thing of a kind; classes in heads are conclusions."""
     for atom in rule.body:
         if atom.kind == "class" and atom.predicate in _KINDS and len(atom.arguments) == 1:
@@ -121,9 +123,14 @@ def _use(atom: Atom, kinds: Kinds) -> str:
     if subject is None:
         return ""
     name = local_name(atom.predicate)
-    return f"{name} leads from {_a(subject)} to {_a(value)}" if value else f"{name} is a property of {_a(subject)}"
+    return (
+        f"{name} leads from {with_article(subject)} to {with_article(value)}"
+        if value
+        else f"{name} is a property of {with_article(subject)}"
+    )
 
 
-def _a(iri: str) -> str:
+def with_article(iri: str) -> str:
+    """Write the name of a class with its article."""
     name = local_name(iri)
     return f"{'an' if name[0] in 'AEIO' else 'a'} {name}"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from difflib import get_close_matches
+from operator import eq, ne
 from typing import Final
 
 from suave_des.errors import nearest
@@ -10,10 +12,19 @@ from suave_des.knowledge.checks.findings import Finding, Level, finding_about
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.model import Model
 from suave_des.knowledge.ontology_file import OntologyFile
-from suave_des.knowledge.rdf import C_STATUS, PERFORMANCE, QA_OPERATOR, XSD, Lit, local_name
+from suave_des.knowledge.rdf import C_STATUS, PERFORMANCE, QA_OPERATOR, SWRLB, XSD, Lit, local_name
 from suave_des.knowledge.rules.syntax import COMPARISON_OF, Atom, Rule, Variable
 
-_EQUAL: Final = COMPARISON_OF["="]
+#: Whether a built-in holds for a text and the one that a rule names.
+_HOLDS: Final[Mapping[str, Callable[[str, str], bool]]] = {
+    COMPARISON_OF["="]: eq,
+    COMPARISON_OF["!="]: ne,
+    SWRLB + "stringEqualIgnoreCase": lambda text, named: text.casefold() == named.casefold(),
+    SWRLB + "contains": lambda text, named: named in text,
+    SWRLB + "containsIgnoreCase": lambda text, named: named.casefold() in text.casefold(),
+    SWRLB + "startsWith": lambda text, named: text.startswith(named),
+    SWRLB + "endsWith": lambda text, named: text.endswith(named),
+}
 
 
 def unreported_components(
@@ -40,13 +51,28 @@ def unreported_statuses(content: Content, reported: Collection[str]) -> list[tup
     asked = [(rule, atom, atom.arguments[-1]) for rule in rules for atom in rule.body if atom.predicate == C_STATUS]
     for rule, _, status in tuple(asked):  # and in a comparison
         if isinstance(status, Variable):
-            equals = [each for each in rule.body if each.predicate == _EQUAL and status in each.arguments]
-            asked += [(rule, atom, term) for atom in equals for term in atom.arguments]
+            tests = [each for each in rule.body if each.predicate in _HOLDS and status in each.arguments]
+            asked += [(rule, atom, term) for atom in tests for term in atom.arguments]
     return [
         (rule, atom, status.text)
         for rule, atom, status in asked
-        if isinstance(status, Lit) and status.datatype == XSD + "string" and status.text not in known
+        if isinstance(status, Lit) and status.datatype == XSD + "string" and _is_unknown(atom, status.text, known)
     ]
+
+
+def _is_unknown(atom: Atom, text: str, known: Collection[str]) -> bool:
+    """Whether a text is none of the known ones, as an atom compares it; one that it excludes must be misspelt."""
+    if atom.predicate == COMPARISON_OF["!="]:
+        return text not in known and did_you_mean_text(text, known) is not None
+    test = _HOLDS[atom.predicate if atom.predicate in _HOLDS else COMPARISON_OF["="]]
+    return not any(test(each, text) for each in known)
+
+
+def did_you_mean_text(text: str, known: Collection[str]) -> str | None:
+    """Return the known text that is probably meant; None if there is none."""
+    by_capitals = {each.upper(): each for each in sorted(known)}
+    found = get_close_matches(text.upper(), by_capitals, n=1)
+    return by_capitals[found[0]] if found else None
 
 
 def mismatched_attributes(

@@ -271,17 +271,35 @@ def no_estimate(attribute: str) -> tuple[str, str]:
     return problem, f"add a hasQAestimation of type {attribute} to a design"
 
 
-def unmeasured_rules(content: Content, model: Model) -> list[tuple[Rule, Atom, str]]:
+def no_value(attribute: str, model: Model) -> tuple[str, str]:
+    """Say why no grounding has a value of an attribute, as no_estimate does, or because missions do not measure it."""
+    if not any(attribute in names for names in model.estimated.values()):
+        return no_estimate(attribute)
+    return f"missions do not measure {attribute}, so no grounding has a value of it", ""
+
+
+def unmeasured_rules(
+    content: Content, model: Model, measured: Collection[str] | None = None
+) -> list[tuple[Rule, Atom, str]]:
     """Find the enabled rules that need a grounding's value (hasQAvalue) of an attribute of which no grounding has one.
 
     A grounding has the measured values of those attributes that its function design has an estimate of.
+
+    Args:
+        content: the ontologies and rules.
+        model: what is in them.
+        measured: quality attributes that missions measure; None: any.
 
     Returns:
         each rule with the atom that names the attribute, and the attribute's name.
     """
     has_value, is_type = HAS_QA_VALUE, IS_QA_TYPE
     estimated = frozenset().union(*model.estimated.values())
-    never = {iri: name for name, iri in model.attributes.items() if name not in estimated}
+    never = {
+        iri: name
+        for name, iri in model.attributes.items()
+        if name not in estimated or (measured is not None and name not in measured)
+    }
     if content.head_properties() & {has_value, is_type} or any(triple[1] == has_value for triple in content.triples):
         return []  # groundings have values from elsewhere, too
     found = []

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from itertools import chain
 from pathlib import Path
 
 from suave_des.knowledge.checks.findings import Finding, Level, finding_from, relative_path
 from suave_des.knowledge.checks.kinds import Kinds, mixed_terms
-from suave_des.knowledge.checks.missions import unreported_statuses
-from suave_des.knowledge.checks.model import dead_rules, no_estimate, undeclared_differences, unmeasured_rules
+from suave_des.knowledge.checks.missions import did_you_mean_text, unreported_statuses
+from suave_des.knowledge.checks.model import dead_rules, no_value, undeclared_differences, unmeasured_rules
+from suave_des.knowledge.checks.slips import slips
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.model import Model
 from suave_des.knowledge.ontology_file import OntologyFile
@@ -62,22 +62,42 @@ def replacing_rules(rules: Sequence[Rule], groups: Sequence[Sequence[Rule]]) -> 
 
 
 def rules_that_cannot_fire(
-    content: Content, model: Model, given: Collection[Path], sources: Mapping[Path, OntologyFile]
+    content: Content,
+    model: Model,
+    given: Collection[Path],
+    sources: Mapping[Path, OntologyFile],
+    measured: Collection[str] | None,
 ) -> Iterator[Finding]:
-    """Find the rules that cannot, or hardly can, fire: notes for imported ontologies, with rules for many models."""
+    """Find the rules that cannot, or hardly can, do what they should.
+
+    These are notes for imported ontologies, which have rules for many models.
+
+    Args:
+        content: the ontologies and rules.
+        model: what is in them.
+        given: files of the user's.
+        sources: the ontologies by their paths.
+        measured: quality attributes that missions measure; None: any.
+    """
+
+    def level_in(rule: Rule) -> Level:
+        return Level.WARN if rule.file.resolve() in given else Level.INFO
+
     dead = [(rule, atom, f"{write_atom(atom)} holds in no state", "") for rule, atom in dead_rules(content, model)]
     known = {id(rule) for rule, *_ in dead}
-    for rule, atom, attribute in unmeasured_rules(content, model):
+    for rule, atom, attribute in unmeasured_rules(content, model, measured):
         if id(rule) not in known:
-            dead.append((rule, atom, *no_estimate(attribute)))
+            dead.append((rule, atom, *no_value(attribute, model)))
+    kinds = Kinds(content, model)
     found = [(rule, atom, f"can never fire: {message}", remedy) for rule, atom, message, remedy in dead]
-    found += mixed_terms(content, Kinds(content, model))
+    found += mixed_terms(content, kinds)
     for rule, atom in undeclared_differences(content):
         message = f"{write_atom(atom)} needs individuals that are declared different; different names are not enough"
         found.append((rule, atom, message, "add owl:AllDifferent to the ontology (Protégé: Different Individuals)"))
     for rule, atom, message, remedy in found:
-        level = Level.WARN if rule.file.resolve() in given else Level.INFO
-        yield _about(rule, sources, level, message, remedy or None, atom.place())
+        yield _about(rule, sources, level_in(rule), message, remedy or None, atom.place())
+    for slip in slips(content, kinds):
+        yield _about(slip.rule, sources, level_in(slip.rule), slip.message, slip.remedy, slip.place)
 
 
 def misspelt_statuses(
@@ -90,8 +110,7 @@ def misspelt_statuses(
     known = sorted({*chain.from_iterable(reported.values())})
     for rule, atom, status in unreported_statuses(content, known):
         if rule.file.resolve() in given:
-            meant = next((each for each in known if each.casefold() == status.casefold()), None)
-            meant = meant or next(iter(get_close_matches(status, known)), None)
+            meant = did_you_mean_text(status, known)
             level, remedy = Level.WARN, f'did you mean "{meant}"?'
             if meant is None:
                 texts = ", ".join(f'"{each}"' for each in known)

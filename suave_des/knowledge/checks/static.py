@@ -123,7 +123,7 @@ def static_findings(subject: Subject, sources: Sequence[OntologyFile]) -> Static
     findings += rule_problems(whole, vocabulary, by_path)
     if model is not None:
         own = {path.resolve() for path in (*subject.given, *subject.rules)}
-        findings += rules_that_cannot_fire(whole, model, own, by_path)
+        findings += rules_that_cannot_fire(whole, model, own, by_path, subject.measured)
         findings += misused_properties(whole, Kinds(whole, model), sources)
         findings += check_designs(whole, model, sources, subject.modes, subject.needed, subject.effects)
         findings += unused_individuals(whole, model, sources)
