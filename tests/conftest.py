@@ -3,7 +3,9 @@
 Cached inferences are kept in a folder of the test run, away from the user's, which all its processes share.
 """
 
+import functools
 import gc
+import importlib.metadata
 import os
 import shutil
 import signal
@@ -24,6 +26,9 @@ __all__ = ["_warm_process", "quick_campaigns", "quick_workers"]
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("repeatable")
+
+# What is installed stays the same: each campaign asks for nine versions, whose files take ten milliseconds to read.
+importlib.metadata.version = functools.cache(importlib.metadata.version)
 
 # Modules and tests are a million objects, which Python's search for cycles would go through again and again: it was a
 # fifth of the tests' time. What has been imported is left out of it; of the rest, half a million come before a search.

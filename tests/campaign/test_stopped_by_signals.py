@@ -84,7 +84,7 @@ def test_no_empty_folder_is_left(number: signal.Signals, moment: str, scenario: 
 def test_workers_leave_ctrl_c_to_the_campaign(scenario: Path, tmp_path: Path) -> None:
     """A terminal sends it to all processes of a command; each would say so in many lines."""
     process = chaos.start(
-        [str(scenario), "--managers", "none", "--runs", "1000", "--workers", "2", "--out", "out"], tmp_path
+        [str(scenario), "--managers", "none", "--runs", "500", "--workers", "2", "--out", "out"], tmp_path
     )
     wait_for(tmp_path / "out" / f"{STORE_FILE}-wal", 50_000)
     for child in chaos.workers_of(process):

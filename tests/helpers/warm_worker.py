@@ -1,8 +1,15 @@
-"""What a process has imported and loaded before its first mission: modules and machine code."""
+"""What a process has imported and loaded before its first mission, or its first campaign: modules and machine code."""
 
-import suave_des.cli.main  # noqa: F401
+import gc
+
+import scipy.special  # noqa: F401
+
+import suave_des.cli.main
+import suave_des.cli.summary  # noqa: F401
+from suave_des.campaign import campaign, display  # noqa: F401
 from suave_des.campaign.executors import mission_runner  # noqa: F401
 from suave_des.scenario.loader import load_scenario
 from suave_des.simulation.simulator import Simulator
 
 Simulator(load_scenario("seams2023")).run("none", 1, 1)
+gc.freeze()  # or each process forked from this one would search all of that for cycles, and copy it thereby

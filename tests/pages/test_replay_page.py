@@ -87,16 +87,16 @@ def test_it_opens_within_a_second(one, browser):
         assert 0.0 < taken["TaskDuration"] < 1.0
 
 
-def test_playing_moves_the_vehicle_until_it_is_paused(one, browser):
-    with opened(browser, one, hash_="#t=10") as found:
-        start = place(found)
-        found.page.click("#play")
-        found.wait_until("Number(document.body.dataset.time) > 12")
-        assert place(found) != start
-        found.page.click("#play")
-        paused = mission_time(found)
-        found.page.wait_for_timeout(150)
-        assert mission_time(found) == pytest.approx(paused, abs=0.2)
+def test_playing_moves_the_vehicle_until_it_is_paused(opened_one):
+    scrub_to(opened_one, 10)
+    start = place(opened_one)
+    opened_one.page.click("#play")
+    opened_one.wait_until("Number(document.body.dataset.time) > 12")
+    assert place(opened_one) != start
+    opened_one.page.click("#play")
+    paused = mission_time(opened_one)
+    opened_one.page.wait_for_timeout(150)
+    assert mission_time(opened_one) == pytest.approx(paused, abs=0.2)
 
 
 def scrub_to(found, time_s):
@@ -122,24 +122,25 @@ def test_keys_move_through_time(key, expected_s, opened_one):
     opened_one.wait_until(f"Math.abs(Number(document.body.dataset.time) - {expected_s}) < 0.5")
 
 
-def test_the_space_bar_plays_and_pauses_even_after_a_click_on_the_button(one, browser):
-    with opened(browser, one) as found:
-        found.page.keyboard.press(" ")
-        assert found.value("document.body.classList.contains('playing')")
-        found.page.focus("#play")
-        found.page.keyboard.press(" ")
-        assert not found.value("document.body.classList.contains('playing')")
+def test_the_space_bar_plays_and_pauses_even_after_a_click_on_the_button(opened_one):
+    scrub_to(opened_one, 0)
+    opened_one.value("document.activeElement.blur()")
+    opened_one.page.keyboard.press(" ")
+    assert opened_one.value("document.body.classList.contains('playing')")
+    opened_one.page.focus("#play")
+    opened_one.page.keyboard.press(" ")
+    assert not opened_one.value("document.body.classList.contains('playing')")
 
 
-def test_the_panel_shows_rule_bindings_and_designs_of_an_adaptation(one, browser):
-    with opened(browser, one, hash_=f"#t={FAILURE_S}") as found:
-        analyze, plan = (found.page.text_content(f".{phase}") for phase in ("analyze", "plan"))
-        assert "IN_ERROR_COMPONENT" in analyze
-        assert "by rule compErrFG" in analyze
-        assert "?c = c_thruster_1" in analyze
-        assert found.page.text_content(".designs .chosen .name") == "fd_recover_thrusters"
-        assert "left out: not realisable" in plan
-        assert found.value("document.querySelectorAll('.lamps .dead').length") == 1
+def test_the_panel_shows_rule_bindings_and_designs_of_an_adaptation(opened_one):
+    scrub_to(opened_one, int(FAILURE_S))
+    analyze, plan = (opened_one.page.text_content(f".{phase}") for phase in ("analyze", "plan"))
+    assert "IN_ERROR_COMPONENT" in analyze
+    assert "by rule compErrFG" in analyze
+    assert "?c = c_thruster_1" in analyze
+    assert opened_one.page.text_content(".designs .chosen .name") == "fd_recover_thrusters"
+    assert "left out: not realisable" in plan
+    assert opened_one.value("document.querySelectorAll('.lamps .dead').length") == 1
 
 
 def test_two_managers_play_side_by_side_on_the_same_numbers(both, browser):

@@ -33,7 +33,7 @@ def report(campaign):
 
 @pytest.fixture(scope="module")
 def opened_report(report, browser):
-    """The report in a window of its own, for those who only look or choose a mission: drawing takes seconds."""
+    """The report in a window, for those who only look or undo what they choose: drawing takes seconds."""
     with opened(browser, report) as found:
         yield ready(found)
 
@@ -47,17 +47,23 @@ def traces(found, chart):
     return found.value(f"document.getElementById('{chart}').data.map(each => each.name)")
 
 
-@pytest.mark.parametrize(("theme", "size"), [("light", DESKTOP), ("dark", PHONE)], ids=["desktop", "phone"])
-def test_it_opens_without_complaint_or_request_and_fits_the_window(theme, size, report, browser):
-    with opened(browser, report, size, theme=theme) as found:
-        ready(found)
-        assert found.complaints == []
-        assert found.outside(report) == []
-        assert found.value("document.documentElement.scrollWidth") <= size[0]
-        assert found.value("document.documentElement.dataset.theme") == theme
-        for chart in ("ecdf", "spread", "paired", "where", "runs", "run-time", "run-map"):
-            drawn = found.value(f"document.querySelectorAll('#{chart} svg path').length")
-            assert drawn > 3, chart
+def assert_is_drawn_and_fits(found, report, size, theme):
+    assert found.complaints == []
+    assert found.outside(report) == []
+    assert found.value("document.documentElement.scrollWidth") <= size[0]
+    assert found.value("document.documentElement.dataset.theme") == theme
+    for chart in ("ecdf", "spread", "paired", "where", "runs", "run-time", "run-map"):
+        drawn = found.value(f"document.querySelectorAll('#{chart} svg path').length")
+        assert drawn > 3, chart
+
+
+class TestItOpensWithoutComplaintOrRequestAndFitsTheWindow:
+    def test_on_a_desktop(self, report, opened_report):
+        assert_is_drawn_and_fits(opened_report, report, DESKTOP, "light")
+
+    def test_on_a_phone_with_a_dark_theme(self, report, browser):
+        with opened(browser, report, PHONE, theme="dark") as found:
+            assert_is_drawn_and_fits(ready(found), report, PHONE, "dark")
 
 
 def test_it_says_first_what_follows_and_last_how_it_was_made(opened_report):
@@ -75,17 +81,22 @@ def test_it_says_for_which_runs_it_has_ways_and_how_to_have_others(opened_report
         assert "--paths N" in told
 
 
-def test_managers_metrics_and_runs_can_be_chosen(report, browser):
-    with opened(browser, report) as found:
-        ready(found)
-        assert traces(found, "ecdf") == ["none", "bt"]
-        found.page.click("#managers button:first-child")
-        assert traces(found, "ecdf") == ["bt"]
-        assert found.page.text_content("#count") == "8 missions"
-        found.page.select_option("#metric", "distance_inspected_m")
-        assert "distance" in found.page.text_content("#ecdf-title")
-        found.page.select_option("#found", "0")
-        assert found.page.text_content("#count") != "8 missions"
+def test_managers_metrics_and_runs_can_be_chosen_and_all_of_them_again(opened_report):
+    page = opened_report.page
+    assert traces(opened_report, "ecdf") == ["none", "bt"]
+    metric, among = (page.input_value(f"#{choice}") for choice in ("metric", "found"))
+    page.click("#managers button:first-child")
+    assert traces(opened_report, "ecdf") == ["bt"]
+    assert page.text_content("#count") == "8 missions"
+    page.select_option("#metric", "distance_inspected_m")
+    assert "distance" in page.text_content("#ecdf-title")
+    page.select_option("#found", "0")
+    assert page.text_content("#count") != "8 missions"
+    page.select_option("#found", among)
+    page.select_option("#metric", metric)
+    page.click("#managers button:first-child")
+    assert traces(opened_report, "ecdf") == ["none", "bt"]
+    assert page.text_content("#count") == "16 missions"
 
 
 def test_a_click_on_a_mission_shows_its_numbers_and_way(opened_report, campaign):
@@ -111,7 +122,8 @@ def test_names_are_text_never_markup(campaign, tmp_path, browser):
         assert found.value("document.querySelectorAll('img, #managers b, #conclusion b').length") == 0
 
 
-def test_ten_thousand_missions_make_a_page_that_can_be_sent(campaign, tmp_path):
+def test_ten_thousand_missions_make_a_page_that_can_be_sent(campaign, tmp_path, monkeypatch):
+    monkeypatch.setattr("suave_des.report.statistics._FEWER_RESAMPLES", 99)  # intervals, however rough, are as long
     rows = pandas.read_csv(campaign / "runs.csv")
     many = pandas.concat([rows.assign(run=rows.run + 8 * copy) for copy in range(625)])
     many.to_csv(tmp_path / "runs.csv", index=False)
