@@ -58,6 +58,9 @@ def compare(
     unpaired: Annotated[
         bool, typer.Option("--unpaired", help="Treat runs as independent although they share random numbers.")
     ] = False,
+    bootstrap: Annotated[
+        bool, typer.Option("--bootstrap", help="BCa bootstrap intervals of means instead of those of t.")
+    ] = False,
     as_format: Annotated[CompareFormat, typer.Option("--format", help="Output format.")] = CompareFormat.TABLE,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write .csv, .json, .md or .tex instead of printing.")
@@ -79,6 +82,7 @@ def compare(
         against=against,
         half_widths=tuple(half_width or ()),
         unpaired=unpaired,
+        bootstrap=bootstrap,
     )
     comparison = compare_folders(results, choices)
     if out is not None:

@@ -35,6 +35,7 @@ class Choices:
         against: the one that all others are compared with, as tables name it; None: each with each.
         half_widths: METRIC:HALF_WIDTH of the intervals for which the number of runs is to be given.
         unpaired: whether runs are taken as independent though they share their random numbers.
+        bootstrap: whether intervals of means and of their differences are by BCa bootstrap instead of t.
     """
 
     managers: Sequence[str] = ()
@@ -43,6 +44,7 @@ class Choices:
     against: str | None = None
     half_widths: Sequence[str] = ()
     unpaired: bool = False
+    bootstrap: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,10 +214,10 @@ def compare(missions: Missions, choices: Choices | None = None) -> Comparison:
     half_widths = parse_half_widths(choices.half_widths, metrics)
     pairs = _pairs([group.name for group in groups], choices.against)
     horizon_s = time_limit_s(groups)
-    summaries = tuple(_summary(group, metric, horizon_s) for metric in metrics for group in groups)
+    summaries = tuple(_summary(group, metric, horizon_s, choices) for metric in metrics for group in groups)
     by_name = {group.name: group for group in groups}
     differences = [
-        _difference(by_name[first], by_name[second], metric, half_widths.get(metric.name), unpaired=choices.unpaired)
+        _difference(by_name[first], by_name[second], metric, half_widths.get(metric.name), choices)
         for metric in metrics
         for first, second in pairs
     ]
@@ -238,7 +240,7 @@ def _pairs(names: list[str], against: str | None) -> list[tuple[str, str]]:
     return [(name, against) for name in names if name != against]
 
 
-def _summary(group: Group, metric: ComparedMetric, horizon_s: float) -> Summary:
+def _summary(group: Group, metric: ComparedMetric, horizon_s: float, choices: Choices) -> Summary:
     """Estimate one metric of one group."""
     sample = group.known_values(metric.name)
     found = Summary(group.name, metric.name, len(sample), len(group.frame) - len(sample))
@@ -247,7 +249,7 @@ def _summary(group: Group, metric: ComparedMetric, horizon_s: float) -> Summary:
     if metric.name == FOUND and group.is_of_missions:
         mean = statistics.share_estimate(int(sample.sum()), len(sample))
     else:
-        mean = statistics.mean_interval(sample)
+        mean = statistics.mean_interval(sample, bootstrap=choices.bootstrap)
     low, median, high = np.percentile(sample, (25.0, 50.0, 75.0))
     search = None
     if metric.name == SEARCH_TIME and group.is_of_missions:
@@ -260,10 +262,10 @@ def _summary(group: Group, metric: ComparedMetric, horizon_s: float) -> Summary:
 
 
 def _difference(
-    first: Group, second: Group, metric: ComparedMetric, half_width: float | None, *, unpaired: bool
+    first: Group, second: Group, metric: ComparedMetric, half_width: float | None, choices: Choices
 ) -> Difference:
     """Compare two groups in one metric."""
-    pairing, x, y = _paired(first, second, metric.name, unpaired=unpaired)
+    pairing, x, y = _paired(first, second, metric.name, unpaired=choices.unpaired)
     n = (len(x),) if pairing.is_paired else (len(x), len(y))
     found = Difference(first.name, second.name, metric.name, pairing, n)
     if not len(x) or not len(y):
@@ -274,12 +276,14 @@ def _difference(
             difference = statistics.paired_share_difference(x > 0.0, y > 0.0)
             tested = statistics.paired_shares_test(x > 0.0, y > 0.0)
         else:
-            difference, tested = statistics.mean_interval(x - y), statistics.signed_rank_test(x, y)
+            difference = statistics.mean_interval(x - y, bootstrap=choices.bootstrap)
+            tested = statistics.signed_rank_test(x, y)
     elif is_share:
         counts = (int(x.sum()), len(x)), (int(y.sum()), len(y))
         difference, tested = statistics.share_difference(*counts), statistics.shares_test(*counts)
     else:
-        difference, tested = statistics.difference_interval(x, y), statistics.rank_sum_test(x, y)
+        difference = statistics.difference_interval(x, y, bootstrap=choices.bootstrap)
+        tested = statistics.rank_sum_test(x, y)
     found = replace(found, difference=difference, tested=tested)
     return _with_sizes(found, x, y, half_width or metric.default_half_width(x, y))
 

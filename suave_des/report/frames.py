@@ -38,6 +38,7 @@ class CampaignFrame(pandas.DataFrame):
         against: str | None = None,
         half_widths: Sequence[str] = (),
         unpaired: bool = False,
+        bootstrap: bool = False,
     ) -> Comparison:
         """Compare the managers, as `suave-des compare` does, in place of pandas' comparison cell by cell.
 
@@ -48,13 +49,14 @@ class CampaignFrame(pandas.DataFrame):
             against: the one that all others are compared with; None: each with each.
             half_widths: METRIC:HALF_WIDTH of intervals for which the number of runs is to be given.
             unpaired: whether runs are taken as independent though they share their random numbers.
+            bootstrap: whether intervals of means are BCa bootstrap intervals instead of those of t.
 
         Raises:
             InputError: a name is not there, or an extra is not installed.
         """
         from suave_des.report.compare import Choices, compare_frame
 
-        return compare_frame(self, Choices(managers, metrics, by, against, half_widths, unpaired))
+        return compare_frame(self, Choices(managers, metrics, by, against, half_widths, unpaired, bootstrap))
 
     def figure(self, kind: str = "auto") -> Figure:
         """Draw the missions, as `suave-des figure` does.

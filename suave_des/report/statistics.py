@@ -26,9 +26,14 @@ Statistic = Callable[..., NDArray[np.float64]]
 EXTRA = "compare"
 """The extra that installs statsmodels and lifelines."""
 SIGNIFICANCE = 0.05
-STUDENT, WELCH = "Student's t", "Welch's t"
+STUDENT, WELCH, BCA = "Student's t", "Welch's t", "BCa bootstrap"
 WILSON, NEWCOMBE, BONETT_PRICE = "Wilson", "Newcombe", "Bonett and Price"
 RESAMPLES = 9_999
+_LARGEST_BOOTSTRAP = 5_000
+"""Of more values the bootstrap's interval is that of t, and would take minutes."""
+_BATCH_VALUES = 1_000_000
+"""Resampled values in memory at a time."""
+_SEED = 20230209  # so that equal samples give equal intervals
 _MOST_RUNS = 10_000_000
 _ROUNDING = 1e-9
 """A share left of one half is often a little more after rounding."""
@@ -56,8 +61,8 @@ class Estimated:
     method: str = ""
 
 
-def mean_interval(sample: Sample) -> Estimated:
-    """Estimate the mean of a sample of one value or more, with its interval by Student's t.
+def mean_interval(sample: Sample, *, bootstrap: bool = False) -> Estimated:
+    """Estimate the mean of a sample of one value or more, with its interval by Student's t, or else by BCa bootstrap.
 
     Differences of runs in pairs have heavy tails: most are small, a few are not, and a small sample has none of these.
     A bootstrap, which knows nothing but the sample, is too narrow then. Where the values are all equal there is no
@@ -65,14 +70,22 @@ def mean_interval(sample: Sample) -> Estimated:
     """
     found = estimate(sample.tolist())
     assert found.mean is not None
+    if bootstrap and len(sample) <= _LARGEST_BOOTSTRAP:
+        return Estimated(found.mean, _bca(lambda x, axis: x.mean(axis=axis), sample), BCA)
     return Estimated(found.mean, found.mean_interval if np.ptp(sample) > 0.0 else None, STUDENT)
 
 
-def difference_interval(first: Sample, second: Sample) -> Estimated:
-    """Estimate the difference of two independent samples' means, first - second, with its interval by Welch (1947)."""
+def difference_interval(first: Sample, second: Sample, *, bootstrap: bool = False) -> Estimated:
+    """Estimate the difference of two independent samples' means, first - second.
+
+    Its interval is that of Welch (1947), or else by BCa bootstrap; see mean_interval.
+    """
     from scipy.stats import ttest_ind
 
     difference = math.fsum(first) / len(first) - math.fsum(second) / len(second)
+    if bootstrap and max(len(first), len(second)) <= _LARGEST_BOOTSTRAP:
+        interval = _bca(lambda x, y, axis: x.mean(axis=axis) - y.mean(axis=axis), first, second)
+        return Estimated(difference, interval, BCA)
     if min(len(first), len(second)) < 2 or np.ptp(first) == np.ptp(second) == 0.0:
         return Estimated(difference)
     with _quiet():  # of a sample without spread
@@ -80,19 +93,30 @@ def difference_interval(first: Sample, second: Sample) -> Estimated:
     return Estimated(difference, _finite(welch.low, welch.high), WELCH)
 
 
+def _bca(statistic: Statistic, *samples: Sample) -> Interval | None:
+    """Return the bias-corrected and accelerated bootstrap interval (Efron 1987); none of samples without spread."""
+    if all(np.ptp(sample) == 0.0 for sample in samples):
+        return None
+    batch = max(1, _BATCH_VALUES // max(map(len, samples)))
+    return bootstrap_interval(statistic, samples, np.random.default_rng(_SEED), batch, method="BCa")
+
+
 def bootstrap_interval(
     statistic: Statistic,
     samples: Sequence[Sample],
     rng: np.random.Generator,
     batch: int | None = None,
+    *,
+    method: Literal["percentile", "BCa"] = "percentile",
 ) -> Interval | None:
-    """Return the percentile bootstrap interval of a statistic of one sample or of several independent ones.
+    """Return the bootstrap interval of a statistic of one sample or of several independent ones.
 
     Args:
         statistic: takes arrays of shape (k, n) and an axis.
         samples: are resampled with replacement.
         rng: to resample with.
         batch: resamples at a time, so that memory stays small.
+        method: as of scipy.stats.bootstrap.
 
     Returns:
         The interval; none for samples of one value, or where it or a resample's statistic is not finite.
@@ -110,7 +134,7 @@ def bootstrap_interval(
             batch=batch,
             vectorized=True,
             confidence_level=CONFIDENCE,
-            method="percentile",
+            method=method,
             rng=rng,
         )
     if not np.isfinite(found.bootstrap_distribution).all():

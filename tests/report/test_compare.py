@@ -217,6 +217,24 @@ class TestCampaign:
         expected = lifelines.utils.restricted_mean_survival_time(fitted, t=300.0)
         assert search.restricted_mean_s.value == pytest.approx(expected)
 
+    @pytest.mark.parametrize("unpaired", [False, True])
+    def test_bootstrap_intervals_are_scipys_and_repeatable(self, campaign: Path, unpaired: bool) -> None:
+        frame = pandas.read_csv(campaign / "runs.csv")
+        none, bt = (frame[frame["manager"] == name]["search_time_s"].to_numpy() for name in ("none", "bt"))
+        choices = Choices(managers=("none", "bt"), metrics=("search_time_s",), unpaired=unpaired, bootstrap=True)
+        first, second = compare_folders([campaign], choices), compare_folders([campaign], choices)
+        found = difference(first, "none", "bt").difference
+        assert found is not None and found == difference(second, "none", "bt").difference
+        samples = (none, bt) if unpaired else (none - bt,)
+        expected = stats.bootstrap(
+            samples,
+            lambda x, *y, axis: x.mean(axis=axis) - sum(each.mean(axis=axis) for each in y),
+            rng=np.random.default_rng(1),
+        ).confidence_interval
+        assert found.interval == pytest.approx((expected.low, expected.high), abs=0.05 * (expected.high - expected.low))
+        assert "95% intervals: BCa bootstrap." in plain_text(first, 100)
+        assert "95% intervals: Student's t" in plain_text(compare_folders([campaign], Choices(unpaired=unpaired)), 100)
+
 
 class TestSweep:
     def test_runs_are_independent_and_points_are_not(self, tmp_path: Path) -> None:
