@@ -223,7 +223,7 @@ def build_model(content: Content, sources: Sequence[OntologyFile]) -> tuple[Mode
         {name: Individual(iri, tuple(own[iri])) for name, iri in group.items()} for group in groups
     )
     estimated: dict[str, set[str]] = {name: set() for name in designs}
-    for design, attribute, _ in _estimations(triples, designs, attributes):
+    for design, attribute, _ in estimations(triples, designs, attributes):
         estimated[design].add(attribute)
     model = Model(
         functions=functions,
@@ -269,7 +269,7 @@ def _members(triples: Iterable[Triple], name: str) -> set[str]:
     return {s for s, p, o in triples if p == RDF_TYPE and o in classes}
 
 
-def _estimations(
+def estimations(
     triples: Iterable[Triple], designs: Mapping[str, str], attributes: Mapping[str, str]
 ) -> Iterator[tuple[str, str, str]]:
     """(design, quality attribute type, IRI of the QAvalue individual) of each hasQAestimation."""
@@ -289,7 +289,7 @@ def expectations(content: Content, model: Model) -> dict[str, dict[str, Decimal]
         if predicate == HAS_VALUE and isinstance(value, Lit)
     }
     found: dict[str, dict[str, Decimal]] = {name: {} for name in model.designs}
-    for design, attribute, individual in _estimations(content.triples, model.designs, model.attributes):
+    for design, attribute, individual in estimations(content.triples, model.designs, model.attributes):
         if individual in numbers:
             value = numbers[individual]
             found[design][attribute] = min(value, found[design].get(attribute, value))

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.checks.findings import Finding, Level, finding_about, finding_from
+from suave_des.knowledge.checks.individuals import classes_instead_of_individuals, confused_individuals, misspelt_facts
 from suave_des.knowledge.checks.kinds import Kinds, misused_properties
 from suave_des.knowledge.checks.missions import mismatched_attributes, unreported_components
 from suave_des.knowledge.checks.model import (
@@ -127,8 +129,13 @@ def static_findings(subject: Subject, sources: Sequence[OntologyFile]) -> Static
         findings += misused_properties(whole, Kinds(whole, model), sources)
         findings += check_designs(whole, model, sources, subject.modes, subject.needed, subject.effects)
         findings += unused_individuals(whole, model, sources)
+        findings += confused_individuals(whole, model, sources, subject.measured)
+        modes = {*chain.from_iterable((subject.modes or {}).values())}
+        findings += classes_instead_of_individuals(whole, model, sources, modes)
         if subject.reported is not None:
             findings += unreported_components(whole, model, sources, subject.reported)
+            statuses = {*chain.from_iterable(subject.reported.values())}
+            findings += misspelt_facts(whole, model, sources, statuses)
             findings += misspelt_statuses(whole, subject.reported, own, by_path)
         if subject.measured is not None:
             findings += mismatched_attributes(whole, model, sources, subject.measured)
