@@ -40,8 +40,8 @@ def run_campaign(
     order given; run, seed and adaptations int64, pipeline_found bool, other metrics float64, nan if not measured.
 
     `frame.attrs` has, as plain values, `missions`, `until_ci` and `failures` as in manifest.json, `summary` (a mapping
-    for each row of summary.csv), `runs_alike` (how many runs in a row share their draws), `interrupted`, and `folder`,
-    which may be None. When missions fail, a warning says so.
+    for each row of summary.csv), `runs_sharing_draw` (the number of consecutive runs that share a draw), `interrupted`,
+    and `folder`, which may be None. When missions fail, a warning says so.
 
     Ctrl-C in a notebook or at a prompt gives the missions that are done, with a warning; elsewhere it is raised as
     CampaignInterrupted, a KeyboardInterrupt, whose `result.frame()` has them.
@@ -177,7 +177,7 @@ def _with_progress(
         warnings.warn(f"{problem}{result.failures[0]}", stacklevel=3)
     folder = None if result.folder is None else str(result.folder)
     attrs = {
-        "runs_alike": result.variation.runs_alike,
+        "runs_sharing_draw": result.variation.runs_sharing_draw,
         "summary": result.summary_records(),
         "interrupted": interrupted,
         "folder": folder,

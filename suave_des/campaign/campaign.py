@@ -242,8 +242,8 @@ class _Campaign:
 
     def _new_tracker(self) -> ProgressTracker:
         spec = self.spec
-        points, alike = self.variation.sweep.points, self.variation.runs_alike
-        return ProgressTracker(points, spec.managers, spec.runs, spec.until, alike)
+        points, sharing = self.variation.sweep.points, self.variation.runs_sharing_draw
+        return ProgressTracker(points, spec.managers, spec.runs, spec.until, sharing)
 
     def run(self, on_progress: OnProgress | None, *, resumed: bool) -> CampaignResult:
         """Run the missions that are not done yet, and write the files."""

@@ -94,9 +94,9 @@ class PairProgress:
 OnProgress = Callable[[Progress], None]
 
 
-def running_mean(runs_alike: int) -> RunningMean:
+def running_mean(runs_sharing_draw: int) -> RunningMean:
     """Return a mean of runs, of which so many in a row share a draw."""
-    return RunningMean() if runs_alike == 1 else GroupedMean()
+    return RunningMean() if runs_sharing_draw == 1 else GroupedMean()
 
 
 class PairTracker:
@@ -107,19 +107,19 @@ class PairTracker:
 
     Args:
         half_width: wanted.
-        runs_alike: consecutive runs that share a draw.
+        runs_sharing_draw: consecutive runs that share a draw.
 
     Attributes:
         last_run: the run after which no more are needed; None until that is known.
         differences: mean of first - second, in the runs in which both have a value.
     """
 
-    def __init__(self, half_width: float, runs_alike: int = 1) -> None:
-        self._half_width, self._runs_alike = half_width, runs_alike
+    def __init__(self, half_width: float, runs_sharing_draw: int = 1) -> None:
+        self._half_width, self._runs_sharing_draw = half_width, runs_sharing_draw
         self._waiting: tuple[dict[int, object], dict[int, object]] = ({}, {})
         self._next = 1
         self.last_run: int | None = None
-        self.differences = running_mean(runs_alike)
+        self.differences = running_mean(runs_sharing_draw)
 
     def add(self, side: int, run: int, value: object) -> None:
         """Take the value of a manager in a run; anything but a number is a run without one.
@@ -135,7 +135,7 @@ class PairTracker:
         self._waiting[side][run] = value
         while self._next in first and self._next in second:
             x, y = first.pop(self._next), second.pop(self._next)
-            draw = (self._next - 1) // self._runs_alike
+            draw = (self._next - 1) // self._runs_sharing_draw
             self._next += 1
             if isinstance(x, float | int) and isinstance(y, float | int):
                 self.differences.add(x - y, draw)
@@ -158,7 +158,7 @@ class GroupTracker:
         metric: column whose mean is followed.
         half_width: the group is over as soon as the interval's half-width is below this; None: after all runs.
         can_end_earlier: whether ended_at may be called, for which all values are kept.
-        runs_alike: consecutive runs that share a draw.
+        runs_sharing_draw: consecutive runs that share a draw.
     """
 
     def __init__(
@@ -168,7 +168,7 @@ class GroupTracker:
         half_width: float | None,
         *,
         can_end_earlier: bool = False,
-        runs_alike: int = 1,
+        runs_sharing_draw: int = 1,
     ) -> None:
         self._values: dict[int, object] | None = {} if can_end_earlier else None
         self._metric, self._index = metric, COLUMNS.index(metric)
@@ -178,8 +178,8 @@ class GroupTracker:
         self.done = self.failed = 0
         self.runs = runs
         self.is_narrow = False
-        self._runs_alike = runs_alike
-        self.values = running_mean(runs_alike)
+        self._runs_sharing_draw = runs_sharing_draw
+        self.values = running_mean(runs_sharing_draw)
 
     def add(self, run: int, outcome: MissionOutcome) -> None:
         """Count an outcome, unless its run is counted already or lies beyond the last one."""
@@ -199,7 +199,7 @@ class GroupTracker:
             self._next += 1
             if not isinstance(value, float | int):
                 continue
-            self.values.add(value, (self._next - 2) // self._runs_alike)
+            self.values.add(value, (self._next - 2) // self._runs_sharing_draw)
             if self.values.is_narrow(self._half_width, FEWEST_RUNS):
                 # The run before the next one is the last; what is known of later ones does not count.
                 self.is_narrow = True
@@ -210,7 +210,7 @@ class GroupTracker:
     def ended_at(self, run: int) -> GroupTracker:
         """Return a tracker that has the runs up to one that may be over already, and no others."""
         assert self._values is not None
-        ended = GroupTracker(run, self._metric, None, runs_alike=self._runs_alike)
+        ended = GroupTracker(run, self._metric, None, runs_sharing_draw=self._runs_sharing_draw)
         for number, found in self._values.items():
             ended._add(number, found)
         ended.is_narrow = True
@@ -235,13 +235,13 @@ class ProgressTracker:
         managers: names, in the campaign's order.
         runs: planned for each group.
         until: when a group is over before that, if at all.
-        runs_alike: consecutive runs that share a draw: the draws are independent, the runs are not.
+        runs_sharing_draw: consecutive runs that share a draw: the draws are independent, the runs are not.
     """
 
     def __init__(
-        self, points: int, managers: Sequence[str], runs: int, until: UntilCi | None, runs_alike: int = 1
+        self, points: int, managers: Sequence[str], runs: int, until: UntilCi | None, runs_sharing_draw: int = 1
     ) -> None:
-        self._managers, self._runs, self._until, self._runs_alike = managers, runs, until, runs_alike
+        self._managers, self._runs, self._until, self._runs_sharing_draw = managers, runs, until, runs_sharing_draw
         self._groups_in_all = points * len(managers)
         self._under_way: dict[MissionGroup, GroupTracker] = {}
         self._complete: dict[MissionGroup, GroupProgress] = {}
@@ -279,7 +279,7 @@ class ProgressTracker:
         assert self._until is not None
         if manager not in self._sides:
             return
-        pair = self._pairs.setdefault(point, PairTracker(self._until.half_width, self._runs_alike))
+        pair = self._pairs.setdefault(point, PairTracker(self._until.half_width, self._runs_sharing_draw))
         if pair.last_run is not None:
             return
         value = None if isinstance(outcome, MissionFailure) else outcome[COLUMNS.index(self._until.metric)]
@@ -319,7 +319,7 @@ class ProgressTracker:
             self._metric,
             half_width,
             can_end_earlier=bool(self._sides),
-            runs_alike=self._runs_alike,
+            runs_sharing_draw=self._runs_sharing_draw,
         )
 
     @property

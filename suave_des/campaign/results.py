@@ -224,7 +224,7 @@ def gather(
     failures: list[MissionFailure] = []
     summary: list[Row] = []
     done = reached = 0
-    tally = _Tally(variation.runs_alike)
+    tally = _Tally(variation.runs_sharing_draw)
 
     def summarise_before(group: MissionGroup) -> None:
         """Add the groups before this one that are not summarised yet; the tally is of the first of them."""
@@ -233,7 +233,7 @@ def gather(
             point, manager = next_group
             swept = map(cell_of, variation.sweep.values(point).values())
             summary.append((spec.managers[manager], *tally.figures(), *swept))
-            tally = _Tally(variation.runs_alike)
+            tally = _Tally(variation.runs_sharing_draw)
 
     for key, outcome in tracker.counted(outcomes()):
         summarise_before((key.point, key.manager))
@@ -265,8 +265,8 @@ class _Tally:
     _FOUND = COLUMNS.index("pipeline_found")
     _INDICES = tuple(COLUMNS.index(metric) for metric in METRICS)
 
-    def __init__(self, runs_alike: int) -> None:
-        self._runs_alike = runs_alike
+    def __init__(self, runs_sharing_draw: int) -> None:
+        self._runs_sharing_draw = runs_sharing_draw
         self._rows = self._found = 0
         self._values = tuple(array("d") for _ in METRICS)
         self._draws = tuple(array("q") for _ in METRICS)
@@ -277,8 +277,8 @@ class _Tally:
         for values, draws, index in zip(self._values, self._draws, self._INDICES, strict=True):
             if (value := row[index]) is not None:
                 values.append(float(value))
-                if self._runs_alike > 1:
-                    draws.append((run - 1) // self._runs_alike)
+                if self._runs_sharing_draw > 1:
+                    draws.append((run - 1) // self._runs_sharing_draw)
 
     def figures(self) -> Row:
         """Return the cells of summary.csv after the first; a figure that needs more missions than there are is None."""

@@ -172,7 +172,7 @@ class Variation:
         return (*self.sweep.parameters, *self.drawn.values(), *((ENSEMBLE_COLUMN,) if self.ensemble else ()))
 
     @property
-    def runs_alike(self) -> int:
+    def runs_sharing_draw(self) -> int:
         """Number of consecutive runs that share a draw, and so are not independent; 1 where nothing is drawn."""
         return self.runs_per_draw if self.drawn else 1
 

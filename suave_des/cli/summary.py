@@ -56,8 +56,8 @@ def print_summary(console: Console, result: CampaignResult) -> None:
             break
     title = f"{result.loaded.scenario.name}, seed {result.spec.seed}: means ± half their 95% intervals"
     print_table(console, f"{title}, standard deviations" if look.has_std else title, table)
-    if (alike := result.variation.runs_alike) > 1:
-        console.print(f"{alike} runs share each draw: intervals take the draws for independent, not the runs")
+    if (sharing := result.variation.runs_sharing_draw) > 1:
+        console.print(f"{sharing} runs share each draw: intervals treat draws as independent, not runs")
     if len(result.summary) > _ROWS_SHOWN:
         more = len(result.summary) - _ROWS_SHOWN + 1
         where = "" if result.folder is None else f", all in {result.folder}/summary.csv"

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from suave_des.estimates import GroupedMean, percent, t_quantile
 from suave_des.report import style
 from suave_des.report.compared_metrics import PAPER_METRICS
-from suave_des.report.grouping import Group, first_alike, runs_alike, time_limit_s
+from suave_des.report.grouping import Group, first_alike, runs_sharing_draw, time_limit_s
 from suave_des.report.words import folded
 
 _ROW_IN = 0.62
@@ -169,7 +169,7 @@ def draw_convergence(groups: Sequence[Group]) -> style.Picture:
         for number, group in enumerate(groups):
             frame = group.frame.sort_values("run", kind="stable")
             known = frame[frame[metric].notna()]
-            alike = runs_alike(known)
+            alike = runs_sharing_draw(known)
             draws = first_alike(known, alike).astype(int).tolist() if alike > 1 else None
             n, means, halves = running_means(known[metric].to_numpy(float), draws)
             look = style.line(number)

@@ -120,7 +120,7 @@ def _short(value: object) -> str:
 
 
 def _group(name: str, frame: pandas.DataFrame, averaged: Sequence[str], *, averages: bool) -> Group:
-    alike = runs_alike(frame) if averages else 1
+    alike = runs_sharing_draw(frame) if averages else 1
     has_points = bool(averaged) and bool(frame[["seed", "run"]].duplicated().any())
     if has_points:
         frame = _means_by_run(frame)
@@ -129,9 +129,13 @@ def _group(name: str, frame: pandas.DataFrame, averaged: Sequence[str], *, avera
     return Group(name, frame, not has_points and alike == 1)
 
 
-def runs_alike(frame: pandas.DataFrame) -> int:
+def runs_sharing_draw(frame: pandas.DataFrame) -> int:
     """Return how many runs in a row share their draws."""
-    return int(frame["runs_alike"].max()) if "runs_alike" in frame and frame["runs_alike"].notna().any() else 1
+    return (
+        int(frame["runs_sharing_draw"].max())
+        if "runs_sharing_draw" in frame and frame["runs_sharing_draw"].notna().any()
+        else 1
+    )
 
 
 def first_alike(frame: pandas.DataFrame, alike: int) -> pandas.Series[float]:
@@ -151,7 +155,7 @@ def _means_by_run(frame: pandas.DataFrame, *, has_all: bool = True) -> pandas.Da
 
 
 def _notes(groups: Sequence[Group], averaged: Sequence[str], frame: pandas.DataFrame) -> Iterator[str]:
-    alike = runs_alike(frame)
+    alike = runs_sharing_draw(frame)
     if alike > 1:
         yield (
             f"the values of the {alike} runs that share each draw (runs_per_draw) are averaged: draws are independent,"

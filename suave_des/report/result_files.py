@@ -31,7 +31,7 @@ class Missions:
 
     Attributes:
         frame: with `source`, `manager`, `scenario`, the columns of report.runs.COLUMNS, and those of a sweep; with
-            `runs_alike`, how many runs in a row share their draws, where that is known.
+            `runs_sharing_draw`, how many runs in a row share their draws, where that is known.
         swept: columns that a sweep varies: they differ between missions of one manager, seed and run.
         notes: caveats about the files for readers of the comparison.
     """
@@ -95,7 +95,9 @@ def missions_of(frame: pandas.DataFrame) -> Missions:
     for name in ("pipeline_found", "mean_reaction_time_s", "run"):
         plain[name] = _as_floats(plain[name])
     others = [name for name in frame.columns if name not in OWN_COLUMNS]
-    missions = Missions(plain.assign(runs_alike=int(frame.attrs.get("runs_alike", 1))), _varying(plain, others))
+    missions = Missions(
+        plain.assign(runs_sharing_draw=int(frame.attrs.get("runs_sharing_draw", 1))), _varying(plain, others)
+    )
     _check_once(missions, None)
     return missions
 
@@ -111,7 +113,7 @@ def _read_source(path: Path) -> Missions:
     check_one_campaign(path)
     if (path / _RUNS_FILE).is_file():
         missions = _of_runs(path / _RUNS_FILE)
-        frame = missions.frame.assign(runs_alike=_runs_alike(path))
+        frame = missions.frame.assign(runs_sharing_draw=_runs_sharing_draw(path))
         return Missions(frame, missions.swept, tuple(_unfinished(path)))
     if (path / _STORE_FILE).is_file():
         remedy = f"suave-des campaign --resume {path} runs the rest and writes them"
@@ -203,7 +205,7 @@ def _is_foreign(path: Path) -> bool:
         return False
 
 
-def _runs_alike(folder: Path) -> int:
+def _runs_sharing_draw(folder: Path) -> int:
     """Return how many runs in a row share the draws of perturbations, from a campaign's manifest; 1 if none do."""
     try:
         manifest = json.loads((folder / _MANIFEST_FILE).read_text(encoding="utf-8"))

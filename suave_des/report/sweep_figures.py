@@ -17,7 +17,7 @@ from suave_des.estimates import estimate
 from suave_des.report import style
 from suave_des.report.campaign_figures import legend_columns
 from suave_des.report.compared_metrics import PAPER_METRICS
-from suave_des.report.grouping import first_alike, runs_alike
+from suave_des.report.grouping import first_alike, runs_sharing_draw
 from suave_des.report.result_files import Missions
 from suave_des.report.words import folded, key_words, value_words
 
@@ -124,7 +124,7 @@ def _draw_means(axes: Axes, frame: pandas.DataFrame, metric: str, beside: float,
     found, middles = [], []
     for _, part in frame.groupby(key):
         has_runs = part["run"].notna().all()
-        runs = first_alike(part, runs_alike(part))
+        runs = first_alike(part, runs_sharing_draw(part))
         by_run = part.groupby(["seed", runs])[metric].mean() if has_runs else part[metric]
         found.append(estimate(by_run.dropna().tolist()))
         middles.append(float(part["place"].mean()) + beside)

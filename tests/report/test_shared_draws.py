@@ -91,7 +91,7 @@ def test_runs_without_perturbations_are_independent(tmp_path: Path) -> None:
 
 def test_until_ci_waits_for_enough_draws() -> None:
     values = np.repeat(np.random.default_rng(2).normal(100.0, 5.0, 60), 10)
-    ordinary, grouped = (GroupTracker(600, "search_time_s", 4.0, runs_alike=alike) for alike in (1, 10))
+    ordinary, grouped = (GroupTracker(600, "search_time_s", 4.0, runs_sharing_draw=alike) for alike in (1, 10))
     pair = PairTracker(4.0, 10)
     for run, value in enumerate(values.tolist(), 1):
         for tracker in (ordinary, grouped):
