@@ -67,7 +67,7 @@ spare: hasQAvalue(?fg, ?q) ^ isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^
 def cluster(tmp_path_factory: pytest.TempPathFactory, users_folder: Path) -> Iterator[Cluster]:
     cluster = Cluster(tmp_path_factory.mktemp("cluster"), users_folder)
     try:
-        cluster.add_worker(replaced=True)
+        cluster.add_worker()
         cluster.add_worker(threads=2)
         cluster.wait_for_workers(2)
         yield cluster

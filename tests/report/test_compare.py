@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import lifelines
 import numpy as np
 import pandas
 import pytest
 from scipy import stats
-from statsmodels.stats.multitest import multipletests
 
 from suave_des import api
 from suave_des.campaign.campaign import run_campaign
@@ -19,6 +17,13 @@ from suave_des.report.compare_files import latex_text, plain_text
 from suave_des.report.paper import published_runs
 
 MANAGERS = ("none", "random", "metacontrol")
+
+
+def holm(ps: list[float]) -> list[float]:
+    """Holm's correction by statsmodels, which takes a while to import."""
+    from statsmodels.stats.multitest import multipletests
+
+    return list(multipletests(ps, method="holm")[1])
 
 
 def difference(comparison: Comparison, first: str, second: str, metric: str = "search_time_s") -> Difference:
@@ -92,7 +97,7 @@ class TestPublishedRuns:
     def test_holms_correction_counts_all_tests(self, published: Comparison) -> None:
         ps = [each.tested.p for each in published.differences if each.tested]
         assert len(ps) == 9
-        adjusted = multipletests(ps, method="holm")[1]
+        adjusted = holm(ps)
         assert [each.p_holm for each in published.differences] == pytest.approx(list(adjusted))
 
     def test_real_missions_are_not_paired_though_the_file_numbers_them(self, published: Comparison) -> None:
@@ -146,9 +151,7 @@ class TestExemplarsColumns:
                 assert tested is not None
                 assert tested.p == pytest.approx(stats.mannwhitneyu(x, y).pvalue, rel=1e-9, abs=1e-12)
         ps = [each.tested.p for each in comparison.differences if each.tested]
-        assert [each.p_holm for each in comparison.differences if each.tested] == pytest.approx(
-            list(multipletests(ps, method="holm")[1]), rel=1e-9
-        )
+        assert [each.p_holm for each in comparison.differences if each.tested] == pytest.approx(holm(ps), rel=1e-9)
 
 
 class TestCampaign:
@@ -209,6 +212,8 @@ class TestCampaign:
         assert compare_frame(frame).difference_rows() == compare_folders([campaign]).difference_rows()
 
     def test_the_restricted_mean_is_lifelines(self, campaign: Path) -> None:
+        import lifelines  # takes a while, too
+
         frame = pandas.read_csv(campaign / "runs.csv")
         own = frame[frame["manager"] == "metacontrol"]
         fitted = lifelines.KaplanMeierFitter().fit(own["search_time_s"], own["pipeline_found"])
