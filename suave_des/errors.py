@@ -6,6 +6,8 @@ import difflib
 from collections.abc import Iterable
 from pathlib import Path
 
+MISTAKES_LOGGER = "suave_des.mistakes"
+"""Name of the logger for mistakes in rules and ontologies that stop nothing."""
 _NAME_LIMIT = 200
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from typing import Final
 
+from suave_des.errors import MISTAKES_LOGGER
 from suave_des.knowledge.checks.findings import Level, ordered
 from suave_des.knowledge.checks.static import static_findings
 from suave_des.knowledge.ontology import Ontology
@@ -12,8 +13,6 @@ from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario_knowledge import subject_of
 
-LOGGER: Final = "suave_des.mistakes"
-"""Name of the logger of these warnings, to switch them off."""
 SHOWN: Final = 10
 """Mistakes that are told one by one."""
 _told: set[tuple[str, tuple[str, ...]]] = set()
@@ -34,7 +33,7 @@ def tell_mistakes(loaded: LoadedScenario, base: Ontology) -> None:
     findings = static_findings(subject_of(loaded), base.sources).findings
     lines = [str(each) for each in ordered(findings) if each.level is not Level.INFO]
     known = base.content_hash, tuple(lines)
-    logger = logging.getLogger(LOGGER)
+    logger = logging.getLogger(MISTAKES_LOGGER)
     if not lines or known in _told or not logger.isEnabledFor(logging.WARNING):
         return
     _told.add(known)

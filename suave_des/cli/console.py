@@ -19,6 +19,8 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
+from suave_des.errors import MISTAKES_LOGGER
+
 if TYPE_CHECKING:
     from suave_des.campaign.progress import OnProgress
     from suave_des.metrics.result import Event, MissionMetrics, MissionResult
@@ -112,7 +114,7 @@ def progress(label: str, *, quiet: bool) -> Iterator[OnProgress | None]:
     """Show the progress of a campaign on standard error, and warnings about its knowledge base, unless `quiet`."""
     from suave_des.campaign.display import shown
 
-    logger = logging.getLogger("suave_des.mistakes")
+    logger = logging.getLogger(MISTAKES_LOGGER)
     logger.disabled = quiet
     try:
         with shown(label, errors(), quiet=quiet) as show:

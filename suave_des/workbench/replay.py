@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 from functools import cached_property, partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
 from suave_des.campaign.knowledge_records import CAMPAIGN_KNOWLEDGE_FILE, KNOWLEDGE_FILE, read_knowledge, read_missions
-from suave_des.errors import InputError, KnowledgeError
+from suave_des.errors import MISTAKES_LOGGER, InputError, KnowledgeError
+from suave_des.knowledge.checks.findings import Finding, Level, ordered
+from suave_des.knowledge.checks.rules import findings_on_rule
 from suave_des.knowledge.content import with_rules
 from suave_des.knowledge.deliberation import NONE_LEFT
 from suave_des.knowledge.ontology import Ontology
@@ -23,6 +27,7 @@ from suave_des.knowledge.rules.files import hash_with_rules, read_rule
 from suave_des.knowledge.rules.parser import parse_rule
 from suave_des.knowledge.state import ContradictionError, Fact, KnowledgeState, Value
 from suave_des.metrics.result import KnowledgeRecord
+from suave_des.monitor.diagnostics import REPORTED_STATUSES
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import Scenario
 from suave_des.scenario_knowledge import read_base
@@ -187,7 +192,10 @@ def try_rule(folder: Path, change: RuleChange) -> Iterator[MissionReplay]:
     comparison: _Comparison | None = None
     for mission in _recorded_missions(folder):
         if comparison is None or comparison.scenario != mission.scenario:
+            is_first = comparison is None
             comparison = _Comparison(mission.scenario, change)
+            for mistake in comparison.mistakes() if is_first and change.text is not None else ():
+                logging.getLogger(MISTAKES_LOGGER).warning("%s", mistake)
         cycles = (comparison.replay(record) for record in mission.records)
         moments = tuple(each for each in cycles if each is not None)
         yield MissionReplay(mission.folder, mission.mission, len(mission.records), moments)
@@ -256,6 +264,13 @@ class _Comparison:
         if change.text is None:
             self.with_rule, self.without_rule = self.before, self.after
         self.rules = [rule for rule in self.with_rule.base.content.enabled_rules if rule.name == name]
+
+    def mistakes(self) -> tuple[Finding, ...]:
+        """Return the errors and warnings that `kb check` would have about the rule that is tried."""
+        names = {rule.name for rule in self.rules}
+        measured = self.after.settings.measured
+        found = (findings_on_rule(name, self.after.base, REPORTED_STATUSES, measured) for name in names)
+        return tuple(each for each in ordered(chain.from_iterable(found)) if each.level is not Level.INFO)
 
     @cached_property
     def _pellet(self) -> InProcessPellet:

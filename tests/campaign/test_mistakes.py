@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from suave_des import run_campaign
-from suave_des.campaign.mistakes import LOGGER, SHOWN
+from suave_des.campaign.mistakes import SHOWN
+from suave_des.errors import MISTAKES_LOGGER
 from suave_des.resources import shipped_folder
 from tests.helpers.command import command_here, suave_des_command
 
@@ -62,7 +63,7 @@ def test_it_changes_no_result(tmp_path: Path, wrong_rule: str, monkeypatch: pyte
 def test_quiet_campaigns_do_not_tell(tmp_path: Path, wrong_rule: str, caplog: pytest.LogCaptureFixture) -> None:
     campaign(tmp_path, "--rules", wrong_rule, "--quiet")
     assert not caplog.messages
-    assert not logging.getLogger(LOGGER).disabled
+    assert not logging.getLogger(MISTAKES_LOGGER).disabled
 
 
 def test_a_measured_attribute_that_is_misspelt(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

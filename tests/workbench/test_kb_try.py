@@ -196,3 +196,15 @@ def test_folders_and_files_that_are_no_record_are_told(mission, tmp_path):
     (tmp_path / "mission.json").write_bytes((mission[0] / "mission.json").read_bytes())
     with pytest.raises(InputError, match=r"knowledge\.jsonl: line 1: is damaged"):
         list(try_rule(tmp_path, RuleChange(NEAR)))
+
+
+def test_mistakes_in_the_rule_are_told(mission, caplog):
+    folder = mission[0]
+    list(try_rule(folder, RuleChange('x: c_status(?c, "False") -> fd_realisability(fd_all_thrusters, false)')))
+    message = 'rule x, column 17: nothing in the simulation reports c_status "False" (did you mean "FALSE"?)'
+    assert caplog.messages == [f"WARN   the rule to try: line 1, {message}"]
+
+
+def test_nothing_is_told_of_a_rule_without_mistakes(mission, caplog):
+    list(try_rule(mission[0], RuleChange(NEAR)))
+    assert not caplog.messages

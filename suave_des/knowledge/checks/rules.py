@@ -15,6 +15,7 @@ from suave_des.knowledge.checks.model import dead_rules, no_value, undeclared_di
 from suave_des.knowledge.checks.slips import slips
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.model import Model
+from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile
 from suave_des.knowledge.rules.checks import check_rule
 from suave_des.knowledge.rules.files import RulesFile
@@ -117,6 +118,28 @@ def misspelt_statuses(
                 level, remedy = Level.INFO, f"reported are {texts}; a function of your own can report others"
             message = f'nothing in the simulation reports c_status "{status}"'
             yield _about(rule, sources, level, message, remedy, atom.place(1))
+
+
+def findings_on_rule(
+    name: str, base: Ontology, reported: Mapping[str, Collection[str]], measured: Collection[str]
+) -> Iterator[Finding]:
+    """Find what is wrong with the rules of a name in a knowledge base.
+
+    Args:
+        name: of the rules.
+        base: the knowledge base that has them.
+        reported: the statuses that the simulation reports, by component.
+        measured: the quality attributes that the scenario measures.
+    """
+    content = replace(base.content, triples=(*base.content.triples, *base.model.triples()))
+    sources = {source.path: source for source in base.sources}
+    given = {rule.file.resolve() for rule in base.rules if rule.name == name}
+    found = chain(
+        rule_problems(content, base.vocabulary, sources),
+        rules_that_cannot_fire(content, base.model, given, sources, measured),
+        misspelt_statuses(content, reported, given, sources),
+    )
+    return (each for each in found if each.rule == name)
 
 
 def _about(
