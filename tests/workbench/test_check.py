@@ -761,6 +761,10 @@ WITHOUT_FIRING = {
         "A: hasQAvalue(?g, ?q) ^ isQAtype(?q, performance) -> Role(?g)",
         (25, "can never fire: missions do not measure performance, so no grounding has a value of it"),
     ),
+    "no value": (
+        "A: isQAtype(?q, battery_level) ^ hasValue(?q, ?v) -> Role(?q)",
+        (4, "can never fire: missions do not measure battery_level, and no ontology has a value of it"),
+    ),
     "excluded text": (
         'A: c_status(?c, ?s) ^ notEqual(?s, "False") -> Role(?c)',
         (36, 'nothing in the simulation reports c_status "False"'),
@@ -791,6 +795,8 @@ def test_a_rule_that_cannot_do_what_it_should(case: str, tmp_path: Path) -> None
         'A: Component(?c) ^ c_status(?c, "RECOVERED") ^ Objective(?o) -> o_updatable(?o, true)',
         "A: hasQAvalue(?g, ?q) ^ hasQAvalue(?h, ?q) ^ typeFD(?g, fd_spiral_low) -> Role(?h)",
         "A: hasQAvalue(?g, ?q) ^ isQAtype(?q, water_visibility) -> Role(?g)",
+        "A: isQAtype(?q, performance) ^ hasValue(?q, ?v) -> Role(?q)",
+        "A: isQAtype(?q, battery_level) -> Role(?q)\nB: Role(?q) -> isQAtype(?q, battery_level)",
         'A: c_status(?c, ?s) ^ startsWith(?s, "REC") -> Role(?c)',
         'A: c_status(?c, ?s) ^ stringEqualIgnoreCase(?s, "false") -> Role(?c)',
     ],

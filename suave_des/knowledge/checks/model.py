@@ -311,3 +311,25 @@ def unmeasured_rules(
                 if isinstance(term, Named) and term.iri in never:
                     found.append((rule, atom, never[term.iri]))
     return found
+
+
+def rules_without_values(content: Content, measured: Collection[str]) -> list[tuple[Rule, Atom, str]]:
+    """Find the enabled rules that need a value of an attribute of which neither ontologies nor missions have one.
+
+    Args:
+        content: the ontologies and rules.
+        measured: quality attributes that missions measure.
+
+    Returns:
+        each rule with the atom that names the attribute, and the attribute's name.
+    """
+    if IS_QA_TYPE in content.head_properties():
+        return []
+    valued = {str(value) for _, predicate, value in content.triples if predicate == IS_QA_TYPE}
+    return [
+        (rule, atom, local_name(term.iri))
+        for rule in content.enabled_rules
+        for atom in rule.body
+        if atom.predicate == IS_QA_TYPE and isinstance(term := atom.arguments[-1], Named)
+        if term.iri not in valued and local_name(term.iri) not in measured
+    ]

@@ -11,7 +11,13 @@ from pathlib import Path
 from suave_des.knowledge.checks.findings import Finding, Level, finding_from, relative_path
 from suave_des.knowledge.checks.kinds import Kinds, mixed_terms
 from suave_des.knowledge.checks.missions import did_you_mean_text, unreported_statuses
-from suave_des.knowledge.checks.model import dead_rules, no_value, undeclared_differences, unmeasured_rules
+from suave_des.knowledge.checks.model import (
+    dead_rules,
+    no_value,
+    rules_without_values,
+    undeclared_differences,
+    unmeasured_rules,
+)
 from suave_des.knowledge.checks.slips import slips
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.model import Model
@@ -89,6 +95,10 @@ def rules_that_cannot_fire(
     for rule, atom, attribute in unmeasured_rules(content, model, measured):
         if id(rule) not in known:
             dead.append((rule, atom, *no_value(attribute, model)))
+    known = {id(rule) for rule, *_ in dead}
+    for rule, atom, attribute in rules_without_values(content, measured) if measured is not None else ():
+        if id(rule) not in known:
+            dead.append((rule, atom, f"missions do not measure {attribute}, and no ontology has a value of it", ""))
     kinds = Kinds(content, model)
     found = [(rule, atom, f"can never fire: {message}", remedy) for rule, atom, message, remedy in dead]
     found += mixed_terms(content, kinds)
