@@ -134,7 +134,8 @@ class GroupedMean(RunningMean):
     """Mean of values that come group by group, and its 95% interval: groups are independent, values are not.
 
     It is that of a mean over clusters (Cochran, Sampling Techniques, 1977, chapter 9A) with Student's t, of as many
-    degrees of freedom as there are groups but one; of groups of one size, that of the groups' means.
+    degrees of freedom as there are groups but one; of groups of one size, that of the groups' means. It is never
+    narrower than if all values were independent: a few groups may have equal means by chance.
     """
 
     __slots__ = ("_closed", "_first", "_groups", "_last", "_open")
@@ -172,4 +173,5 @@ class GroupedMean(RunningMean):
             return None
         off, (a, b, c) = self.mean - self._first, self._sums()
         squares = max(0.0, a - 2.0 * off * b + off * off * c) * self._groups / (self._groups - 1)
-        return t_quantile(self._groups - 1) * math.sqrt(squares) / self.n
+        of_groups = t_quantile(self._groups - 1) * math.sqrt(squares) / self.n
+        return max(of_groups, super().half_width or 0.0)

@@ -55,6 +55,11 @@ def test_groups_of_one_value_give_the_ordinary_interval() -> None:
     assert grouped.independent == ordinary.independent == 4
 
 
+def test_groups_of_equal_means_do_not_give_an_interval_without_width() -> None:
+    interval = interval_in_groups([120.0, 121.0, 121.0, 120.0], [0, 0, 1, 1])
+    assert interval == pytest.approx(stats.t.interval(0.95, 3, 120.5, stats.sem([120.0, 121.0, 121.0, 120.0])))
+
+
 def test_the_summary_has_the_interval_of_the_draws(folder: Path) -> None:
     runs, summary = pandas.read_csv(folder / "runs.csv"), pandas.read_csv(folder / "summary.csv").set_index("manager")
     means = of_draws(runs, "search_time_s")["none"]
