@@ -79,9 +79,16 @@ def pytest_collection_finish() -> None:
     gc.enable()
 
 
-def pytest_runtest_teardown() -> None:
-    """Leave out of the search what a test has imported, if it is much."""
-    if len(sys.modules) > _searched_without + 50:
+@pytest.hookimpl(trylast=True)
+def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> None:
+    """Leave out of the search what a test has imported, and what a module of tests has left, if it is much.
+
+    Java has Python search for cycles in all that is not left out, whenever it collects its own garbage.
+    """
+    if nextitem is not None and nextitem.path != item.path and len(gc.get_objects()) > 40_000:
+        gc.collect()
+        _leave_out_of_the_search()
+    elif len(sys.modules) > _searched_without + 50:
         _leave_out_of_the_search()
 
 
