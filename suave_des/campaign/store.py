@@ -181,7 +181,8 @@ class Store:
         if self.path is not None:
             self._check_still_there(self.path)
         with _user_errors(self.path):
-            self._db.execute("COMMIT")
+            if self._db.in_transaction:  # or an interruption came between these two
+                self._db.execute("COMMIT")
             self._db.execute("BEGIN")
         self._committed_s = time.monotonic()
 

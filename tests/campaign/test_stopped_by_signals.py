@@ -17,7 +17,7 @@ import pytest
 from benchmarks import chaos
 from suave_des.campaign.campaign import resume_campaign, run_campaign
 from suave_des.campaign.executors.local import LocalWorkers
-from suave_des.campaign.store import LOCK_FILE, NEW_STORE_FILE, STORE_FILE
+from suave_des.campaign.store import LOCK_FILE, NEW_STORE_FILE, STORE_FILE, Store, make_store
 
 STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
 RUNS = 100_000
@@ -167,6 +167,17 @@ class TestInterruptedAtAnAwkwardMoment:
             name: content for name, content in before.items() if name.endswith(".csv")
         }
         assert not (out / NEW_STORE_FILE).exists()
+
+    def test_between_two_transactions_what_comes_next_is_kept(self, tmp_path: Path) -> None:
+        path = tmp_path / STORE_FILE
+        make_store(path, {})
+        store = Store(path)
+        store._db.execute("COMMIT")  # as commit() does, and is interrupted before it begins the next
+        store.note("remarks", ["mine"])
+        store.close()
+        store = Store(path)
+        assert store.about("remarks") == ["mine"]
+        store.close()
 
     def test_while_files_are_written_it_says_how_to_have_them(
         self, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
