@@ -51,7 +51,7 @@ def draw_distributions(groups: Sequence[Group]) -> style.Picture:
     limit_s = _limit_of_lost(groups)
     for axes, metric, title in _metric_panels(figure, sharey=True):
         end = max(1.0, max(float(group.known_values(metric).max()) for group in groups) * 1.06)
-        for number, group in enumerate(groups):
+        for number, group in _looks(groups):
             values = np.sort(group.known_values(metric))
             shares = np.arange(1, len(values) + 1) / len(values)
             look = style.line(number)
@@ -84,8 +84,8 @@ def draw_rainclouds(groups: Sequence[Group], published: Mapping[str, Group]) -> 
     height = _ROW_IN * len(groups) + 0.55 + _LEGEND_LINE_IN
     figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
     for axes, metric, title in _metric_panels(figure, sharey=True):
-        for number, group in enumerate(groups):
-            _raincloud(axes, number, group, metric, published.get(group.name))
+        for row, (number, group) in enumerate(_looks(groups)):
+            _raincloud(axes, row, number, group, metric, published.get(group.name))
         axes.set_xlabel(title)
         axes.set_xlim(left=0.0)
     left = figure.axes[0]
@@ -118,15 +118,15 @@ def draw_rainclouds(groups: Sequence[Group], published: Mapping[str, Group]) -> 
     return figure
 
 
-def _raincloud(axes: Axes, row: int, group: Group, metric: str, published: Group | None) -> None:
+def _raincloud(axes: Axes, row: int, number: int, group: Group, metric: str, published: Group | None) -> None:
     values = np.sort(group.known_values(metric))
-    colour = style.line(row)["color"]
+    colour = style.line(number)["color"]
     if len(values) >= _FEWEST_FOR_CLOUD and np.ptp(values) > 0.0:
         grid = np.linspace(values[0], values[-1], 300)
         heights = _density(values, grid)
         heights *= 0.38 / heights.max()
         axes.fill_between(
-            grid, row - 0.12 - heights, row - 0.12, color=colour, alpha=0.55, lw=0, hatch=style.hatch(row)
+            grid, row - 0.12 - heights, row - 0.12, color=colour, alpha=0.55, lw=0, hatch=style.hatch(number)
         )
         axes.plot(grid, row - 0.12 - heights, color=colour, lw=0.8)
     low, median, high = np.percentile(values, (25, 50, 75))
@@ -166,7 +166,7 @@ def draw_convergence(groups: Sequence[Group]) -> style.Picture:
     labels = [*map(_label, groups), "95% interval of the mean"]
     figure = style.Picture(figsize=(style.WIDTH_IN, 2.5 + _legend_height(labels)), layout="constrained")
     for axes, metric, title in _metric_panels(figure):
-        for number, group in enumerate(groups):
+        for number, group in _looks(groups):
             frame = group.frame.sort_values("run", kind="stable")
             known = frame[frame[metric].notna()]
             alike = runs_sharing_draw(known)
@@ -221,7 +221,7 @@ def draw_detections(groups: Sequence[Group]) -> style.Picture:
 
     Areas are shares of the group's missions; the bars above are shares by that point.
     """
-    columns = min(len(groups), 3)
+    columns = style.columns(len(groups))
     rows = math.ceil(len(groups) / columns)
     width = style.WIDTH_IN if columns > 1 else style.WIDTH_IN / 2
     figure = style.Picture(figsize=(width, 2.6 * rows + 0.4), layout="constrained")
@@ -232,13 +232,13 @@ def draw_detections(groups: Sequence[Group]) -> style.Picture:
     )
     top_s = max(float(group.known_values("search_time_s").max()) for group in groups) * 1.2
     bars = []
-    for number, (part, group) in enumerate(zip(parts, groups, strict=False)):
+    for place, (part, (number, group)) in enumerate(zip(parts, _looks(groups), strict=False)):
         above, below = part.subplots(2, 1, sharex=True, height_ratios=(1.0, 3.0))
         _draw_detections(above, below, number, group)
         bars.append(above)
         above.set_title(_label(group, 26), fontsize=8)
         below.set(xlim=ends, ylim=(0.0, top_s), xlabel="x of the point seen first (m)")
-        if number % columns == 0:
+        if place % columns == 0:
             below.set_ylabel("search time (s)")
             above.set_ylabel("share")
     top = max(above.get_ylim()[1] for above in bars)
@@ -273,7 +273,7 @@ def draw_reactions(groups: Sequence[Group]) -> style.Picture:
         figsize=(style.WIDTH_IN, 2.5 + _legend_height(list(map(_label, groups)))), layout="constrained"
     )
     left, right = figure.subplots(1, 2)
-    for number, group in enumerate(groups):
+    for number, group in _looks(groups):
         look = style.line(number)
         if "adaptations" in group.frame and len(counts := group.known_values("adaptations")):
             missions = np.bincount((counts - counts.min()).astype(int))  # 0 where no mission has a number
@@ -313,9 +313,14 @@ def _metric_panels(figure: style.Picture, *, sharey: bool = False) -> Iterator[t
         yield axes, metric, title
 
 
+def _looks(groups: Sequence[Group]) -> Iterator[tuple[int, Group]]:
+    """Yield each group with the number of its look."""
+    return zip(style.looks([group.name for group in groups]), groups, strict=True)
+
+
 def _handles(groups: Sequence[Group]) -> list[Artist]:
     """Make the lines with markers that a legend shows for each group."""
-    return [Line2D([], [], marker=style.marker(number), ms=3.5, **style.line(number)) for number in range(len(groups))]
+    return [Line2D([], [], marker=style.marker(number), ms=3.5, **style.line(number)) for number, _ in _looks(groups)]
 
 
 def _label(group: Group, width: int = 40) -> str:

@@ -293,7 +293,7 @@ def draw_paths(records: Sequence[MissionRecord]) -> style.Picture:
     The pipeline is that of the first.
     """
     managers = list(dict.fromkeys(str(record.metrics["manager"]) for record in records))
-    columns = min(len(managers), 3)
+    columns = style.columns(len(managers))
     rows = -(-len(managers) // columns)
     searches = [_search(record) for record in records]
     low = np.min([search.min(axis=0) for search in searches], axis=0) - _PATHS_MARGIN_M
@@ -304,7 +304,7 @@ def draw_paths(records: Sequence[MissionRecord]) -> style.Picture:
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for axes in panels.ravel()[len(managers) :]:
         axes.set_visible(False)
-    for number, (axes, manager) in enumerate(zip(panels.ravel(), managers, strict=False)):
+    for axes, manager, number in zip(panels.ravel(), managers, style.looks(managers), strict=False):
         own = [record for record in records if str(record.metrics["manager"]) == manager]
         colour = style.line(number)["color"]
         _draw_pipeline(axes, records[0])

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from itertools import count
 from typing import Any
 
 import matplotlib
@@ -18,6 +19,8 @@ BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 BLUE, VERMILION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#8A8A8A"
 CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION)
 """For what has no colour of its own, in this order."""
+_KNOWN_MANAGERS = ("none", "random", "metacontrol", "bt")
+"""They have the same look in every figure: that of their place here."""
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (6, 1.5, 1, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
 _MARKERS = "osD^v<>PX"
 _HATCHES = ("", "////", "....", "xxxx", "----", "\\\\\\\\")
@@ -60,6 +63,17 @@ _SETTINGS: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "suave-des",  # equal data give equal files
 }
+
+
+def looks(names: Sequence[str]) -> list[int]:
+    """Return for each manager the number of its look, which `line`, `marker` and `hatch` take."""
+    others = count(len(_KNOWN_MANAGERS) if set(names).intersection(_KNOWN_MANAGERS) else 0)
+    return [_KNOWN_MANAGERS.index(name) if name in _KNOWN_MANAGERS else next(others) for name in names]
+
+
+def columns(panels: int) -> int:
+    """Return the number of columns in which panels are arranged."""
+    return 2 if panels == 4 else min(panels, 3)
 
 
 def line(number: int) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import pandas
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
 from suave_des.errors import InputError
 from suave_des.estimates import estimate
@@ -25,6 +26,8 @@ _MOST_PARAMETERS, _COLUMNS = 9, 3
 _MOST_VALUES = 16
 """A parameter with more values is a sampled one: its missions are drawn in so many bins of equal numbers at most."""
 _BINS = 8
+_MOST_TICKS = 6
+"""With more swept values, or where two are closer than so many would be, the axis has round numbers instead."""
 _APART = 0.012
 """Between managers at the same value, as a share of the axis, so that their intervals do not hide each other."""
 
@@ -95,17 +98,24 @@ def _draw_panel(axes: Axes, frame: pandas.DataFrame, names: pandas.Series[str], 
     places, words = _places(frame[parameter])
     apart = _APART * float(places.max() - places.min())
     managers = list(dict.fromkeys(names))
-    for number, manager in enumerate(managers):
+    for place, (number, manager) in enumerate(zip(style.looks(managers), managers, strict=True)):
         own = names == manager
-        beside = (number - (len(managers) - 1) / 2) * apart
+        beside = (place - (len(managers) - 1) / 2) * apart
         _draw_means(axes, frame[own].assign(place=places[own]), metric, beside, number, manager)
     if words:
         shown_words = [_folded(style.text(value_words(word)), 14) for word in words]
         long = max(map(len, words)) > 6 and len(words) > 2
         axes.set_xticks(range(len(words)), shown_words, rotation=30 if long else 0, ha="right" if long else "center")
         axes.set_xlim(-0.5, len(words) - 0.5)
+    elif _fit_as_ticks(values := np.unique(places)):
+        axes.set_xticks(values, [f"{value:g}" for value in values])
     else:
         axes.xaxis.set_major_locator(MaxNLocator(4))
+
+
+def _fit_as_ticks(values: NDArray[np.float64]) -> bool:
+    """Return whether swept values are few enough, and far enough apart, to be written at the axis."""
+    return 1 < len(values) <= _MOST_TICKS and bool(np.diff(values).min() > np.ptp(values) / _MOST_TICKS)
 
 
 def _places(parameter: pandas.Series) -> tuple[pandas.Series[float], list[str]]:

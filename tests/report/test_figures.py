@@ -180,6 +180,29 @@ def test_no_parameter_is_left_out_silently() -> None:
         draw_sweep(missions_of(frame))
 
 
+@pytest.mark.parametrize(("points", "labels"), [(4, ["0", "1", "2", "3"]), (9, None)])
+def test_the_axis_of_a_sweep_has_its_values_if_they_are_few(points: int, labels: list[str] | None) -> None:
+    figure = draw_sweep(missions_of(sweep_frame(points, 2)), ["start.x_m"])
+    ticks = figure.axes[-1].get_xticks().tolist()
+    if labels is None:
+        assert len(ticks) < points
+    else:
+        assert [text.get_text() for text in figure.axes[-1].get_xticklabels()] == labels
+
+
+def test_a_manager_looks_the_same_in_every_figure() -> None:
+    assert style.looks(["none", "random", "metacontrol", "bt"]) == [0, 1, 2, 3]
+    assert style.looks(["mine", "metacontrol", "yours", "none"]) == [4, 2, 5, 0]
+    assert style.looks(["mine", "yours"]) == [0, 1]
+    frame = sweep_frame(3, 4)
+    both = missions_of(pandas.concat([frame.assign(manager=name) for name in ("metacontrol", "bt")]))
+    curves = draw_distributions(grouped(both)[0]).axes[0].get_lines()
+    means = draw_sweep(both, ["start.x_m"]).axes[0].containers
+    expected = [style.line(2)["color"], style.line(3)["color"]]
+    assert list(dict.fromkeys(curve.get_color() for curve in curves if len(curve.get_xdata()) > 2)) == expected
+    assert [container[0].get_color() for container in means] == expected
+
+
 def test_more_managers_than_colours_differ_in_their_lines() -> None:
     names = [f"manager_{number}" for number in range(14)]
     frame = pandas.DataFrame(
