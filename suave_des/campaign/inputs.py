@@ -81,7 +81,7 @@ def check_inputs(
     found = user_modules((), custom_functions(loaded))
     files = InputFiles()
     if given or any(manager_class(name).needs_knowledge for name in managers):
-        from suave_des.campaign.mistakes import tell_mistakes
+        from suave_des.campaign.mistakes import report_mistakes
         from suave_des.knowledge.state import KnowledgeState
         from suave_des.scenario_knowledge import open_knowledge
 
@@ -91,7 +91,7 @@ def check_inputs(
             logging.getLogger("suave_des").warning("note: %s", assumption)
         for path in knowledge.base.files:
             files.ontology(path)
-        tell_mistakes(loaded, knowledge.base)
+        report_mistakes(loaded, knowledge.base)
     found |= _modules(managers)
     for each in [loaded] if variation is None else scenarios_of(loaded, variation):
         for manager in managers:

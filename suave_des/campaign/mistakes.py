@@ -1,4 +1,4 @@
-"""Tell of mistakes in ontologies, rules and scenarios of the user's before missions run, as `kb check` does."""
+"""Report mistakes in the user's ontologies, rules and scenarios before missions run, as `kb check` does."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario_knowledge import subject_of
 
 SHOWN: Final = 10
-"""Mistakes that are told one by one."""
-_told: set[tuple[str, tuple[str, ...]]] = set()
-"""What this process has told already of which knowledge base."""
+"""Mistakes that are reported one by one."""
+_reported: set[tuple[str, tuple[str, ...]]] = set()
+"""What this process has already reported, of which knowledge base."""
 
 
-def tell_mistakes(loaded: LoadedScenario, base: Ontology) -> None:
+def report_mistakes(loaded: LoadedScenario, base: Ontology) -> None:
     """Log the errors and warnings that `kb check` has without a reasoner, as it words them; once for the same files.
 
     This takes some 40 ms, and nothing if all files are the shipped ones, which have no mistakes.
@@ -34,9 +34,9 @@ def tell_mistakes(loaded: LoadedScenario, base: Ontology) -> None:
     lines = [str(each) for each in ordered(findings) if each.level is not Level.INFO]
     known = base.content_hash, tuple(lines)
     logger = logging.getLogger(MISTAKES_LOGGER)
-    if not lines or known in _told or not logger.isEnabledFor(logging.WARNING):
+    if not lines or known in _reported or not logger.isEnabledFor(logging.WARNING):
         return
-    _told.add(known)
+    _reported.add(known)
     for line in lines[:SHOWN]:
         logger.warning("%s", line)
     more = f"{len(lines) - SHOWN} more; " if len(lines) > SHOWN else ""

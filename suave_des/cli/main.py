@@ -117,7 +117,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         with signals_raised():
             status = _command_line().main(arguments, prog_name="suave-des", standalone_mode=False) or 0
             if sys.stdout is not None:
-                sys.stdout.flush()  # what cannot be written is told here, not while Python ends
+                sys.stdout.flush()  # what cannot be written is reported here, not while Python ends
             if was_interrupted() and status == 128 + signal.SIGINT:  # typer's for any signal before the command began
                 status = _report("interrupted", exit_status())
     except _CommandInterruptedError as interruption:

@@ -23,8 +23,8 @@ COLUMNS = ("manager", *PAPER_METRICS, "detection_x_m", "pipeline_found", "mean_r
 """Columns of a frame of missions.
 
 detection_x_m is nan where it is not known or nothing was detected, pipeline_found a nullable boolean, missing where the
-file does not tell, and mean_reaction_time_s nan where nothing was reacted to or the file does not tell. run is nan and
-seed, which is text, empty where the file does not tell.
+file does not say, and mean_reaction_time_s nan where nothing was reacted to or the file does not say. run is nan and
+seed, which is text, empty where the file does not say.
 """
 _SIZE_LIMIT_BYTES = 500_000_000
 _GREATEST = 1e12

@@ -124,7 +124,7 @@ class ShareComparison:
 def found_shares(
     published: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequence[str]
 ) -> tuple[ShareComparison, ...]:
-    """Compare the share of missions that found the pipeline, of the managers for which both sides tell it."""
+    """Compare the share of missions that found the pipeline, of the managers for which both sides have it."""
     where: Region = {"pipeline_found": ((1.0, 1.0),)}
     shares = [Share(manager=manager, name="pipeline found", where=where) for manager in managers]
     theirs, ours = (runs[runs["pipeline_found"].notna()] for runs in (published, simulated))

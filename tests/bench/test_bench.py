@@ -354,5 +354,5 @@ def test_the_machine_is_told_in_one_line() -> None:
 
 
 @pytest.mark.parametrize(("load", "busy"), [(0.1, False), (1.5, True)])
-def test_a_busy_machine_is_told(load, busy) -> None:
+def test_a_busy_machine_is_reported(load, busy) -> None:
     assert is_busy({"load": [load, 0.0, 0.0], "cores": 2}) is busy

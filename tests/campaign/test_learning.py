@@ -243,7 +243,7 @@ class NeedsSetting(ManagingSubsystem):
         ("NeedsSetting", 2, "--manager-option table=..."),
     ],
 )
-def test_mistakes_in_a_class_are_told_early(tmp_path: Path, name: str, status: int, words: str) -> None:
+def test_mistakes_in_a_class_are_reported_early(tmp_path: Path, name: str, status: int, words: str) -> None:
     (tmp_path / "mistakes.py").write_text(MISTAKES)
     done = command_here("run", "seams2023", "--manager", f"mistakes:{name}", cwd=tmp_path)
     assert done.returncode == status and words in done.stderr and "Traceback" not in done.stderr

@@ -18,7 +18,7 @@ STATUS = 'nothing in the simulation reports c_status "False" (did you mean "FALS
 
 @pytest.fixture(autouse=True)
 def told_nothing_yet(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("suave_des.campaign.mistakes._told", set())
+    monkeypatch.setattr("suave_des.campaign.mistakes._reported", set())
 
 
 @pytest.fixture
@@ -54,7 +54,7 @@ def test_it_is_told_on_standard_error(tmp_path: Path, wrong_rule: str) -> None:
 def test_it_changes_no_result(tmp_path: Path, wrong_rule: str, monkeypatch: pytest.MonkeyPatch) -> None:
     campaign(tmp_path, "--rules", wrong_rule, managers="metacontrol")
     first = (tmp_path / "out" / "runs.csv").read_bytes()
-    monkeypatch.setattr("suave_des.campaign.mistakes.tell_mistakes", lambda *_: None)
+    monkeypatch.setattr("suave_des.campaign.mistakes.report_mistakes", lambda *_: None)
     (tmp_path / "out").rename(tmp_path / "before")
     campaign(tmp_path, "--rules", wrong_rule, managers="metacontrol")
     assert (tmp_path / "out" / "runs.csv").read_bytes() == first

@@ -176,7 +176,7 @@ def test_failed_missions_do_not_count_and_the_manifest_says_where_each_manager_e
     assert (result.done + len(result.failures), result.planned) == (raises["last_run"] + none["last_run"],) * 2
 
 
-def test_a_limit_that_is_not_reached_is_told(scenario: Path, tmp_path: Path) -> None:
+def test_a_limit_that_is_not_reached_is_reported(scenario: Path, tmp_path: Path) -> None:
     result = run_campaign(scenario, ["none"], 25, 1, out=tmp_path / "out", until_ci="initial_y_m:0.00001")
     told = json.loads((tmp_path / "out" / "manifest.json").read_text())["until_ci"]
     assert told["managers"][0]["why"] == "all runs are done"

@@ -234,7 +234,7 @@ class TestLimits:
         assert process.communicate(timeout=30)[1] == "suave-des: interrupted\n"
         assert process.returncode == 143
 
-    def test_of_open_files_is_told(self, tmp_path: Path) -> None:
+    def test_of_open_files_is_reported(self, tmp_path: Path) -> None:
         import resource
 
         arguments = ["campaign", "seams2023", "--managers", "none", "--runs", "9", "--workers", "2", "--out", "out"]

@@ -84,7 +84,7 @@ def test_a_bad_file_is_told_with_its_place(tmp_path: Path, name: str) -> None:
     assert expected in problem
 
 
-def test_a_missing_file_a_folder_and_bytes_are_told(tmp_path: Path) -> None:
+def test_a_missing_file_a_folder_and_bytes_are_reported(tmp_path: Path) -> None:
     assert "no such file" in problem_of(lambda: Ontology.load([tmp_path / "none.owl"]))
     assert "is a folder" in problem_of(lambda: Ontology.load([tmp_path]))
     path = tmp_path / "bytes.owl"
@@ -134,12 +134,12 @@ def test_a_value_that_is_no_decimal_is_told_with_line(suave_copy: MakeOntology, 
     assert f"{path}: line {line}: qa_water_visibility_high: hasValue '{value}' is not an xsd:decimal" in problem
 
 
-def test_an_unknown_operator_is_told(suave_copy: MakeOntology) -> None:
+def test_an_unknown_operator_is_reported(suave_copy: MakeOntology) -> None:
     path = suave_copy(individual("noise", "QualityAttributeType", ("qa_comparison_operator", "=<")))
     assert "qa_comparison_operator '=<' is unknown (one of < <= > >=)" in problem_of(lambda: Ontology.load([path]))
 
 
-def test_two_things_of_one_kind_and_name_are_told(suave_copy: MakeOntology) -> None:
+def test_two_things_of_one_kind_and_name_are_reported(suave_copy: MakeOntology) -> None:
     path = suave_copy(individual("mros:fd_spiral_low", "FunctionDesign"))
     assert "two function designs have this name" in problem_of(lambda: Ontology.load([path]))
 
@@ -150,7 +150,7 @@ def test_an_overridden_value_must_exist(suave_copy: MakeOntology) -> None:
     assert "qa_water_visibility_high" in problem
 
 
-def test_two_values_of_a_functional_property_are_told_with_line(suave_copy: MakeOntology) -> None:
+def test_two_values_of_a_functional_property_are_reported_with_line(suave_copy: MakeOntology) -> None:
     path = suave_copy(individual("qa_water_visibility_high", "QAvalue", ("hasValue", "9")))
     problem = problem_of(lambda: Ontology.load([path]))
     assert problem.startswith(f"{path}: line ")
@@ -158,7 +158,7 @@ def test_two_values_of_a_functional_property_are_told_with_line(suave_copy: Make
 
 
 @pytest.mark.parametrize("name", ["pellet", "owlready2"])
-def test_an_ontology_whose_rules_contradict_it_is_told(suave_copy: MakeOntology, name: str) -> None:
+def test_an_ontology_whose_rules_contradict_it_is_reported(suave_copy: MakeOntology, name: str) -> None:
     text = "QAvalue(?q) ^ isQAtype(?q, :water_visibility) -> hasValue(?q, 3.25)"
     path = suave_copy(rule("levelling", text))
     base = Ontology.load([path])
@@ -183,7 +183,7 @@ def test_a_contradictions_rule_is_not_looked_for_where_an_individual_of_its_name
 
 
 @pytest.mark.parametrize("name", ["pellet", "owlready2"])
-def test_a_conclusion_outside_its_propertys_range_is_told(suave_copy: MakeOntology, name: str) -> None:
+def test_a_conclusion_outside_its_propertys_range_is_reported(suave_copy: MakeOntology, name: str) -> None:
     path = suave_copy(rule("odd", "FunctionGrounding(?g) -> fg_status(?g, 3.5)"))
     reasoner = make_reasoner(name, Ontology.load([path]))
     problem = problem_of(lambda: reasoner.infer(searching("fd_spiral_low")))

@@ -61,7 +61,7 @@ def test_a_java_that_is_too_old_is_told_with_both_versions(
         java.java_home()
 
 
-def test_a_java_home_without_java_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_java_home_without_java_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("JAVA_HOME", str(tmp_path))
     with pytest.raises(InputError, match="there is no Java that runs in it"):
         java.java_home()

@@ -97,7 +97,7 @@ def full(name: str) -> str:
         ("\x00", "line 1, column 1", "expected a rule's name instead of '\\x00'"),
     ],
 )
-def test_mistakes_are_told_with_line_and_column(text: str, place: str, problem: str) -> None:
+def test_mistakes_are_reported_with_line_and_column(text: str, place: str, problem: str) -> None:
     (error,) = parse_rules(text).errors
     assert error.place == place
     assert problem in str(error)

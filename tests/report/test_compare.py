@@ -293,7 +293,7 @@ class TestFewValues:
         assert comparison.conclusion == "There is only a, so there is nothing to compare it with."
 
 
-def test_a_significant_difference_of_ranks_against_that_of_means_is_told() -> None:
+def test_a_significant_difference_of_ranks_against_that_of_means_is_reported() -> None:
     chance = np.random.default_rng(1)
     a = chance.normal(100.0, 1.0, 60)
     b = np.where(np.arange(60) < 8, 290.0, a - 5.0)
@@ -325,7 +325,7 @@ class TestConclusions:
         frame = runs(a=[*hard, *chance.normal(80.0, 5.0, 80)], b=list(hard - chance.normal(10.0, 1.0, 20)))
         assert compare_frame(frame).conclusion.startswith("b finds the pipeline")
 
-    def test_an_interval_without_0_and_no_significance_are_both_told(self) -> None:
+    def test_an_interval_without_0_and_no_significance_are_both_reported(self) -> None:
         frame = runs(a=[100.0, 101.0, 102.0, 103.0], b=[150.0, 151.5, 152.0, 153.0])
         found = difference(compare_frame(frame), "a", "b")
         assert not found.is_significant
@@ -347,20 +347,20 @@ class TestConclusions:
 class TestCaveats:
     """Missions that never found the pipeline, or have no value, are told of."""
 
-    def test_their_search_time_and_their_number_are_told(self) -> None:
+    def test_their_search_time_and_their_number_are_reported(self) -> None:
         notes = compare_frame(runs(a=[100.0, 300.0, 120.0], b=[90.0, 95.0, 110.0])).notes
         (note,) = (each for each in notes if "never found" in each)
         assert "(a 1 of 3) is the time at which they ended" in note
         frame = runs(a=[100.0, 300.0, 120.0], b=[90.0, 95.0, 110.0])
         assert f"% Note: {note}.\n" in latex_text(compare_frame(frame))
 
-    def test_limits_that_differ_are_told(self) -> None:
+    def test_limits_that_differ_are_reported(self) -> None:
         frame = runs(a=[100.0, 300.0, 120.0], b=[90.0, 95.0, 300.0])
         frame.loc[(frame["manager"] == "b") & ~frame["pipeline_found"], "search_time_s"] = 400.0
         notes = compare_frame(frame).notes
         assert any("ended at different times (a after 300 s, b after 400 s)" in each for each in notes)
 
-    def test_missions_that_are_left_out_are_told(self) -> None:
+    def test_missions_that_are_left_out_are_reported(self) -> None:
         frame = runs(a=[100.0, 110.0, 120.0], b=[90.0, 95.0, 110.0])
         frame["mean_reaction_time_s"] = [1.0, float("nan"), 1.2, 0.5, 0.6, 0.7]
         notes = compare_frame(frame).notes

@@ -95,7 +95,7 @@ def test_a_missing_file_is_named(missing: str, mission: Path, tmp_path: Path) ->
     assert not (tmp_path / "map.png").exists()
 
 
-def test_a_picture_that_cannot_be_written_is_told(mission: Path, tmp_path: Path) -> None:
+def test_a_picture_that_cannot_be_written_is_reported(mission: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"map\.png: cannot be written"):
         draw_folder(mission, tmp_path / "nowhere" / "map.png")
 
@@ -106,7 +106,7 @@ def test_no_picture_has_the_time_at_which_it_was_written(ending: str, date: byte
     assert date not in (tmp_path / f"empty{ending}").read_bytes()
 
 
-def test_a_campaign_without_missions_is_told(campaign: Path, tmp_path: Path) -> None:
+def test_a_campaign_without_missions_is_reported(campaign: Path, tmp_path: Path) -> None:
     header = (campaign / "runs.csv").read_text().splitlines()[0]
     (tmp_path / "runs.csv").write_text(header + "\n")
     with pytest.raises(InputError, match=r"runs\.csv: line 1: has no missions"):
@@ -352,7 +352,7 @@ def test_the_number_of_missions_stays_in_one_piece() -> None:
     assert "(n = 1,000)" in folded(f"{LONG} (n = 1,000)") and "\n" in folded(LONG)
 
 
-def test_a_campaign_without_the_swept_parameter_is_told(campaign: Path, tmp_path: Path) -> None:
+def test_a_campaign_without_the_swept_parameter_is_reported(campaign: Path, tmp_path: Path) -> None:
     run_campaign("seams2023", managers=["none"], runs=1, sweep={"start.y_m": [2.0, 2.5]}, out=tmp_path / "swept")
     with pytest.raises(InputError, match=r"does not vary start\.y_m"):
         draw_results([campaign, tmp_path / "swept"], tmp_path / "figure.png")

@@ -312,7 +312,7 @@ class TestWithoutCounterpart:
         ):
             assert key in note
 
-    def test_every_key_of_the_files_is_taken_over_or_told(self, imported) -> None:
+    def test_every_key_of_the_files_is_taken_over_or_reported(self, imported) -> None:
         texts = TASK_BRIDGE_2023, OTHER, RUNNER
         result = imported(*texts)
         for number, text in enumerate(texts):
@@ -346,7 +346,7 @@ class TestCampaign:
     def content(self, imported, *texts) -> dict:
         return yaml.safe_load(imported(*texts, campaign=True).campaign)
 
-    def test_has_what_the_runner_is_told(self, imported) -> None:
+    def test_has_what_the_runner_is_reported(self, imported) -> None:
         def drawn(minimum, maximum, **more):
             return {"distribution": "uniform", "minimum": minimum, "maximum": maximum, **more}
 
@@ -415,7 +415,7 @@ class TestCampaign:
             ("/opt/ros/mission.yaml", "/opt/ros/other.yaml", "none of the files given"),
         ],
     )
-    def test_what_does_not_fit_is_told(self, imported, old, new, told) -> None:
+    def test_what_does_not_fit_is_reported(self, imported, old, new, told) -> None:
         assert notes_about(imported(RUNNER.replace(old, new), campaign=True), told)
 
     @pytest.mark.parametrize(
@@ -530,7 +530,7 @@ class TestRunnerSeed:
     def test_needs_a_campaign(self, imported) -> None:
         assert "--campaign" in refused(imported, STUDY_OF_2025, runner_seed=100).remedy
 
-    def test_without_anything_random_is_told(self, imported) -> None:
+    def test_without_anything_random_is_reported(self, imported) -> None:
         text = "".join(line for line in STUDY_OF_2025.splitlines(True) if "_random_interval" not in line)
         assert notes_about(imported(text, campaign=True, runner_seed=100), "nothing is drawn at random")
 

@@ -35,7 +35,7 @@ def test_a_column_may_give_the_number(column):
     assert CONDITIONS.numbers(frame(**{column: [3, 1]})).tolist() == [3, 1]
 
 
-def test_without_such_columns_nothing_is_told():
+def test_without_such_columns_nothing_is_reported():
     assert CONDITIONS.numbers(frame(run=[1, 2])) is None
 
 

@@ -148,7 +148,7 @@ def test_further_columns_are_numbers_where_all_their_values_are(write):
         read_runs(path, further=["speed"])
 
 
-def test_rows_of_averages_in_the_exemplars_files_are_left_out_and_told(write):
+def test_rows_of_averages_in_the_exemplars_files_are_left_out_and_reported(write):
     header = "mission name,datetime,pipeline found,time searching pipeline (s),distance inspected (m)"
     rows = ["suave bt,01-Jul-2025-00-43-53,True,87,40.25", "AVERAGE,,,87.0,40.25", "STD,,,0.0,0.0"]
     runs = read_runs(write("results.csv", "\n".join([header, *rows])))

@@ -217,7 +217,7 @@ def test_contradictions_come_from_pellet(tmp_path: Path) -> None:
     assert "by the rule A (mine.swrl, line 1)" in error.message
 
 
-def test_exact_values_are_told(tmp_path: Path) -> None:
+def test_exact_values_are_reported(tmp_path: Path) -> None:
     rules = "A: hasValue(?q, ?v) ^ add(?s, ?v, 1) ^ lessThan(?s, 2) -> Role(?q)"
     assert only(found(tmp_path, rules), "rule A computes with add").level is Level.INFO
 
@@ -335,7 +335,7 @@ def test_a_number_with_a_comma(tmp_path: Path) -> None:
     assert only(check(Subject([path])), "hasValue '3,25' is not an xsd:decimal").remedy == "a number such as 2.25"
 
 
-def test_a_rule_as_text_that_takes_the_place_of_another_is_told(tmp_path: Path) -> None:
+def test_a_rule_as_text_that_takes_the_place_of_another_is_reported(tmp_path: Path) -> None:
     finding = only(found(tmp_path, "S1a: Role(?q) -> Role(?q)"), "replaces the rule of this name in")
     assert (finding.level, finding.rule, finding.line) == (Level.WARN, "S1a", 1)
     assert finding.message.endswith("tomasys.owl")

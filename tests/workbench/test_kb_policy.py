@@ -295,7 +295,7 @@ class TestDiff:
         none = replace(mine, alike=())
         assert mine.common(none).alike == none.common(mine).alike == mine.alike
 
-    def test_a_file_that_is_missing_is_told(self, command, edited):
+    def test_a_file_that_is_missing_is_reported(self, command, edited):
         status, _, error = command("diff", edited(""), "nowhere.owl")
         assert status == 2
         assert "nowhere.owl: no such file" in error

@@ -45,7 +45,7 @@ def test_all_variables_may_have_names_of_any_letters(bench, name):
     assert set(found.columns) == {name.replace(r"\u0061", "a"), "f"}
 
 
-def test_no_answer_is_told(command):
+def test_no_answer_is_reported(command):
     assert command("query", "SELECT ?d WHERE { ?d tomasys:solvsF ?f }")[:2] == (0, "d\nno rows\n")
 
 

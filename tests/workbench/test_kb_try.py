@@ -163,7 +163,7 @@ def test_the_options_change_what_is_tried_against(mission, tmp_path, command):
         ('{"scenario": 1}\n{"swept": {}}', "line 2: is damaged"),
     ],
 )
-def test_a_damaged_record_of_a_campaign_is_told(tmp_path, command, line, said):
+def test_a_damaged_record_of_a_campaign_is_reported(tmp_path, command, line, said):
     (tmp_path / CAMPAIGN_KNOWLEDGE_FILE).write_text(line + "\n")
     status, _, error = command("try", NEAR, "--on", tmp_path)
     assert (status, error.count("\n")) == (2, 1)
@@ -180,14 +180,14 @@ def test_a_damaged_record_of_a_campaign_is_told(tmp_path, command, line, said):
         (("near FunctionGrounding(?fg)",), "the rule to try"),
     ],
 )
-def test_what_cannot_be_tried_is_told(mission, command, words, said):
+def test_what_cannot_be_tried_is_reported(mission, command, words, said):
     status, text, error = command("try", *words, "--on", mission[0])
     assert (status, text) == (2, "")
     assert said in error
     assert error.count("\n") == 1
 
 
-def test_folders_and_files_that_are_no_record_are_told(mission, tmp_path):
+def test_folders_and_files_that_are_no_record_are_reported(mission, tmp_path):
     with pytest.raises(InputError, match=r"has no knowledge\.jsonl or knowledge_states\.jsonl.*--record-knowledge"):
         list(try_rule(tmp_path, RuleChange(NEAR)))
     (tmp_path / KNOWLEDGE_FILE).write_text('{"t_s": 1}\n')
@@ -198,7 +198,7 @@ def test_folders_and_files_that_are_no_record_are_told(mission, tmp_path):
         list(try_rule(tmp_path, RuleChange(NEAR)))
 
 
-def test_mistakes_in_the_rule_are_told(mission, caplog):
+def test_mistakes_in_the_rule_are_reported(mission, caplog):
     folder = mission[0]
     list(try_rule(folder, RuleChange('x: c_status(?c, "False") -> fd_realisability(fd_all_thrusters, false)')))
     message = 'rule x, column 17: nothing in the simulation reports c_status "False" (did you mean "FALSE"?)'

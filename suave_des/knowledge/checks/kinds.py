@@ -90,14 +90,14 @@ def mixed_terms(content: Content, kinds: Kinds) -> list[tuple[Rule, Atom, str, s
     found = []
     for rule in content.enabled_rules:
         known: dict[Term, tuple[str, str]] = {}
-        told: set[Term] = set()
+        reported: set[Term] = set()
         for atom, term, kind in uses(rule, kinds):
             name = local_name(atom.predicate)
             if isinstance(term, Named) and term not in known and (own := kinds.of.get(term.iri)):
                 known[term] = min(own), ""
             before, by = known.setdefault(term, (kind, "" if atom.kind == "class" else name))
-            if kinds.exclude(before, kind) and term not in told:
-                told.add(term)
+            if kinds.exclude(before, kind) and term not in reported:
+                reported.add(term)
                 thing = f"?{term.name}" if isinstance(term, Variable) else local_name(getattr(term, "iri", ""))
                 first = with_article(before) + (f" in {by}" if by else "")
                 found.append((rule, atom, f"{thing} is {first}, but {with_article(kind)} in {name}", _use(atom, kinds)))
