@@ -16,6 +16,7 @@ from suave_des.monitor.diagnostics import REPORTED_STATUSES
 from suave_des.resources import find
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import Scenario
+from suave_des.scenario.signal_kinds import ConstantSignal, SinusoidSignal, StepSignal, TableSignal
 
 if TYPE_CHECKING:
     from suave_des.knowledge.checks.static import Subject
@@ -74,6 +75,26 @@ def measured_attributes(scenario: Scenario) -> tuple[str, ...]:
     return tuple(sorted({*scenario.signals, *(() if scenario.battery is None else (BATTERY_LEVEL,))}))
 
 
+def measured_ranges(loaded: LoadedScenario) -> dict[str, tuple[float, float]]:
+    """Return the smallest and the greatest value that each attribute's monitor can measure, where that is known."""
+    ranges = {} if loaded.scenario.battery is None else {BATTERY_LEVEL: (0.0, 1.0)}
+    for name, signal in loaded.scenario.signals.items():
+        values: Sequence[object]
+        match signal:
+            case SinusoidSignal():
+                values = signal.minimum, signal.maximum
+            case ConstantSignal():
+                values = (signal.value,)
+            case StepSignal():
+                values = signal.before, signal.after
+            case TableSignal():
+                values = loaded.tables[name][1]
+        numbers = [float(value) for value in values if isinstance(value, float | int)]
+        if signal.noise == 0.0 and len(numbers) == len(values):
+            ranges[name] = min(numbers), max(numbers)
+    return ranges
+
+
 def subject_of(loaded: LoadedScenario) -> Subject:
     """Return what `kb check` checks of a scenario: its knowledge base, and what missions have to do with it."""
     from suave_des.knowledge.checks.static import Subject  # which missions do not need
@@ -93,6 +114,7 @@ def subject_of(loaded: LoadedScenario) -> Subject:
         operators=loaded.scenario.revision.comparison_operators,
         reported=REPORTED_STATUSES,
         measured=measured_attributes(loaded.scenario),
+        ranges=measured_ranges(loaded),
     )
 
 

@@ -19,6 +19,7 @@ from suave_des.knowledge.checks.model import (
     unmeasured_rules,
 )
 from suave_des.knowledge.checks.slips import slips
+from suave_des.knowledge.checks.thresholds import decided_comparisons
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.model import Model
 from suave_des.knowledge.ontology import Ontology
@@ -128,6 +129,21 @@ def misspelt_statuses(
                 level, remedy = Level.INFO, f"reported are {texts}; a function of your own can report others"
             message = f'nothing in the simulation reports c_status "{status}"'
             yield _about(rule, sources, level, message, remedy, atom.place(1))
+
+
+def comparisons_out_of_range(
+    content: Content,
+    ranges: Mapping[str, tuple[float, float]],
+    given: Collection[Path],
+    sources: Mapping[Path, OntologyFile],
+) -> Iterator[Finding]:
+    """Find the rules of the user's that compare a measured value with a number beyond all that missions measure."""
+    for rule, atom, attribute, outcome in decided_comparisons(content, ranges):
+        if rule.file.resolve() in given:
+            low, high = ranges[attribute]
+            reached = f"{attribute} is between {low:g} and {high:g}"
+            message = f"{write_atom(atom)} {outcome} holds in this scenario: {reached}"
+            yield _about(rule, sources, Level.WARN, message, "check the number and its unit", atom.place())
 
 
 def findings_on_rule(

@@ -21,6 +21,7 @@ from suave_des.knowledge.checks.model import (
     unused_individuals,
 )
 from suave_des.knowledge.checks.rules import (
+    comparisons_out_of_range,
     misspelt_statuses,
     replacing_rules,
     rule_problems,
@@ -52,6 +53,7 @@ class Subject:
         operators: qa_comparison_operator that the revision assumes of quality attribute types that have none, by name.
         reported: the statuses that the simulation reports, by component; None: that is not checked.
         measured: the quality attributes that the scenario measures; None: that is not checked.
+        ranges: the smallest and the greatest value of measured attributes, where they are known.
         time_limit_s: for Pellet.
     """
 
@@ -66,6 +68,7 @@ class Subject:
     operators: Mapping[str, str] = field(default_factory=dict)
     reported: Mapping[str, Collection[str]] | None = None
     measured: Collection[str] | None = None
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     time_limit_s: float = TIME_LIMIT_S
 
     @property
@@ -139,6 +142,7 @@ def static_findings(subject: Subject, sources: Sequence[OntologyFile]) -> Static
             findings += misspelt_statuses(whole, subject.reported, own, by_path)
         if subject.measured is not None:
             findings += mismatched_attributes(whole, model, sources, subject.measured)
+        findings += comparisons_out_of_range(whole, subject.ranges, own, by_path)
         for name, sign in assumed.items():
             findings.append(finding_about(name, sources, Level.INFO, assumption(name, sign)))
         if values_are_right:
