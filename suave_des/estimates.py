@@ -25,9 +25,10 @@ def interval_text(interval: Interval | None, style: str) -> str:
 
 def percent(share: float) -> str:
     """Write a share in whole per cent: "100%" of all only, and "0%" of none only."""
-    if share > 0.995:
-        return "100%" if share == 1.0 else ">99%"
-    return "<1%" if 0.0 < share < 0.005 else f"{share:.0%}"
+    text = f"{share:.0%}"
+    if share < 1.0 and text == "100%":
+        return ">99%"
+    return "<1%" if share > 0.0 and text == "0%" else text
 
 
 @dataclass(frozen=True, slots=True)

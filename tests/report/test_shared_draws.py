@@ -109,5 +109,6 @@ def test_until_ci_waits_for_enough_draws() -> None:
 
 
 def test_only_all_are_100_per_cent_and_none_are_0() -> None:
-    shares = [1.0, 0.9961, 0.994, 0.5, 0.006, 0.004, 0.0]
-    assert [percent(share) for share in shares] == ["100%", ">99%", "99%", "50%", "1%", "<1%", "0%"]
+    shares = [1.0, 0.9961, 0.995, 0.994, 0.5, 0.006, 0.005, 0.004, 0.0]
+    shown = ["100%", ">99%", ">99%", "99%", "50%", "1%", "<1%", "<1%", "0%"]
+    assert [percent(share) for share in shares] == shown
