@@ -28,7 +28,7 @@ def conclusion(found: Difference, metric: ComparedMetric) -> str:
     test = f"{_basis(found)}, {p_text(found.p_holm)}"
     if not found.is_significant:
         text = f"No difference in {metric.title} is shown between {found.first} and {found.second}"
-        if not _contains_0(found):
+        if found.difference.interval is not None and not _contains_0(found):
             text += " by the test, though the interval of the mean, which is not corrected, does not contain 0"
         return f"{text} ({_mean_of(found, metric)}{_interval(found, metric)}{test})."
     ranks = _direction_of_ranks(found)
@@ -65,10 +65,10 @@ def _mean_of(found: Difference, metric: ComparedMetric) -> str:
 
 
 def _contains_0(found: Difference) -> bool:
-    """Whether the interval of the difference contains 0, or there is none."""
+    """Whether the interval of the difference contains 0; there is none where all runs differ by the same."""
     assert found.difference is not None
-    low, high = found.difference.interval or (0.0, 0.0)
-    return low <= 0.0 <= high
+    interval = found.difference.interval
+    return interval is not None and interval[0] <= 0.0 <= interval[1]
 
 
 def _is_claimed(found: Difference) -> bool:

@@ -287,6 +287,13 @@ class TestFewValues:
         assert found.tested is not None and found.tested.p == 1.0
         assert "No difference in search time is shown" in found.conclusion
 
+    def test_a_difference_that_is_the_same_in_each_pair_is_claimed(self) -> None:
+        a = np.random.default_rng(1).normal(100.0, 5.0, 20)
+        claim = "a finds the pipeline 5.00 s sooner than b (no interval; 20 pairs, Wilcoxon, p < 0.001)."
+        assert difference(compare_frame(runs(a=list(a), b=list(a + 5.0))), "a", "b").conclusion == claim
+        few = difference(compare_frame(runs(a=[100.0], b=[105.0])), "a", "b")
+        assert few.conclusion.startswith("No difference in search time is shown between a and b (")
+
     def test_one_manager_has_nothing_to_be_compared_with(self) -> None:
         comparison = compare_frame(runs(a=[100.0, 110.0]))
         assert comparison.differences == ()
