@@ -99,7 +99,8 @@ def grouped(
         raise InputError(problem, remedy=f"choose {_MOST_GROUPS} or fewer with managers and by")
     averaged = [name for name in missions.swept if averages and name not in by]
     names = _names([key for key, _ in found], by)
-    groups = [_group(name, part, averaged, averages=averages) for name, (_, part) in zip(names, found, strict=True)]
+    alike = runs_sharing_draw(frame) if averages else 1
+    groups = [_group(name, part, averaged, alike) for name, (_, part) in zip(names, found, strict=True)]
     return groups, list(_notes(groups, averaged, frame))
 
 
@@ -119,8 +120,7 @@ def _short(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else printable(str(value))
 
 
-def _group(name: str, frame: pandas.DataFrame, averaged: Sequence[str], *, averages: bool) -> Group:
-    alike = runs_sharing_draw(frame) if averages else 1
+def _group(name: str, frame: pandas.DataFrame, averaged: Sequence[str], alike: int) -> Group:
     has_points = bool(averaged) and bool(frame[["seed", "run"]].duplicated().any())
     if has_points:
         frame = _means_by_run(frame)
@@ -130,12 +130,8 @@ def _group(name: str, frame: pandas.DataFrame, averaged: Sequence[str], *, avera
 
 
 def runs_sharing_draw(frame: pandas.DataFrame) -> int:
-    """Return how many runs in a row share their draws."""
-    return (
-        int(frame["runs_sharing_draw"].max())
-        if "runs_sharing_draw" in frame and frame["runs_sharing_draw"].notna().any()
-        else 1
-    )
+    """Return how many runs in a row share their draws; of several campaigns, as many as have whole draws of each."""
+    return math.lcm(*frame["runs_sharing_draw"].dropna().astype(int).unique()) if "runs_sharing_draw" in frame else 1
 
 
 def first_alike(frame: pandas.DataFrame, alike: int) -> pandas.Series[float]:
@@ -157,9 +153,11 @@ def _means_by_run(frame: pandas.DataFrame, *, has_all: bool = True) -> pandas.Da
 def _notes(groups: Sequence[Group], averaged: Sequence[str], frame: pandas.DataFrame) -> Iterator[str]:
     alike = runs_sharing_draw(frame)
     if alike > 1:
+        is_one = frame["runs_sharing_draw"].eq(alike).all()
+        what = f"the {alike} runs that share each draw" if is_one else f"every {alike} runs in a row, which share draws"
         yield (
-            f"the values of the {alike} runs that share each draw (runs_per_draw) are averaged: draws are independent,"
-            " and runs are not; n and the runs needed are numbers of draws"
+            f"the values of {what} (runs_per_draw) are averaged: draws are independent, and runs are not; n and the"
+            f" runs needed are numbers of {'draws' if is_one else 'these averages'}"
         )
     if averaged and not all(group.is_of_missions for group in groups):
         yield (

@@ -14,7 +14,7 @@ from suave_des.campaign.campaign import run_campaign
 from suave_des.campaign.progress import GroupTracker, PairTracker
 from suave_des.estimates import GroupedMean, RunningMean, estimate, interval_in_groups, percent
 from suave_des.report.campaign_figures import running_means
-from suave_des.report.compare import compare_folders, compare_frame
+from suave_des.report.compare import Choices, compare_folders, compare_frame
 
 VARIED = {
     "runs_per_draw": 4,
@@ -82,6 +82,20 @@ def test_a_comparison_takes_the_draws_for_independent(folder: Path) -> None:
         tuple(stats.ttest_rel(means["none"], means["bt"]).confidence_interval())
     )
     assert any("4 runs that share each draw" in note for note in comparison.notes)
+
+
+def test_campaigns_with_other_draws_are_paired_by_the_same_runs(folder: Path, tmp_path: Path) -> None:
+    run_campaign("seams2023", ["none"], 24, 1, out=tmp_path / "other", **(VARIED | {"runs_per_draw": 3}))
+    comparison = compare_folders([folder, tmp_path / "other"], Choices(managers=["none"]))
+    found = comparison.differences[0]
+    means = []
+    for each in (folder, tmp_path / "other"):
+        runs = pandas.read_csv(each / "runs.csv").query("manager == 'none'")
+        means.append(runs.groupby((runs["run"] - 1) // 12)["search_time_s"].mean())
+    assert found.n == (2,) and found.difference is not None
+    assert found.difference.value == pytest.approx((means[0] - means[1]).mean())
+    assert "left out" not in found.pairing.why
+    assert any("every 12 runs in a row" in note for note in comparison.notes)
 
 
 def test_so_does_that_of_a_data_frame() -> None:
