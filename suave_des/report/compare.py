@@ -250,6 +250,8 @@ def _summary(group: Group, metric: ComparedMetric, horizon_s: float, choices: Ch
         mean = statistics.share_estimate(int(sample.sum()), len(sample))
     else:
         mean = statistics.mean_interval(sample, bootstrap=choices.bootstrap)
+        if metric.name == FOUND:
+            mean = statistics.cut(mean, 0.0, 1.0)
     low, median, high = np.percentile(sample, (25.0, 50.0, 75.0))
     search = None
     if metric.name == SEARCH_TIME and group.is_of_missions:
@@ -284,6 +286,8 @@ def _difference(
     else:
         difference = statistics.difference_interval(x, y, bootstrap=choices.bootstrap)
         tested = statistics.rank_sum_test(x, y)
+    if metric.name == FOUND:
+        difference = statistics.cut(difference, -1.0, 1.0)
     found = replace(found, difference=difference, tested=tested)
     return _with_sizes(found, x, y, half_width or metric.default_half_width(x, y))
 

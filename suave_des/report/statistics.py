@@ -75,6 +75,14 @@ def mean_interval(sample: Sample, *, bootstrap: bool = False) -> Estimated:
     return Estimated(found.mean, found.mean_interval if np.ptp(sample) > 0.0 else None, STUDENT)
 
 
+def cut(found: Estimated, lowest: float, highest: float) -> Estimated:
+    """Cut an interval off at the limits of what is estimated, such as a share averaged over runs."""
+    if found.interval is None:
+        return found
+    low, high = found.interval
+    return replace(found, interval=(max(lowest, low), min(highest, high)))
+
+
 def difference_interval(first: Sample, second: Sample, *, bootstrap: bool = False) -> Estimated:
     """Estimate the difference of two independent samples' means, first - second.
 

@@ -98,6 +98,19 @@ def test_campaigns_with_other_draws_are_paired_by_the_same_runs(folder: Path, tm
     assert any("every 12 runs in a row" in note for note in comparison.notes)
 
 
+def test_intervals_of_shares_of_draws_are_cut_off_at_all_and_none() -> None:
+    found = [True] * 39 + [False]
+    rows = [(manager, run + 1, found[run] or manager == "a") for manager in "ab" for run in range(40)]
+    frame = pandas.DataFrame(rows, columns=["manager", "run", "pipeline_found"])
+    frame = frame.assign(seed=1, scenario="s", search_time_s=100.0, distance_inspected_m=1.0, mean_reaction_time_s=1.0)
+    frame.attrs["runs_sharing_draw"] = 4
+    for unpaired in (False, True):
+        (a, b) = compare_frame(frame, Choices(metrics=["pipeline_found"], unpaired=unpaired)).summaries
+        assert a.mean is not None and b.mean is not None and b.mean.interval is not None
+        assert (a.mean.value, a.mean.interval) == (1.0, None)
+        assert b.mean.interval[1] == 1.0 > b.mean.value > b.mean.interval[0]
+
+
 def test_so_does_that_of_a_data_frame() -> None:
     frame = api.run_campaign("seams2023", ["none", "bt"], runs=8, progress=False, **VARIED)
     assert frame.compare().differences[0].n == compare_frame(frame).differences[0].n == (2,)
