@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 
 import matplotlib
 import numpy as np
@@ -178,7 +178,8 @@ def draw_convergence(groups: Sequence[Group]) -> style.Picture:
                 line.set(marker=style.marker(number), ms=5, clip_on=False)
             low, high = means - halves, means + halves
             axes.fill_between(n, low, high, where=n >= _FEWEST_FOR_INTERVAL, color=look["color"], alpha=0.18, lw=0)
-        axes.set(xlabel="number of runs", ylabel=f"mean {title}")
+        shares = any(runs_sharing_draw(group.frame) > 1 for group in groups)
+        axes.set(xlabel=f"number of {'draws' if shares else 'runs'}", ylabel=f"mean {title}")
         axes.set_xlim(left=1.0)
         axes.set_ylim(bottom=0.0)
         axes.xaxis.set_major_locator(MaxNLocator(6, integer=True, min_n_ticks=1))
@@ -203,17 +204,18 @@ def running_means(
     stds = first.std().to_numpy()[n - 1]  # nan for a single value, which has no interval
     halves = np.array([t_quantile(int(each) - 1) for each in n]) * stds / np.sqrt(n)
     if draws is not None:
-        grouped = GroupedMean()
-        halves = np.array([_half_width_with(grouped, *each) for each in zip(values.tolist(), draws, strict=True)])[
-            n - 1
-        ]
+        halves = np.array(list(_half_widths(values.tolist(), draws, set(n.tolist()))))
     return n, first.mean().to_numpy()[n - 1], halves
 
 
-def _half_width_with(mean: GroupedMean, value: float, draw: int) -> float:
-    """Add a value; return half the width of the interval, nan for one draw."""
-    mean.add(value, draw)
-    return math.nan if mean.half_width is None else mean.half_width
+def _half_widths(values: Sequence[float], draws: Sequence[int], wanted: Container[int]) -> Iterator[float]:
+    """Yield half the widths of the intervals of the first n values, for each n wanted; nan for one draw."""
+    mean = GroupedMean()
+    for value, draw in zip(values, draws, strict=True):
+        mean.add(value, draw)
+        if mean.n in wanted:
+            half_width = mean.half_width
+            yield math.nan if half_width is None else half_width
 
 
 def draw_detections(groups: Sequence[Group]) -> style.Picture:

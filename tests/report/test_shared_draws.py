@@ -15,6 +15,7 @@ from suave_des.campaign.progress import GroupTracker, PairTracker
 from suave_des.estimates import GroupedMean, RunningMean, estimate, interval_in_groups, percent
 from suave_des.report.campaign_figures import running_means
 from suave_des.report.compare import Choices, compare_folders, compare_frame
+from suave_des.report.figures import draw_frame
 
 VARIED = {
     "runs_per_draw": 4,
@@ -114,6 +115,12 @@ def test_intervals_of_shares_of_draws_are_cut_off_at_all_and_none() -> None:
 def test_so_does_that_of_a_data_frame() -> None:
     frame = api.run_campaign("seams2023", ["none", "bt"], runs=8, progress=False, **VARIED)
     assert frame.compare().differences[0].n == compare_frame(frame).differences[0].n == (2,)
+
+
+def test_the_convergence_is_drawn_over_draws() -> None:
+    frame = api.run_campaign("seams2023", ["none"], runs=8, progress=False, **VARIED)
+    figure = draw_frame(frame, "convergence")
+    assert figure.axes[0].get_xlabel() == "number of draws"
 
 
 def test_runs_without_perturbations_are_independent(tmp_path: Path) -> None:
