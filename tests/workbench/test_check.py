@@ -757,6 +757,10 @@ WITHOUT_FIRING = {
         "A: hasQAvalue(?g, ?q) ^ isQAtype(?p, water_visibility) ^ hasValue(?p, ?v) -> Role(?g)",
         (19, "?q occurs only here, and nothing connects it with ?p, which is a QAvalue, too"),
     ),
+    "not connected, by a capital": (
+        "A: hasQAvalue(?g, ?q) ^ isQAtype(?Q, water_visibility) ^ hasValue(?Q, ?v) -> Role(?g)",
+        (19, "?q occurs only here, and is another variable than ?Q"),
+    ),
     "unmeasured": (
         "A: hasQAvalue(?g, ?q) ^ isQAtype(?q, performance) -> Role(?g)",
         (25, "can never fire: missions do not measure performance, so no grounding has a value of it"),
@@ -797,7 +801,9 @@ def test_a_rule_that_cannot_do_what_it_should(case: str, tmp_path: Path) -> None
         "A: hasQAvalue(?g, ?q) ^ isQAtype(?q, water_visibility) -> Role(?g)",
         "A: isQAtype(?q, performance) ^ hasValue(?q, ?v) -> Role(?q)",
         "A: isQAtype(?q, battery_level) -> Role(?q)\nB: Role(?q) -> isQAtype(?q, battery_level)",
+        "A: solvesO(?g, ?o) ^ typeFD(?g, fd_spiral_low) ^ solvesO(?h, ?p) ^ o_updatable(?p, true) -> Role(?h)",
         'A: c_status(?c, ?s) ^ startsWith(?s, "REC") -> Role(?c)',
+        'A: c_status(?c, ?s) ^ contains("FALSE or RECOVERED", ?s) -> Role(?c)',
         'A: c_status(?c, ?s) ^ stringEqualIgnoreCase(?s, "false") -> Role(?c)',
     ],
 )

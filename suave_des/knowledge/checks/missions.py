@@ -13,7 +13,7 @@ from suave_des.knowledge.content import Content
 from suave_des.knowledge.model import Model
 from suave_des.knowledge.ontology_file import OntologyFile
 from suave_des.knowledge.rdf import C_STATUS, PERFORMANCE, QA_OPERATOR, SWRLB, XSD, Lit, local_name
-from suave_des.knowledge.rules.syntax import COMPARISON_OF, Atom, Rule, Variable
+from suave_des.knowledge.rules.syntax import COMPARISON_OF, COMPARISONS, Atom, Rule, Variable
 
 #: Whether a built-in holds for a text and the one that a rule names.
 _HOLDS: Final[Mapping[str, Callable[[str, str], bool]]] = {
@@ -52,6 +52,8 @@ def unreported_statuses(content: Content, reported: Collection[str]) -> list[tup
     for rule, _, status in tuple(asked):  # and in a comparison
         if isinstance(status, Variable):
             tests = [each for each in rule.body if each.predicate in _HOLDS and status in each.arguments]
+            is_either = COMPARISONS.keys()  # the other built-ins ask something of their first argument
+            tests = [each for each in tests if each.predicate in is_either or each.arguments[0] == status]
             asked += [(rule, atom, term) for atom in tests for term in atom.arguments]
     return [
         (rule, atom, status.text)

@@ -49,7 +49,10 @@ def _counts(rule: Rule) -> Counter[str]:
 
 
 def _unconnected(rule: Rule, kinds: Kinds) -> Iterator[Slip]:
-    """Find what a property leads to without any use, while another thing of its kind is connected with nothing."""
+    """Find what a property leads to without any use, while another thing of its kind is connected with nothing.
+
+    Names that differ in capitals are left to check_rule, and what the same property leads to is meant to be another.
+    """
     group: dict[str, set[str]] = {}
     for atom in rule.body:
         together = set(atom.variables()).union(*(group.get(name, ()) for name in atom.variables()))
@@ -59,12 +62,19 @@ def _unconnected(rule: Rule, kinds: Kinds) -> Iterator[Slip]:
     for atom, term, kind in uses(rule, kinds):
         if isinstance(term, Variable) and term.name in group:
             found.setdefault(term.name, (kind, atom, term))
+    led_to = {(atom.predicate, term) for atom, term, _ in uses(rule, kinds) if _is_value(atom, term)}
     for name, (kind, atom, term) in found.items():
-        alike = [other for other in found if found[other][0] == kind and other not in group[name]]
-        if counts[name] == 1 and alike and atom.kind == "object" and atom.arguments[1] == term:
+        apart = [other for other in found if found[other][0] == kind and other not in group[name]]
+        apart = [other for other in apart if (atom.predicate, found[other][2]) not in led_to]
+        alike = [other for other in apart if other.casefold() != name.casefold()]
+        if counts[name] == 1 and alike and _is_value(atom, term):
             what = f"?{alike[0]}, which is {with_article(kind)}, too"
             problem = f"?{name} occurs only here, and nothing connects it with {what}"
             yield Slip(rule, problem, atom.place(1), f"did you mean ?{alike[0]}?")
+
+
+def _is_value(atom: Atom, term: Term) -> bool:
+    return atom.kind == "object" and atom.arguments[1] == term
 
 
 def _nearly_the_same(rule: Rule) -> Iterator[Slip]:
