@@ -234,7 +234,7 @@ def _check_comparisons(rule: Rule, vocabulary: Vocabulary) -> Iterator[RuleProbl
                 low, high = least[one.name], most[one.name]
                 if low[0] > high[0] or (low[0] == high[0] and (low[1] or high[1])):
                     problem = f"no value of ?{one.name} is {low[2]} and {high[2]}: the rule never fires"
-                    yield RuleProblem(problem, atom.place(), "turn one of the comparisons", is_fatal=False)
+                    yield RuleProblem(problem, atom.place(), "reverse one of the comparisons", is_fatal=False)
 
 
 def _check_builtin(atom: Atom, name: str, *, is_head: bool) -> Iterator[RuleProblem]:
