@@ -10,6 +10,7 @@ from suave_des.knowledge.checks.findings import Finding, Level
 from suave_des.knowledge.checks.static import Subject, static_findings
 from suave_des.knowledge.ontology_file import collect
 from suave_des.monitor.diagnostics import REPORTED_STATUSES
+from suave_des.workbench.shapes import check_shapes
 
 SUAVE = "http://www.metacontrol.org/suave#"
 TOMASYS = "http://metacontrol.org/tomasys#"
@@ -116,3 +117,13 @@ def test_an_edit_that_means_something_else(case: str, edited) -> None:
 )
 def test_right_edits(extra: str, edited) -> None:
     assert not warned(edited, extra)
+
+
+def test_a_comparison_operator_with_and_without_its_datatype(edited) -> None:
+    def problems(operator: str) -> list[str]:
+        found = check_shapes(collect([edited(thing("current", "QualityAttributeType", operator))]), (), {})
+        return [each.message for each in found if each.level is Level.ERROR]
+
+    assert not problems(value("qa_comparison_operator", "&gt;=", "string"))
+    assert not problems("<tomasys:qa_comparison_operator>&lt;</tomasys:qa_comparison_operator>")
+    assert problems(value("qa_comparison_operator", "==", "string"))
