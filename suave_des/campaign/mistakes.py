@@ -17,6 +17,8 @@ SHOWN: Final = 10
 """Mistakes that are reported one by one."""
 _reported: set[tuple[str, tuple[str, ...]]] = set()
 """What this process has already reported, of which knowledge base."""
+_checked: set[int] = set()
+"""Hashes of what this process has already checked: a script may run thousands of missions with the same files."""
 
 
 def report_mistakes(loaded: LoadedScenario, base: Ontology) -> None:
@@ -28,13 +30,18 @@ def report_mistakes(loaded: LoadedScenario, base: Ontology) -> None:
         loaded: the scenario with its files.
         base: its knowledge base.
     """
-    if not _has_own_files(loaded):
+    logger = logging.getLogger(MISTAKES_LOGGER)
+    if not logger.isEnabledFor(logging.WARNING) or not _has_own_files(loaded):
         return
+    files = tuple(sorted(loaded.inputs.items())), loaded.ontologies, loaded.rules
+    checked = hash((base.content_hash, loaded.scenario.model_dump_json(), files))
+    if checked in _checked:
+        return
+    _checked.add(checked)
     findings = static_findings(subject_of(loaded), base.sources).findings
     lines = [str(each) for each in ordered(findings) if each.level is not Level.INFO]
     known = base.content_hash, tuple(lines)
-    logger = logging.getLogger(MISTAKES_LOGGER)
-    if not lines or known in _reported or not logger.isEnabledFor(logging.WARNING):
+    if not lines or known in _reported:
         return
     _reported.add(known)
     for line in lines[:SHOWN]:

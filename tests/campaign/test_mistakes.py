@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,8 @@ import pytest
 from suave_des import run_campaign
 from suave_des.campaign.mistakes import SHOWN
 from suave_des.errors import MISTAKES_LOGGER
+from suave_des.knowledge.checks.static import StaticFindings, Subject, static_findings
+from suave_des.knowledge.ontology_file import OntologyFile
 from suave_des.resources import shipped_folder
 from tests.helpers.command import command_here, suave_des_command
 
@@ -18,7 +21,8 @@ STATUS = 'nothing in the simulation reports c_status "False" (did you mean "FALS
 
 @pytest.fixture(autouse=True)
 def told_nothing_yet(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("suave_des.campaign.mistakes._reported", set())
+    for name in ("_reported", "_checked"):
+        monkeypatch.setattr(f"suave_des.campaign.mistakes.{name}", set())
 
 
 @pytest.fixture
@@ -91,6 +95,23 @@ def test_scripts_are_told_once_of_the_same_files(
     for _ in range(2):
         run_campaign("seams2023", "none", 1, rules=[tmp_path / wrong_rule])
     assert [STATUS in message for message in caplog.messages] == [True, False]
+
+
+def test_the_same_files_are_checked_once_and_changed_ones_again(
+    tmp_path: Path, wrong_rule: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    checks: list[Subject] = []
+
+    def counted(subject: Subject, sources: Sequence[OntologyFile]) -> StaticFindings:
+        checks.append(subject)
+        return static_findings(subject, sources)
+
+    monkeypatch.setattr("suave_des.campaign.mistakes.static_findings", counted)
+    for status, number in (("False", 1), ("False", 1), ("FALSE", 2), ("Flase", 3), ("False", 3)):
+        (tmp_path / wrong_rule).write_text(f'Late: c_status(?c, "{status}") -> Role(?c)\n', encoding="utf-8")
+        run_campaign("seams2023", "none", 1, rules=[tmp_path / wrong_rule])
+        assert len(checks) == number
+    assert [STATUS in message for message in caplog.messages] == [True, False, False, False]
 
 
 def test_many_mistakes_are_counted(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
