@@ -19,7 +19,7 @@ from suave_des.report import statistics
 from suave_des.report.caveats import caveats
 from suave_des.report.compared_metrics import FOUND, SEARCH_TIME, ComparedMetric, chosen_metrics, parse_half_widths
 from suave_des.report.conclusions import conclusion, overall_conclusion
-from suave_des.report.grouping import Group, grouped, time_limit_s
+from suave_des.report.grouping import Group, counted, grouped, time_limit_s
 from suave_des.report.result_files import Missions, missions_of, read_missions
 from suave_des.report.statistics import Estimated, Sample, SearchTimes, Tested
 
@@ -138,6 +138,7 @@ class Comparison:
         differences: by metric, then pair.
         notes: caveats about the data.
         metrics: the compared metrics.
+        counted: what n counts: "mission", or "run" or "draw" where missions are averaged over these.
     """
 
     conclusion: str
@@ -145,6 +146,7 @@ class Comparison:
     differences: tuple[Difference, ...]
     notes: tuple[str, ...]
     metrics: tuple[ComparedMetric, ...] = field(repr=False)
+    counted: str = field(default="mission", repr=False)
 
     def summary_rows(self) -> list[dict[str, Any]]:
         """Return a row for each group and metric, of plain values."""
@@ -228,7 +230,7 @@ def compare(missions: Missions, choices: Choices | None = None) -> Comparison:
     differences = [replace(each, conclusion=conclusion(each, known[each.metric])) for each in differences]
     sentence = overall_conclusion(metrics[0], differences, means, [group.name for group in groups])
     notes = [*missions.notes, *notes, *caveats(groups, metrics)]
-    return Comparison(sentence, summaries, tuple(differences), tuple(notes), metrics)
+    return Comparison(sentence, summaries, tuple(differences), tuple(notes), metrics, counted(groups))
 
 
 def _pairs(names: list[str], against: str | None) -> list[tuple[str, str]]:

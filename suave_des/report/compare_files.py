@@ -309,8 +309,8 @@ def _listed(names: Iterable[str]) -> str:
 def _sizes(comparison: Comparison) -> str:
     sizes = {each.group: each.n for each in comparison.of_metric(comparison.metrics[0].name)[0]}
     if len(set(sizes.values())) == 1:
-        return f"{number_of(next(iter(sizes.values())), 'mission')} for each manager."
-    return "; ".join(f"{name}: {number_of(n, 'mission')}" for name, n in sizes.items()) + "."
+        return f"{number_of(next(iter(sizes.values())), comparison.counted)} for each manager."
+    return "; ".join(f"{name}: {number_of(n, comparison.counted)}" for name, n in sizes.items()) + "."
 
 
 def capital(text: str) -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+import math
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any, Self
 
 import pandas
 
@@ -11,6 +12,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from suave_des.report.compare import Comparison
+
+
+_SHARING = "runs_sharing_draw"
 
 
 class CampaignFrame(pandas.DataFrame):
@@ -28,6 +32,15 @@ class CampaignFrame(pandas.DataFrame):
     @property
     def _constructor(self) -> type[CampaignFrame]:
         return CampaignFrame
+
+    def __finalize__(self, other: Any, method: str | None = None, **keywords: Any) -> Self:
+        """Keep how many runs share a draw where frames are joined: pandas keeps attrs only if all are equal."""
+        found: Self = super().__finalize__(other, method, **keywords)  # type: ignore[misc]
+        parts: Iterable[Any] = getattr(other, "objs", getattr(other, "input_objs", ())) if method == "concat" else ()
+        known = {part.attrs[_SHARING] for part in parts if _SHARING in part.attrs}
+        if known:
+            found.attrs[_SHARING] = math.lcm(*known)
+        return found
 
     def compare(  # type: ignore[override]
         self,

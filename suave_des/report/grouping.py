@@ -57,6 +57,13 @@ class Group:
         return pandas.MultiIndex.from_frame(self.frame[["seed", "run"]])
 
 
+def counted(groups: Sequence[Group]) -> str:
+    """Return what the rows of groups are."""
+    if any(runs_sharing_draw(group.frame) > 1 and not group.is_of_missions for group in groups):
+        return "draw"
+    return "mission" if all(group.is_of_missions for group in groups) else "run"
+
+
 def time_limit_s(groups: Sequence[Group]) -> float:
     """Return the whole seconds that missions of every group had; where all found the pipeline, the longest search."""
     lost = [group.frame.loc[group.frame["pipeline_found"] == 0.0, "search_time_s"] for group in groups]
@@ -154,7 +161,7 @@ def _notes(groups: Sequence[Group], averaged: Sequence[str], frame: pandas.DataF
     alike = runs_sharing_draw(frame)
     if alike > 1:
         is_one = frame["runs_sharing_draw"].eq(alike).all()
-        what = f"the {alike} runs that share each draw" if is_one else f"every {alike} runs in a row, which share draws"
+        what = f"the {alike} runs that share each draw" if is_one else f"every {alike} runs, of which some share a draw"
         yield (
             f"the values of {what} (runs_per_draw) are averaged: draws are independent, and runs are not; n and the"
             f" runs needed are numbers of {'draws' if is_one else 'these averages'}"

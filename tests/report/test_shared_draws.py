@@ -15,6 +15,7 @@ from suave_des.campaign.progress import GroupTracker, PairTracker
 from suave_des.estimates import GroupedMean, RunningMean, estimate, interval_in_groups, percent
 from suave_des.report.campaign_figures import running_means
 from suave_des.report.compare import Choices, compare_folders, compare_frame
+from suave_des.report.compare_files import latex_text
 from suave_des.report.figures import draw_frame
 
 VARIED = {
@@ -83,6 +84,7 @@ def test_a_comparison_takes_the_draws_for_independent(folder: Path) -> None:
         tuple(stats.ttest_rel(means["none"], means["bt"]).confidence_interval())
     )
     assert any("4 runs that share each draw" in note for note in comparison.notes)
+    assert r"\caption{6 draws for each manager.}" in latex_text(comparison)
 
 
 def test_campaigns_with_other_draws_are_paired_by_the_same_runs(folder: Path, tmp_path: Path) -> None:
@@ -96,7 +98,7 @@ def test_campaigns_with_other_draws_are_paired_by_the_same_runs(folder: Path, tm
     assert found.n == (2,) and found.difference is not None
     assert found.difference.value == pytest.approx((means[0] - means[1]).mean())
     assert "left out" not in found.pairing.why
-    assert any("every 12 runs in a row" in note for note in comparison.notes)
+    assert any("every 12 runs, of which some share a draw" in note for note in comparison.notes)
 
 
 def test_intervals_of_shares_of_draws_are_cut_off_at_all_and_none() -> None:
@@ -115,6 +117,9 @@ def test_intervals_of_shares_of_draws_are_cut_off_at_all_and_none() -> None:
 def test_so_does_that_of_a_data_frame() -> None:
     frame = api.run_campaign("seams2023", ["none", "bt"], runs=8, progress=False, **VARIED)
     assert frame.compare().differences[0].n == compare_frame(frame).differences[0].n == (2,)
+    other = api.run_campaign("seams2023", ["none", "bt"], runs=8, seed=2, progress=False, **VARIED)
+    both = pandas.concat([frame, other])
+    assert compare_frame(both).differences[0].n == (4,)
 
 
 def test_the_convergence_is_drawn_over_draws() -> None:
