@@ -80,10 +80,9 @@ def _power(validation: Validation, real: str) -> Iterator[str]:
     sizes = [(each.published.n, each.simulated.n) for each in validation.samples]
     if sizes:
         apart = min(float(kolmogi(SIGNIFICANCE)) * (1.0 / n + 1.0 / m) ** 0.5 for n, m in sizes)
-        yield (
-            f"A KS p of {SIGNIFICANCE} or more does not show that distributions are equal: with so few {real} missions"
-            f" it is less only where the shares at or below some value differ by more than about {min(1.0, apart):.0%}."
-        )
+        few = f"with so few {real} missions it is less only where the shares at or below some value differ by more than"
+        rest = f"{few} about {apart:.0%}" if apart < 1.0 else "with so few missions it is hardly ever less"
+        yield f"A KS p of {SIGNIFICANCE} or more does not show that distributions are equal: {rest}."
 
 
 def _are(count: int, of: int | None = None) -> str:

@@ -96,6 +96,11 @@ def test_the_published_runs_against_themselves_meet_every_target(validate):
     assert "differ by more than about 43%." in told  # 20 missions against 20: 1.358 * sqrt(2 / 20)
 
 
+def test_a_single_mission_cannot_show_that_distributions_differ(validate):
+    told = " ".join(validate("--runs", "1").out.split())
+    assert "are equal: with so few missions it is hardly ever less." in told
+
+
 def test_a_target_that_is_not_met_is_told_and_counts_only_when_strict(validate, tmp_path):
     text = DATA.read_text(encoding="utf-8").replace("none,", "x,").replace("random,", "none,").replace("x,", "random,")
     (tmp_path / "swapped.csv").write_text(text, encoding="utf-8")
