@@ -257,7 +257,7 @@ def _summary(group: Group, metric: ComparedMetric, horizon_s: float, choices: Ch
     low, median, high = np.percentile(sample, (25.0, 50.0, 75.0))
     search = None
     if metric.name == SEARCH_TIME and group.is_of_missions:
-        was_found = group.values(FOUND)
+        was_found = group.values(FOUND)[~np.isnan(group.values(metric.name))]
         if not np.isnan(was_found).any():
             search = statistics.search_times(sample, was_found.astype(bool), horizon_s)
     std = float(sample.std(ddof=1)) if len(sample) > 1 else None

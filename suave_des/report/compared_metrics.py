@@ -103,7 +103,9 @@ _METRICS = (
         half_width=0.5,
         interval_decimals=2,
     ),
-    ComparedMetric("adaptations", "adaptations", "", 0, "adapts {} times less than", "adapts {} times more than"),
+    ComparedMetric(
+        "adaptations", "adaptations", "", 0, "makes {} fewer adaptations than", "makes {} more adaptations than"
+    ),
     ComparedMetric("mission_duration_s", "mission duration", "s"),
     ComparedMetric(
         "detection_time_s",

@@ -294,6 +294,18 @@ class TestFewValues:
         few = difference(compare_frame(runs(a=[100.0], b=[105.0])), "a", "b")
         assert few.conclusion.startswith("No difference in search time is shown between a and b (")
 
+    def test_missions_without_a_search_time_are_left_out(self) -> None:
+        frame = runs(a=[100.0, 110.0, 120.0], b=[90.0, 95.0, 99.0])
+        frame.loc[0, "search_time_s"] = np.nan
+        found = summary(compare_frame(frame), "a")
+        assert (found.n, found.missing) == (2, 1)
+        assert found.search is not None and found.search.restricted_mean_s.value <= 115.0
+
+    def test_a_number_of_adaptations_is_not_a_factor(self) -> None:
+        frame = runs(a=[100.0] * 20, b=[120.0] * 20).assign(adaptations=[3] * 20 + [1] * 20)
+        found = difference(compare_frame(frame, Choices(metrics=["adaptations"])), "a", "b", "adaptations")
+        assert found.conclusion.startswith("a makes 2.00 more adaptations than b (")
+
     def test_one_manager_has_nothing_to_be_compared_with(self) -> None:
         comparison = compare_frame(runs(a=[100.0, 110.0]))
         assert comparison.differences == ()
