@@ -27,7 +27,7 @@ def private_cache(kind: str) -> Path | None:
 
     Machine code and classes are kept there, which are run without a further look. Where the cache folder cannot be
     used, as without a home folder, a temporary one takes its place, for this process and those that it starts; this is
-    said once. None if there is none of either.
+    said once. None if there is neither.
     """
     try:
         chosen = cache_folder()

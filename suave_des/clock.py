@@ -1,7 +1,7 @@
 """Additions to SimPy's clock: ticks of a periodic timer, events at a mission time, alarms.
 
-Activities are SimPy processes. What looks ahead and is often overtaken by events is not: it sets an alarm, and sets it
-anew. This module alone uses callbacks and SimPy's private fields.
+Activities are SimPy processes. What looks ahead and is often overtaken by events is not: it sets an alarm, and resets
+it. This module alone uses callbacks and SimPy's private fields.
 """
 
 from __future__ import annotations

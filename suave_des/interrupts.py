@@ -1,4 +1,4 @@
-"""Ctrl-C and kill: as one exception that ends a command in good order, and deferred while that must not be."""
+"""Ctrl-C and kill: raised as one exception that ends a command in good order, and deferred where it must not."""
 
 from __future__ import annotations
 

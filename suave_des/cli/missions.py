@@ -1,6 +1,6 @@
 """suave-des run, train, serve and bench: missions one by one, and how fast they are.
 
-For oneself, for managers that learn, and for other programs."""
+To look at, to train managers that learn, and for other programs."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ class FollowPipeline(FunctionNode, WaypointSource):
     def activated(self) -> None:
         """Start; the distance restarts at zero, although the published value stays until there is a new one.
 
-        If the revision lets the distance accumulate, only the interrupted piece does not count.
+        If the revision lets the distance accumulate, only the piece that was interrupted is lost.
         """
         if not self.revision.distance_goes_on:
             self._travelled_m = 0.0

@@ -10,7 +10,7 @@ import random
 from collections.abc import Callable, Collection, Generator, Hashable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Protocol
 
 import simpy
 
@@ -32,7 +32,7 @@ Dependencies = Mapping[str, tuple[float, ...]]
 """By quality attribute: the numbers, ascending, that its measured value is compared with."""
 
 
-def _unknown(*_: object) -> Any:
+def _unknown(*_: object) -> NoReturn:
     raise NotImplementedError("this system was made without a vehicle")
 
 

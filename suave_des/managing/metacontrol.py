@@ -85,7 +85,7 @@ class Metacontrol(ManagingSubsystem):
         latency_s = self._latency_s
         if callable(latency_s):
             return self.execute(conclusion, latency_s())
-        # A longer latency must pass in any case: the cycles that come due meanwhile are skipped.
+        # A latency of a period or more must pass even so: cycles that come due meanwhile are skipped.
         if latency_s < self.period_s and self._changes_nothing(conclusion):
             self._recorded_statuses = conclusion.statuses
             return None
@@ -97,10 +97,6 @@ class Metacontrol(ManagingSubsystem):
             for attribute in self.system.measurements:
                 if (value := self.measured(attribute)) is not None:
                     self.measurements[attribute] = value
-
-    def measured(self, attribute: str) -> float | None:
-        """Look up the value of a quality attribute for `monitor`; none if nothing was published."""
-        return self.system.measured(attribute, self._listens_since_s)
 
     def analyze(self) -> Inference:
         """Infer what the rules say about the current state."""
@@ -169,6 +165,10 @@ class Metacontrol(ManagingSubsystem):
 
     # Queries of the loop.
 
+    def measured(self, attribute: str) -> float | None:
+        """Look up the value of a quality attribute for `monitor`; none if nothing was published."""
+        return self.system.measured(attribute, self._listens_since_s)
+
     @property
     def depends_on(self) -> Dependencies | None:
         """The numbers in the knowledge base, if the rules only compare measured values with them."""
@@ -214,7 +214,7 @@ class Metacontrol(ManagingSubsystem):
         return bool(self.objectives) or not self._revision.ignores_diagnostics_without_objective
 
     def _attributes_to_await(self) -> frozenset[str]:
-        """Find the signals whose first measurements cycles wait for: those that function designs have values of."""
+        """Find the signals to be measured before the first cycle: those of which function designs expect a value."""
         if not self._revision.waits_for_first_measurement:
             return frozenset()
         return self._knowledge.expected_attributes.intersection(self.system.measurements, self.system.scenario.signals)

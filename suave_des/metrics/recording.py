@@ -75,7 +75,7 @@ class Recorder:
     def trajectory(
         self, vehicle: Vehicle, visibility: Measurements, further: Mapping[str, Measured]
     ) -> tuple[TrajectoryPoint, ...]:
-        """The vehicle's way until now: at each point the mode in force, the visibility, and the battery's level."""
+        """The vehicle's path so far: at each point the mode in force, the visibility, and the battery's level."""
         if not self.enabled:
             return ()
         points = []

@@ -329,10 +329,10 @@ def _first_lines(names: pandas.Series[str]) -> dict[str, int]:
 
 
 def _numbers(text: pandas.Series[str]) -> NDArray[np.float64]:
-    """Convert cells to numbers; what is none is nan."""
+    """Convert cells to numbers; other cells become nan."""
     cells = text.to_list()
     together = "".join(cells)
-    if together.isascii() and "_" not in together:  # else float() would take what is no number in a CSV file
+    if together.isascii() and "_" not in together:  # else float() would accept more than numbers of a CSV file
         with suppress(ValueError):
             return np.array([float(cell) if cell else math.nan for cell in cells])
     return pandas.to_numeric(text, errors="coerce").to_numpy(float)

@@ -85,7 +85,7 @@ class ManagerHost:
             self._process = self.system.env.process(self._adapt_periodically(period_s))
 
     def _declared(self) -> Dependencies | None:
-        """Read the manager's `depends_on`, if calls are to be skipped or its author is to hear of mistakes."""
+        """Read the manager's `depends_on`, for skipping calls, or to check it for its author."""
         if not self.skips_idle_calls and is_built_in(self.name):
             return None
         declared = self.manager.depends_on

@@ -90,7 +90,7 @@ class SetPointSender:
         self._before_loss = self._draw()
 
     def send(self, x_m: float, y_m: float, z_m: float) -> None:
-        """Send a set-point in the world frame; the sender is not told whether it arrived.
+        """Send a set-point in the world frame; there is no acknowledgement.
 
         Raises:
             ValueError: a coordinate is not a finite number.

@@ -95,33 +95,33 @@ class MissionReplay:
         folder: the mission's output folder, or its campaign's.
         mission: which of the campaign's; empty for a mission with a folder of its own.
         states: number of recorded states.
-        moments: the cycles in which the rule fires or changes something, in order of time.
+        cycles: the cycles in which the rule fires or changes something, in order of time.
     """
 
     folder: Path
     mission: str
     states: int
-    moments: tuple[ReplayedCycle, ...]
+    cycles: tuple[ReplayedCycle, ...]
 
     def lines(self) -> Iterator[str]:
         """The replay as `kb try` prints it."""
         firings: dict[str, list[ReplayedCycle]] = {}
         decisions: dict[str, list[ReplayedCycle]] = {}
-        for cycle in self.moments:
+        for cycle in self.cycles:
             for firing in cycle.firings:
                 firings.setdefault(_firing_text(firing), []).append(cycle)
             for each in cycle.decisions:
                 then, recorded = each.then or "no change", each.recorded or "no change"
                 decisions.setdefault(f"{each.function}: {then} instead of {recorded}", []).append(cycle)
         which = f": {self.mission}" if self.mission else ""
-        firing_cycles = sum(bool(cycle.firings) for cycle in self.moments)
+        firing_cycles = sum(bool(cycle.firings) for cycle in self.cycles)
         yield f"{self.folder}{which}: fires in {firing_cycles} of {self.states} recorded states"
         for text, cycles in firings.items():
             yield f"  {_times(cycles)}: {text}"
         yield f"  decisions that would have been different: {sum(map(len, decisions.values()))}"
         for text, cycles in decisions.items():
             yield f"    {_times(cycles)}: {text}"
-        contradicting = [cycle for cycle in self.moments if cycle.contradiction]
+        contradicting = [cycle for cycle in self.cycles if cycle.contradiction]
         if contradicting:
             yield f"  states that would contradict themselves: {len(contradicting)} ({_times(contradicting)})"
             yield f"    {contradicting[0].contradiction}"
@@ -197,8 +197,8 @@ def try_rule(folder: Path, change: RuleChange) -> Iterator[MissionReplay]:
             for mistake in comparison.mistakes() if is_first and change.text is not None else ():
                 logging.getLogger(MISTAKES_LOGGER).warning("%s", mistake)
         cycles = (comparison.replay(record) for record in mission.records)
-        moments = tuple(each for each in cycles if each is not None)
-        yield MissionReplay(mission.folder, mission.mission, len(mission.records), moments)
+        replayed = tuple(each for each in cycles if each is not None)
+        yield MissionReplay(mission.folder, mission.mission, len(mission.records), replayed)
 
 
 def _recorded_missions(folder: Path) -> Iterator[_RecordedMission]:

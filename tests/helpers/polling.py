@@ -3,6 +3,7 @@
 - Guidance reads the vehicle's position at each tick, and sends one set-point at a time.
 - The detector looks at each row of the vehicle's track when its time has come.
 - Managers are called at each of their times.
+- Metacontrol analyzes and plans in each cycle, and executes each plan.
 - Monitors publish each measured value, and managers read what was published.
 """
 
@@ -21,9 +22,11 @@ import simpy
 from numpy.typing import NDArray
 
 from suave_des.clock import Alarm, Process, until
+from suave_des.knowledge.deliberation import Conclusion
 from suave_des.managed.mode_manager import ModeManager
 from suave_des.managed.node import Log
 from suave_des.managing.base import ManagedSystem, ManagingSubsystem
+from suave_des.managing.metacontrol import Metacontrol
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
 from suave_des.monitor.measurements import Measured, Thresholds
@@ -208,12 +211,27 @@ def time_triggered(
     return ManagerHost(name, manager_type, run, system, bus, skips_idle_calls=False)
 
 
+def analyze_and_plan_anew(self: Metacontrol) -> Conclusion:
+    """Go through analyze and plan, without looking up the result for an equal state."""
+    inference = self.analyze()
+    return Conclusion(inference, self.plan(inference))
+
+
+def never(*_: object) -> bool:
+    """No plan changes nothing."""
+    return False
+
+
 PARTS: Final = {
     "guidance": {
         "suave_des.managed.search.Guidance": PollingGuidance,
         "suave_des.managed.follow.Guidance": PollingGuidance,
     },
     "detector": {"suave_des.simulation.mission.PipelineDetector": PollingDetector},
+    "loop": {
+        "suave_des.managing.metacontrol.Metacontrol._analyze_and_plan": analyze_and_plan_anew,
+        "suave_des.managing.metacontrol.Metacontrol._changes_nothing": never,
+    },
     "calls": {"suave_des.simulation.mission.ManagerHost": time_triggered},
     "monitors": {"suave_des.simulation.simulator.MissionRun": PlainMission},  # needs "calls"
 }

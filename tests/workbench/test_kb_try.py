@@ -67,8 +67,8 @@ def test_a_rule_fires_exactly_where_its_body_holds(mission):
         if record.state.grounded(SEARCH) is not None and record.state.measured("water_visibility")[0] < 2.5
     ]
     assert expected
-    assert [moment.t_s for moment in trial.moments if moment.firings] == pytest.approx(expected, abs=1e-6)
-    (firing,) = trial.moments[0].firings
+    assert [cycle.t_s for cycle in trial.cycles if cycle.firings] == pytest.approx(expected, abs=1e-6)
+    (firing,) = trial.cycles[0].firings
     assert dict(firing.bindings)["q"] == "obs_water_visibility"
     assert firing.is_new
     assert trial.states == len(result.knowledge)
@@ -77,7 +77,7 @@ def test_a_rule_fires_exactly_where_its_body_holds(mission):
 def test_doing_without_a_rule_undoes_the_decisions_that_it_called_for(mission):
     folder, result = mission
     (trial,) = try_rule(folder, RuleChange(disabled="QAWaterVisibility"))
-    lost = [each for moment in trial.moments for each in moment.decisions]
+    lost = [each for cycle in trial.cycles for each in cycle.decisions]
     adapted = [event for event in result.events if event.event == "adaptation" and "IN_ERROR_NFR" in event.detail]
     assert len(lost) == len(adapted) > 0
     assert {each.then for each in lost} == {None}
@@ -88,7 +88,7 @@ def test_a_rule_that_contradicts_others_is_told_with_its_time(mission, command):
     folder, _ = mission
     clash = NEAR.replace("near:", "clash:").replace("IN_ERROR_NFR", "IN_ERROR_FR").replace("2.5", "4")
     (trial,) = try_rule(folder, RuleChange(clash))
-    problems = [moment for moment in trial.moments if moment.contradiction]
+    problems = [cycle for cycle in trial.cycles if cycle.contradiction]
     assert problems
     assert all("by the rules QAWaterVisibility (" in moment.contradiction for moment in problems)
     assert all(", clash (" in moment.contradiction for moment in problems)
@@ -133,8 +133,8 @@ def test_a_campaign_is_tried_mission_by_mission_each_with_what_was_swept(mission
     alone = next(try_rule(mission[0], RuleChange(disabled="QAWaterVisibility")))
     first, second = try_rule(campaign, RuleChange(disabled="QAWaterVisibility"))
     assert (first.mission, second.mission) == ("metacontrol, run 1", "metacontrol, run 1, point 1")
-    assert first.moments == alone.moments
-    assert second.moments != first.moments
+    assert first.cycles == alone.cycles
+    assert second.cycles != first.cycles
     status, text, _ = command("try", "--disable", "QAWaterVisibility", "--on", campaign)
     assert status == 0
     assert "metacontrol, run 1: fires in" in text

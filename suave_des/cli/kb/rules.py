@@ -190,13 +190,13 @@ def try_(
         print_json(missions)
         return
     for mission in missions:
-        if mission.moments or len(missions) == 1:
+        if mission.cycles or len(missions) == 1:
             print(*mission.lines(), sep="\n")
     if len(missions) > 1:
-        moments = [mission.moments for mission in missions]
-        firing = sum(any(each.firings for each in one) for one in moments)
-        changed = [sum(len(each.decisions) for each in one) for one in moments]
-        contradictions = sum(any(each.contradiction for each in one) for one in moments)
+        cycles = [mission.cycles for mission in missions]
+        firing = sum(any(each.firings for each in one) for one in cycles)
+        changed = [sum(len(each.decisions) for each in one) for one in cycles]
+        contradictions = sum(any(each.contradiction for each in one) for one in cycles)
         print(
             f"{len(missions)} missions: fires in {firing}, different decisions in {sum(map(bool, changed))} "
             f"({number_of(sum(changed), 'decision')}), contradictions in {contradictions}"

@@ -1,4 +1,4 @@
-"""A signal that asks to stop is heard, wherever Python is when it comes."""
+"""A signal that asks to stop is raised, wherever Python is when it comes."""
 
 import signal
 import subprocess
