@@ -29,8 +29,8 @@ from suave_des.knowledge.state import (
 #: Performance of a design for which none is given.
 DEFAULT_PERFORMANCE: Final = Decimal("0.001")
 _PERFORMANCE: Final = local_name(PERFORMANCE)
-#: Statuses that call for adaptation, besides all that start with IN_ERROR_; the last three occur in older files.
-_CALLING: Final = frozenset({UNGROUNDED, "INTERNAL_ERROR", "EXTERNAL_ERROR", "UPDATABLE"})
+#: Statuses that trigger adaptation, besides all that start with IN_ERROR_; the last three occur in older files.
+_TRIGGERS: Final = frozenset({UNGROUNDED, "INTERNAL_ERROR", "EXTERNAL_ERROR", "UPDATABLE"})
 
 
 def plan(ontology: Ontology, inference: Inference, *, improve_exceeded: bool = False) -> Plan:
@@ -47,9 +47,9 @@ def plan(ontology: Ontology, inference: Inference, *, improve_exceeded: bool = F
     decisions = []
     exceeded = dict(_exceeded(ontology, inference.state)) if improve_exceeded else {}
     for objective in inference.state.objectives:
-        call = _call(objective, inference) or exceeded.get(objective.function)
-        if call is not None:
-            decisions.append(_decide(ontology, inference, objective.function, call))
+        trigger = _trigger(objective, inference) or exceeded.get(objective.function)
+        if trigger is not None:
+            decisions.append(_decide(ontology, inference, objective.function, trigger))
     return Plan(tuple(decisions))
 
 
@@ -62,37 +62,38 @@ def _exceeded(ontology: Ontology, state: KnowledgeState) -> Iterator[tuple[str, 
                 yield function, f"{name} {measured[name]:.2f} exceeds what {design} expects"
 
 
-def calls(status: str) -> bool:
+def triggers_adaptation(status: str) -> bool:
     """Whether an objective of a status (o_status) is adapted."""
-    return status in _CALLING or status.startswith("IN_ERROR_")
+    return status in _TRIGGERS or status.startswith("IN_ERROR_")
 
 
-def _call(objective: ObjectiveState, inference: Inference) -> str | None:
+def _trigger(objective: ObjectiveState, inference: Inference) -> str | None:
     """Return why an objective is adapted; None if it need not be."""
     name = objective_name(objective.function)
     for status in map(str, inference.values(name, "o_status")):
-        if calls(status):
+        if triggers_adaptation(status):
             return f"o_status {status}"
     if True in inference.values(name, "o_updatable"):
         return "updatable"
     return "always to be improved" if True in inference.values(name, "o_always_improve") else None
 
 
-def _decide(ontology: Ontology, inference: Inference, function: str, call: str) -> Decision:
+def _decide(ontology: Ontology, inference: Inference, function: str, trigger: str) -> Decision:
     designs = [name for name in inference.subjects("solvesF", function) if name in ontology.model.designs]
-    objections = {design: next(_objections(inference, design, function), None) for design in designs}
-    rejected = tuple(Rejection(design, reason) for design, reason in objections.items() if reason is not None)
-    left = {design: performance(inference, design) for design, reason in objections.items() if reason is None}
-    if not left:
-        present = inference.state.grounded(function)
-        kept = f"{present} is kept" if present else f"it stays {NO_GROUNDING}"
-        return Decision(function, None, f"{call}: no function design is left, {kept}", rejected)
-    best = min(left, key=lambda design: (-left[design], design))
-    reason = f"{call}: highest performance ({_show(left[best])}) among {len(left)} eligible of {len(designs)} designs"
+    reasons = {design: next(_rejection_reasons(inference, design, function), None) for design in designs}
+    rejected = tuple(Rejection(design, reason) for design, reason in reasons.items() if reason is not None)
+    eligible = {design: performance(inference, design) for design, reason in reasons.items() if reason is None}
+    if not eligible:
+        current = inference.state.grounded(function)
+        kept = f"{current} is kept" if current else f"it stays {NO_GROUNDING}"
+        return Decision(function, None, f"{trigger}: no function design is left, {kept}", rejected)
+    best = min(eligible, key=lambda design: (-eligible[design], design))
+    among = f"among {len(eligible)} eligible of {len(designs)} designs"
+    reason = f"{trigger}: highest performance ({_show(eligible[best])}) {among}"
     return Decision(function, best, reason, rejected)
 
 
-def _objections(inference: Inference, design: str, function: str) -> Iterator[str]:
+def _rejection_reasons(inference: Inference, design: str, function: str) -> Iterator[str]:
     """Yield the reasons why a function design must not be chosen now."""
     objective = objective_name(function)
     if False in inference.values(design, "fd_realisability"):

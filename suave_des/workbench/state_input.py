@@ -12,7 +12,7 @@ from suave_des.campaign.knowledge_records import CAMPAIGN_KNOWLEDGE_FILE, KNOWLE
 from suave_des.domain import GENERATE_SEARCH_PATH, MAINTAIN_MOTION
 from suave_des.errors import InputError, KeyPath, KnowledgeError, did_you_mean, nearest, shown
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.planning import calls
+from suave_des.knowledge.planning import triggers_adaptation
 from suave_des.knowledge.rdf import TOMASYS
 from suave_des.knowledge.rules.syntax import texts_of
 from suave_des.knowledge.state import UNGROUNDED, KnowledgeState, ObjectiveState
@@ -117,7 +117,7 @@ class StateBuilder:
         known = texts_of((atom for rule in self.base.rules for atom in rule.atoms), TOMASYS + property_name)
         if property_name == "o_status":
             known.add(UNGROUNDED)
-        if value not in known and not calls(value) and nearest(value.upper(), known) is not None:
+        if value not in known and not triggers_adaptation(value) and nearest(value.upper(), known) is not None:
             remedy = did_you_mean(value.upper(), sorted(known))
             raise InputError(f"no rule mentions the {property_name} {shown(value)}", remedy=remedy)
 

@@ -9,7 +9,7 @@ import pytest
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.planning import calls, plan
+from suave_des.knowledge.planning import plan, triggers_adaptation
 from suave_des.knowledge.reasoners import Reasoner, make_reasoner
 from suave_des.knowledge.state import Decision, KnowledgeState, ObjectiveState
 from tests.helpers.knowledge_states import MOTION, SEARCH, searching
@@ -93,9 +93,9 @@ def test_the_older_updatable_status_calls_for_adaptation(kb: Ontology, pellet: R
     assert SEARCH in decide(kb, pellet, searching("fd_spiral_low", 3.5, status="UPDATABLE"))
 
 
-def test_statuses_that_other_ontologies_list_call_for_adaptation_too() -> None:
-    assert all(map(calls, ("IN_ERROR_OF_MINE", "INTERNAL_ERROR", "EXTERNAL_ERROR")))
-    assert not calls("OK")
+def test_statuses_that_other_ontologies_list_trigger_adaptation_too() -> None:
+    assert all(map(triggers_adaptation, ("IN_ERROR_OF_MINE", "INTERNAL_ERROR", "EXTERNAL_ERROR")))
+    assert not triggers_adaptation("OK")
 
 
 def test_a_failed_thruster_is_recovered_and_then_all_thrusters_used_again(kb: Ontology, pellet: Reasoner) -> None:

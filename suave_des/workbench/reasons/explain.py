@@ -204,9 +204,9 @@ class _Explainer:
                 answer = f"{asked} is {each.verdict}: {each.reason}"
             elif each.design == asked and not wanted:
                 answer = f"{asked} is chosen: {decision.reason}"
-        return DecisionExplanation(decision.function, answer, tuple(self._call(decision.function)), candidates)
+        return DecisionExplanation(decision.function, answer, tuple(self._trigger(decision.function)), candidates)
 
-    def _call(self, function: str) -> Iterator[Derivation]:
+    def _trigger(self, function: str) -> Iterator[Derivation]:
         objective = objective_name(function)
         for fact in sorted(self.conclusion.inference.facts, key=str):
             if fact.subject == objective and fact.property in ("o_status", "o_updatable"):
