@@ -24,13 +24,11 @@ from typing import Any
 
 import numpy as np
 
+from calibration.cases import FreeParameter, Problem, read_cases, read_problem
+from calibration.fit import larger
+from calibration.loss import evaluate, resampling_spread
 from suave_des import load_scenario
-from suave_des.calibration.cases import read_cases
-from suave_des.calibration.fit import larger
-from suave_des.calibration.loss import FreeParameter, Problem, evaluate, resampling_spread
-from suave_des.calibration.parameters import read_problem
-from suave_des.resources import find
-from suave_des.validation.real import read_conditions
+from suave_des.results.real import read_conditions
 
 Values = Mapping[str, float]
 Losses = tuple[float, ...]
@@ -48,7 +46,7 @@ CHECK_FACTOR = 2
 
 def problem_of(scenario: str, parameters: str, runs: int, managers: str | None = None) -> Problem:
     """Return a scenario or campaign with its published runs, and with what the file of its calibration frees."""
-    return read_problem(find(parameters, "scenarios/calibration"), read_cases([scenario], (), managers), runs, 1)
+    return read_problem(parameters, read_cases([scenario], (), managers), runs, 1)
 
 
 def loss(problem: Problem, values: Values) -> float:

@@ -2,7 +2,7 @@
 
 The search starts in the middle of the bounds, as the shipped values have seen all conditions; those are judged alike,
 to compare. Random is left out: what it does differs from run to run by far more than with any parameter. Writes
-half_blocks.csv: the loss of each half (see suave_des.calibration.loss), and the median over managers and conditions of
+half_blocks.csv: the loss of each half (see calibration/loss.py), and the median over managers and conditions of
 |real - simulated median search time|.
 
     python analysis/half_blocks.py [--out DIR] [--runs N] [--evaluations N] [--workers N]
@@ -16,11 +16,9 @@ from pathlib import Path
 
 import pandas
 
-from suave_des.calibration.cases import Case, read_cases
-from suave_des.calibration.fit import fit, larger
-from suave_des.calibration.loss import judge
-from suave_des.calibration.parameters import read_problem
-from suave_des.resources import find
+from calibration.cases import Case, read_cases, read_problem
+from calibration.fit import fit, larger
+from calibration.loss import judge
 
 MANAGERS = "none,metacontrol,bt"
 HALVES = ((1, 3, 5), (2, 4, 6))
@@ -33,7 +31,7 @@ def study(case: Case, runs: int, evaluations: int, workers: int) -> pandas.DataF
         A row for each fit and judged half: values ("shipped" or "fitted"), fitted_on, judged_on, held_out, loss,
         median_difference_s.
     """
-    whole = read_problem(find("planta_exp1", "scenarios/calibration"), [case], runs, 1)
+    whole = read_problem("planta_exp1", [case], runs, 1)
     middle = tuple(replace(each, start=(each.lower + each.upper) / 2.0) for each in whole.parameters)
     (case,) = whole.cases
     fits = [("shipped", HALVES[0] + HALVES[1], [each.start for each in whole.parameters])]

@@ -19,11 +19,10 @@ import numpy as np
 import pandas
 import studies
 
+from calibration.cases import Case, Problem, read_cases
+from calibration.loss import compare, simulate_case
 from suave_des import with_values
-from suave_des.calibration.cases import Case, read_cases
-from suave_des.calibration.loss import Problem, compare, simulate_case
-from suave_des.validation.conditions import compare_conditions, summarise
-from suave_des.validation.validation import COMPARED, validate
+from suave_des.results.validation import COMPARED, compare_conditions, over_conditions, validate
 
 SHARE_2025 = 10
 """Missions for each manager of 2023 to one for each manager and condition of 2025."""
@@ -121,7 +120,7 @@ def agreement_2023(runs: int, change: Change) -> dict[str, float]:
     (case,) = read_cases(["seams2023"])
     simulated, distance = simulated_and_distance(case, {**change.both, **change.of_2023}, runs)
     found = validate(case.real, simulated, case.managers, seed=studies.SEED)
-    agreeing = sum(target.met is True for target in found.targets if target.kind in ("mean", "std", "ks"))
+    agreeing = int((found.targets.set_index("kind")["met"].loc[["mean", "std", "ks"]] == True).sum())  # noqa: E712
     return {"agreeing_2023": agreeing, "distance_2023": distance}
 
 
@@ -140,19 +139,15 @@ def agreement_2025(runs: int, change: Change) -> dict[str, float]:
     (case,) = read_cases(["planta_exp1_campaign"], managers=ADAPTED_ALIKE)
     simulated, distance = simulated_and_distance(case, {**change.both, **change.of_2025}, runs * len(case.conditions))
     compared = compare_conditions(case.real, simulated, case.managers, COMPARED)
-    summaries = {(each.manager, each.metric): each for each in summarise(compared)}
-    spread = summaries["none", "distance_inspected_m"]
-    reactions = [
-        each.simulated.median
-        for each in compared
-        if (each.manager, each.metric) == ("metacontrol", "mean_reaction_time_s")
-    ]
+    summaries = over_conditions(compared).set_index(["manager", "metric"])
+    spread = summaries.loc["none", "distance_inspected_m"]
+    reactions = compared.query("manager == 'metacontrol' and metric == 'mean_reaction_time_s'")["simulated_median"]
     return {
         "distance_2025": distance,
-        "median_apart_2025_s": summaries["all", "search_time_s"].difference,
-        "spread_of_none_2025_m": spread.simulated_std,
-        "real_spread_of_none_2025_m": spread.real_std,
-        "reactions_2025_s": float(np.ptp(reactions[:FIRST_CONDITIONS])),
+        "median_apart_2025_s": float(summaries.loc[("all", "search_time_s"), "difference"]),
+        "spread_of_none_2025_m": float(spread["simulated_std"]),
+        "real_spread_of_none_2025_m": float(spread["real_std"]),
+        "reactions_2025_s": float(np.ptp(reactions.to_numpy()[:FIRST_CONDITIONS])),
     }
 
 

@@ -14,8 +14,8 @@ import sys
 from pathlib import Path
 
 from suave_des import InputError
-from suave_des.report.paper import FILES, compare, published_estimates, published_runs
-from suave_des.report.runs import read_runs
+from suave_des.records.runs import read_runs
+from suave_des.results.paper import FILES, compare_with_paper, published_runs
 
 
 def main() -> None:
@@ -26,7 +26,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="folder for paper_table.md and paper_table.csv")
     arguments = parser.parse_args()
     try:
-        comparison = compare(read_runs(arguments.runs).frame, published_estimates(arguments.published))
+        comparison = compare_with_paper(read_runs(arguments.runs).frame, arguments.published)
         if arguments.out is not None:
             arguments.out.mkdir(parents=True, exist_ok=True)
             for name, text in zip(FILES, (comparison.markdown(), comparison.csv()), strict=True):

@@ -2,9 +2,11 @@
 
 Experiment 1 of the study of 2025 has a constant visibility and thruster failures. Predicted here, for its managers and
 its six starts: the same with a visibility of period 120 s and no failure, and with both disturbances at once, for two
-shifts of the visibility. Each run has a member of the ensemble of parameter sets that fit the known runs equally well,
-so that the intervals are what is not known of the vehicle and its software admits for a mean: `low95` and `high95`; for
-the mean of real runs, five under each condition as in that study, they are `low95_of_runs` and `high95_of_runs`.
+shifts of the visibility. Of the study's files only that of experiment 1 gives the manager none another search mode than
+the exemplar's default, fd_spiral_low, which it has here. Each run has a member of the ensemble of parameter sets that
+fit the known runs equally well, so that the intervals are what is not known of the vehicle and its software admits for
+a mean: `low95` and `high95`; for the mean of real runs, five under each condition as in that study, they are
+`low95_of_runs` and `high95_of_runs`.
 
     python analysis/predictions_2025.py [--out DIR] [--runs N] [--workers N]
 
@@ -21,7 +23,7 @@ import pandas
 import studies
 from matplotlib.figure import Figure
 
-from suave_des.campaign.ensemble import COLUMN, read_ensemble
+from suave_des.campaign.variation import ENSEMBLE_COLUMN, read_ensemble
 from suave_des.estimates import t_quantile
 
 SCENARIO = ENSEMBLE = "planta_exp1"
@@ -48,7 +50,9 @@ def sweep_of(experiment: str, shift_s: float, conditions: list[int]) -> dict[str
     ]
     starts = [STARTS_Y_M[number - 1] for number in conditions]
     signals = [{**signal, "publishing_period_s": 1.0}] * len(conditions)
-    return {"zip": {"start.y_m": starts, "signals.water_visibility": signals, "thruster_events": failures}}
+    modes = ["fd_spiral_low"] * len(conditions)
+    varied = {"start.y_m": starts, "signals.water_visibility": signals, "thruster_events": failures}
+    return {"zip": {**varied, "default_modes.f_generate_search_path": modes}}
 
 
 def simulate(runs: int, workers: int, conditions: list[int] | None = None) -> pandas.DataFrame:
@@ -88,7 +92,7 @@ def predict(missions: pandas.DataFrame, metric: str) -> dict[str, float]:
     Chance is what missions of one member under one condition differ by. The members' means have some of it, too, so
     that their interval is a little wider than the parameters alone make it.
     """
-    cells = missions.astype({metric: float}).groupby([COLUMN, "condition"])[metric]
+    cells = missions.astype({metric: float}).groupby([ENSEMBLE_COLUMN, "condition"])[metric]
     means, variances = (cells.agg(kind).unstack() for kind in ("mean", "var"))
     members = means.mean(axis=1)
     between = float(members.var())

@@ -22,10 +22,9 @@ from matplotlib.figure import Figure
 from SALib.analyze import morris as analyze_morris
 from SALib.sample import morris as sample_morris
 
-from suave_des import load_scenario, with_values
-from suave_des.calibration.parameters import read_parameters
-from suave_des.report import style
-from suave_des.resources import find
+from calibration.cases import read_cases, read_problem
+from suave_des import with_values
+from suave_des.results import style
 from suave_des.simulation.simulator import Simulator
 
 MANAGERS = ("none", "random", "metacontrol")
@@ -78,9 +77,8 @@ def main() -> None:
     chosen = options.parse_args()
     chosen.out.mkdir(parents=True, exist_ok=True)
 
-    scenarios = {"seams2023": load_scenario("seams2023")}
-    formed, free = read_parameters(find("seams2023", "scenarios/calibration"), scenarios)
-    loaded = formed["seams2023"]
+    fitted = read_problem("seams2023", read_cases(["seams2023"]), chosen.runs, 1)
+    free, loaded = fitted.parameters, fitted.cases[0].loaded
     paths = tuple(each.path for each in free)
     names = [path.split(".", 1)[1].removesuffix("_m_per_s") for path in paths]
     problem = {"num_vars": len(free), "names": names, "bounds": [[each.lower, each.upper] for each in free]}

@@ -14,15 +14,13 @@ from pathlib import Path
 
 import pandas
 
+from calibration.cases import fitted_scenario, read_cases, read_problem
+from calibration.fit import fit
 from suave_des import run_campaign
-from suave_des.calibration.cases import read_cases
-from suave_des.calibration.fit import fit
-from suave_des.calibration.parameters import read_problem
-from suave_des.calibration.report import fitted_scenario, fitted_values
-from suave_des.estimates import estimate
-from suave_des.report.runs import read_runs
+from suave_des.estimates import mean_of, std_of
+from suave_des.records.runs import read_runs
 from suave_des.resources import find
-from suave_des.validation.validation import sample
+from suave_des.results.validation import sample
 
 METRICS = ("search_time_s", "distance_inspected_m")
 WITHIN_STD = 0.5
@@ -34,7 +32,7 @@ def split_check(fitted: Mapping[str, pandas.DataFrame], published: pandas.DataFr
 
     Args:
         fitted: by left-out manager, missions simulated with what was fitted without it; of each frame only the rows of
-            that manager count. Columns as of report.runs.COLUMNS, the place of detection apart.
+            that manager count. Columns as of records.runs.COLUMNS, the place of detection apart.
         published: the published missions, likewise.
 
     Returns:
@@ -50,21 +48,21 @@ def split_check(fitted: Mapping[str, pandas.DataFrame], published: pandas.DataFr
 
 
 def _row(manager: str, metric: str, published: pandas.DataFrame, frame: pandas.DataFrame) -> dict[str, object]:
-    theirs = estimate(sample(published, manager, metric).tolist())
-    ours = estimate(sample(frame, manager, metric).tolist())
-    if theirs.mean is None or theirs.std is None or ours.mean is None:
-        raise ValueError(f"manager {manager}: {theirs.n} published and {ours.n} simulated missions are too few")
-    difference = ours.mean - theirs.mean
-    in_std = difference / theirs.std if theirs.std else float("nan")
+    theirs, ours = (sample(side, manager, metric).tolist() for side in (published, frame))
+    if len(theirs) < 2 or not ours:
+        raise ValueError(f"manager {manager}: {len(theirs)} published and {len(ours)} simulated missions are too few")
+    means, stds = ([estimate(each).value for each in (theirs, ours)] for estimate in (mean_of, std_of))
+    difference = means[1] - means[0]
+    in_std = difference / stds[0] if stds[0] else float("nan")
     return {
         "left_out": manager,
         "metric": metric,
-        "published_n": theirs.n,
-        "published_mean": theirs.mean,
-        "published_std": theirs.std,
-        "predicted_n": ours.n,
-        "predicted_mean": ours.mean,
-        "predicted_std": ours.std,
+        "published_n": len(theirs),
+        "published_mean": means[0],
+        "published_std": stds[0],
+        "predicted_n": len(ours),
+        "predicted_mean": means[1],
+        "predicted_std": stds[1],
         "difference": difference,
         "difference_in_std": in_std,
         "within": abs(in_std) <= WITHIN_STD,
@@ -88,14 +86,15 @@ def main() -> None:
     for left_out in managers:
         (case,) = read_cases(["seams2023"], (), ",".join(name for name in managers if name != left_out))
         case = replace(case, shares=())  # they were chosen by what all three managers do
-        problem = read_problem(find("seams2023", "scenarios/calibration"), [case], chosen.runs, 1)
+        problem = read_problem("seams2023", [case], chosen.runs, 1)
         # The search starts in the middle of the bounds: the shipped values have seen all three managers.
         free = tuple(replace(each, start=(each.lower + each.upper) / 2.0) for each in problem.parameters)
         problem = replace(problem, parameters=free)
         tried = fit(problem, chosen.evaluations, workers=chosen.workers, seed=1)
         best = min(tried, key=lambda each: each.loss)
         scenario = chosen.out / f"without_{left_out}.yaml"
-        scenario.write_text(fitted_scenario(problem, problem.cases[0], fitted_values(best), chosen.out))
+        values = [round(value, 3) for value in best.values]
+        scenario.write_text(fitted_scenario(problem, problem.cases[0], values, chosen.out))
         predicted[left_out] = run_campaign(scenario, [left_out], chosen.missions, 2, chosen.workers, progress=False)
         print(f"without {left_out}: distance of the two others {best.loss:.4f}")
     result = split_check(predicted, published.frame)

@@ -19,8 +19,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from suave_des import run_campaign
-from suave_des.report import style
-from suave_des.report.statistics import mean_interval
+from suave_des.results import style
+from suave_des.results.statistics import mean_interval
 
 FIRST_RUNS = 3
 SEED = 1

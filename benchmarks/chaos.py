@@ -21,7 +21,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import suave_des
-from suave_des.campaign.store import STORE_FILE, Store
+from suave_des.records.store import STORE_FILE, Store
 
 MANAGERS = ("none", "random")
 SHORT = "base: seams2023.yaml\nmission: {time_limit_s: 60}\n"
@@ -114,7 +114,7 @@ def survive(kills: int, chance: random.Random, folder: Path, asked: Sequence[str
     while len(done) < kills:
         process = start(arguments, folder)
         if chance.random() < 0.8:
-            while process.poll() is None and not (journal.exists() and journal.stat().st_size > 100_000):
+            while process.poll() is None and not (journal.exists() and journal.stat().st_size > 200_000):
                 time.sleep(0.01)
         time.sleep(chance.uniform(0.0, longest_s))
         own = workers_of(process)

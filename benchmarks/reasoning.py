@@ -26,8 +26,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet.cached import CachedPellet
-from suave_des.knowledge.reasoners import Reasoner, make_reasoner
+from suave_des.knowledge.pellet.java import make_archive
+from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import Inference, KnowledgeState, ObjectiveState
 from suave_des.resources import shipped_folder
 from suave_des.workbench import KnowledgeBase as Workbench
@@ -39,11 +39,11 @@ MOTION = "f_maintain_motion"
 SEARCH = "f_generate_search_path"
 _FIRST = """
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.reasoners import make_reasoner
+from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 state = KnowledgeState.of([ObjectiveState({search!r})], groundings={{{search!r}: "fd_spiral_high"}},
                           measurements={{"water_visibility": "1"}})
-assert make_reasoner({name!r}, Ontology.load()).infer(state).facts
+assert Reasoner(Ontology.load(), {name!r}).analyze(state).facts
 """
 _MORE_DESIGNS = """
 <owl:NamedIndividual rdf:about="http://www.metacontrol.org/suave#qa_{n}">
@@ -79,7 +79,7 @@ def timed(reasoner: Reasoner, states: list[KnowledgeState]) -> tuple[list[float]
     times_s, inferences = [], []
     for state in states:
         begin_s = time.perf_counter()
-        inferences.append(reasoner.infer(state))
+        inferences.append(reasoner.analyze(state))
         times_s.append(time.perf_counter() - begin_s)
     return times_s, inferences
 
@@ -119,11 +119,11 @@ def measure_backends(kb: Ontology, count: int, draw: random.Random) -> dict[str,
         SystemExit: the backends do not infer the same.
     """
     states = [random_state(draw) for _ in range(count)]
-    pellet = make_reasoner("pellet", kb)
+    pellet = Reasoner(kb, "pellet")
     timed(pellet, [random_state(draw) for _ in range(WARM_UP)])
-    stock = make_reasoner("owlready2", kb)
-    stock.infer(random_state(draw))  # its first call has the in-process Pellet check the rules
-    cached = CachedPellet(kb)
+    stock = Reasoner(kb, "owlready2")
+    stock.analyze(random_state(draw))  # its first call has the in-process Pellet check the rules
+    cached = Reasoner(kb)
     timed(cached, states)
     summaries, found = {}, []
     # The same states as new objects: nothing about them is known but what they say.
@@ -167,8 +167,8 @@ def growth(draw: random.Random) -> list[dict[str, float]]:
             path.write_text(text.replace("</rdf:RDF>", more + "</rdf:RDF>"), encoding="utf-8")
             kb = Ontology.load([path])
             states = [random_state(draw) for _ in range(200)]
-            pellet_s, _ = timed(make_reasoner("pellet", kb), states)
-            cached = CachedPellet(kb)
+            pellet_s, _ = timed(Reasoner(kb, "pellet"), states)
+            cached = Reasoner(kb)
             timed(cached, states)
             hits_s, _ = timed(cached, states * 5)
             rows.append(
@@ -192,11 +192,11 @@ def leak_mb(kb: Ontology, draw: random.Random) -> float | None:
     """Growth of this process over many inferences of Pellet; None where the system does not tell."""
     if not Path("/proc/self/statm").exists():
         return None
-    pellet = make_reasoner("pellet", kb)
+    pellet = Reasoner(kb, "pellet")
     timed(pellet, [random_state(draw) for _ in range(WARM_UP)])
     before = resident_mb()
     for _ in range(LEAK_STATES):
-        pellet.infer(random_state(draw))
+        pellet.analyze(random_state(draw))
     return resident_mb() - before
 
 
@@ -207,9 +207,7 @@ def measure(count: int, seed: int) -> dict[str, Any]:
     with empty_memory() as folder:
         load_s = seconds(Ontology.load)
         summaries = measure_backends(kb, count, draw)
-        subprocess.run(
-            [sys.executable, "-m", "suave_des.knowledge.java_archive"], check=True, stdout=subprocess.DEVNULL
-        )
+        make_archive()
         first = {name: first_inference_s(name) for name in ("pellet", "cached")}
         assert any((folder / "inferences").iterdir())  # or the last two of the three had no cached inference
     filled_s, states = policy_s()

@@ -12,8 +12,8 @@ if _TYPE_CHECKING:
     from suave_des.api import resume_campaign, run_campaign, stream_campaign
     from suave_des.campaign.single import run_mission
     from suave_des.errors import InputError, MissionError
-    from suave_des.interfaces.mission import Mission
     from suave_des.scenario.loader import load_scenario, with_values
+    from suave_des.simulation.mission import Mission
 
 __version__ = "0.1.0"
 
@@ -31,7 +31,7 @@ __all__ = [
 
 _HOMES = {
     "InputError": "suave_des.errors",
-    "Mission": "suave_des.interfaces.mission",
+    "Mission": "suave_des.simulation.mission",
     "MissionError": "suave_des.errors",
     "load_scenario": "suave_des.scenario.loader",
     "resume_campaign": "suave_des.api",

@@ -6,10 +6,10 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any
 
 from suave_des.campaign import campaign as campaigns
-from suave_des.campaign.campaign import CampaignOptions, CampaignResult
+from suave_des.campaign.campaign import CampaignResult
 from suave_des.campaign.progress import OnProgress
 from suave_des.errors import InputError
 from suave_des.registry import ManagerLike
@@ -18,7 +18,7 @@ from suave_des.scenario.loader import LoadedScenario
 if TYPE_CHECKING:
     import pandas
 
-    from suave_des.report.frames import CampaignFrame
+    from suave_des.results.compare import CampaignFrame
 
 
 def run_campaign(
@@ -30,7 +30,7 @@ def run_campaign(
     out: str | Path | None = None,
     *,
     progress: bool | None = None,
-    **options: Unpack[CampaignOptions],
+    **options: Any,
 ) -> CampaignFrame:
     """Run missions of a scenario under each manager; a row for each mission, with the columns of runs.csv.
 
@@ -39,7 +39,7 @@ def run_campaign(
     The rows are the same for any number of workers. Columns scenario and manager are categories, the managers in the
     order given; run, seed and adaptations int64, pipeline_found bool, other metrics float64, nan if not measured.
 
-    `frame.attrs` has, as plain values, `missions`, `until_ci` and `failures` as in manifest.json, `summary` (a mapping
+    `frame.attrs` has, as plain values, `missions` and `failures` as in manifest.json, `summary` (a mapping
     for each row of summary.csv), `runs_sharing_draw` (the number of consecutive runs that share a draw), `interrupted`,
     and `folder`, which may be None. When missions fail, a warning says so.
 
@@ -61,7 +61,7 @@ def run_campaign(
             need nothing.
         out: folder for runs.csv, summary.csv and manifest.json, from which the campaign can be resumed. None: no files.
         progress: whether to show progress; by default in a notebook and on a terminal.
-        options: see suave_des.campaign.spec.CampaignSpec, such as sweep, perturbations, until_ci and rules. The values
+        options: see suave_des.campaign.spec.CampaignSpec, such as sweep, perturbations and rules. The values
             of a sweep may be a list, an array or a range.
 
     Raises:
@@ -86,7 +86,7 @@ def stream_campaign(
     *,
     chunk_rows: int = 10_000,
     progress: bool | None = None,
-    **options: Unpack[CampaignOptions],
+    **options: Any,
 ) -> Iterator[CampaignFrame]:
     """Yield the same in data frames of `chunk_rows` rows, in order, for more rows than fit into memory.
 
@@ -111,7 +111,6 @@ def resume_campaign(
     workers: int = 1,
     *,
     runs: int | None = None,
-    until_ci: str | None = None,
     scheduler: str | None = None,
     managers: Sequence[str] = (),
     confirmed: bool = False,
@@ -123,7 +122,6 @@ def resume_campaign(
         folder: its output folder.
         workers: processes; the number may differ.
         runs: a greater number of runs; by default the original number.
-        until_ci: the original metric with a smaller half-width; by default the original one.
         scheduler: address of a Dask scheduler whose workers run the missions, instead of processes here.
         managers: those of the campaign's that are not installed; their code is run only if they are named here.
         confirmed: whether to run the code of all managers that the folder names.
@@ -140,7 +138,6 @@ def resume_campaign(
             folder,
             workers,
             runs=runs,
-            until_ci=until_ci,
             on_progress=show,
             scheduler=scheduler,
             managers=managers,
@@ -156,7 +153,7 @@ def _with_progress(
     """Run a campaign and show its progress; return its result, and the attrs of its frames."""
     from rich.console import Console
 
-    from suave_des.campaign.display import shown
+    from suave_des.campaign.progress import shown
 
     label = named.scenario.name if isinstance(named, LoadedScenario) else str(named)
     console = Console(stderr=True, highlight=False)
@@ -178,7 +175,7 @@ def _with_progress(
     folder = None if result.folder is None else str(result.folder)
     attrs = {
         "runs_sharing_draw": result.variation.runs_sharing_draw,
-        "summary": result.summary_records(),
+        "summary": list(result.summary),
         "interrupted": interrupted,
         "folder": folder,
     }
@@ -186,7 +183,7 @@ def _with_progress(
 
 
 def _with_attrs(frame: pandas.DataFrame, attrs: dict[str, Any]) -> CampaignFrame:
-    from suave_des.report.frames import CampaignFrame
+    from suave_des.results.compare import CampaignFrame
 
     rows = CampaignFrame(frame)
     rows.attrs.update(attrs)

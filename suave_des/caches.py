@@ -1,14 +1,28 @@
-"""The user's folder for what can be made again: cached inferences, machine code, Java's archive."""
+"""The user's cache folder, for what can be made again, and files in it that are checked before use.
+
+`inferences/` has what Pellet inferred, `numba/` machine code, `java/` an archive of Pellet's classes, `findings/` what
+`kb check` found. Each may be deleted at any time.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 import stat
 import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
+from typing import Any, Final
 
-_CACHE_VARIABLE = "SUAVE_DES_CACHE_DIR"
+_CACHE_VARIABLE: Final = "SUAVE_DES_CACHE_DIR"
+_DIGEST_BYTES: Final = hashlib.sha256().digest_size
+#: Entries of this size in all are kept in one file: with exact values there is no end to new ones.
+MAX_BYTES: Final = 16 * 2**20
+#: Files of a kind that are kept; the least recently used are removed.
+MAX_FILES: Final = 64
 
 
 def cache_folder() -> Path:
@@ -68,3 +82,80 @@ def _private(folder: Path) -> Path:
     if not os.access(folder, os.R_OK | os.W_OK | os.X_OK):
         raise PermissionError(None, f"{folder} cannot be written")
     return folder
+
+
+def remove_oldest(folder: Path, pattern: str, keep: int = MAX_FILES) -> None:
+    """Remove all but the most recently used files of a folder."""
+    with suppress(OSError):
+        for path in sorted(folder.glob(pattern), key=lambda path: path.stat().st_mtime)[:-keep]:
+            path.unlink(missing_ok=True)
+
+
+def with_checksum(content: bytes) -> bytes:
+    """Put the checksum before what a file is to hold; see `read_checked`."""
+    return hashlib.sha256(content).digest() + content
+
+
+def read_checked(path: Path) -> bytes | None:
+    """Read a file that `with_checksum` began; None if it is not there, or damaged."""
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return None
+    digest, content = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
+    return content if hashlib.sha256(content).digest() == digest else None
+
+
+class SharedEntries:
+    """Values by key, in a file that several processes extend without locks.
+
+        entries = SharedEntries(private_cache("inferences"), digest)
+        entries.add("some state", ["what follows"])
+        dict(entries.read())  # {"some state": ["what follows"]}
+
+    Each entry is a line of JSON with a checksum, appended with a single write: a line that two processes mangled, or
+    that was cut short, is left out when it is read. Nothing in a file is ever executed.
+
+    Args:
+        folder: that has the file; None: nothing is kept. So it is where the folder cannot be written to.
+        digest: identifies all that the entries depend on; it names the file, and is part of the checksums.
+    """
+
+    def __init__(self, folder: Path | None, digest: str) -> None:
+        self._salt = digest.encode()
+        self._path = None if folder is None else folder / f"{digest}.jsonl"
+
+    def read(self) -> Iterator[tuple[str, Any]]:
+        """Return all entries that are whole, the oldest first."""
+        try:
+            content = b"" if self._path is None else self._path.read_bytes()
+            if content and self._path is not None:
+                os.utime(self._path)
+        except OSError:
+            return
+        for line in content.split(b"\n"):
+            checksum, _, text = line.partition(b" ")
+            if checksum == self._checksum(text):
+                key, value = json.loads(text)
+                yield key, value
+
+    def add(self, key: str, value: object) -> None:
+        """Append an entry, a value of JSON."""
+        if self._path is None:
+            return
+        text = json.dumps([key, value], separators=(",", ":")).encode()
+        with suppress(OSError):  # without its file the cache is slower, not wrong
+            self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            handle = os.open(self._path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
+            try:
+                size = os.fstat(handle).st_size
+                if size < MAX_BYTES:
+                    # The line break before it ends a line that another process left unfinished.
+                    os.write(handle, b"\n" + self._checksum(text) + b" " + text + b"\n")
+            finally:
+                os.close(handle)
+            if size == 0:
+                remove_oldest(self._path.parent, "*.jsonl")
+
+    def _checksum(self, text: bytes) -> bytes:
+        return hashlib.sha256(self._salt + text).hexdigest()[:24].encode()

@@ -1,4 +1,4 @@
-"""Additions to SimPy's clock: ticks of a periodic timer, events at a mission time, alarms.
+"""Additions to SimPy's clock: ticks of a periodic timer, events at a mission time, calls at one, alarms.
 
 Activities are SimPy processes. What looks ahead and is often overtaken by events is not: it sets an alarm, and resets
 it. This module alone uses callbacks and SimPy's private fields.
@@ -22,18 +22,24 @@ def tick_at_or_after(t_s: float, phase_s: float, period_s: float) -> float:
     return phase_s + max(0, math.ceil((t_s - phase_s) / period_s - 1e-9)) * period_s
 
 
-def until(env: simpy.Environment, t_s: float) -> simpy.Timeout:
-    """An event at mission time t, or now if t has passed."""
-    delay_s = t_s - env.now
-    return simpy.Timeout(env, delay_s if delay_s > 0.0 else 0.0)
-
-
 def exactly_at(env: simpy.Environment, t_s: float) -> simpy.Event:
     """An event at mission time t itself; a delay added to the current time may miss it by rounding."""
     event = simpy.Event(env)
     event._ok, event._value = True, None
     heappush(env._queue, (t_s, simpy.events.NORMAL, next(env._eid), event))
     return event
+
+
+def until(env: simpy.Environment, t_s: float) -> simpy.Event:
+    """An event at mission time t, or now if t has passed: `env.timeout` in half its time."""
+    now_s = env._now
+    delay_s = t_s - now_s
+    return exactly_at(env, now_s + delay_s if delay_s > 0.0 else now_s)
+
+
+def call_at(env: simpy.Environment, t_s: float, callback: Callable[[], None]) -> None:
+    """Call a function at mission time t, or as the next thing now if t has passed."""
+    until(env, t_s).callbacks.append(lambda _: callback())
 
 
 def advance(env: simpy.Environment, t_s: float) -> None:
@@ -67,11 +73,6 @@ class Alarm:
         self._env = env
         self._callback = callback
         self._pending: simpy.Event | None = None
-
-    @property
-    def now_s(self) -> float:
-        """Mission time."""
-        return float(self._env.now)
 
     def set(self, t_s: float) -> None:
         """Call the function at mission time t, or as the next thing now if t has passed."""

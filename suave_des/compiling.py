@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import pickle
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Final, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
 from numba.core import caching
 from numpy.typing import NDArray
 
-from suave_des.caches import private_cache
+from suave_des.caches import private_cache, read_checked, with_checksum
 from suave_des.imports import hidden
 
 # What numba would load on the first call. To see that there is a BLAS, it imports scipy.linalg, which takes 0.2 s and
@@ -69,14 +68,11 @@ class _CodeCache(caching.FunctionCache):
             super().save_overload(signature, data)
 
 
-_DIGEST_BYTES: Final = hashlib.sha256().digest_size
-
-
 class _CheckedFile(caching.IndexDataCacheFile):
     """Index and data files of numba's cache, each with a checksum."""
 
     def _load_index(self) -> dict[Any, Any]:
-        content = _checked(Path(self._index_path))
+        content = read_checked(Path(self._index_path))
         if content is None:
             return {}
         version, stamp, overloads = pickle.loads(content)
@@ -86,23 +82,12 @@ class _CheckedFile(caching.IndexDataCacheFile):
         self._write(self._index_path, (self._version, self._source_stamp, overloads))
 
     def _load_data(self, name: str) -> Any:
-        content = _checked(Path(self._data_path(name)))
+        content = read_checked(Path(self._data_path(name)))
         return None if content is None else pickle.loads(content)
 
     def _save_data(self, name: str, data: Any) -> None:
         self._write(self._data_path(name), data)
 
     def _write(self, path: str, data: Any) -> None:
-        content = self._dump(data)
         with self._open_for_write(path) as file:
-            file.write(hashlib.sha256(content).digest() + content)
-
-
-def _checked(path: Path) -> bytes | None:
-    """The content of a file, if it is there, and is what was written."""
-    try:
-        content = path.read_bytes()
-    except OSError:
-        return None
-    digest, content = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
-    return content if hashlib.sha256(content).digest() == digest else None
+            file.write(with_checksum(self._dump(data)))

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 SEA_BED_Z_M = -20.0
 """The sea bed is the plane of this height in the world frame (z up)."""
 SURFACE_Z_M = 0.0
-THRUSTERS = 6
-"""Number of the vehicle's thrusters; the first is thruster 1."""
+THRUSTER_NAMES = tuple(f"c_thruster_{number}" for number in range(1, 7))
+"""The vehicle's thrusters 1 to 6, as the ontology and diagnostics name them."""
 
 MAINTAIN_MOTION = "f_maintain_motion"
 GENERATE_SEARCH_PATH = "f_generate_search_path"
@@ -35,11 +35,3 @@ class Task:
 
     name: str
     functions: tuple[str, ...]
-
-
-def thruster_name(thruster: int) -> str:
-    """Name of a thruster in diagnostics and in the knowledge base."""
-    return f"c_thruster_{thruster}"
-
-
-THRUSTER_NAMES = tuple(map(thruster_name, range(1, THRUSTERS + 1)))

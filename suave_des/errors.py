@@ -107,15 +107,21 @@ def number_of(number: int, noun: str) -> str:
     return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
+def similar(word: object, known: Iterable[str], cutoff: float = 0.6) -> str | None:
+    """Find the known name that is most similar to a word, from `cutoff` on (1: the same); None if none is."""
+    found = difflib.get_close_matches(str(word), sorted(known), n=1, cutoff=cutoff)
+    return found[0] if found else None
+
+
+def nearest(word: object, known: Iterable[str]) -> str | None:
+    """Suggest the known name most similar to a word, as a question; None when none is similar."""
+    near = similar(word, known)
+    return f"did you mean {near}?" if near else None
+
+
 def did_you_mean(word: object, known: Iterable[str], what: str = "known") -> str:
     """Return the remedy for a misspelt word: the nearest known one, and the list of all."""
     names = list(known)
-    near = difflib.get_close_matches(str(word), names, n=1, cutoff=0.6)
-    listing = f"{what}: {', '.join(names)}" if names else f"{what}: none"
-    return f"did you mean {near[0]!r}? {listing}" if near else listing
-
-
-def nearest(word: str, known: Iterable[str]) -> str | None:
-    """Suggest the known name most similar to a word, as a question; None when none is similar."""
-    found = difflib.get_close_matches(word, sorted(known), n=1, cutoff=0.6)
-    return f"did you mean {found[0]}?" if found else None
+    listing = f"{what}: {', '.join(names) or 'none'}"
+    near = similar(word, names)
+    return f"did you mean {near!r}? {listing}" if near else listing

@@ -13,10 +13,12 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, BinaryIO, TypeVar
 
 from suave_des.errors import InputError, line_error
 
+LIMIT_BYTES = 1_000_000_000
+"""Of a file that has no smaller limit."""
 _PIECE_ROWS = 1000
 _PART = ".part"
 
@@ -41,7 +43,6 @@ FAMILIES: Mapping[str, tuple[str, ...]] = {
         *DERIVED,
         "knowledge_states.jsonl",
     ),
-    "fit": ("fitted.yaml", "parameters.csv", "calibration.json", "profiles.png"),
 }
 """Names of result files by kind; a folder has those of one family, so that nothing in it is misread."""
 
@@ -50,17 +51,18 @@ DECIMALS = 6
 _Cell = TypeVar("_Cell", float, "float | None", "str | int | float | bool | None")
 
 
-def read_bytes(path: Path, limit: int) -> bytes:
-    """Read a file that the user named.
+@contextmanager
+def opened(path: Path) -> Iterator[BinaryIO]:
+    """Open a file that the user named, to read it; what is no file, such as a pipe, is not waited for.
 
     Raises:
-        InputError: missing, a folder, not a regular file, unreadable, or longer than `limit` bytes.
+        InputError: missing, a folder, not a regular file, or unreadable.
     """
     try:
-        if not stat.S_ISREG(path.stat().st_mode) and not path.is_dir():  # a pipe would be waited for without end
-            raise InputError("is not a regular file", file=path, remedy="name a file on disk")
-        with path.open("rb") as stream:
-            content = stream.read(limit + 1)
+        with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as stream:  # noqa: PTH123
+            if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+                raise InputError("is not a regular file", file=path, remedy="name a file on disk")
+            yield stream
     except IsADirectoryError:
         raise InputError("is a folder", file=path, remedy="name a file in it") from None
     except FileNotFoundError:
@@ -68,9 +70,51 @@ def read_bytes(path: Path, limit: int) -> bytes:
     except OSError as error:
         remedy = "check the name and the rights"
         raise InputError(f"cannot be read: {error.strerror}", file=path, remedy=remedy) from None
+
+
+def read_bytes(path: Path, limit: int = LIMIT_BYTES) -> bytes:
+    """Read a file that the user named.
+
+    Raises:
+        InputError: as `opened`; or it is longer than `limit` bytes.
+    """
+    with opened(path) as stream:
+        content = stream.read(limit + 1)
     if len(content) > limit:
         raise InputError(f"is larger than {limit:,} bytes", file=path, remedy="split it or shorten it")
     return content
+
+
+def check_own(paths: Iterable[Path]) -> None:
+    """Check that files that are to be changed in place are that: a link or a pipe may lead to anything.
+
+    Raises:
+        InputError: one of those that are there is a link, has a second name, or is no file.
+    """
+    for path in paths:
+        try:
+            found = path.lstat()
+        except OSError:
+            continue
+        _check(
+            path,
+            (stat.S_ISLNK(found.st_mode), "is a link, which is not followed", "remove it"),
+            (not stat.S_ISREG(found.st_mode), "is not a regular file", "remove it"),
+            (found.st_nlink > 1, "is a hard link: another file would change with it", "remove it, or copy the folder"),
+        )
+
+
+def read_json(path: Path) -> Any:
+    """Read a JSON file that the user named.
+
+    Raises:
+        InputError: as `opened`; or it is not JSON.
+    """
+    content = decode(path, read_bytes(path))
+    try:
+        return json.loads(content)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"is not JSON: {error}", file=path, remedy="restore it, or make it anew") from None
 
 
 def decode(path: Path, content: bytes) -> str:

@@ -42,14 +42,10 @@ def main_hidden() -> Iterator[None]:
 
 
 def register_environments() -> None:
-    """Make `gymnasium.make("suave_des/PipelineInspection-v0")` known, and its vector form."""
+    """Make `gymnasium.make("suave_des/PipelineInspection-v0")` known."""
     from gymnasium import register
 
-    register(
-        id="suave_des/PipelineInspection-v0",
-        entry_point="suave_des.interfaces.gym:PipelineInspection",
-        vector_entry_point="suave_des.interfaces.gym:PipelineInspectionVector",
-    )
+    register(id="suave_des/PipelineInspection-v0", entry_point="suave_des.interfaces.gym:PipelineInspection")
 
 
 def when_imported(module: str, act: Callable[[], None]) -> None:

@@ -1,4 +1,7 @@
-"""Managers and user-defined functions by name: built in, registered by another package, or given as module:Class."""
+"""Managers and functions by name: built in, registered by a package, or a user's own module:Class, which is checked.
+
+What users' code does wrong is told with its place in their code.
+"""
 
 from __future__ import annotations
 
@@ -6,21 +9,35 @@ import importlib
 import inspect
 import re
 import sys
-from collections.abc import Callable, Collection, Iterator, Mapping
-from difflib import get_close_matches
+from collections.abc import Callable, Collection, Iterator
 from functools import cache
 from importlib.metadata import entry_points
+from itertools import chain
+from math import inf, isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from sysconfig import get_path
+from traceback import extract_tb, walk_tb
+from types import ModuleType
+from typing import TYPE_CHECKING, TypeVar
 from weakref import WeakSet
 
-from suave_des.domain import MANAGER_GROUP
-from suave_des.errors import InputError, did_you_mean, nearest, shown
-from suave_des.managing.base import ManagingSubsystem
+from suave_des.domain import (
+    BATTERY_LEVEL,
+    GENERATE_RECHARGE_PATH,
+    MANAGER_GROUP,
+    MISSION_FUNCTIONS,
+    SURFACE,
+    WATER_VISIBILITY,
+)
+from suave_des.errors import InputError, did_you_mean, nearest, shown, similar
+from suave_des.managing.base import Dependencies, ManagingSubsystem, System
 from suave_des.monitor.diagnostics import Kind
+from suave_des.scenario.loader import LoadedScenario
+from suave_des.scenario.models import Scenario
 
-if TYPE_CHECKING:
-    from suave_des.managed.custom import CustomFunction
+if TYPE_CHECKING:  # or looking a manager up would load the vehicle and the compiler
+    from suave_des.managed.mode_manager import ModeManager
+    from suave_des.managed.node import CustomFunction
 
 _Base = TypeVar("_Base")
 ManagerLike = str | type[ManagingSubsystem]
@@ -37,54 +54,19 @@ _BUILT_IN = {
     "oracle": "suave_des.managing.reference:Oracle",
 }
 _FAMILIES = {
-    "fixed": ("suave_des.managing.reference:fixed_mode", "fixed:MODE"),
+    "fixed": ("suave_des.managing.simple:fixed_mode", "fixed:MODE"),
     "exec": ("suave_des.interfaces.exec:exec_manager", "exec:COMMAND"),
 }
 """Managers that are named with an argument after a colon: what makes the class of one, and how it is written."""
+_OWN = Path(__file__).parent
+_LIBRARY = re.compile(rf"{re.escape(get_path('stdlib'))}|.*/(site|dist)-packages/")
+_MANAGER_HOOKS = (
+    *("__init__", "check", "input_files", "recall", "mission_started", "mission_ended"),
+    *("task_requested", "task_cancelled", "diagnostic", "adapt"),
+)
+_FUNCTION_HOOKS = ("__init__", "configure", "activated", "deactivated")
+_MAY_YIELD = ("adapt", "input_files")
 _checked: WeakSet[type] = WeakSet()  # a class that is kept would keep its module open at the end of a worker
-
-
-class _Hooks(NamedTuple):
-    """The hooks of managers, or those of functions: their arguments, by name.
-
-    Attributes:
-        hooks: those of an instance.
-        class_methods: what is asked of a class, before there is a mission.
-        generators: those that may yield.
-        lets_time_pass: says how mission time can pass.
-    """
-
-    hooks: Mapping[str, str]
-    class_methods: Mapping[str, str]
-    generators: Collection[str]
-    lets_time_pass: str
-
-
-_MANAGER_HOOKS = _Hooks(
-    hooks={
-        "__init__": "(self, system)",
-        "mission_started": "(self)",
-        "mission_ended": "(self, metrics)",
-        "task_requested": "(self, task)",
-        "task_cancelled": "(self, task)",
-        "diagnostic": "(self, diagnostic)",
-        "adapt": "(self)",
-    },
-    class_methods={"check": "(cls, loaded)", "input_files": "(cls, settings)"},
-    generators=("adapt", "input_files"),
-    lets_time_pass="adapt may let time pass: with yield self.system.env.timeout(seconds)",
-)
-_FUNCTION_HOOKS = _Hooks(
-    hooks={
-        "__init__": "(self, context)",
-        "configure": "(self, mode)",
-        "activated": "(self)",
-        "deactivated": "(self)",
-    },
-    class_methods={},
-    generators=(),
-    lets_time_pass="what takes mission time is a process: self.env.process(self.another_method())",
-)
 
 
 def is_built_in(name: str) -> bool:
@@ -119,7 +101,7 @@ def name_of(manager: ManagerLike) -> str:
         return manager
     if not (isinstance(manager, type) and issubclass(manager, ManagingSubsystem)):
         problem = f"expected a manager, got {shown(manager)}"
-        raise InputError(problem, remedy="give a name, or a subclass of suave_des.managing.base.ManagingSubsystem")
+        raise InputError(problem, remedy="give a name, or a subclass of suave_des.ManagingSubsystem")
     target = f"{manager.__module__}:{manager.__qualname__}"
     if getattr(sys.modules.get(manager.__module__), manager.__qualname__, None) is not manager:
         problem = f"manager {target!r} cannot be found by its name"
@@ -143,8 +125,7 @@ def manager_class(name: str) -> type[ManagingSubsystem]:
         raise InputError(f"there is no manager {name!r}", remedy=f"{hint}; your own is given as package.module:Class")
     found = _load(f"manager {name!r}", target, ManagingSubsystem)
     if not is_built_in(name) and found not in _checked:
-        _check_hooks(f"manager {name!r}", found, ManagingSubsystem, _MANAGER_HOOKS)
-        _check_subscriptions(name, found)
+        check_manager(f"manager {name!r}", found)
         _checked.add(found)
     return found
 
@@ -156,95 +137,6 @@ def _member(family: str, argument: str) -> type[ManagingSubsystem]:
     module, _, function = target.partition(":")
     make: Callable[[str], type[ManagingSubsystem]] = getattr(importlib.import_module(module), function)
     return make(argument)
-
-
-def _check_hooks(what: str, kind: type, root: type, expected: _Hooks) -> None:
-    """Check that each hook that a class has can be called as hooks are called.
-
-    Args:
-        what: names the class in errors.
-        kind: the class.
-        root: its base that defines the hooks.
-        expected: the hooks.
-
-    Raises:
-        InputError: one takes other arguments, or would only make a generator or coroutine; or none is there, but
-            something that resembles one.
-    """
-
-    def wrong(problem: str, remedy: str) -> InputError:
-        return InputError(f"{what}{problem}", remedy=remedy)
-
-    hooks, class_methods, generators, lets_time_pass = expected
-    for hook, form in (*hooks.items(), *class_methods.items()):
-        function = getattr(kind, hook)
-        arguments = [object()] * (form.count(",") + form.startswith("(self"))
-        if not callable(function):
-            raise wrong(f": {hook} is not a method", f"write def {hook}{form}")
-        try:
-            inspect.signature(function).bind(*arguments)
-        except TypeError as error:
-            problem = f": {hook}{inspect.signature(function)} cannot be called as a hook: {error}"
-            decorator = "@classmethod " if hook in class_methods else ""
-            raise wrong(problem, f"write {decorator}def {hook}{form}") from None
-        except ValueError:  # no signature: compiled
-            continue
-        if inspect.iscoroutinefunction(function) or inspect.isasyncgenfunction(function):
-            raise wrong(f": {hook} is async, and nothing would run it", f"write def {hook}{form}; {lets_time_pass}")
-        if inspect.isgeneratorfunction(function) and hook not in generators:
-            raise wrong(f": {hook} yields, and nothing would run it", f"return from {hook} at once; {lets_time_pass}")
-    own = {each for base in kind.__mro__[: kind.__mro__.index(root)] for each in vars(base)}
-    if not own & hooks.keys():
-        resembling = {each: near for each in own for near in get_close_matches(each, hooks, n=1, cutoff=0.75)}
-        for each, hook in sorted(resembling.items()):
-            raise wrong(f" has no hook, but {each}", f"did you mean {hook}{hooks[hook]}?")
-    for each, hook in _misspelt_hooks(kind, root, hooks):
-        remedy = f"did you mean {hook}{hooks[hook]}? give a method of your own a name that differs more"
-        raise wrong(f": {each} is not a hook, and nothing calls it", remedy)
-
-
-def _check_subscriptions(name: str, kind: type[ManagingSubsystem]) -> None:
-    """Check what a manager subscribes to.
-
-    Raises:
-        InputError: it is no kind of diagnostics.
-    """
-    subscribed = kind.subscribes_to
-    is_collection = isinstance(subscribed, Collection) and not isinstance(subscribed, str)
-    unknown = [each for each in subscribed if each not in list(Kind)] if is_collection else []
-    if unknown or not (is_collection or isinstance(subscribed, property)):
-        remedy = f"give a tuple of some of {', '.join(f'Kind.{known.name}' for known in Kind)}"
-        what = f"has {shown(unknown[0])}" if unknown else f"is {shown(subscribed)}"
-        raise InputError(f"manager {name!r}: subscribes_to {what}", remedy=remedy)
-
-
-def _misspelt_hooks(kind: type, root: type, hooks: Collection[str]) -> Iterator[tuple[str, str]]:
-    """Yield methods that are most likely misspelt hooks, each with the hook.
-
-    The name of such a method is very similar to a hook that its class lacks; the method overrides nothing, and its name
-    occurs nowhere else in its module.
-    """
-    classes = kind.__mro__[: kind.__mro__.index(root)]
-    for base in (each for each in classes if not each.__module__.startswith("suave_des.")):
-        for each in sorted(name for name, member in vars(base).items() if inspect.isfunction(member)):
-            near = get_close_matches(each, hooks, n=1, cutoff=0.8)
-            inherits = any(hasattr(parent, each) for parent in base.__bases__)
-            if near and near[0] not in vars(base) and not inherits and not is_named_elsewhere(each, base):
-                yield each, near[0]
-
-
-@cache
-def is_named_elsewhere(method: str, kind: type) -> bool:
-    """Return whether a method's name occurs in its module besides its definition; True if there is no source.
-
-    Imports do not count: a manager that imports from suave_des.monitor.diagnostics does not call its `diagnostics`.
-    """
-    try:
-        source = inspect.getsource(sys.modules[kind.__module__])
-    except (OSError, TypeError, KeyError):
-        return True
-    source = re.sub(r"^\s*(from|import) .*$", "", source, flags=re.MULTILINE)
-    return re.search(rf"(?<!def )\b{re.escape(method)}\b", source) is not None
 
 
 def registered_functions() -> tuple[str, ...]:
@@ -262,7 +154,7 @@ def function_class(function: str, name: str) -> type[CustomFunction]:
     Raises:
         InputError: there is no such class, it is no subclass of CustomFunction, or a hook is wrong.
     """
-    from suave_des.managed.custom import CustomFunction  # loads the vehicle
+    from suave_des.managed.node import CustomFunction  # loads the vehicle
 
     target = name if ":" in name else _registered(FUNCTION_GROUP).get(name)
     if target is None:
@@ -271,9 +163,41 @@ def function_class(function: str, name: str) -> type[CustomFunction]:
     what = f"function {function}, {name!r}"
     found = _load(what, target, CustomFunction)
     if found not in _checked:
-        _check_hooks(what, found, CustomFunction, _FUNCTION_HOOKS)
+        check_function(what, found, CustomFunction)
         _checked.add(found)
     return found
+
+
+def built_in_functions(scenario: Scenario) -> tuple[str, ...]:
+    """List the functions that the exemplar has, in a mission of this scenario."""
+    recharge = () if scenario.battery is None else (GENERATE_RECHARGE_PATH,)
+    return *MISSION_FUNCTIONS, *recharge, *(() if scenario.leak is None else (SURFACE,))
+
+
+def custom_functions(loaded: LoadedScenario) -> dict[str, type[CustomFunction]]:
+    """Find the classes of a scenario's further functions, by the name of the function.
+
+    They are named under `functions:`; one that a package registers under the function's own name needs no entry.
+
+    Raises:
+        InputError: a function that the mission needs has no node, or a class cannot be used.
+    """
+    scenario, registered = loaded.scenario, registered_functions()
+    built_in = built_in_functions(scenario)
+    types = {name: name for name in loaded.modes.functions if name in registered and name not in built_in}
+    types |= {name: settings.node for name, settings in scenario.functions.items()}
+    for name in scenario.needed_functions():
+        if name not in built_in and name not in types:
+            if name == GENERATE_RECHARGE_PATH:
+                raise loaded.layer.error(f"{name} needs a battery", ("mission", "functions"), "add battery: {}")
+            remedy = (
+                f"name its class: functions: {{{name}: {{node: module:Class}}}}, or install a package that registers "
+                f"it (entry point group {FUNCTION_GROUP})"
+            )
+            if registered:
+                remedy += f"; {did_you_mean(name, registered, 'registered')}"
+            raise loaded.layer.error(f"function {name} has no node", ("mission", "functions"), remedy)
+    return {name: function_class(name, node) for name, node in types.items()}
 
 
 @cache
@@ -283,23 +207,225 @@ def _registered(group: str = MANAGER_GROUP) -> dict[str, str]:
 
 def _load(what: str, target: str, base: type[_Base]) -> type[_Base]:
     module_name, _, attribute = target.partition(":")
-    try:
-        if module_name not in sys.modules and (here := str(Path.cwd())) not in sys.path:
-            sys.path.append(here)  # where `python` would find it, but an installed command would not
-        module = importlib.import_module(module_name)
-    except (Exception, SystemExit) as error:  # whatever the module's own code raises on import
-        if isinstance(error.__cause__, KeyboardInterrupt):  # Python 3.11 wraps it while a class is made
-            raise error.__cause__ from None
-        raise InputError(
-            f"{what}: {type(error).__name__}: {error}",
-            remedy="module must be importable: installed, or in the current folder or one on PYTHONPATH",
-        ) from error
+    module = imported(what, module_name)
     found = getattr(module, attribute, None)
     if not (isinstance(found, type) and issubclass(found, base)):
         classes = {name for name, each in vars(module).items() if isinstance(each, type) and issubclass(each, base)}
         raise InputError(
             f"{what}: {module_name} has no subclass of {base.__name__} named {attribute!r}",
             remedy=(nearest(attribute, classes) if found is None else None)
-            or f"derive your class from {base.__module__}.{base.__name__}",
+            or f"derive your class from suave_des.{base.__name__}",
         )
     return found
+
+
+# Users' code.
+
+
+def imported(what: str, module: str) -> ModuleType:
+    """Import a module of a user's.
+
+    Raises:
+        InputError: it is not there, or its code raises; `what` names what it is imported for.
+    """
+    try:
+        if module not in sys.modules and (here := str(Path.cwd())) not in sys.path:
+            sys.path.append(here)  # where `python` would find it, but an installed command would not
+        return importlib.import_module(module)
+    except SyntaxError as error:
+        raise InputError(f"{what}: {error.msg}", file=error.filename, place=f"line {error.lineno}") from error
+    except (Exception, SystemExit) as error:  # whatever the module's own code raises
+        if isinstance(error.__cause__, KeyboardInterrupt):  # Python 3.11 wraps it while a class is made
+            raise error.__cause__ from None
+        problem = f"{what}: {type(error).__name__}: {error}"
+        own = [each for each in extract_tb(error.__traceback__)[1:] if "importlib" not in each.filename]
+        if own:
+            raise InputError(problem, file=own[-1].filename, place=f"line {own[-1].lineno}") from error
+        remedy = "module must be importable: installed, or in the current folder or one on PYTHONPATH"
+        raise InputError(problem, remedy=remedy) from error
+
+
+def check_manager(what: str, kind: type[ManagingSubsystem]) -> None:
+    """Check a manager's hooks, and what it subscribes to.
+
+    Raises:
+        InputError: a hook cannot be called as hooks are called, a method is most likely a misspelt one, or something
+            subscribed to is no kind of diagnostics; `what` names the manager.
+    """
+    passes = "adapt may let time pass: with yield self.system.env.timeout(seconds)"
+    _check_hooks(what, kind, ManagingSubsystem, _MANAGER_HOOKS, passes)
+    subscribed = kind.subscribes_to
+    is_collection = isinstance(subscribed, Collection) and not isinstance(subscribed, str)
+    unknown = [each for each in subscribed if each not in list(Kind)] if is_collection else []
+    if unknown or not (is_collection or isinstance(subscribed, property)):
+        remedy = f"give a tuple of some of {', '.join(f'Kind.{known.name}' for known in Kind)}"
+        found = f"has {shown(unknown[0])}" if unknown else f"is {shown(subscribed)}"
+        raise InputError(f"{what}: subscribes_to {found}", remedy=remedy)
+
+
+def check_function(what: str, kind: type, root: type) -> None:
+    """Check the hooks of a user-defined function; `root` is CustomFunction.
+
+    Raises:
+        InputError: as `check_manager`.
+    """
+    passes = "what takes mission time is a process: self.env.process(self.another_method())"
+    _check_hooks(what, kind, root, _FUNCTION_HOOKS, passes)
+
+
+def _check_hooks(what: str, kind: type, root: type, hooks: Collection[str], lets_time_pass: str) -> None:
+    def wrong(problem: str, remedy: str) -> InputError:
+        return InputError(f"{what}: {problem}", remedy=remedy)
+
+    forms = {name: _form(root, name) for name in hooks}
+    for hook, form in forms.items():
+        function = getattr(kind, hook)
+        if not callable(function):
+            raise wrong(f"{hook} is not a method", f"write {form}")
+        try:
+            inspect.signature(function).bind(*inspect.signature(getattr(root, hook)).parameters)
+        except TypeError as error:
+            problem = f"{hook}{inspect.signature(function)} cannot be called as a hook: {error}"
+            raise wrong(problem, f"write {form}") from None
+        except ValueError:  # no signature: compiled
+            continue
+        if inspect.iscoroutinefunction(function) or inspect.isasyncgenfunction(function):
+            raise wrong(f"{hook} is async, and nothing would run it", f"write {form}; {lets_time_pass}")
+        if inspect.isgeneratorfunction(function) and hook not in _MAY_YIELD:
+            raise wrong(f"{hook} yields, and nothing would run it", f"return from {hook} at once; {lets_time_pass}")
+    classes = kind.__mro__[: kind.__mro__.index(root)]
+    for base in (each for each in classes if not each.__module__.startswith("suave_des.")):
+        for each in sorted(name for name, member in vars(base).items() if inspect.isfunction(member)):
+            near = similar(each, forms, cutoff=0.8)
+            inherits = any(hasattr(parent, each) for parent in base.__bases__)
+            if near is not None and near not in vars(base) and not inherits and not _is_named_elsewhere(each, base):
+                remedy = f"did you mean {forms[near]}? give a method of your own a name that differs more"
+                raise wrong(f"{each} is not a hook, and nothing calls it", remedy)
+
+
+def _form(root: type, hook: str) -> str:
+    """Write how a hook is defined: def adapt(self)."""
+    is_of_class = isinstance(inspect.getattr_static(root, hook), classmethod)
+    parameters = list(inspect.signature(getattr(root, hook)).parameters)
+    arguments = ", ".join(["cls", *parameters] if is_of_class else parameters)
+    return f"{'@classmethod ' if is_of_class else ''}def {hook}({arguments})"
+
+
+@cache
+def _is_named_elsewhere(method: str, kind: type) -> bool:
+    """Return whether a method's name occurs in its module besides its definition; True if there is no source.
+
+    Imports do not count: a manager that imports from suave_des.monitor.diagnostics does not call its `diagnostics`.
+    """
+    try:
+        source = inspect.getsource(sys.modules[kind.__module__])
+    except (OSError, TypeError, KeyError):
+        return True
+    source = re.sub(r"^\s*(from|import) .*$", "", source, flags=re.MULTILINE)
+    return re.search(rf"(?<!def )\b{re.escape(method)}\b", source) is not None
+
+
+# What a manager says of itself, once it was made.
+
+
+def checked_times(manager: ManagingSubsystem) -> tuple[float, float] | None:
+    """Return a manager's period and first time; None if it is not called periodically.
+
+    Raises:
+        ValueError: they are no such times.
+    """
+    period_s, starts_s = manager.period_s, manager.starts_s
+    if period_s is None:
+        return None
+    if not (hasattr(period_s, "__float__") and 0.0 < period_s < inf):
+        raise ValueError(f"period_s is {period_s!r}; it must be a number above 0, or None")
+    if not (hasattr(starts_s, "__float__") and 0.0 <= starts_s < inf):
+        raise ValueError(f"starts_s is {starts_s!r}; it must be a number, 0 or above")
+    return period_s, starts_s
+
+
+def checked_dependencies(manager: ManagingSubsystem) -> Dependencies | None:
+    """Return what a manager's class itself declares to depend on: one derived from it may depend on more.
+
+    Raises:
+        ValueError: it is no mapping from measured quality attributes to numbers.
+    """
+    declared = manager.depends_on if "depends_on" in vars(type(manager)) else None
+    if declared is None:
+        return None
+    try:
+        found = {name: tuple(sorted(map(float, each))) for name, each in declared.items()}
+        are_numbers = not any(map(isnan, chain(*found.values())))
+    except (AttributeError, TypeError, ValueError):
+        are_numbers = False
+    if not are_numbers:
+        form = f"{{'{WATER_VISIBILITY}': (2.25, 3.25)}}, or None"
+        raise ValueError(f"depends_on is {shown(declared)}; it must be like {form}")
+    known = _measured_somewhere(manager.system)
+    if unknown := sorted(found.keys() - set(known), key=str):
+        raise ValueError(
+            f"depends_on has {shown(unknown[0])}, which nothing measures ({did_you_mean(unknown[0], known)})"
+        )
+    return found
+
+
+def remarks(manager: ManagingSubsystem) -> Iterator[str]:
+    """Yield probable mistakes of a manager's author that are no errors, as a mission has shown them."""
+    author = next(base for base in type(manager).__mro__ if "adapt" in vars(base))
+    is_shipped = author.__module__.startswith("suave_des.")
+    if not is_shipped and manager.period_s is None and not _is_named_elsewhere("adapt", author):
+        yield "adapt is never called: period_s is None (set it in the class, such as period_s = 2.0)"
+    known = _measured_somewhere(manager.system)
+    for name in sorted(manager.system.unmeasured.difference(known), key=str):
+        yield f"measured({shown(name)}) is always None: nothing measures it ({did_you_mean(name, known)})"
+
+
+def refusals(modes: ModeManager) -> dict[str, int]:
+    """Say why requests for modes were refused, and what would be right; with the number of requests for each reason."""
+    return {_why_refused(modes, *request): count for request, count in modes.refused.items()}
+
+
+def _why_refused(modes: ModeManager, function: str, mode: str) -> str:
+    if function not in modes.table:
+        if mode in modes.table:
+            return f"change_mode({shown(function)}, {shown(mode)}) has its arguments swapped (function, then mode)"
+        known = modes.table.functions
+        return f"the modes file has no function {shown(function)} ({did_you_mean(function, known)})"
+    if function not in modes.nodes:
+        return f"{function} has no node here (name its class under functions: in the scenario)"
+    return f"{function} has no mode {shown(mode)} ({did_you_mean(mode, modes.table.modes(function))})"
+
+
+def _measured_somewhere(system: System) -> list[str]:
+    """List what is measured, here or in some shipped scenario: a manager may be written for all of them."""
+    return sorted({*system.measurements, WATER_VISIBILITY, BATTERY_LEVEL})
+
+
+def cause_of(error: BaseException, function: str = "") -> str:
+    """Say what was raised, in which function, and where in the user's code: "ValueError: no plan (mine.py, line 7)".
+
+    The text is the same in each run: it has no memory addresses.
+
+    Args:
+        error: the exception.
+        function: name of the user-defined function that raised it; if empty, that whose method is in the traceback.
+    """
+    name = function or _function_that_raised(error)
+    text = re.sub(r" at 0x[0-9a-f]+", "", f"{f'function {name}: ' if name else ''}{type(error).__name__}: {error}")
+    frames = [each for each in extract_tb(error.__traceback__) if not Path(each.filename).is_relative_to(_OWN)]
+    written = [each for each in frames if not _LIBRARY.match(each.filename)]
+    if not (frames := written or frames):
+        return text
+    file = Path(frames[-1].filename)
+    return f"{text} ({f'{file.name}, ' if file.is_file() else ''}line {frames[-1].lineno})"
+
+
+def _function_that_raised(error: BaseException | None) -> str:
+    from suave_des.managed.node import CustomFunction  # loads the vehicle
+
+    while error is not None:
+        for frame, _ in walk_tb(error.__traceback__):
+            if isinstance(owner := frame.f_locals.get("self"), CustomFunction):
+                return owner.context.name
+        error = error.__cause__  # SimPy raises a copy of what a process has raised
+    return ""

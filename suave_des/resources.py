@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from suave_des.errors import InputError
+from suave_des.errors import InputError, did_you_mean
 
 DEFAULT_SCENARIO = "seams2023"
 """The paper's, where none is named."""
@@ -16,7 +16,6 @@ _KINDS = {
     "scenarios/revisions": ".yaml",
     "scenarios/vehicles": ".yaml",
     "scenarios/published": ".csv",
-    "scenarios/calibration": ".yaml",
     "scenarios/ensembles": ".csv",
 }
 
@@ -58,5 +57,6 @@ def find(name: str | Path, kind: str, *, beside: Path | None = None) -> Path:
         raise InputError("is a folder", file=path, remedy="name a file in it")
     if _is_a(Path.exists, candidates[0]):
         raise InputError("is not a regular file", file=path, remedy="name a file on disk")
-    known = ", ".join(sorted(entry.name for entry in shipped_folder(kind).glob(f"*{_KINDS[kind]}")))
-    raise InputError("no such file", file=path, remedy=f"give a path, or one of the shipped files: {known}")
+    known = sorted(entry.name for entry in shipped_folder(kind).glob(f"*{_KINDS[kind]}"))
+    remedy = did_you_mean(path.name, known, "give a path, or one of the shipped files")
+    raise InputError("no such file", file=path, remedy=remedy)

@@ -7,22 +7,21 @@ from decimal import Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from suave_des.domain import BATTERY_LEVEL, MISSION_FUNCTIONS
+from suave_des.domain import BATTERY_LEVEL
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.knowledge.deliberation import Deliberation
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.reasoners import make_reasoner
+from suave_des.knowledge.reasoner import Reasoner
 from suave_des.monitor.diagnostics import REPORTED_STATUSES
 from suave_des.resources import find
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario.models import Scenario
-from suave_des.scenario.signal_kinds import ConstantSignal, SinusoidSignal, StepSignal, TableSignal
+from suave_des.scenario.physical import ConstantSignal, SinusoidSignal, StepSignal, TableSignal
 
 if TYPE_CHECKING:
-    from suave_des.knowledge.checks.static import Subject
+    from suave_des.knowledge.checks import Subject
 
 OPENED: Final = 4
-_opened: dict[Hashable, Deliberation] = {}
+_opened: dict[Hashable, Reasoner] = {}
 """Knowledge bases that are kept open, the oldest first."""
 
 
@@ -32,8 +31,13 @@ def open_base(loaded: LoadedScenario) -> Ontology:
     Raises:
         KnowledgeError: the ontologies or rules cannot be read.
     """
+    from suave_des.knowledge.checks.model import check_revision
+
+    scenario = loaded.scenario
     try:
-        return read_base(loaded.scenario, loaded.ontologies, loaded.rules)
+        base = read_base(scenario, loaded.ontologies, loaded.rules)
+        check_revision(base, measured_attributes(scenario), scenario.revision.name)
+        return base
     except KnowledgeError as error:
         raise loaded.located(error) from None
 
@@ -97,7 +101,7 @@ def measured_ranges(loaded: LoadedScenario) -> dict[str, tuple[float, float]]:
 
 def subject_of(loaded: LoadedScenario) -> Subject:
     """Return what `kb check` checks of a scenario: its knowledge base, and what missions have to do with it."""
-    from suave_des.knowledge.checks.static import Subject  # which missions do not need
+    from suave_des.knowledge.checks import Subject  # which missions do not need
 
     knowledge = loaded.scenario.knowledge
     return Subject(
@@ -106,11 +110,8 @@ def subject_of(loaded: LoadedScenario) -> Subject:
         disabled_rules=knowledge.disabled_rules,
         values=_values(loaded.scenario),
         modes={name: loaded.modes.modes(name) for name in loaded.modes.functions},
-        effects={
-            name: {mode: (each.active, each.parameters) for mode, each in modes.items()}
-            for name, modes in loaded.modes.table.items()
-        },
-        needed=MISSION_FUNCTIONS,
+        needed=loaded.scenario.needed_functions(),
+        revision=loaded.scenario.revision.name,
         operators=loaded.scenario.revision.comparison_operators,
         reported=REPORTED_STATUSES,
         measured=measured_attributes(loaded.scenario),
@@ -122,7 +123,7 @@ def _values(scenario: Scenario) -> dict[str, Decimal]:
     return {name: Decimal(repr(value)) for name, value in scenario.knowledge.values.items()}
 
 
-def open_knowledge(loaded: LoadedScenario) -> Deliberation:
+def open_knowledge(loaded: LoadedScenario) -> Reasoner:
     """The scenario's knowledge base with the reasoner that the scenario names.
 
     Raises:
@@ -133,17 +134,17 @@ def open_knowledge(loaded: LoadedScenario) -> Deliberation:
     knowledge = loaded.scenario.knowledge.model_dump_json(), tuple(sorted(loaded.inputs.items()))
     operators = tuple(sorted(loaded.scenario.revision.comparison_operators.items()))
     same = *knowledge, loaded.ontologies, loaded.rules, operators
-    deliberation = _opened.get(same)
-    if deliberation is None:
+    reasoner = _opened.get(same)
+    if reasoner is None:
         base = open_base(loaded)
         try:
-            deliberation = Deliberation(base, make_reasoner(loaded.scenario.knowledge.reasoner, base))
+            reasoner = Reasoner(base, loaded.scenario.knowledge.reasoner)
         except KnowledgeError as error:
             raise loaded.located(error) from None
         if len(_opened) >= OPENED:
             del _opened[next(iter(_opened))]
-        _opened[same] = deliberation
-    base = deliberation.base
+        _opened[same] = reasoner
+    base = reasoner.base
     functions = loaded.scenario.needed_functions()
     base.check(functions)
     for function in functions:
@@ -155,4 +156,4 @@ def open_knowledge(loaded: LoadedScenario) -> Deliberation:
                     place=function,
                     remedy="add the mode, or remove the design from the ontology",
                 )
-    return deliberation
+    return reasoner

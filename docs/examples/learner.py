@@ -10,11 +10,12 @@ PAIRS = [(murky, clear) for murky in MODES for clear in MODES]
 class Learner(Threshold):
     """Searches in one mode while the visibility is below 2.25 m, and in another above; which ones is learned."""
 
-    def __init__(self, system):
-        super().__init__(system)
-        self.totals = system.learned  # by pair of modes: missions, and the sum of their search times
-        if system.training:
-            stream = system.stream("learner")
+    def recall(self, learned, training):
+        """Choose a pair of modes for this mission."""
+        self.totals = learned  # by pair of modes: missions, and the sum of their search times
+        self.training = training
+        if training:
+            stream = self.system.stream("learner")
             untried = [pair for pair in PAIRS if self.key(pair) not in self.totals]
             self.pair = untried[0] if untried else stream.choice(PAIRS) if stream.random() < 0.3 else self.best()
         else:
@@ -28,7 +29,7 @@ class Learner(Threshold):
 
     def mission_ended(self, metrics):
         """Note how long the search took."""
-        if self.system.training:
+        if self.training:
             missions, total_s = self.totals.get(self.key(self.pair), (0, 0.0))
             self.totals[self.key(self.pair)] = [missions + 1, total_s + metrics.search_time_s]
 

@@ -2,123 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing, suppress
-from dataclasses import replace
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
-from suave_des.campaign.executors.local import InProcess, LocalWorkers, end_worker_of_script
 from suave_des.campaign.inputs import (
+    check_campaign,
     check_same,
     check_trusted,
     deciding,
-    default_time_out_s,
     identity,
-    read_inputs,
+    note_own,
+    provenance,
+    read_campaign,
     trained_on,
 )
-from suave_des.campaign.missions import Executor, Finished, JobSpec, Remark, WorkerError, plan
+from suave_des.campaign.missions import Campaign, Executor, MissionRunner, Remark, WorkerError
 from suave_des.campaign.progress import OnProgress, Progress, ProgressTracker
-from suave_des.campaign.result_files import FILES, SUAVE_FOLDER, write_results
 from suave_des.campaign.results import CampaignResult, gather
-from suave_des.campaign.spec import CampaignFile, CampaignSpec, read_campaign_file
-from suave_des.campaign.stopping import FirstFailures, check_size
-from suave_des.campaign.store import (
-    LOCK_FILE,
-    NEW_STORE_FILE,
-    STORE_FILE,
-    Store,
-    StoreError,
-    locked,
-    make_store,
-    remove_store,
-    stored_outcomes,
-)
-from suave_des.campaign.variation import plain
+from suave_des.campaign.spec import CampaignSpec, read_campaign_file
+from suave_des.campaign.workers import LocalWorkers, in_process
 from suave_des.errors import InputError, SuaveDesError, did_you_mean
 from suave_des.files import check_output_folder, make_output_folder, remove_parts, remove_results
+from suave_des.records.store import FILES, STORE_FILE, Store, StoreError, check_no_link, has_campaign, is_left_over
 from suave_des.registry import ManagerLike, name_of
-from suave_des.scenario.loader import LoadedScenario, Replacements
+from suave_des.scenario.loader import LoadedScenario
 
-__all__ = ["CampaignInterrupted", "CampaignOptions", "CampaignResult", "Progress", "resume_campaign", "run_campaign"]
+__all__ = ["CampaignInterrupted", "CampaignResult", "Progress", "resume_campaign", "run_campaign"]
 _MORE_MANAGERS = (
     "for other managers, run a second campaign with the same seed into another folder:"
     " suave-des compare {} FOLDER pairs their runs by number"
 )
-
-
-class CampaignOptions(Replacements, total=False):
-    """Options of a campaign by name, see CampaignSpec; None or missing ones are taken from the campaign file."""
-
-    sweep: Mapping[str, Any] | None
-    perturbations: Mapping[str, Any] | None
-    runs_per_draw: int | None
-    ensemble: str | Path | None
-    until_ci: str | None
-    time_out_s: float | None
-    scheduler: str | None
-    suave_format: bool
-    parquet: bool
-    record_knowledge: bool
-    confirmed: bool
-    overwrite: bool
-    command: Sequence[str]
-
-
-def run_campaign(
-    scenario: str | Path | LoadedScenario,
-    managers: ManagerLike | Iterable[ManagerLike] | None = None,
-    runs: int | None = None,
-    seed: int | None = None,
-    workers: int | None = 1,
-    out: str | Path | None = None,
-    *,
-    on_progress: OnProgress | None = None,
-    **options: Unpack[CampaignOptions],
-) -> CampaignResult:
-    """Run `runs` missions of a scenario under each manager, as suave_des.run_campaign does, whose arguments it has.
-
-    The result is the same for any number of workers, and however often the campaign was interrupted and resumed. A
-    mission that fails (its manager raises, it takes too long, its worker process dies repeatedly) has no row;
-    the others are kept.
-
-    Example:
-        result = run_campaign("seams2023", ["none", "metacontrol"], runs=100, workers=2)
-        print(result.frame().groupby("manager")["search_time_s"].mean())
-
-    Args:
-        scenario, managers, runs, seed, out, options: see CampaignSpec.
-        workers: None: 2, or 1 for few missions of built-in managers.
-        on_progress: called when missions are done.
-
-    Raises:
-        InputError: something given cannot be used; nothing is written then.
-        WorkerError: worker processes end again and again; finished missions are kept.
-        StoreError: the disk is full, or the folder was removed.
-        CampaignInterrupted: Ctrl-C; finished missions are kept.
-    """
-    if managers is not None:
-        managers = [managers] if isinstance(managers, str | type) else list(managers)
-        managers = list(map(name_of, managers))
-    given = {"managers": managers, "runs": runs, "seed": seed, "workers": workers, "out": out}
-    options["sweep"] = plain(options.get("sweep"))
-    loaded = scenario if isinstance(scenario, LoadedScenario) else None
-    named = scenario.path if isinstance(scenario, LoadedScenario) else scenario
-    spec = CampaignSpec.of(named, **given, **options)
-    if spec.out is not None:
-        _check_new(spec.out, overwrite=spec.overwrite)
-    file = read_campaign_file(spec.scenario) if loaded is None else None
-    with ExitStack() as stack:
-        campaign = _Campaign(spec, file, stack, loaded)
-        if spec.suave_format and campaign.variation.sweep.points > 1:
-            raise InputError(
-                "the exemplar's results file has no columns for swept values",
-                remedy="omit --format suave, or run a campaign for each point",
-            )
-        if not spec.confirmed:
-            check_size(campaign.job, campaign.tracker.total, campaign.spec.processes)
-        return campaign.run(on_progress, resumed=False)
+_LARGE = 1_000_000
+"""Missions from which a campaign needs to be confirmed."""
+_MISSIONS_A_SECOND = 450
+"""Of one worker, as docs/guides/cluster.md counts."""
 
 
 class CampaignInterrupted(KeyboardInterrupt):
@@ -133,12 +52,63 @@ class CampaignInterrupted(KeyboardInterrupt):
         super().__init__(f"interrupted; {result.kept()}")
 
 
+def run_campaign(
+    scenario: str | Path | LoadedScenario,
+    managers: ManagerLike | Iterable[ManagerLike] | None = None,
+    runs: int | None = None,
+    seed: int | None = None,
+    workers: int | None = 1,
+    out: str | Path | None = None,
+    *,
+    on_progress: OnProgress | None = None,
+    **options: Any,
+) -> CampaignResult:
+    """Run `runs` missions of a scenario under each manager, as suave_des.run_campaign does, whose arguments it has.
+
+    The result is the same for any number of workers, and however often the campaign was interrupted and resumed. A
+    mission that fails (its manager raises, it takes too long, its worker process dies repeatedly) has no row;
+    the others are kept.
+
+    Example:
+        result = run_campaign("seams2023", ["none", "metacontrol"], runs=100, workers=2)
+        print(result.frame().groupby("manager")["search_time_s"].mean())
+
+    Args:
+        scenario, managers, runs, seed, out, options: see CampaignSpec and load_scenario.
+        workers: None: 2, or 1 for few missions of built-in managers.
+        on_progress: called when missions are done.
+
+    Raises:
+        InputError: something given cannot be used; nothing is written then.
+        WorkerError: worker processes end again and again; finished missions are kept.
+        StoreError: the disk is full, or the folder was removed.
+        CampaignInterrupted: Ctrl-C; finished missions are kept.
+    """
+    if managers is not None:
+        managers = [managers] if isinstance(managers, str | type) else list(managers)
+        managers = list(map(name_of, managers))
+    loaded = scenario if isinstance(scenario, LoadedScenario) else None
+    named = scenario.path if isinstance(scenario, LoadedScenario) else scenario
+    given = {"managers": managers, "runs": runs, "seed": seed, "workers": workers, "out": out}
+    spec = CampaignSpec.of(named, **given, **options)
+    if spec.out is not None:
+        _check_new(spec.out, overwrite=spec.overwrite)
+    file = read_campaign_file(spec.scenario) if loaded is None else None
+
+    def read() -> Campaign:
+        campaign = read_campaign(spec, file, loaded)
+        _check_size(campaign)
+        return campaign
+
+    with ExitStack() as stack:
+        return _run(stack, spec.with_file(file), read, None, on_progress)
+
+
 def resume_campaign(
     folder: str | Path,
     workers: int | None = 1,
     *,
     runs: int | None = None,
-    until_ci: str | None = None,
     on_progress: OnProgress | None = None,
     scheduler: str | None = None,
     managers: Collection[str] = (),
@@ -149,7 +119,7 @@ def resume_campaign(
     Missions that failed for reasons that may not recur (time-out, a worker that was killed) are run again.
 
     Args:
-        folder, runs, until_ci, scheduler, managers, confirmed: see suave_des.resume_campaign.
+        folder, runs, scheduler, managers, confirmed: see suave_des.resume_campaign.
         workers: as in run_campaign; the number may differ.
         on_progress: called when missions are done.
 
@@ -158,31 +128,71 @@ def resume_campaign(
             difference is named.
         WorkerError, StoreError, CampaignInterrupted: as run_campaign.
     """
-    folder = Path(folder)
-    if not (folder / STORE_FILE).is_file():
-        raise InputError("there is no campaign to resume", file=folder, remedy="start one with --out")
-    changed = {"runs": runs, "until_ci": until_ci, "out": folder, "workers": workers, "scheduler": scheduler}
-    with locked(folder), closing(Store(folder / STORE_FILE)) as store:
-        spec = CampaignSpec.of_stored(store.about("request"), **changed)
-    if unknown := [name for name in managers if name not in spec.managers]:
-        problem = f"the campaign has no manager {unknown[0]!r}, and cannot be given new ones"
-        remedy = f"{did_you_mean(unknown[0], spec.managers, 'its managers')}; {_MORE_MANAGERS.format(folder)}"
-        raise InputError(problem, file=folder, remedy=remedy)
-    check_trusted(spec.managers, managers, folder, confirmed=confirmed)
+    changed = {"runs": runs, "workers": workers, "scheduler": scheduler, "out": Path(folder)}
+    changed = {name: value for name, value in changed.items() if value is not None}
     with ExitStack() as stack:
+        store, campaign = stack.enter_context(_stored(Path(folder), changed, managers, confirmed=confirmed))
+        return _run(stack, campaign.spec, lambda: campaign, store, on_progress)
+
+
+def opened_campaign(folder: Path, managers: Collection[str] = (), *, confirmed: bool = False) -> MissionRunner:
+    """Open a campaign, to run missions of it again.
+
+    Args:
+        folder: the campaign's.
+        managers: those whose missions are wanted, which the user has named himself; empty: all.
+        confirmed: whether all code that the folder names may run, see `check_trusted`.
+
+    Raises:
+        InputError: there is no campaign in the folder, its inputs no longer exist, or it names code that is neither
+            installed nor named.
+    """
+    changed = {"managers": tuple(managers)} if managers else {}
+    with _stored(folder, changed, managers, confirmed=confirmed) as (_, campaign):
+        check_campaign(campaign)
+    return MissionRunner(campaign)
+
+
+@contextmanager
+def _stored(
+    folder: Path, changed: Mapping[str, Any], named: Collection[str], *, confirmed: bool
+) -> Iterator[tuple[Store, Campaign]]:
+    """Open the campaign in a folder, and check that its code is trusted.
+
+    Args:
+        folder: the campaign's.
+        changed: options that differ from the stored ones.
+        named, confirmed: see check_trusted.
+    """
+    if not has_campaign(folder):
+        raise InputError("there is no campaign in it", file=folder, remedy="give the --out folder of a campaign")
+    with closing(Store(folder / STORE_FILE)) as store:
+        with store.reading():
+            stored = CampaignSpec.model_validate(store.about("request"))
+        request = CampaignSpec.read({**stored.stored(), **changed})
         try:
-            campaign = _Campaign(spec, read_campaign_file(spec.scenario), stack)
+            with store.reading():
+                file = read_campaign_file(request.scenario)
+                campaign = read_campaign(request, file)
+            functions = (name for name in campaign.code() if name not in campaign.spec.managers)
+            known = (*stored.with_file(file).managers, *functions)
+            for name in named:
+                if name not in known:
+                    problem = f"the campaign has no manager {name!r}, and cannot be given new ones"
+                    remedy = f"{did_you_mean(name, known, 'its managers')}; {_MORE_MANAGERS.format(folder)}"
+                    raise InputError(problem, file=folder, remedy=remedy)
+            check_trusted(campaign, named, folder, confirmed=confirmed)
         except InputError as error:
-            if str(Path.cwd()) == spec.folder:
+            if str(Path.cwd()) == request.folder or error.file == str(folder):
                 raise
-            remedy = f"the campaign was started in {spec.folder}: resume it there"
+            remedy = f"the campaign was started in {request.folder}: do this there"
             raise InputError(error.problem, file=error.file, place=error.place, remedy=remedy) from None
-        return campaign.run(on_progress, resumed=True)
+        yield store, campaign
 
 
 def _check_new(folder: Path, *, overwrite: bool) -> None:
-    check_output_folder(folder, "campaign", overwrite=overwrite, left_over=_is_of_campaign)
-    if not overwrite and (folder / STORE_FILE).exists():
+    check_output_folder(folder, "campaign", overwrite=overwrite, left_over=is_left_over)
+    if not overwrite and has_campaign(folder):
         raise InputError(
             "the output folder is not empty: it has a campaign in it",
             file=folder,
@@ -190,193 +200,143 @@ def _check_new(folder: Path, *, overwrite: bool) -> None:
         )
 
 
-def _is_of_campaign(name: str) -> bool:
-    """Whether a file belongs to a campaign; without a store, it was left by one that was killed at its start."""
-    return name in (LOCK_FILE, SUAVE_FOLDER, *FILES) or name.startswith((STORE_FILE, NEW_STORE_FILE))
+def _check_size(campaign: Campaign) -> None:
+    """Check that a very large campaign is intended, and that the exemplar's files can have its results."""
+    spec, total = campaign.spec, campaign.planned
+    if total > _LARGE and not spec.confirmed:
+        hours = total / (_MISSIONS_A_SECOND * spec.processes) / 3600.0
+        problem = f"{total:,} missions take about {hours:,.1f} hours at {_MISSIONS_A_SECOND} a second for each worker"
+        raise InputError(problem, remedy="confirm with --yes")
+    if spec.suave_format and campaign.variation.sweep.points > 1:
+        remedy = "omit --format suave, or run a campaign for each point"
+        raise InputError("the exemplar's results file has no columns for swept values", remedy=remedy)
 
 
-class _Campaign:
-    """A campaign whose input is read and checked.
+def _run(
+    stack: ExitStack,
+    spec: CampaignSpec,
+    read: Callable[[], Campaign],
+    store: Store | None,
+    on_progress: OnProgress | None,
+) -> CampaignResult:
+    """Check a campaign, run the missions that are not done yet, and write the files.
 
     Args:
-        spec: what to run.
-        file: the campaign file, if the specification names one.
-        stack: stops at its end whatever the campaign starts.
-        loaded: the scenario; None: it is read.
+        stack: of what is to be closed at the end.
+        spec: the whole specification.
+        read: reads the campaign.
+        store: of the campaign that is resumed; None: it is new.
+        on_progress: called when missions are done.
     """
+    executor: Executor = in_process
+    spec.check()
+    if spec.processes > 1 and spec.scheduler is None:  # at once: they import while this process reads and checks
+        executor = stack.enter_context(LocalWorkers(spec.managers, spec.processes)).outcomes
+    campaign = read()
+    inputs = check_campaign(campaign)
+    if spec.scheduler is not None:
+        from suave_des.campaign.cluster import connected
 
-    def __init__(
-        self, spec: CampaignSpec, file: CampaignFile | None, stack: ExitStack, loaded: LoadedScenario | None = None
-    ) -> None:
-        self.spec = spec = spec.with_file(file)
-        end_worker_of_script(spec.managers, spec.processes)
-        try:
-            spec.check()
-        except InputError as error:
-            raise error if file is None or "until_ci" not in spec.from_file else file.located(error) from None
-        self._stack = stack
-        self._local = self._start_workers()
-        self.loaded, self.variation, self.inputs = read_inputs(spec, file, loaded)
-        if "time_out_s" in spec.from_file and not (file is not None and file.sets("time_out_s")):
-            self.spec = spec = replace(spec, time_out_s=default_time_out_s(self.loaded, self.variation))
-        self.job = JobSpec(
-            self.loaded, self.variation, spec.managers, spec.seed, spec.time_out_s, spec.record_knowledge
-        )
-        self.tracker = self._new_tracker()
-        self.remarks: tuple[Remark, ...] = ()
-
-    def _start_workers(self) -> Executor:
-        """Start worker processes at once: they import what they need while this process reads and checks."""
-        workers = self.spec.processes
-        if workers == 1 or self.spec.scheduler is not None:
-            return InProcess()
-        return self._stack.enter_context(LocalWorkers(self.spec.managers, workers))
-
-    def _executor(self) -> Executor:
-        """Return the executor; a cluster is contacted only when everything else is checked."""
-        if self.spec.scheduler is None:
-            return self._local
-        from suave_des.campaign.executors.dask_cluster import connected
-
-        return self._stack.enter_context(connected(self.spec.scheduler))
-
-    def _new_tracker(self) -> ProgressTracker:
-        spec = self.spec
-        points, sharing = self.variation.sweep.points, self.variation.runs_sharing_draw
-        return ProgressTracker(points, spec.managers, spec.runs, spec.until, sharing)
-
-    def run(self, on_progress: OnProgress | None, *, resumed: bool) -> CampaignResult:
-        """Run the missions that are not done yet, and write the files."""
-        executor, folder = self._executor(), self.spec.out
-        with ExitStack() as stack:
+        executor = stack.enter_context(connected(spec.scheduler)).outcomes
+    folder, is_new = spec.out, store is None
+    decides = deciding(campaign, inputs)
+    about = {"request": campaign.request.stored(), "deciding": decides, "identity": identity(decides)}
+    if store is None:
+        store = stack.enter_context(_new_store(folder, about))
+        if folder is not None:
+            note_own(campaign, folder)
+    elif folder is not None:
+        with store.reading():
+            check_same(store.about("deciding"), decides, folder)
+        check_no_link(folder)
+        remove_parts(folder, FILES)
+        store.forget_passing_failures()
+        for name, value in about.items():
+            store.note(name, value)
+    stopped, remarks = _work(campaign, store, executor, on_progress)
+    if stopped is not None and ((is_new and store.count() == 0) or isinstance(stopped, InputError)):
+        raise stopped
+    command = f"suave-des campaign --resume {folder}"
+    if isinstance(stopped, StoreError):
+        kept = folder is not None and has_campaign(folder)
+        raise StoreError(f"{stopped}{f'; what was kept before is safe: {command} runs the rest' if kept else ''}")
+    try:
+        with store.reading():
+            result = gather(campaign, store.outcomes, (*map(str, remarks), *trained_on(campaign)))
             if folder is not None:
-                if not folder.exists():
-                    stack.callback(_remove_empty, folder)  # unless something is in it then
-                make_output_folder(folder)
-                stack.enter_context(locked(folder))
-                remove_parts(folder, FILES)
-            if not resumed:
-                stack.callback(self._remove_store_if_empty)
-            store = self._store(resumed=resumed)
-            try:
-                stopped = self._work(store, executor, on_progress)
-                is_empty = store.count() == 0
-            finally:
-                if folder is not None:
-                    store.close()
-            if stopped is not None and is_empty and not resumed:
-                raise stopped
-            if isinstance(stopped, StoreError):
-                raise StoreError(f"{stopped}{self._how_to_go_on()}") from None
-            if isinstance(stopped, InputError):
-                raise stopped
-            try:
-                result = self._results(store, is_whole=stopped is None)
-            except KeyboardInterrupt:
-                if folder is None:
-                    raise
-                raise KeyboardInterrupt(f"interrupted; {self._how_to_have_files()}") from None
-        if isinstance(stopped, WorkerError):
-            raise WorkerError(f"{stopped}; {result.kept()}")
-        if stopped is not None:
-            raise CampaignInterrupted(result)
-        return result
-
-    def _store(self, *, resumed: bool) -> Store:
-        folder = self.spec.out
+                hashes = {**inputs, **(campaign.file.inputs if campaign.file else {})}
+                made = provenance(campaign.loaded, hashes, campaign.spec.command)
+                result.write({**made, "campaign_sha256": about["identity"]})
+    except (KeyboardInterrupt, InputError) as error:
+        how = f"nothing is lost: {command} writes the files"
         if folder is None:
-            return Store(None)
-        decides = deciding(self.spec, self.loaded, self.inputs)
-        about = {"request": self.spec.stored(), "deciding": decides, "identity": identity(decides)}
-        path = folder / STORE_FILE
-        if not resumed:
-            remove_results(folder, FILES)  # first, or a kill would leave them beside the new campaign
-            make_store(path, about)
-        store = Store(path)
-        try:
-            if resumed:
-                check_same(store.about("deciding"), decides, folder)
-                store.forget_passing_failures()
-                for name, value in about.items():
-                    store.note(name, value)
-        except BaseException:
-            store.close()
             raise
-        return store
+        if isinstance(error, KeyboardInterrupt):
+            raise KeyboardInterrupt(f"interrupted; {how}") from None
+        raise InputError(error.problem, file=error.file, remedy=how) from None
+    if isinstance(stopped, WorkerError):
+        raise WorkerError(f"{stopped}; {result.kept()}")
+    if stopped is not None:
+        raise CampaignInterrupted(result)
+    return result
 
-    def _work(
-        self, store: Store, executor: Executor, on_progress: OnProgress | None
-    ) -> KeyboardInterrupt | SuaveDesError | None:
-        """Run missions until all are done; return what stopped the campaign before that."""
-        tracker, spec, alike = self.tracker, self.spec, FirstFailures(self.spec.managers)
-        remarks: dict[tuple[str, ...], int] = {
-            (manager, text): count for manager, text, count in store.about("remarks", default=[])
-        }
-        try:
-            tracker.add_earlier(store.outcomes())
-            points = self.variation.sweep.points
-            missions = plan(
-                points, len(spec.managers), spec.runs, store.settled, tracker.is_over, run_by_run=tracker.needs_pairs
-            )
-            if left := tracker.total - tracker.done:
-                for among in executor.outcomes(self.job, missions, left):
-                    finished = [(key, each) for key, each in among if not isinstance(each, Remark)]
-                    for _, each in among:
-                        if isinstance(each, Remark):
-                            remarks[each[:2]] = remarks.get(each[:2], 0) + each.times
-                    store.append(finished)
-                    alike.check(finished)
-                    tracker.add(finished)
-                    if on_progress is not None:
-                        on_progress(tracker.progress())
-            store.commit()
-            self.remarks = tuple(Remark(manager, text, count) for (manager, text), count in sorted(remarks.items()))
-            if self.remarks:
-                store.note("remarks", self.remarks)
-        except (KeyboardInterrupt, SuaveDesError) as error:
-            if not isinstance(error, StoreError):
-                with suppress(StoreError):  # which is reported when the files cannot be written either
-                    store.commit()
-            return error
-        return None
 
-    def _results(self, store: Store, *, is_whole: bool) -> CampaignResult:
-        outcomes, tracker = self._outcomes(store), self.tracker
-        if not is_whole:  # it may have been interrupted while it counted
-            tracker = self._new_tracker()
-            tracker.add(outcomes())
-        seen = trained_on(self.loaded, self.spec.managers, self.spec.seed, self.spec.runs)
-        remarks = (*map(str, self.remarks), *seen)
-        result = gather(self.spec, self.loaded, self.variation, outcomes, tracker, remarks)
-        if self.spec.out is not None:
-            try:
-                write_results(result, self.inputs, identity(deciding(self.spec, self.loaded, self.inputs)))
-            except InputError as error:
-                raise InputError(error.problem, file=error.file, remedy=self._how_to_have_files()) from None
-        return result
-
-    def _outcomes(self, store: Store) -> Callable[[], Iterator[Finished]]:
-        if self.spec.out is None:
-            return store.outcomes
-        path = self.spec.out / STORE_FILE
-        return lambda: stored_outcomes(path)
-
-    def _remove_store_if_empty(self) -> None:
-        """Remove a store without outcomes; one that cannot be read stays."""
-        if self.spec.out is not None:
-            with suppress(SuaveDesError):
-                if next(stored_outcomes(self.spec.out / STORE_FILE), None) is None:
-                    remove_store(self.spec.out)
-
-    def _how_to_have_files(self) -> str:
-        return f"nothing is lost: suave-des campaign --resume {self.spec.out} writes the files"
-
-    def _how_to_go_on(self) -> str:
-        if self.spec.out is None or not (self.spec.out / STORE_FILE).exists():
-            return ""
-        return f"; what was kept before is safe: suave-des campaign --resume {self.spec.out} runs the rest"
+@contextmanager
+def _new_store(folder: Path | None, about: Mapping[str, Any]) -> Iterator[Store]:
+    """Begin the store of a new campaign, in its folder or a temporary one; what is left empty is removed."""
+    if folder is None:
+        store = Store(None)
+        store.begin(about)
+        yield store  # whose result reads it
+        return
+    with ExitStack() as stack:
+        if not folder.exists():
+            stack.callback(_remove_empty, folder)
+        make_output_folder(folder)
+        check_no_link(folder)
+        store = Store(folder / STORE_FILE, replace=True)
+        stack.callback(store.close, keep_empty=False)
+        remove_parts(folder, FILES)
+        remove_results(folder, FILES)  # first, or a kill would leave them beside the new campaign
+        store.begin(about)
+        yield store
 
 
 def _remove_empty(folder: Path) -> None:
     with suppress(OSError):
         folder.rmdir()
+
+
+def _work(
+    campaign: Campaign, store: Store, executor: Executor, on_progress: OnProgress | None
+) -> tuple[KeyboardInterrupt | SuaveDesError | None, list[Remark]]:
+    """Run missions until all are done; return what stopped the campaign before that, and remarks about managers."""
+    spec, variation = campaign.spec, campaign.variation
+    tracker = ProgressTracker(variation.sweep.points, spec.managers, spec.runs, variation.runs_sharing_draw)
+    with store.reading():
+        remarks = {(manager, text): int(count) for manager, text, count in store.about("remarks", default=[])}
+    stopped: KeyboardInterrupt | SuaveDesError | None = None
+    try:
+        with store.reading():
+            tracker.add(store.outcomes())
+        if left := tracker.total - tracker.done:
+            for among in executor(campaign, campaign.missions(store.settled), left):
+                finished = []
+                for key, each in among:
+                    if isinstance(each, Remark):
+                        remarks[each.manager, each.text] = remarks.get((each.manager, each.text), 0) + each.times
+                    else:
+                        finished.append((key, each))
+                store.append(finished)
+                tracker.add(finished)
+                if on_progress is not None:
+                    on_progress(tracker.progress())
+        store.commit()
+    except (KeyboardInterrupt, SuaveDesError) as error:
+        stopped = error
+    told = [Remark(manager, text, count) for (manager, text), count in sorted(remarks.items())]
+    with suppress(StoreError):  # which is reported when the files cannot be written either
+        store.commit()
+        if told:
+            store.note("remarks", told)
+    return stopped, told

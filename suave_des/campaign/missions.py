@@ -1,124 +1,44 @@
-"""The missions of a campaign: their keys, the job that they share, and their outcomes."""
+"""A campaign's missions: which have to be run, what they share, how one is run within its time, and what comes out."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator
-from dataclasses import dataclass, fields
+import ctypes
+import signal
+import threading
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from itertools import product
-from operator import attrgetter
-from typing import NamedTuple, Protocol
+from types import FrameType
+from typing import TYPE_CHECKING, NamedTuple
 
-from suave_des.campaign.variation import Variation
+from suave_des.campaign.spec import CampaignFile, CampaignSpec, check_range
+from suave_des.campaign.variation import Variation, cell_of, short_mission
 from suave_des.errors import MissionError, SuaveDesError
-from suave_des.files import rounded
-from suave_des.metrics.result import MissionMetrics, MissionResult
+from suave_des.interrupts import alarm, handled
+from suave_des.metrics.result import MissionResult
+from suave_des.records.knowledge import mission_line
+from suave_des.records.metrics import Row, further_of, row_of
+from suave_des.records.store import MissionFailure, MissionKey
+from suave_des.registry import is_built_in, is_installed
 from suave_des.scenario.loader import LoadedScenario
 
+if TYPE_CHECKING:
+    from suave_des.simulation.simulator import Simulator
 
-class MissionKey(NamedTuple):
-    """The key of a mission in a campaign; missions and their rows are in the order of their keys.
-
-    Attributes:
-        point: number of the sweep's point, from 0; 0 without a sweep.
-        manager: index among the campaign's managers, from 0.
-        run: number of the run, from 1; runs with the same number use common random numbers under all managers and at
-            all points.
-    """
-
-    point: int
-    manager: int
-    run: int
-
-
-Chunk = tuple[MissionKey, ...]
-MissionGroup = tuple[int, int]
-"""Point and manager: the missions that differ in the run only."""
-
-
-def plan(
-    points: int,
-    managers: int,
-    runs: int,
-    settled: Callable[[MissionGroup], Collection[int]],
-    is_over: Callable[[MissionGroup, int], bool],
-    *,
-    run_by_run: bool,
-) -> Iterator[MissionKey]:
-    """Yield the missions that have yet to be run, in order.
-
-    Args:
-        points: number of points of the sweep.
-        managers: number of managers.
-        runs: for each manager at each point.
-        settled: returns the runs of a group that need not be run; called once for each group, when its turn comes.
-        is_over: returns whether a group needs neither a run nor later ones; called before each.
-        run_by_run: whether a run is planned under all managers before the next one, so that their difference is known.
-    """
-    together = [range(managers)] if run_by_run else [range(manager, manager + 1) for manager in range(managers)]
-    for point, group in product(range(points), together):
-        known = {manager: settled((point, manager)) for manager in group}
-        for run in range(1, runs + 1):
-            left = [manager for manager in group if not is_over((point, manager), run)]
-            if not left:
-                break
-            yield from (MissionKey(point, manager, run) for manager in left if run not in known[manager])
-
-
-COLUMN_TYPES = {field.name: str(field.type).removesuffix(" | None") for field in fields(MissionMetrics)}
-"""Columns of runs.csv that every campaign has, and the names of their types."""
-COLUMNS = tuple(COLUMN_TYPES)
-
-Cell = str | int | float | bool | None
-Row = tuple[Cell, ...]
-
-_cells: Callable[[MissionMetrics], Row] = attrgetter(*COLUMNS)
-
-
-def row_of(metrics: MissionMetrics) -> Row:
-    """Return the cells of runs.csv, rounded as in the file, from which all statistics are computed."""
-    return tuple(map(rounded, _cells(metrics)))
-
-
-def further_of(result: MissionResult) -> Row:
-    """Return the cells of the columns that the scenario asks for, rounded likewise."""
-    return tuple(map(rounded, result.further.values()))
-
-
-class MissionFailure(NamedTuple):
-    """A mission that has no row.
-
-    Attributes:
-        manager: name of the managing subsystem.
-        run: number of the run.
-        time_s: mission time at which it happened; None if that is not known.
-        cause: the manager's exception, or another reason why the mission ended.
-        lasting: whether the mission itself failed; a time-out or a worker that was killed may not happen again, so a
-            resumed campaign runs such a mission once more.
-        point: of the sweep, from 0.
-    """
-
-    manager: str
-    run: int
-    time_s: float | None
-    cause: str
-    lasting: bool = True
-    point: int = 0
-
-    def __str__(self) -> str:
-        """Return all that is known, in one line."""
-        if self.time_s is None:
-            return f"manager {self.manager}, run {self.run}: {self.cause}"
-        return str(MissionError(self.manager, self.run, self.time_s, self.cause))
+NOT_REPEATABLE = (
+    "a mission that was run again in the same process gave another row: the class keeps state from one mission"
+    " to the next, or has its own source of randomness, so results depend on the number of workers."
+    " To learn, use `suave-des train`; for random numbers, system.stream"
+)
+_REPEATED_AFTER = {2, *(4**power for power in range(1, 11))}
+"""Missions of a manager in a process after which its first is run again, as its class may keep state"""
+_REPEAT_S = 1.0
+"""A mission that swallowed the interruption is interrupted again after this time."""
 
 
 class Remark(NamedTuple):
-    """A remark about a manager for users; it is delivered among the outcomes.
-
-    Attributes:
-        manager: name of the managing subsystem.
-        text: what.
-        times: number of occurrences; 0 if irrelevant.
-    """
+    """A remark about a manager for users, delivered among the outcomes; times is 0 where counting says nothing."""
 
     manager: str
     text: str
@@ -129,56 +49,203 @@ class Remark(NamedTuple):
         return f"manager {self.manager}: {self.text}{f' ({self.times} times)' if self.times > 1 else ''}"
 
 
-MissionOutcome = Row | MissionFailure | Remark
-Finished = tuple[MissionKey, MissionOutcome]
-
-
-@dataclass(frozen=True)
-class JobSpec:
-    """Everything that a worker needs apart from the missions' keys; it is sent by value.
-
-    Attributes:
-        loaded: the scenario with its files.
-        variation: differences between missions apart from manager and run.
-        managers: names, in the campaign's order.
-        seed: the campaign's.
-        time_out_s: wall-clock time that a mission may take.
-        record_knowledge: whether each row is followed by a cell with the mission's line of knowledge_states.jsonl.
-    """
-
-    loaded: LoadedScenario
-    variation: Variation
-    managers: tuple[str, ...]
-    seed: int
-    time_out_s: float
-    record_knowledge: bool = False
-
-    def failed(self, key: MissionKey, cause: str) -> Finished:
-        """Return the outcome of a mission whose process was ended."""
-        return key, MissionFailure(self.managers[key.manager], key.run, None, cause, lasting=False, point=key.point)
-
-    def timed_out(self, key: MissionKey) -> Finished:
-        """Return the outcome of a mission that took too long."""
-        return self.failed(key, f"not done after {self.time_out_s:g} s (time-out)")
-
-
-class Executor(Protocol):
-    """Runs missions somewhere: in this process, in worker processes, or on a cluster."""
-
-    def outcomes(self, job: JobSpec, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
-        """Yield the outcomes of all missions, some at a time, in the order in which they finish.
-
-        Args:
-            job: what the missions have in common.
-            missions: to run; each is requested only when a worker has room for it.
-            total: about how many there are.
-
-        Raises:
-            InputError: the scenario, a manager or the knowledge base cannot be used at all.
-            WorkerError: workers end before their work is done, again and again.
-        """
-        ...
+Chunk = tuple[MissionKey, ...]
+Finished = tuple[MissionKey, Row | MissionFailure | Remark]
 
 
 class WorkerError(SuaveDesError):
     """Missions cannot be run, because the processes that should run them die."""
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A campaign that was read: everything that its missions share. It is sent to workers by value.
+
+    Attributes:
+        request: what was given of the specification; the rest is left to the campaign file.
+        spec: the whole specification.
+        loaded: its scenario.
+        variation: what differs between its missions besides manager and run.
+        file: the campaign file, if there is one.
+        inputs: SHA-256 of the ensemble's file by its name, if there is one.
+    """
+
+    request: CampaignSpec
+    spec: CampaignSpec
+    loaded: LoadedScenario
+    variation: Variation
+    file: CampaignFile | None
+    inputs: Mapping[str, str]
+
+    @property
+    def planned(self) -> int:
+        """Number of missions."""
+        return self.variation.sweep.points * len(self.spec.managers) * self.spec.runs
+
+    def missions(self, settled: Callable[[int, int], Collection[int]]) -> Iterator[MissionKey]:
+        """Yield the missions that have yet to be run, in order.
+
+        Args:
+            settled: returns the runs of a manager at a point that need not be run; called when their turn comes.
+        """
+        for point, manager in product(range(self.variation.sweep.points), range(len(self.spec.managers))):
+            known = settled(point, manager)
+            yield from (MissionKey(point, manager, run) for run in range(1, self.spec.runs + 1) if run not in known)
+
+    def scenarios(self) -> Iterator[LoadedScenario]:
+        """Yield scenarios that together have every swept value of what managers and functions are set to."""
+        if any(path.startswith(("managers.", "functions.")) for path in self.variation.paths.values()):
+            for point in sorted(set(self.variation.sweep.each_value())):
+                yield self.variation.scenario(self.loaded, point)
+        else:
+            yield self.loaded
+
+    def code(self) -> tuple[str, ...]:
+        """Return the managers and the classes of functions that it runs and that no package has installed."""
+        nodes = [each.node for scenario in self.scenarios() for each in scenario.scenario.functions.values()]
+        managers = [name for name in self.spec.managers if not is_installed(name)]
+        return tuple(dict.fromkeys([*managers, *(node for node in nodes if ":" in node)]))
+
+    def failed(self, key: MissionKey, cause: str) -> tuple[MissionKey, MissionFailure]:
+        """Return the outcome of a mission whose process was ended."""
+        manager = self.spec.managers[key.manager]
+        return key, MissionFailure(manager, key.run, None, cause, lasting=False, point=key.point)
+
+    def timed_out(self, key: MissionKey) -> tuple[MissionKey, MissionFailure]:
+        """Return the outcome of a mission that took too long."""
+        return self.failed(key, f"not done after {self.spec.time_out_s:g} s (time-out)")
+
+
+Executor = Callable[[Campaign, Iterable[MissionKey], int], Iterator[list[Finished]]]
+"""Runs missions somewhere: in this process, in worker processes, or on a cluster.
+
+It takes the campaign, the keys of missions, each of which is requested only when a worker has room for it, and about
+how many they are. It yields their outcomes, some at a time, in the order in which they finish. It raises InputError if
+the scenario, a manager or the knowledge base cannot be used at all, and WorkerError if workers end again and again.
+"""
+
+
+class MissionRunner:
+    """Runs missions of one campaign in this process."""
+
+    def __init__(self, campaign: Campaign) -> None:
+        self.campaign, self._variation = campaign, campaign.variation
+        # Load or compile what missions run, before the first one's time counts: a mission of a second does.
+        short_mission(campaign.loaded)
+        self._point, self._simulators = -1, dict[int | None, "Simulator"]()
+        self._first: dict[int, tuple[MissionKey, Row | MissionFailure]] = {}
+        self._number: dict[int, int] = {}
+
+    def run(self, manager: str, run: int, point: int = 0) -> tuple[LoadedScenario, MissionResult]:
+        """Run a mission again, with its record; return its scenario and result.
+
+        Args:
+            manager: one of the campaign's.
+            run: number of the run.
+            point: of its sweep, 0 without one.
+
+        Raises:
+            InputError: the campaign has no such run or point.
+            MissionError: the manager raised.
+        """
+        check_range("run", run, 1, self.campaign.spec.runs)
+        check_range("point", point, 0, self._variation.sweep.points - 1)
+        simulator = self._simulator(point, run)
+        return simulator.loaded, simulator.run(manager, run, self.campaign.spec.seed, record=True)
+
+    def each(self, missions: Iterable[MissionKey]) -> Iterator[Finished]:
+        """Yield the outcome of each mission, in order.
+
+        Raises:
+            InputError: the scenario, a manager or the knowledge base cannot be used at all.
+        """
+        for key in missions:
+            manager = self.campaign.spec.managers[key.manager]
+            outcome, remarks = self._outcome(key)
+            yield key, outcome
+            if not is_built_in(manager) and not isinstance(outcome, MissionFailure) and self._differs(key, outcome):
+                yield key, Remark(manager, NOT_REPEATABLE)
+            for remark in remarks:
+                yield key, remark
+
+    def _differs(self, key: MissionKey, outcome: Row | MissionFailure) -> bool:
+        """Whether a manager's first mission in this process gives another outcome when it is run again."""
+        first, before = self._first.setdefault(key.manager, (key, outcome))
+        self._number[key.manager] = number = self._number.get(key.manager, 0) + 1
+        if number not in _REPEATED_AFTER:
+            return False
+        again, _ = self._outcome(first)
+        return again != before and not (isinstance(again, MissionFailure) and not again.lasting)
+
+    def _outcome(self, key: MissionKey) -> tuple[Row | MissionFailure, list[Remark]]:
+        """Run a mission; return its outcome, and what its manager's author should know."""
+        spec, variation, manager = self.campaign.spec, self._variation, self.campaign.spec.managers[key.manager]
+        simulator = self._simulator(key.point, key.run)
+        try:
+            with _time_limit(spec.time_out_s):
+                result = simulator.run(manager, key.run, spec.seed, record=spec.record_knowledge)
+        except MissionError as error:
+            return MissionFailure(error.manager, error.run, error.time_s, error.cause, point=key.point), []
+        except MissionTimeOut:
+            return self.campaign.timed_out(key)[1], []
+        values, member = variation.sweep.values(key.point), variation.member(key.run)
+        drawn = (result.drawn[path] for path in variation.drawn)
+        members = () if member is None else (member,)
+        row = (*row_of(result.metrics), *map(cell_of, values.values()), *drawn, *members, *further_of(result))
+        if spec.record_knowledge:
+            swept = {variation.paths[name]: value for name, value in values.items()}
+            known = mission_line(manager, key.point, key.run, result.knowledge, swept) if result.knowledge else ""
+            row = (*row, known)
+        remarks = [Remark(manager, text, count) for text, count in result.refused.items()]
+        return row, [*remarks, *(Remark(manager, text, 0) for text in result.remarks)]
+
+    def _simulator(self, point: int, run: int) -> Simulator:
+        """Return the simulator of a point and of a run's member of the ensemble; missions come point by point."""
+        from suave_des.simulation.simulator import Simulator  # with it comes the compiler, which takes a while
+
+        variation, member = self._variation, self._variation.member(run)
+        if point != self._point:
+            self._point, self._simulators = point, {}
+        if member not in self._simulators:
+            loaded = variation.scenario(self.campaign.loaded, point, member)
+            self._simulators[member] = Simulator(loaded, dict.fromkeys(variation.drawn, variation.runs_per_draw))
+        return self._simulators[member]
+
+
+# Time limits, so that a manager that never returns costs its own mission only.
+
+
+class MissionTimeOut(BaseException):
+    """A mission took too long; not an Exception, so that a manager that catches those does not catch this."""
+
+
+@contextmanager
+def _time_limit(seconds: float) -> Iterator[None]:
+    """Raise MissionTimeOut in the block when it takes longer, and again while it swallows that.
+
+    The alarm signal reaches the main thread in whatever it waits for; other threads when they return to Python.
+    """
+    if threading.current_thread() is threading.main_thread():
+        with handled([signal.SIGALRM], _raise), alarm(seconds, _REPEAT_S):
+            yield
+        return
+    thread, over = ctypes.c_ulong(threading.get_ident()), threading.Event()
+
+    def watch() -> None:
+        wait_s = seconds
+        while not over.wait(wait_s):
+            wait_s = _REPEAT_S
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(thread, ctypes.py_object(MissionTimeOut))
+
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    try:
+        yield
+    finally:
+        over.set()
+        watcher.join()
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(thread, None)  # of one that comes too late
+
+
+def _raise(number: int, frame: FrameType | None) -> None:
+    raise MissionTimeOut

@@ -1,33 +1,22 @@
-"""Single missions: outside campaigns, repeated from a campaign, and for training."""
+"""Single missions: with their whole record, and for training."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import chdir, closing, contextmanager
-from dataclasses import astuple, dataclass, fields
-from operator import attrgetter
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Unpack
 
-from suave_des.campaign.inputs import check_inputs, check_trusted, provenance, read_inputs
-from suave_des.campaign.knowledge_records import KNOWLEDGE_FILE, knowledge_text
-from suave_des.campaign.missions import COLUMNS, further_of, row_of
-from suave_des.campaign.spec import RUNS_LIMIT, CampaignSpec, check_range, check_seed, read_campaign_file
-from suave_des.campaign.store import STORE_FILE, Store
-from suave_des.campaign.variation import Variation
-from suave_des.errors import InputError, did_you_mean
-from suave_des.files import check_output_file, check_output_folder, csv_text, json_text, make_output_folder, write_files
-from suave_des.managing.learned import Learned, read_file
-from suave_des.metrics.result import Event, MissionMetrics, MissionResult, TrajectoryPoint
+from suave_des.campaign.inputs import check_inputs, provenance
+from suave_des.campaign.spec import RUNS_LIMIT, check_range, check_seed
+from suave_des.errors import InputError
+from suave_des.files import check_output_file, check_output_folder, make_output_folder, write_files
+from suave_des.learned import Learned, read_file
+from suave_des.metrics.result import MissionMetrics, MissionResult
+from suave_des.records.knowledge import KNOWLEDGE_FILE
+from suave_des.records.mission_folder import mission_files
 from suave_des.registry import ManagerLike, name_of
 from suave_des.scenario.loader import LoadedScenario, Replacements, load_scenario
 from suave_des.simulation.simulator import Simulator
-
-MISSION_FILE, EVENTS_FILE, TRAJECTORY_FILE = "mission.json", "events.csv", "trajectory.csv"
-
-EVENT_COLUMNS = tuple(field.name for field in fields(Event))
-TRAJECTORY_COLUMNS = tuple(field.name for field in fields(TrajectoryPoint) if field.name != "further")
-"""Columns that every trajectory.csv has."""
 
 
 def run_mission(
@@ -72,37 +61,13 @@ def run_mission(
     name = name_of(manager)
     loaded = load_scenario(scenario, **replacements)
     given = any(replacements.get(each) for each in ("ontologies", "rules", "disabled_rules"))
-    inputs = check_inputs(loaded, [name], given=given)
+    inputs = check_inputs([loaded], [name], given=given)
     result = Simulator(loaded).run(name, run, seed, record=True, on_time=on_time)
     if folder is not None:
         make_output_folder(folder)
-        write_files(folder, _files(loaded, result, inputs, command), stale=(KNOWLEDGE_FILE,))
+        files = mission_files(result, loaded.scenario, provenance(loaded, inputs, command))
+        write_files(folder, files, stale=(KNOWLEDGE_FILE,))
     return result
-
-
-def _files(
-    loaded: LoadedScenario, result: MissionResult, inputs: Mapping[str, str], command: Sequence[str]
-) -> dict[str, str]:
-    mission = {
-        "metrics": dict(zip((*COLUMNS, *result.further), (*row_of(result.metrics), *further_of(result)), strict=True)),
-        "drawn": dict(sorted(result.drawn.items())),
-        "scenario": loaded.scenario.model_dump(mode="json"),
-        **provenance(loaded, inputs, command),
-    }
-    files = {
-        MISSION_FILE: json_text(mission),
-        EVENTS_FILE: csv_text(EVENT_COLUMNS, map(astuple, result.events)),
-        TRAJECTORY_FILE: _trajectory_text(result.trajectory),
-    }
-    if result.knowledge:
-        files[KNOWLEDGE_FILE] = knowledge_text(result.knowledge)
-    return files
-
-
-def _trajectory_text(points: Sequence[TrajectoryPoint]) -> str:
-    cells, further = attrgetter(*TRAJECTORY_COLUMNS), tuple(points[0].further)
-    rows = ((*cells(point), *(point.further[name] for name in further)) for point in points)
-    return csv_text((*TRAJECTORY_COLUMNS, *further), rows)
 
 
 # Training: missions in one process, in the order of their runs, and a file at the end.
@@ -130,7 +95,7 @@ def train(
 
     Args:
         scenario: path of a scenario file, or name of a shipped one.
-        manager: name, or module:Class; it keeps what it learns in `system.learned`.
+        manager: name, or module:Class; it keeps what it learns in the dict that its hook `recall` is given.
         missions: how many: runs 1 to that.
         out: file to write.
         seed: of everything that is random.
@@ -147,14 +112,18 @@ def train(
     check_range("missions", missions, 1, RUNS_LIMIT)
     check_seed(seed)
     loaded = load_scenario(scenario, **replacements)
-    inputs = check_inputs(loaded, [manager], given=False)
-    learned: dict[str, Any] = {} if start is None else dict(read_file(Path(start)).learned)
+    inputs = check_inputs([loaded], [manager], given=False)
+    before = None if start is None else read_file(Path(start))
+    learned: dict[str, Any] = {} if before is None else dict(before.learned)
     simulator = Simulator(loaded, training={manager: learned})
     for run in range(1, missions + 1):
         on_mission(simulator.run(manager, run, seed).metrics)
     if not learned:
-        raise InputError(f"manager {manager} has learned nothing", remedy="store training results in system.learned")
-    result = Learned(manager, loaded.scenario.name, seed, missions, dict(sorted(inputs.items())), learned)
+        remedy = "keep what it learns in the dict that the hook recall is given"
+        raise InputError(f"manager {manager} has learned nothing", remedy=remedy)
+    read = dict(sorted({**loaded.inputs, **inputs}.items()))
+    earlier = () if before is None else before.trainings
+    result = Learned(manager, loaded.scenario.name, seed, missions, read, learned, earlier)
     write_files(Path(out).parent, {Path(out).name: result.text()})
     return result
 
@@ -164,74 +133,3 @@ def blocks(values: Sequence[float], count: int = 10) -> list[tuple[int, int, flo
     size = max(1, -(-len(values) // count))
     parts = [values[first : first + size] for first in range(0, len(values), size)]
     return [(n * size + 1, n * size + len(part), sum(part) / len(part)) for n, part in enumerate(parts)]
-
-
-@dataclass(frozen=True)
-class OpenedCampaign:
-    """A campaign whose missions can be run again.
-
-    Attributes:
-        spec: its specification.
-        loaded: its scenario.
-        variation: what differs between its missions besides manager and run.
-    """
-
-    spec: CampaignSpec
-    loaded: LoadedScenario
-    variation: Variation
-
-    def simulator(self, point: int = 0, run: int | None = None) -> Simulator:
-        """Make what runs the missions of a point of the sweep, 0 without one; with an ensemble, those of a run.
-
-        Raises:
-            InputError: there is no such point.
-        """
-        if not 0 <= point < self.variation.sweep.points:
-            remedy = f"its sweep has the points 0 to {self.variation.sweep.points - 1}"
-            raise InputError(f"the campaign has no point {point}", remedy=remedy)
-        loaded = self.variation.scenario(self.loaded, point, None if run is None else self.variation.member(run))
-        return Simulator(loaded, dict.fromkeys(self.variation.drawn, self.spec.runs_per_draw))
-
-    def run(self, manager: str, run: int, point: int = 0, *, simulator: Simulator | None = None) -> MissionResult:
-        """Run a mission of the campaign again, with its record.
-
-        Raises:
-            InputError: the campaign has no such manager, run or point.
-            MissionError: the manager raised.
-        """
-        if manager not in self.spec.managers:
-            remedy = did_you_mean(manager, self.spec.managers, "its managers")
-            raise InputError(f"the campaign has no manager {manager!r}", remedy=remedy)
-        if not 1 <= run <= self.spec.runs:
-            raise InputError(f"the campaign has no run {run}", remedy=f"it has runs 1 to {self.spec.runs}")
-        if simulator is None or self.variation.ensemble is not None:
-            simulator = self.simulator(point, run)
-        return simulator.run(manager, run, self.spec.seed, record=True)
-
-
-@contextmanager
-def opened_campaign(folder: Path, named: Collection[str] = ()) -> Iterator[OpenedCampaign]:
-    """Open a campaign, to run missions of it again; what it names is looked up where it was started.
-
-    Args:
-        folder: the campaign's.
-        named: managers that the user has named: their code may run, see `check_trusted`.
-
-    Raises:
-        InputError: there is no campaign in the folder, its inputs no longer exist, or it names managers
-            that are neither installed nor named.
-    """
-    path = (folder / STORE_FILE).absolute()
-    if not path.is_file():
-        remedy = "give the --out folder of suave-des run or campaign"
-        raise InputError("has no campaign whose missions can be run again", file=folder, remedy=remedy)
-    with closing(Store(path)) as store:
-        spec = CampaignSpec.of_stored(store.about("request"))
-    started_in = Path(spec.folder)
-    with chdir(started_in if started_in.is_dir() else Path.cwd()):
-        file = read_campaign_file(spec.scenario)
-        spec = spec.with_file(file)
-        check_trusted(spec.managers, named, folder, confirmed=False)
-        spec.check()
-        loaded, variation, _ = read_inputs(spec, file)
-        yield OpenedCampaign(spec, loaded, variation)

@@ -1,6 +1,9 @@
-"""Differences between a campaign's missions apart from manager and run: a sweep, and each run's draws.
+"""Differences between a campaign's missions apart from manager and run: a sweep, each run's draws, and an ensemble.
 
-The points of a sweep follow from the campaign's seed and their number, so that any worker finds the same.
+The points of a sweep follow from the campaign's seed and their number, so that any worker finds the same. An ensemble
+has parameter sets that fit the real runs equally well: unknown parameters of the real vehicle and its software are not
+noise, but the same in all its missions. Each run has one of its members, the same under all managers, so that a
+difference between managers can be analysed member by member.
 """
 
 from __future__ import annotations
@@ -8,70 +11,109 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import islice
-from typing import Any
+from itertools import combinations, groupby, islice
+from pathlib import Path
+from statistics import fmean, stdev
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import AfterValidator, Field, TypeAdapter, ValidationError, model_validator
 
-from suave_des.campaign.ensemble import COLUMN as ENSEMBLE_COLUMN
-from suave_des.campaign.ensemble import Ensemble
 from suave_des.domain import WATER_VISIBILITY
-from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.draws import Streams
+from suave_des.errors import InputError, line_error, number_of, shown
+from suave_des.estimates import known, mean_of, t_quantile
+from suave_des.files import as_number, read_csv
 from suave_des.metrics.result import MissionResult
+from suave_des.records.metrics import Row
+from suave_des.records.store import MissionKey
+from suave_des.resources import find
 from suave_des.scenario.loader import LoadedScenario, value_at, with_values
 from suave_des.scenario.models import MissionSettings
-from suave_des.scenario.quantities import Distribution
-from suave_des.streams import Streams
+from suave_des.scenario.quantities import Distribution, Real, Strict, wrong
+from suave_des.scenario.yamlfile import problem_and_remedy
 
-METHODS = ("latin_hypercube", "sobol")
-SOBOL_DIMENSIONS = 21_201
-"""Dimensions for which scipy has direction numbers of Sobol's sequence."""
-_FORMS = ("grid", "zip", "sample")
+ENSEMBLE_COLUMN = "ensemble_member"
+"""Column of runs.csv: number of the member, from 1."""
+ENSEMBLE_COLUMNS = (
+    *("first", "second", "metric", "n", "difference", "ci95_low", "ci95_high"),
+    *("members", "members_above_0", "members_below_0", "range95_low", "range95_high"),
+)
+"""Columns of ensemble.csv before those of swept parameters."""
+_NO_PARAMETERS = ("member", "loss")
+_ENSEMBLE_LIMIT_BYTES = 5_000_000
 _MOST_VALUES = 1_000_000
 _CHECKED_POINTS = 300
 """Of sweeps with more points, so many are checked before anything runs."""
 _DISTRIBUTION: TypeAdapter[Any] = TypeAdapter(Distribution)
 
 
-@dataclass(frozen=True)
-class SampledPoints:
-    """A sampled design: points that fill a box evenly.
-
-    Attributes:
-        method: one of METHODS.
-        points: how many; for sobol a power of 2, as its balance needs.
-        ranges: smallest and greatest value by key path.
-    """
-
-    method: str
-    points: int
-    ranges: Mapping[str, tuple[float, float]]
+def _each_once(values: Sequence[Any]) -> Sequence[Any]:
+    """Check that no value is there twice."""
+    seen = set()
+    for value in values:
+        if (text := json.dumps(value)) in seen:
+            raise wrong(f"{shown(value)} is given twice", "name each value once")
+        seen.add(text)
+    return values
 
 
-@dataclass(frozen=True)
-class Sweep:
+def _range(ends: tuple[float, float]) -> tuple[float, float]:
+    if not ends[0] < ends[1]:
+        raise wrong(f"{shown(list(ends))} is no range", "give [smallest, greatest]")
+    return ends
+
+
+Values = Annotated[tuple[Any, ...], Field(min_length=1)]
+
+
+class Sample(Strict):
+    """A sampled design: points that fill a box evenly."""
+
+    method: Literal["latin_hypercube", "sobol"]
+    """How."""
+    points: Annotated[int, Field(strict=True, ge=1, le=2**24)]
+    """How many; for sobol a power of 2, as its balance needs."""
+    ranges: Annotated[dict[str, Annotated[tuple[Real, Real], AfterValidator(_range)]], Field(min_length=1)]
+    """Smallest and greatest value by key path."""
+
+    @model_validator(mode="after")
+    def _is_balanced(self) -> Self:
+        if self.method == "sobol" and self.points & (self.points - 1):
+            lower = 1 << self.points.bit_length() - 1
+            problem = f"{self.points} is not a power of 2, as sobol needs"
+            raise wrong(problem, f"give {lower} or {2 * lower}", "points")
+        return self
+
+
+class Sweep(Strict):
     """Every combination of a grid's values, the rows of a zip, and the points of a sampled design.
 
     Points are counted from 0; what is named last changes fastest.
-
-    Attributes:
-        grid: values by key path; all combinations are used.
-        zipped: values by key path, of equal number: the first values together, then the second, and so on.
-        sample: a sampled design, or none.
-        seed: the campaign's, for the sampled design.
     """
 
-    grid: Mapping[str, Sequence[Any]] = field(default_factory=dict)
-    zipped: Mapping[str, Sequence[Any]] = field(default_factory=dict)
-    sample: SampledPoints | None = None
+    grid: dict[str, Annotated[Values, AfterValidator(_each_once)]] = Field(default_factory=dict)
+    """Values by key path; all combinations are used."""
+    zip: dict[str, Values] = Field(default_factory=dict)
+    """Values by key path, of equal number: the first values together, then the second, and so on."""
+    sample: Sample | None = None
+    """A sampled design, or none."""
     seed: int = 0
+    """The campaign's, for the sampled design."""
+
+    @model_validator(mode="after")
+    def _rows_are_whole(self) -> Self:
+        if len({len(values) for values in self.zip.values()}) > 1:
+            listed = ", ".join(f"{name} has {len(values)}" for name, values in self.zip.items())
+            raise wrong(f"the lists differ in length: {listed}", "give lists of the same length, or use grid", "zip")
+        return self
 
     @property
     def parameters(self) -> tuple[str, ...]:
         """Key paths of the parameters that are swept, as given."""
-        return (*self.grid, *self.zipped, *(self.sample.ranges if self.sample else ()))
+        return (*self.grid, *self.zip, *(self.sample.ranges if self.sample else ()))
 
     @property
     def points(self) -> int:
@@ -84,9 +126,9 @@ class Sweep:
         for size in reversed(self._sizes()):
             point, place = divmod(point, size)
             places.append(place)
-        *grid, row, sampled = reversed(places)
-        values = {path: self.grid[path][place] for path, place in zip(self.grid, grid, strict=True)}
-        values |= {path: column[row] for path, column in self.zipped.items()}
+        sampled, row, *grid = places
+        values = {path: own[place] for (path, own), place in zip(self.grid.items(), reversed(grid), strict=True)}
+        values |= {path: column[row] for path, column in self.zip.items()}
         if self.sample is not None:
             values |= dict(zip(self.sample.ranges, self._sampled[sampled], strict=True))
         return values
@@ -100,11 +142,10 @@ class Sweep:
 
     def plain(self) -> dict[str, Any]:
         """Return it as plain data, without parts that are not used."""
-        plain = {"grid": dict(self.grid), "zip": dict(self.zipped), "sample": self.sample and asdict(self.sample)}
-        return {form: content for form, content in plain.items() if content}
+        return {form: content for form, content in self.model_dump(mode="json", exclude={"seed"}).items() if content}
 
     def _sizes(self) -> tuple[int, ...]:
-        rows = len(next(iter(self.zipped.values()))) if self.zipped else 1
+        rows = len(next(iter(self.zip.values()), (None,)))
         return (*map(len, self.grid.values()), rows, self.sample.points if self.sample else 1)
 
     @cached_property
@@ -122,7 +163,7 @@ class Sweep:
 
 
 def plain(given: Any, name: str = "sweep") -> Any:
-    """Convert a caller's sweep to the form of a file: arrays, ranges, series and the like become lists.
+    """Convert what a caller gives to the form of a file: arrays, ranges, series and the like become lists, paths text.
 
     Example:
         >>> plain({"thruster_events.0.time_s": range(20, 50, 10)})
@@ -131,6 +172,8 @@ def plain(given: Any, name: str = "sweep") -> Any:
     Raises:
         InputError: a range is without end, or very long.
     """
+    if isinstance(given, Path):
+        return str(given)
     if isinstance(given, Mapping):
         return {key: plain(each, f"{name}.{key}") for key, each in given.items()}
     if hasattr(given, "tolist"):  # of numpy or pandas
@@ -146,6 +189,29 @@ def plain(given: Any, name: str = "sweep") -> Any:
 def cell_of(value: Any) -> str | int | float | bool | None:
     """Return a parameter's value as in runs.csv: lists and mappings as JSON."""
     return value if value is None or isinstance(value, str | int | float | bool) else json.dumps(value)
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """Parameter sets that fit real missions equally well.
+
+    Attributes:
+        name: of its file.
+        paths: key paths in the scenario.
+        members: values of the parameters, one tuple for each member.
+    """
+
+    name: str
+    paths: tuple[str, ...]
+    members: tuple[tuple[float, ...], ...]
+
+    def member(self, run: int) -> int:
+        """Return the number, from 1, of the member that a run uses: they are used in turn."""
+        return (run - 1) % len(self.members) + 1
+
+    def values(self, member: int) -> dict[str, float]:
+        """Return a member's values by key path."""
+        return dict(zip(self.paths, self.members[member - 1], strict=True))
 
 
 @dataclass(frozen=True)
@@ -186,24 +252,20 @@ class Variation:
         Raises:
             InputError: the scenario does not allow the point's values together.
         """
-        if self.paths:
-            values = self.sweep.values(point)
-            try:
-                loaded = with_values(loaded, {self.paths[name]: value for name, value in values.items()})
-            except InputError as error:
-                at = ", ".join(f"{name}={shown(value)}" for name, value in values.items())
-                raise InputError(f"at {at}: {error.problem}", file=error.file, remedy=error.remedy) from None
+        named = self.sweep.values(point) if self.paths else {}
         if member is not None and self.ensemble is not None:
-            loaded = with_values(loaded, self.ensemble.values(member))
-        return loaded
+            named |= self.ensemble.values(member)
+        if not named:
+            return loaded
+        try:
+            return with_values(loaded, {self.paths.get(name, name): value for name, value in named.items()})
+        except InputError as error:
+            at = ", ".join(f"{name}={shown(value)}" for name, value in named.items())
+            raise InputError(f"at {at}: {error.problem}", file=error.file, remedy=error.remedy) from None
 
 
 def vary(
-    loaded: LoadedScenario,
-    sweep: Mapping[str, Any],
-    perturbations: Mapping[str, Any],
-    runs_per_draw: int,
-    seed: int,
+    loaded: LoadedScenario, sweep: Mapping[str, Any], perturbations: Mapping[str, Any], runs_per_draw: int, seed: int
 ) -> tuple[LoadedScenario, Variation]:
     """Put the distributions of perturbations into a scenario; return it with the variation.
 
@@ -218,153 +280,84 @@ def vary(
         InputError: a key path leads nowhere, a value is not allowed there, or the sweep has no points; its place is
             the key path within what was given.
     """
-    if runs_per_draw < 1:
-        raise _wrong("runs_per_draw", f"{runs_per_draw} is out of range", "1, or how many runs share one draw")
-    perturbed = {name: _full_path(loaded, f"perturbations.{name}", name) for name in perturbations}
-    for name, path in perturbed.items():
+    varied: dict[str, str] = {}
+
+    def full_path(place: str, name: str) -> str:
+        """Return the key path of a name: a signal needs no `signals.`, and visibility is water_visibility."""
+        first, *rest = name.split(".")
+        signal = WATER_VISIBILITY if first == "visibility" else first
+        if first not in type(loaded.scenario).model_fields and signal in loaded.scenario.signals:
+            name = ".".join(("signals", signal, *rest))
+        with _at(place):
+            value_at(loaded, name)
+            if name in varied:
+                raise InputError(f"varies {name}, as {varied[name]} does", remedy="vary each key once")
+        varied[name] = place
+        return name
+
+    drawn = {full_path(f"perturbations.{name}", name): name for name in perturbations}
+    for path, name in drawn.items():
         loaded = _perturbed(loaded, f"perturbations.{name}", path, perturbations[name])
     found, places = _sweep(sweep, seed)
-    paths = {name: _full_path(loaded, places[name], name) for name in found.parameters}
-    _check_each_once(perturbed, {places[name]: path for name, path in paths.items()})
-    variation = Variation(found, {path: name for name, path in perturbed.items()}, paths, runs_per_draw)
-    _check_drawn(loaded, perturbed)
-    _check_points(loaded, variation, next(iter(places.values())) if len(places) == 1 else "sweep")
+    paths = {name: full_path(places[name], name) for name in found.parameters}
+    variation = Variation(found, drawn, paths, runs_per_draw)
+    points = {*range(0, found.points, max(1, found.points // _CHECKED_POINTS))}
+    points.update(islice(found.each_value(), _CHECKED_POINTS))
+    with _at(next(iter(places.values())) if len(places) == 1 else "sweep"):
+        for point in sorted(points):
+            variation.scenario(loaded, point)
     return loaded, variation
 
 
-def _wrong(place: str, problem: str, remedy: str | None) -> InputError:
-    return InputError(problem, place=place, remedy=remedy)
-
-
-def _full_path(loaded: LoadedScenario, place: str, name: str) -> str:
-    """Return the key path of a name: a signal needs no `signals.`, and visibility is water_visibility."""
-    first, *rest = name.split(".")
-    if first not in type(loaded.scenario).model_fields:
-        signal = WATER_VISIBILITY if first == "visibility" else first
-        if signal in loaded.scenario.signals:
-            name = ".".join(("signals", signal, *rest))
+@contextmanager
+def _at(place: str, problem: str = "") -> Iterator[None]:
+    """Give errors a key path within what was given as their place, and perhaps begin them with a problem."""
     try:
-        value_at(loaded, name)
+        yield
     except InputError as error:
-        raise _wrong(place, error.problem, error.remedy) from None
-    return name
+        raise InputError(problem + error.problem, place=place, remedy=error.remedy) from None
 
 
 def _perturbed(loaded: LoadedScenario, place: str, path: str, distribution: Any) -> LoadedScenario:
+    if not isinstance(distribution, Mapping):
+        remedy = "such as {distribution: normal, mean: 1, std: 2}"
+        raise InputError(f"expected a distribution, got {shown(distribution)}", place=place, remedy=remedy)
     try:
         _DISTRIBUTION.validate_python(distribution)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        inside = ".".join(str(part) for part in first["loc"][1:])
-        remedy = "such as {distribution: uniform, minimum: 1, maximum: 2}"
-        raise _wrong(place, f"{inside}: {first['msg']}".lstrip(": "), remedy) from None
-    if not isinstance(distribution, Mapping):
-        raise _wrong(
-            place,
-            f"expected a distribution, got {shown(distribution)}",
-            "such as {distribution: normal, mean: 1, std: 2}",
-        )
-    try:
+        keys, problem, how = problem_and_remedy(error, dict(distribution), Distribution)
+        raise InputError(problem, place=".".join(map(str, [place, *keys])), remedy=how) from None
+    with _at(place, f"{path} cannot have such a distribution: "):
         return with_values(loaded, {path: dict(distribution)})
-    except InputError as error:
-        raise _wrong(place, f"{path} cannot have such a distribution: {error.problem}", error.remedy) from None
 
 
 def _sweep(given: Mapping[str, Any], seed: int) -> tuple[Sweep, dict[str, str]]:
     """Read a sweep; return it with the place of each parameter in what was given."""
-    forms = [form for form in _FORMS if form in given]
-    if not forms:
-        return Sweep(grid=_columns("sweep", given), seed=seed), {name: f"sweep.{name}" for name in given}
-    if others := [name for name in given if name not in _FORMS]:
-        raise _wrong(f"sweep.{others[0]}", f"cannot stand beside {forms[0]}", "put it under grid, zip or sample")
-    zipped = _columns("sweep.zip", given.get("zip", {}))
-    lengths = {name: len(values) for name, values in zipped.items()}
-    if len(set(lengths.values())) > 1:
-        listed = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-        raise _wrong("sweep.zip", f"the lists differ in length: {listed}", "give lists of the same length, or use grid")
-    sample = _sample(given["sample"]) if "sample" in given else None
-    sweep = Sweep(_columns("sweep.grid", given.get("grid", {})), zipped, sample, seed)
-    ranges = sample.ranges if sample else {}
-    named = {"sample.ranges": ranges, "zip": zipped, "grid": sweep.grid}
-    return sweep, {name: f"sweep.{form}.{name}" for form, names in named.items() for name in names}
+    forms = [form for form in ("grid", "zip", "sample") if form in given]
+    data = {**(given if forms else {"grid": given}), "seed": seed}
+    try:
+        sweep = Sweep.model_validate(data)
+    except ValidationError as error:
+        (*keys, last), problem, remedy = problem_and_remedy(error, data, Sweep)
+        if forms and not keys and last not in ("grid", "zip", "sample"):
+            problem, remedy = f"cannot stand beside {forms[0]}", "put it under grid, zip or sample"
+        keys = [key for key in ("sweep", *keys, last) if forms or key != "grid"]
+        raise InputError(problem, place=".".join(map(str, keys)), remedy=remedy) from None
+    parts = {"grid.": sweep.grid, "zip.": sweep.zip, "sample.ranges.": sweep.sample.ranges if sweep.sample else {}}
+    return sweep, {name: f"sweep.{part if forms else ''}{name}" for part, names in parts.items() for name in names}
 
 
-def _columns(place: str, given: Any) -> dict[str, list[Any]]:
-    if not isinstance(given, Mapping):
-        raise _wrong(
-            place, f"expected a mapping, got {shown(given)}", "write `key path: [value, value]` lines under it"
-        )
-    for name, values in given.items():
-        if not isinstance(values, list | tuple):
-            raise _wrong(
-                f"{place}.{name}", f"expected a list, got {shown(values)}", f"write it in brackets: [{values}]"
-            )
-        if not values:
-            raise _wrong(f"{place}.{name}", "is empty", "give at least one value, or remove the key")
-        if place != "sweep.zip" and (repeated := _repeated(values)) is not None:
-            raise _wrong(f"{place}.{name}", f"{shown(repeated)} is given twice", "name each value once")
-    return {name: list(values) for name, values in given.items()}
+def check_drawn(loaded: LoadedScenario, variation: Variation) -> None:
+    """Check that perturbations are drawn once per run, unlike latencies and noise, which are drawn at each use.
 
-
-def _repeated(values: Sequence[Any]) -> Any:
-    """Return the first value that is there twice; None if there is none."""
-    seen = set()
-    for value in values:
-        if (text := json.dumps(value)) in seen:
-            return value
-        seen.add(text)
-    return None
-
-
-def _sample(given: Any) -> SampledPoints:
-    place = "sweep.sample"
-    keys = ("method", "points", "ranges")
-    if not isinstance(given, Mapping):
-        raise _wrong(place, f"expected a mapping, got {shown(given)}", f"give {', '.join(keys)}")
-    for key in given:
-        if key not in keys:
-            raise _wrong(f"{place}.{key}", "unknown key", did_you_mean(key, keys))
-    for key in keys:
-        if key not in given:
-            raise _wrong(place, f"has no {key}", "add it")
-    method, points, ranges = given["method"], given["points"], given["ranges"]
-    if method not in METHODS:
-        raise _wrong(f"{place}.method", f"{shown(method)} is not known", did_you_mean(method, METHODS))
-    if not isinstance(points, int) or isinstance(points, bool) or not 1 <= points <= 2**24:
-        raise _wrong(f"{place}.points", f"{shown(points)} is out of range", "a whole number from 1 to 16777216")
-    if method == "sobol" and points & (points - 1):
-        lower = 1 << points.bit_length() - 1
-        raise _wrong(f"{place}.points", f"{points} is not a power of 2, as sobol needs", f"give {lower} or {2 * lower}")
-    bounds = _columns(f"{place}.ranges", ranges)
-    if not bounds or len(bounds) > SOBOL_DIMENSIONS:
-        raise _wrong(f"{place}.ranges", f"has {len(bounds)} parameters", f"1 to {SOBOL_DIMENSIONS}")
-    for name, pair in bounds.items():
-        numbers = [each for each in pair if isinstance(each, int | float) and not isinstance(each, bool)]
-        if len(pair) != 2 or len(numbers) != 2 or not numbers[0] < numbers[1]:
-            raise _wrong(f"{place}.ranges.{name}", f"expected a range, got {shown(pair)}", "give [smallest, greatest]")
-    return SampledPoints(method, points, {name: (float(low), float(high)) for name, (low, high) in bounds.items()})
-
-
-def _check_each_once(perturbed: Mapping[str, str], swept: Mapping[str, str]) -> None:
-    seen: dict[str, str] = {}
-    for place, path in [*((f"perturbations.{name}", path) for name, path in perturbed.items()), *swept.items()]:
-        if path in seen:
-            raise _wrong(place, f"varies {path}, as {seen[path]} does", "vary each key once")
-        seen[path] = place
-
-
-def _check_drawn(loaded: LoadedScenario, perturbed: Mapping[str, str]) -> None:
-    """Check that each is drawn once per run, unlike latencies and noise, which are drawn at each use."""
-    if not perturbed:
-        return
-    drawn = short_mission(loaded).drawn
-    for name, path in perturbed.items():
+    Raises:
+        InputError: one is not; its place is its key path within what was given.
+    """
+    drawn = short_mission(loaded).drawn if variation.drawn else {}
+    for path, name in variation.drawn.items():
         if path not in drawn:
-            raise _wrong(
-                f"perturbations.{name}",
-                "is drawn at each use, not once per run",
-                "put the distribution into the scenario itself, or sweep its parameters",
-            )
+            remedy = "put the distribution into the scenario itself, or sweep its parameters"
+            raise InputError("is drawn at each use, not once per run", place=f"perturbations.{name}", remedy=remedy)
 
 
 def short_mission(loaded: LoadedScenario) -> MissionResult:
@@ -375,13 +368,117 @@ def short_mission(loaded: LoadedScenario) -> MissionResult:
     return Simulator(replace(loaded, scenario=short)).run("none", 1, 0)
 
 
-def _check_points(loaded: LoadedScenario, variation: Variation, place: str) -> None:
-    """Check that the scenario allows the points: all, or of very many those that have each value at least once."""
-    sweep = variation.sweep
-    points = set(range(0, sweep.points, max(1, sweep.points // _CHECKED_POINTS)))
-    points.update(islice(sweep.each_value(), _CHECKED_POINTS))
-    for point in sorted(points):
+# Ensembles.
+
+
+def read_ensemble(name: str | Path) -> tuple[Ensemble, Path, str]:
+    """Read an ensemble: a CSV file with a column for each parameter and a row for each member.
+
+    Args:
+        name: of a file, or of a shipped one, such as seams2023. Its columns are named by the key paths of the scenario;
+            columns `member` and `loss` are only for information.
+
+    Returns:
+        The ensemble, its path, and the SHA-256 of the file.
+
+    Raises:
+        InputError: with file and line: it cannot be read, has fewer than two members, or something else than numbers.
+    """
+    path = find(name, "scenarios/ensembles")
+    header, rows, digest = read_csv(path, _ENSEMBLE_LIMIT_BYTES, "a row for each member")
+    paths = tuple(name for name in header if name not in _NO_PARAMETERS)
+    if not paths or not all(header):
+        raise line_error(path, 1, "has no columns of parameters", "name each by its key path in the scenario")
+    if repeated := next((each for each in header if header.count(each) > 1), None):
+        raise line_error(path, 1, f"has column {shown(repeated)} twice", "name each parameter once")
+    members = []
+    for line, row in rows:
+        if len(row) != len(header):
+            problem = f"has {number_of(len(row), 'value')}, but the header has {len(header)}"
+            raise line_error(path, line, problem, "give each column one")
+        cells = {name: cell for name, cell in zip(header, row, strict=True) if name not in _NO_PARAMETERS}
+        for name, cell in cells.items():
+            if not math.isfinite(as_number(cell)):
+                raise line_error(path, line, f"{name}: expected a number, got {shown(cell)}", "give it a value")
+        members.append(tuple(map(float, cells.values())))
+    if len(members) < 2:
+        raise line_error(path, 1, f"has {number_of(len(members), 'member')}", "an ensemble has two or more")
+    return Ensemble(path.stem, paths, tuple(members)), path, digest
+
+
+def with_ensemble(loaded: LoadedScenario, variation: Variation, ensemble: Ensemble, path: Path) -> Variation:
+    """Return a variation with an ensemble, which was read from a path.
+
+    Raises:
+        InputError: a parameter is not a number of this scenario, a member's values are not allowed in it, or it is
+            swept or perturbed, too.
+    """
+    for name in ensemble.paths:
+        for other in {*variation.drawn, *variation.paths.values()}:
+            if f"{name}.".startswith(f"{other}.") or f"{other}.".startswith(f"{name}."):  # one is below the other
+                problem = f"varies {name}, as the campaign's sweep or perturbations do"
+                raise InputError(problem, file=path, remedy="vary each key once")
+    found = replace(variation, ensemble=ensemble)
+    for member in range(1, len(ensemble.members) + 1):
         try:
-            variation.scenario(loaded, point)
+            found.scenario(loaded, 0, member)
         except InputError as error:
-            raise _wrong(place, error.problem, error.remedy) from None
+            problem = f"member {member} does not fit scenario {loaded.scenario.name}: {error.problem}"
+            raise InputError(problem, file=path, remedy=error.remedy) from None
+    return found
+
+
+def differences(
+    rows: Iterable[tuple[MissionKey, Row]],
+    managers: Sequence[str],
+    metrics: Mapping[str, int],
+    ensemble: Ensemble,
+    runs_sharing_draw: int = 1,
+) -> Iterator[dict[str, Any]]:
+    """Yield the difference of each pair of managers in each metric, point by point, in the columns of ensemble.csv.
+
+    The difference is paired by run, over the runs that both have. Its 95% interval is by Student's t over independent
+    draws, for chance alone. The range in which the differences of 95 in 100 parameter sets lie is the prediction
+    interval for a further set: the mean ± Student's t times the standard deviation of the members' means, times the
+    root of 1 + 1 / their number. The few runs of each member make it wider than the parameters do; with more of them it
+    becomes narrower, down to that.
+
+    Args:
+        rows: rows of runs.csv, ordered by their keys.
+        managers: names, in the campaign's order.
+        metrics: place in a row, by column.
+        ensemble: parameter sets of the campaign.
+        runs_sharing_draw: consecutive runs that share a draw, and so are not independent.
+    """
+    for point, group in groupby(rows, key=lambda each: each[0].point):
+        by_manager: dict[int, dict[int, list[Any]]] = {}
+        for key, row in group:
+            by_manager.setdefault(key.manager, {})[key.run] = [row[place] for place in metrics.values()]
+        for place, metric in enumerate(metrics):
+            for second, first in combinations(sorted(by_manager), 2):
+                ours, theirs = by_manager[first], by_manager[second]
+                if by_run := {run: ours[run][place] - theirs[run][place] for run in ours if run in theirs}:
+                    names = {"first": managers[first], "second": managers[second], "metric": metric}
+                    yield {**names, **_difference(by_run, ensemble, runs_sharing_draw), "point": point}
+
+
+def _difference(by_run: Mapping[int, float], ensemble: Ensemble, runs_sharing_draw: int) -> dict[str, Any]:
+    by_member: dict[int, list[float]] = {}
+    for run, value in by_run.items():
+        by_member.setdefault(ensemble.member(run), []).append(value)
+    means, mean = list(map(fmean, by_member.values())), fmean(by_run.values())
+    of_draws = mean_of(list(by_run.values()), [(run - 1) // runs_sharing_draw for run in by_run])
+    members, half = len(means), math.nan
+    if members > 1:
+        half = t_quantile(members - 1) * stdev(means) * math.sqrt(1.0 + 1.0 / members)
+    return {
+        "n": len(by_run),
+        "difference": mean,
+        "ci95_low": known(of_draws.low),
+        "ci95_high": known(of_draws.high),
+        "members": members,
+        "members_above_0": sum(each > 0.0 for each in means),
+        "members_below_0": sum(each < 0.0 for each in means),
+        "range95_low": known(mean - half),
+        "range95_high": known(mean + half),
+    }

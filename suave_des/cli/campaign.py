@@ -1,47 +1,48 @@
-"""suave-des campaign and reproduce: many missions, and their result files."""
+"""suave-des campaign and reproduce: many missions, their result files, and their summary on the terminal."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
-from suave_des.cli.console import TEXT_WIDTH, errors, fits, output, plain_table, print_table, progress
+from suave_des.cli.console import TEXT_WIDTH, errors, number, output, print_table, progress
 from suave_des.cli.options import (
-    CampaignWorkers,
+    Fields,
     Files,
+    Given,
     ManagerOptions,
-    OptionGroup,
-    Overwrite,
     Quiet,
-    Seed,
-    SeedIfNew,
-    TimeOut,
     check_no_use,
-    comma_separated,
     command_line,
-    grouped_options,
+    flags,
 )
 from suave_des.errors import InputError, number_of
 from suave_des.files import write_files
 from suave_des.resources import DEFAULT_SCENARIO
+from suave_des.tables import Table, broken_name
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from suave_des.campaign.campaign import CampaignResult
-    from suave_des.campaign.missions import MissionFailure
-    from suave_des.report.paper import PaperComparison, PaperFigure
+    from suave_des.records.store import MissionFailure
 
+_RUNS = 200
+"""Of reproduce, for each manager."""
 _FAILURES_SHOWN = 20
-_MANAGERS, _RUNS = "none,random,metacontrol", "20"
-"""As in campaign.spec, which is not imported for --help."""
+_ROWS_SHOWN = 40
+"""Of a sweep with more, the first ones."""
+_NARROW = 10
+"""A heading is broken into lines of about this width where the summary is too wide otherwise."""
+_LOOKS = ((100, 6, True), (_NARROW, 6, True), (_NARROW, 6, False), (8, 4, False))
+"""Width of headings, digits of swept values, and whether standard deviations are shown: from the widest on."""
+_MAY_CHANGE = ("managers", "runs", "workers", "scheduler", "confirmed")
+"""Options of a campaign that is resumed, too."""
 
 
 class ResultFormat(StrEnum):
@@ -51,35 +52,6 @@ class ResultFormat(StrEnum):
     PARQUET = "parquet"
 
 
-@dataclass(frozen=True)
-class NewCampaign(OptionGroup):
-    """Options that apply to a whole campaign; a resumed campaign has them already."""
-
-    seed: SeedIfNew = None
-    ensemble: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FILE",
-            help="Give each run one of this file's parameter sets, which fit the real runs equally well; seams2023 is"
-            " shipped.",
-        ),
-    ] = None
-    time_out: TimeOut = None
-    format: Annotated[
-        list[ResultFormat] | None,
-        typer.Option(help="Also write the exemplar's own files into DIR/suave, or runs.parquet; repeat it for both."),
-    ] = None
-    record_knowledge: Annotated[
-        bool,
-        typer.Option(
-            "--record-knowledge", help="Record the knowledge states that managers analysed, in knowledge_states.jsonl."
-        ),
-    ] = False
-    overwrite: Overwrite = False
-    manager_option: ManagerOptions = None
-
-
-@grouped_options
 def campaign(
     scenario: Annotated[
         str | None,
@@ -89,46 +61,24 @@ def campaign(
             show_default=False,
         ),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder for runs.csv, summary.csv and manifest.json.")
-    ] = None,
+    *,
+    options: Annotated[
+        Given,
+        Fields(
+            ("out", *_MAY_CHANGE, "seed", "ensemble", "time_out_s", "record_knowledge", "overwrite"),
+        ),
+    ],
     resume: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Continue the campaign in this folder; --runs may add runs.")
     ] = None,
-    managers: Annotated[
-        str | None,
-        typer.Option(metavar="NAME,...", help="Managing subsystems: names, or module:Class.", show_default=_MANAGERS),
-    ] = None,
-    runs: Annotated[
-        int | None, typer.Option(help="Missions for each manager, at each point.", show_default=_RUNS)
-    ] = None,
-    workers: CampaignWorkers = None,
-    scheduler: Annotated[
-        str | None,
+    form: Annotated[
+        list[ResultFormat] | None,
         typer.Option(
-            metavar="tcp://HOST:PORT",
-            help="Run missions on the workers of this Dask scheduler; results are the same.",
+            "--format", help="Also write the exemplar's own files into DIR/suave, or runs.parquet; repeat it for both."
         ),
     ] = None,
-    until_ci: Annotated[
-        str | None,
-        typer.Option(
-            metavar="METRIC:HALF_WIDTH",
-            help="Stop a manager when the half-width of the 95% interval of its mean is below HALF_WIDTH, after 20 to"
-            " --runs missions (by default 10000), as in search_time_s:5; or stop all when the difference of two"
-            " managers is known that precisely, after at least 100 runs, as in 'metacontrol - bt: search_time_s: 2'.",
-        ),
-    ] = None,
+    manager_option: ManagerOptions = None,
     quiet: Quiet = False,
-    yes: Annotated[
-        bool,
-        typer.Option(
-            "--yes",
-            help="Confirm more than a million missions; with --resume: trust the managers that DIR names.",
-        ),
-    ] = False,
-    *,
-    new: NewCampaign,
     files: Files,
 ) -> None:
     """Run many missions and write their results.
@@ -136,66 +86,103 @@ def campaign(
     A campaign file may hold all settings, with sweeps and values drawn in each run; options override it. Finished
     missions are kept; after an interruption, --resume DIR runs those that are missing.
     """
-    names = None if managers is None else comma_separated(managers)
     if resume is not None:
+        fixed = {name: value for name, value in options.items() if name not in _MAY_CHANGE}
         check_no_use(
-            {"SCENARIO": scenario, "--out": out, **new.given, **files.given},
+            {"SCENARIO": scenario, "--format": form, "--manager-option": manager_option, **flags(fixed), **files.given},
             "with --resume: the settings of a campaign cannot be changed",
             "remove it, or start a new campaign in another folder",
         )
-    elif scenario is None or out is None:
+    elif scenario is None or "out" not in options:
         missing = "SCENARIO" if scenario is None else "--out DIR"
         raise InputError(f"{missing} is missing", remedy="see suave-des campaign --help")
     from suave_des.campaign.campaign import resume_campaign, run_campaign
     from suave_des.campaign.spec import managers_of
-    from suave_des.cli.summary import print_differences, print_stops, print_summary
 
     with progress(str(resume or scenario), quiet=quiet) as show:
+        settings: Given = {"workers": None, **options}
         if resume is not None:
-            result = resume_campaign(
-                resume,
-                workers,
-                runs=runs,
-                until_ci=until_ci,
-                on_progress=show,
-                scheduler=scheduler,
-                managers=names or (),
-                confirmed=yes,
-            )
+            result = resume_campaign(resume, on_progress=show, **settings)
         else:
             assert scenario is not None
-            options = (
-                files.with_options(new.manager_option, names or managers_of(scenario))
-                if new.manager_option
-                else files.replacements
-            )
-            result = run_campaign(
-                scenario,
-                names,
-                runs,
-                new.seed,
-                workers,
-                out,
-                on_progress=show,
-                **options,
-                suave_format=ResultFormat.SUAVE in (new.format or ()),
-                parquet=ResultFormat.PARQUET in (new.format or ()),
-                record_knowledge=new.record_knowledge,
-                time_out_s=new.time_out,
-                until_ci=until_ci,
-                ensemble=new.ensemble,
-                confirmed=yes,
-                overwrite=new.overwrite,
-                command=command_line(),
-                scheduler=scheduler,
-            )
+            managers = options.get("managers") or (managers_of(scenario) if manager_option else ())
+            written = {"suave_format": ResultFormat.SUAVE, "parquet": ResultFormat.PARQUET}
+            settings |= {name: True for name, each in written.items() if each in (form or ())}
+            replaced = files.with_options(manager_option, managers)
+            result = run_campaign(scenario, on_progress=show, command=command_line(), **settings, **replaced)
     console = output()
-    print_summary(console, result)
-    print_stops(console, result)
-    print_differences(console, result)
+    print_table(console, _summary(result, console.width))
+    if (sharing := result.variation.runs_sharing_draw) > 1:
+        console.print(f"{sharing} runs share each draw: intervals treat draws as independent, not runs")
+    if len(result.summary) > _ROWS_SHOWN:
+        more = f"... and {len(result.summary) - _ROWS_SHOWN + 1} rows more"
+        console.print(f"{more}, all in {result.folder}/summary.csv")
+    if found := result.differences():
+        console.print()
+        print_table(console, _differences(found, result.variation.sweep.parameters))
     kept = f"{number_of(result.done, 'mission')} {'is' if result.done == 1 else 'are'}"
     console.print(f"{kept} in {result.folder}/runs.csv")
     exit_telling_failures(result)
+
+
+def _summary(result: CampaignResult, width: int) -> Table:
+    """The rows of summary.csv; headings that do not fit are broken into lines, and what else does not is left out."""
+    for look in _LOOKS:
+        table = _summary_in(result, *look)
+        if max(map(len, table.text(width).splitlines())) <= width:
+            break
+    return table
+
+
+def _summary_in(result: CampaignResult, heading_width: int, digits: int, has_std: bool) -> Table:
+    from suave_des.campaign.progress import estimated
+    from suave_des.estimates import percent
+    from suave_des.records.metrics import METRICS, PAPER_METRICS
+
+    def figures(cells: Mapping[str, Any], metric: str) -> list[str]:
+        mean, low, high, std = (cells[f"{metric}_{figure}"] for figure in ("mean", "ci95_low", "ci95_high", "std"))
+        means = estimated(mean, None if low is None or high is None else (high - low) / 2.0)
+        return [means, number(std)] if has_std else [means]
+
+    parameters = result.variation.sweep.parameters
+    headings = [*parameters, "manager", "missions", "found"]
+    for metric in PAPER_METRICS:
+        headings += [METRICS[metric].brief, "std"] if has_std else [METRICS[metric].brief]
+    records = result.summary
+    rows = []
+    for cells in records if len(records) <= _ROWS_SHOWN else records[: _ROWS_SHOWN - 1]:
+        swept = (
+            f"{value:.{digits}g}" if isinstance(value := cells[name], float) else str(value) for name in parameters
+        )
+        found = "" if cells["found_share"] is None else percent(cells["found_share"])
+        measured = [text for metric in PAPER_METRICS for text in figures(cells, metric)]
+        rows.append([*swept, cells["manager"], str(cells["n"]), found, *measured])
+    title = f"{result.loaded.scenario.name}, seed {result.spec.seed}: means ± half their 95% intervals"
+    return Table(
+        [broken_name(heading, heading_width, "") for heading in headings],
+        rows,
+        f"{title}, standard deviations" if has_std else title,
+        align=f"{'r' * len(parameters)}l",
+    )
+
+
+def _differences(found: list[dict[str, Any]], parameters: Sequence[str]) -> Table:
+    """How managers differ, and in how many of the ensemble's parameter sets they do so in the same direction."""
+    from suave_des.records.metrics import METRICS
+
+    def bounds(low: float | None, high: float | None) -> str:
+        return "" if low is None or high is None else f"{low:+.1f} to {high:+.1f}"
+
+    rows: list[list[str]] = []
+    for metric, group in groupby(found, itemgetter("metric")):
+        rows.append([METRICS[metric].brief])
+        for each in group:
+            same = f"{max(each['members_above_0'], each['members_below_0'])} of {each['members']}"
+            ranges = [bounds(each[f"{name}_low"], each[f"{name}_high"]) for name in ("ci95", "range95")]
+            swept = [str(each[name]) for name in parameters]
+            rows.append([*swept, f"  {each['first']} - {each['second']}", f"{each['difference']:+.2f}", *ranges, same])
+    headings = [*parameters, "first - second", "difference", "by chance", "over the sets", "same sign"]
+    return Table(headings, rows, "Differences, paired by run, with 95% ranges", f"{'r' * len(parameters)}l")
 
 
 def exit_telling_failures(result: CampaignResult) -> None:
@@ -221,18 +208,20 @@ def exit_telling_failures(result: CampaignResult) -> None:
     raise typer.Exit(3)
 
 
-@grouped_options
 def reproduce(
-    runs: Annotated[int, typer.Option(help="Missions for each manager; the paper has 20.")] = 200,
-    workers: CampaignWorkers = None,
-    seed: Seed = 1,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder for result files; without it, none are written.")
-    ] = None,
-    overwrite: Overwrite = False,
-    quiet: Quiet = False,
-    time_out: TimeOut = None,
     *,
+    options: Annotated[
+        Given,
+        Fields(
+            ("runs", "workers", "seed", "out", "overwrite", "time_out_s"),
+            {
+                "runs": "Missions for each manager; the paper has 20.",
+                "out": "Folder for result files; without it, none are written.",
+            },
+            {"runs": str(_RUNS)},
+        ),
+    ],
+    quiet: Quiet = False,
     files: Files,
 ) -> None:
     """Run the paper's experiment and compare the results.
@@ -240,64 +229,23 @@ def reproduce(
     Prints the table of the paper (SEAMS 2023, arXiv:2303.09220) beside the simulated results.
     """
     from suave_des.campaign.campaign import run_campaign
-    from suave_des.report.paper import FILES, compare, published_estimates
+    from suave_des.records.metrics import PAPER_METRICS
+    from suave_des.results.missions import PAPER_ORDER
+    from suave_des.results.paper import FILES, compare_with_paper
 
-    published = published_estimates()
-    managers = list(dict.fromkeys(manager for manager, _ in published))
+    settings: Given = {"runs": _RUNS, "workers": None, "command": command_line(), **options}
     with progress("reproduce", quiet=quiet) as show:
-        result = run_campaign(
-            DEFAULT_SCENARIO,
-            managers,
-            runs,
-            seed,
-            workers,
-            out,
-            overwrite=overwrite,
-            time_out_s=time_out,
-            command=command_line(),
-            on_progress=show,
-            **files.replacements,
-        )
-    comparison = compare(result.frame(), published)
+        result = run_campaign(DEFAULT_SCENARIO, list(PAPER_ORDER), on_progress=show, **settings, **files.replacements)
+    comparison = compare_with_paper(result.frame())
     console = output()
-    print_comparison(console, comparison)
-    if out is None:
-        console.print("\nNo files were written; --out DIR keeps each mission's figures.")
-    else:
-        write_files(out, dict(zip(FILES, (comparison.markdown(), comparison.csv()), strict=True)))
-        console.print(f"\nThe missions are in {out}/runs.csv, this table in {out}/paper_table.md")
-    exit_telling_failures(result)
-
-
-def print_comparison(console: Console, comparison: PaperComparison) -> None:
-    """Print the paper's table beside the simulated results, with remarks on their differences."""
-    from suave_des.report.compared_metrics import PAPER_METRICS
-
-    for metric, title in PAPER_METRICS.items():
-        figures = [figure for figure in comparison.figures if figure.metric == metric]
-        table = _table(figures, is_narrow=False)
-        if not fits(console, table):
-            table = _table(figures, is_narrow=True)
-        print_table(console, title, table)
+    for metric in PAPER_METRICS:
+        print_table(console, comparison.table(metric))
         console.print()
     for line in comparison.remarks():
         console.print(fill(line, min(console.width, TEXT_WIDTH)))
-
-
-def _table(figures: Sequence[PaperFigure], *, is_narrow: bool) -> Table:
-    table = plain_table()
-    table.add_column("manager", min_width=12)
-    table.add_column("", min_width=5)
-    for heading in ("paper", "95% interval", "here", "95% interval", "difference"):
-        table.add_column(heading, justify="right", min_width=8, no_wrap=True)
-    if not is_narrow:
-        table.add_column("")
-    for figure in figures:
-        *cells, difference, mark = figure.cells()
-        if is_narrow:
-            cells = [cell.replace(" to ", "..") for cell in cells]
-            ends = [f"{difference} {mark or ' '}"]
-        else:
-            ends = [difference, mark]
-        table.add_row(figure.manager, figure.statistic, *cells, *ends)
-    return table
+    if result.folder is None:
+        console.print("\nNo files were written; --out DIR keeps each mission's figures.")
+    else:
+        write_files(result.folder, dict(zip(FILES, (comparison.markdown(), comparison.csv()), strict=True)))
+        console.print(f"\nThe missions are in {result.folder}/runs.csv, this table in {result.folder}/paper_table.md")
+    exit_telling_failures(result)

@@ -8,18 +8,19 @@ import codecs
 import logging
 import os
 import sys
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from textwrap import fill
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import Progress
 from rich.segment import Segment
-from rich.table import Table
 from rich.text import Text
 
 from suave_des.errors import MISTAKES_LOGGER
+from suave_des.tables import Table
 
 if TYPE_CHECKING:
     from suave_des.campaign.progress import OnProgress
@@ -96,6 +97,10 @@ _STYLES = {
 """Of a timeline's events; one that is not here, such as an outside manager's, has none."""
 
 
+_UNITS = {"_m2": " m2", "_s": " s"}
+"""Of further metrics, by the end of a column."""
+
+
 def output() -> Console:
     """The console for results."""
     console = PlainConsole()
@@ -112,7 +117,7 @@ def errors() -> Console:
 @contextmanager
 def progress(label: str, *, quiet: bool) -> Iterator[OnProgress | None]:
     """Show the progress of a campaign on standard error, and warnings about its knowledge base, unless `quiet`."""
-    from suave_des.campaign.display import shown
+    from suave_des.campaign.progress import shown
 
     logger = logging.getLogger(MISTAKES_LOGGER)
     logger.disabled = quiet
@@ -150,37 +155,12 @@ def counted(what: str, console: Console) -> Iterator[Callable[[int, int], None]]
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
-def plain_table(headings: Iterable[str] = (), *, right: Container[str] = (), **look: Any) -> Table:
-    """Make a table that reads well on a terminal and in a plain log.
-
-    Args:
-        headings: of its columns.
-        right: headings of the columns that are aligned to the right.
-        look: further settings of every column, as rich's Table.add_column takes them.
-    """
-    table = Table(box=None, padding=(0, 1), pad_edge=False)
-    for heading in headings:
-        table.add_column(heading, justify="right" if heading in right else "left", **look)
-    return table
-
-
-def print_table(console: Console, title: str, table: Table) -> None:
-    """Print a table under its title."""
-    console.print(Text(title, "bold"), soft_wrap=False)
-    print_trimmed(console, table)
-
-
-def print_trimmed(console: Console, table: Table) -> None:
-    """Print a table without trailing blanks."""
-    with console.capture() as lines:
-        console.print(table)
-    for line in lines.get().splitlines():
-        console.file.write(line.rstrip() + "\n")
-
-
-def fits(console: Console, table: Table) -> bool:
-    """Return whether a table is no wider than the console, with each cell in one line."""
-    return console.measure(table, options=console.options.update(width=1000)).maximum <= console.width
+def print_table(console: Console, table: Table, marks: Mapping[str, str] = MappingProxyType({})) -> None:
+    """Print a table under its title, long names in it broken so that they fit; `marks` has styles of words in it."""
+    text = Text(table.text(console.width))
+    for word, style in marks.items():
+        text.highlight_words([word], style)
+    console.print(Text(table.title, "bold"), text, sep="\n")
 
 
 def number(value: object) -> str:
@@ -202,7 +182,10 @@ def print_timeline(console: Console, result: MissionResult) -> None:
     for event in result.events:
         console.print(_event_line(event, sources, names, width))
     console.print()
-    print_trimmed(console, _metrics_table(metrics, result.further))
+    rows = list(_metrics_rows(metrics, result.further))
+    names, values = (max(len(row[column]) for row in rows) for column in (0, 1))
+    for name, value, remark in rows:
+        console.print(f"{name:<{names}}  {value:>{values}}  {remark}".rstrip())
 
 
 def _event_line(event: Event, sources: int, names: int, width: int | None) -> Text:
@@ -221,25 +204,24 @@ def _event_line(event: Event, sources: int, names: int, width: int | None) -> Te
     return text
 
 
-def _metrics_table(metrics: MissionMetrics, further: Mapping[str, float | int | None]) -> Table:
-    table = Table.grid(padding=(0, 2))
-    table.add_column()
-    table.add_column(justify="right")
-    table.add_column()
+def _metrics_rows(metrics: MissionMetrics, further: Mapping[str, float | int | None]) -> Iterator[tuple[str, str, str]]:
+    """Name, value with its unit, and a remark on it."""
     reaction_s = metrics.mean_reaction_time_s
-    not_found = "" if metrics.pipeline_found else "not found: the time limit counts"
-    table.add_row("search time", f"{metrics.search_time_s:.1f} s", not_found)
-    table.add_row("distance inspected", f"{metrics.distance_inspected_m:.2f} m")
+    yield (
+        "search time",
+        f"{metrics.search_time_s:.1f} s",
+        "" if metrics.pipeline_found else "not found: the time limit counts",
+    )
+    yield "distance inspected", f"{metrics.distance_inspected_m:.2f} m", ""
     if reaction_s is None:
-        table.add_row("mean reaction time", "none", "no reaction was completed")
+        yield "mean reaction time", "none", "no reaction was completed"
     else:
-        table.add_row("mean reaction time", f"{reaction_s:.2f} s")
-    table.add_row("adaptations", str(metrics.adaptations))
-    table.add_row("mission duration", f"{metrics.mission_duration_s:.1f} s")
+        yield "mean reaction time", f"{reaction_s:.2f} s", ""
+    yield "adaptations", str(metrics.adaptations), ""
+    yield "mission duration", f"{metrics.mission_duration_s:.1f} s", ""
     for column, value in further.items():
-        number = f"{value:.2f}" if isinstance(value, float) else "none" if value is None else str(value)
-        unit = next((f" {unit}" for ending, unit in (("_m2", "m2"), ("_s", "s")) if column.endswith(ending)), "")
-        table.add_row(
-            column.removesuffix("_m2").removesuffix("_s").replace("_", " "), number + unit * (value is not None)
+        name, unit = next(
+            ((column.removesuffix(end), unit) for end, unit in _UNITS.items() if column.endswith(end)), (column, "")
         )
-    return table
+        text = f"{value:.2f}" if isinstance(value, float) else str(value)
+        yield name.replace("_", " "), "none" if value is None else text + unit, ""

@@ -1,4 +1,4 @@
-"""suave-des import-config, scenarios, schema and tree: files that describe missions, and what they lead to."""
+"""suave-des import-config, export-config, scenarios, schema, tree: files that describe missions, and what follows."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from typing import Annotated
 
 import typer
 
-from suave_des.cli.console import output, plain, plain_table, print_table
+from suave_des.cli.console import output, plain, print_table
 from suave_des.cli.options import Overwrite
 from suave_des.errors import InputError
-from suave_des.files import check_output_file, write_files
+from suave_des.files import check_output_file, make_output_folder, write_files
 from suave_des.resources import shipped_folder
+from suave_des.tables import Table
 
 
 def scenarios() -> None:
@@ -21,16 +22,16 @@ def scenarios() -> None:
     from suave_des.scenario.loader import load_scenario
 
     folder = shipped_folder("scenarios")
-    table = plain_table(("name", "revision", "what it is"))
+    rows = []
     files = sorted(folder.glob("*.yaml"))
     modes = [path for path in files if path.stem.endswith("_modes")]
     campaigns = [path for path in files if path.stem.endswith("_campaign")]
     for path in files:
         if path not in (*modes, *campaigns):
             scenario = load_scenario(path).scenario
-            table.add_row(path.stem, scenario.revision.name, scenario.description)
+            rows.append((path.stem, scenario.revision.name, scenario.description))
     console = output()
-    print_table(console, "Scenarios", table)
+    print_table(console, Table(("name", "revision", "what it is"), rows, "Scenarios", align="lll"))
     ontologies = sorted(shipped_folder("ontology").glob("*.owl"))
     console.print(f"\nCampaign files: {', '.join(path.name for path in campaigns)}")
     console.print(f"Modes files: {', '.join(path.name for path in modes)}")
@@ -104,7 +105,6 @@ def import_config(
     Keys without a counterpart are reported. Files may be of any revision, with or without leading slashes.
     """
     from suave_des.registry import manager_names
-    from suave_des.scenario.exemplar.files import ImportOptions
     from suave_des.scenario.exemplar.importing import import_config as imported_from
 
     targets = [out] if campaign is None else [out, campaign]
@@ -116,8 +116,15 @@ def import_config(
         if target.resolve() in [file.resolve() for file in files]:
             raise InputError("is one of the files to import", file=target, remedy="give the output a different name")
         check_output_file(target, overwrite=overwrite)
-    options = ImportOptions(base, revision, campaign, runner_seed, manager_names())
-    imported = imported_from(files, out, options)
+    imported = imported_from(
+        files,
+        out,
+        managers=manager_names(),
+        base=base,
+        revision=revision,
+        campaign=campaign,
+        runner_seed=runner_seed,
+    )
     written: dict[Path, dict[str, str | bytes | Iterable[str]]] = {}
     for target, text in zip(targets, filter(None, (imported.scenario, imported.campaign)), strict=True):
         written.setdefault(target.parent, {})[target.name] = text
@@ -130,6 +137,41 @@ def import_config(
         print(f"{campaign} is written")
 
 
+def export_config(
+    scenario: Annotated[
+        str, typer.Argument(metavar="SCENARIO", help="A scenario or campaign file, or the name of a shipped scenario.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for mission_config.yaml and runner_config.yml.")],
+    revision: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Revision of the exemplar that is to read them.", show_default="the scenario's"
+        ),
+    ] = None,
+    overwrite: Overwrite = False,
+) -> None:
+    """Write a scenario as the exemplar's configuration files.
+
+    import-config gives the same scenario again. What the exemplar cannot express is reported.
+    """
+    from suave_des.campaign.spec import CampaignSettings, read_campaign_file
+    from suave_des.scenario.exemplar.exporting import export_config as exported
+    from suave_des.scenario.loader import load_scenario
+
+    file = read_campaign_file(scenario)
+    loaded = load_scenario(scenario if file is None else file.scenario)
+    settings = CampaignSettings(campaign=1, scenario="") if file is None else file.settings
+    given = {"managers", "runs", "seed"} | (set() if file is None else file.settings.model_fields_set)
+    texts, lost = exported(loaded, settings.model_dump(mode="json", include=given), revision)
+    for name in texts:
+        check_output_file(out / name if out.is_dir() else out, overwrite=overwrite)
+    make_output_folder(out)
+    write_files(out, texts)
+    for line in lost:
+        print(plain(f"not expressed: {line}"))
+    print(f"written: {', '.join(str(out / name) for name in texts)}")
+
+
 def tree(
     manager: Annotated[str, typer.Argument(metavar="MANAGER", help="bt, bt_extended, or module:Class with a tree.")],
     scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="Scenario that provides the tree's settings.")] = (
@@ -137,10 +179,9 @@ def tree(
     ),
 ) -> None:
     """Draw the behaviour tree of a manager."""
-    from suave_des.scenario.loader import load_scenario
-    from suave_des.simulation.simulator import Simulator
+    from suave_des.simulation.mission import Mission
 
-    drawn = getattr(Simulator(load_scenario(scenario)).start(manager, 1, 1).manager, "drawing", None)
+    drawn = getattr(Mission(scenario, manager).manager, "drawing", None)
     if drawn is None:
         raise InputError(
             f"manager {manager!r} has no tree",

@@ -16,10 +16,10 @@ from typing import Annotated, Any, ClassVar
 import typer
 
 from suave_des import __version__
-from suave_des.cli import calibrate, campaign, files, missions, results, validate
+from suave_des.cli import campaign, files, missions, results, validate
 from suave_des.cli.console import plain, write_what_the_terminal_has
 from suave_des.cli.kb import commands as kb
-from suave_des.cli.options import CommandsUnderHeadings, Headings, add_commands, remember_command_line
+from suave_des.cli.options import CONTEXT, CommandsUnderHeadings, Headings, remember_command_line
 from suave_des.errors import InputError, SuaveDesError
 from suave_des.interrupts import exit_status, signals_raised, was_interrupted
 
@@ -38,8 +38,7 @@ class _Commands(CommandsUnderHeadings):
         "Run missions": (campaign.reproduce, missions.run, campaign.campaign, missions.train, missions.serve),
         "Look at results": (results.compare, results.figure, results.report, results.replay, validate.validate),
         "Knowledge, rules and trees": (kb.app, files.tree),
-        "Files": (files.import_config, files.scenarios, files.schema),
-        "Other": (calibrate.calibrate, missions.bench),
+        "Files": (files.import_config, files.export_config, files.scenarios, files.schema),
     }
 
     def invoke(self, ctx: Any) -> Any:
@@ -69,13 +68,12 @@ app = typer.Typer(
     name="suave-des",
     cls=_Commands,
     add_completion=True,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings=CONTEXT,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     help="SUAVE, the self-adaptive underwater vehicle exemplar, as a repeatable discrete-event simulation.",
     epilog="Exit status: 0 done; 2 bad input; 3 done, but missions failed; 130 interrupted, 143 by kill.",
 )
-add_commands(app, _Commands.headings)
 
 
 def _print_version(wanted: bool) -> None:
@@ -141,7 +139,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _abandoned() -> int:
     """Count the reasoners that this process has abandoned after a time-out."""
-    limit = sys.modules.get("suave_des.knowledge.pellet.limit")
+    limit = sys.modules.get("suave_des.knowledge.pellet")
     return 0 if limit is None else int(limit.times_abandoned())
 
 

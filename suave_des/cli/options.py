@@ -1,14 +1,17 @@
-"""Arguments and options that several commands share, and how commands are grouped under headings."""
+"""Arguments and options of commands: those that several share, those of campaigns' fields, and how commands are built.
+
+An option of campaigns is declared once, as a documented field of `CampaignSpec`; `Fields` makes options of them.
+"""
 
 from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_args, get_type_hints
 
 import typer
 from typer.core import TyperGroup
@@ -19,12 +22,6 @@ if TYPE_CHECKING:
     from suave_des.scenario.loader import Replacements
 
 Scenario = Annotated[str, typer.Argument(metavar="SCENARIO", help="A scenario file, or the name of a shipped one.")]
-Ontologies = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--ontology", metavar="FILE", help="Ontology to use instead of the scenario's; repeat it for several files."
-    ),
-]
 Results = Annotated[
     list[Path],
     typer.Argument(
@@ -37,67 +34,119 @@ Modes = Annotated[
 Reasoner = Annotated[
     str | None, typer.Option("--reasoner", metavar="NAME", help="cached, pellet, or owlready2 (slow).")
 ]
-RuleFiles = Annotated[
-    list[Path] | None,
-    typer.Option("--rules", metavar="FILE", help="Rule file to add to the ontologies; repeat it for several files."),
-]
-DisabledRules = Annotated[
-    list[str] | None,
-    typer.Option("--disable-rule", metavar="NAME", help="Disable a rule; repeat it for several."),
-]
-SetValues = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set", metavar="KEY=VALUE", help="Override a scenario value, such as mission.time_limit_s=400; repeatable."
-    ),
-]
 Seed = Annotated[int, typer.Option("--seed", help="Random seed.")]
 SeedIfNew = Annotated[int | None, typer.Option("--seed", help="Random seed.", show_default="1")]
 """For commands that may go on from results, which have a seed already."""
 Workers = Annotated[int, typer.Option("--workers", help="Worker processes; results do not depend on the number.")]
-CampaignWorkers = Annotated[
-    int | None,
-    typer.Option(
-        "--workers",
-        help="Worker processes; results do not depend on the number.",
-        show_default="2, or 1 for few missions",
-    ),
-]
-TimeOut = Annotated[
-    float | None,
-    typer.Option(
-        "--time-out",
-        metavar="SECONDS",
-        help="Wall-clock limit for a mission.",
-        show_default="120; with the reasoner owlready2 1800",
-    ),
-]
 ManagersInData = Annotated[
     str | None, typer.Option("--managers", metavar="NAME,...", help="Managers to compare; by default all in the data.")
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress, and no warnings about rules and ontologies.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace results of the same kind in the output folder.")]
+ManagerOptions = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--manager-option",
+        metavar="[MANAGER.]KEY=VALUE",
+        help="Setting of a manager; without MANAGER, of every manager that is not built in; repeat it for several.",
+    ),
+]
+Given = dict[str, Any]
+"""What is given of the options of `Fields`, by the name of the field."""
 
 
 @dataclass(frozen=True)
-class OptionGroup:
-    """Options that several commands share, or that go together; a field is named as its option."""
+class Fields:
+    """Options for fields of CampaignSpec: the annotation of a command's parameter, which takes what is given of them.
+
+        options: Annotated[Given, Fields("runs", "seed", default={"runs": "200"})]
+
+    Attributes:
+        help: of a field that means something else here than in a campaign.
+        default: as shown, if it is another one here than in a campaign.
+    """
+
+    names: tuple[str, ...]
+    help: Mapping[str, str] = field(default_factory=dict)
+    default: Mapping[str, str] = field(default_factory=dict)
+
+    def parameters(self) -> Iterator[inspect.Parameter]:
+        """Yield an option for each field."""
+        from suave_des.campaign.spec import CampaignSpec
+        from suave_des.scenario.schema import field_docs
+
+        texts = field_docs(CampaignSpec)
+        for name in self.names:
+            declared = CampaignSpec.model_fields[name]
+            option, kind = _option(name), next(each for each in _KINDS if each in _types_in(declared.annotation))
+            help_text = self.help.get(name) or " ".join(texts[name].split())
+            default = self.default.get(name) or option.default or _written(declared.default)
+            given = typer.Option(option.flag, metavar=option.metavar, help=help_text, show_default=default or False)
+            annotation: Any = Annotated[bool if kind is bool else kind | None, given]
+            yield _keyword(name, False if kind is bool else None, annotation)
+
+    def taken(self, given: dict[str, Any]) -> Given:
+        """Take what is given from a command's arguments; of names, there may be several, with commas between them."""
+        from suave_des.campaign.spec import CampaignSpec
+
+        values = {name: value for name in self.names if _is_given(value := given.pop(name))}
+        lists = [name for name in values if tuple in _types_in(CampaignSpec.model_fields[name].annotation)]
+        return values | {name: comma_separated(values[name]) for name in lists}
+
+
+_KINDS = (bool, int, float, Path, str)
+
+
+def _option(name: str) -> Any:
+    from suave_des.campaign.spec import CampaignSpec, Option
+
+    declared = CampaignSpec.model_fields[name].metadata
+    option = next((each for each in declared if isinstance(each, Option)), Option())
+    return option._replace(flag=option.flag or f"--{name.replace('_', '-')}")
+
+
+def _types_in(annotation: Any) -> set[Any]:
+    parts = get_args(annotation)
+    outer = getattr(annotation, "__origin__", annotation)
+    return {outer}.union(*map(_types_in, parts))
+
+
+def _written(default: Any) -> str:
+    return ",".join(default) if isinstance(default, tuple) else str(default) if _is_given(default) else ""
+
+
+def flags(given: Given) -> dict[str, Any]:
+    """Name what is given by its options: {"--time-out": 60.0}."""
+    return {_option(name).flag: value for name, value in given.items()}
+
+
+@dataclass(frozen=True)
+class KnowledgeFiles:
+    """Options that replace or add to a scenario's ontologies, rules and values; a field is named as its option."""
+
+    ontology: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FILE", help="Ontology to use instead of the scenario's; repeat it for several files."),
+    ] = None
+    rules: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FILE", help="Rule file to add to the ontologies; repeat it for several files."),
+    ] = None
+    disable_rule: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Disable a rule; repeat it for several.")
+    ] = None
+    set: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KEY=VALUE", help="Override a scenario value, such as mission.time_limit_s=400; repeatable."
+        ),
+    ] = None
 
     @property
     def given(self) -> dict[str, object]:
         """The options that are given, by name."""
         values = {f"--{each.name.replace('_', '-')}": getattr(self, each.name) for each in fields(self)}
         return {option: value for option, value in values.items() if _is_given(value)}
-
-
-@dataclass(frozen=True)
-class KnowledgeFiles(OptionGroup):
-    """Options that replace or add to a scenario's ontologies, rules and values."""
-
-    ontology: Ontologies = None
-    rules: RuleFiles = None
-    disable_rule: DisabledRules = None
-    set: SetValues = None
 
     @property
     def replacements(self) -> Replacements:
@@ -138,11 +187,11 @@ def _is_given(value: object) -> bool:
     return value is not None and value is not False and value != []
 
 
-def check_no_use(options: Mapping[str, object], where: str, remedy: str = "leave it out") -> None:
-    """Check that no option is given that has no effect in this use of the command.
+def check_no_use(options: Mapping[str, object], where: str, remedy: str = "remove it") -> None:
+    """Check that none of some options is given.
 
     Args:
-        options: values by name, such as those of `Files.given`.
+        options: options with their values, such as those of `Files.given`.
         where: the use of the command, such as "with --resume".
         remedy: what to do instead.
 
@@ -173,16 +222,6 @@ def key_and_value(word: str, option: str) -> tuple[str, Any]:
     return key.strip(), read_value(value, option)
 
 
-ManagerOptions = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--manager-option",
-        metavar="[MANAGER.]KEY=VALUE",
-        help="Setting of a manager; without MANAGER, of every manager that is not built in; repeat it for several.",
-    ),
-]
-
-
 def manager_options(words: Sequence[str] | None, managers: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Settings by manager and key.
 
@@ -205,50 +244,12 @@ def manager_options(words: Sequence[str] | None, managers: Sequence[str]) -> dic
             raise InputError(f"{shown(key)} is for none of the managers", place="--manager-option", remedy=remedy)
         targets = [named] if named is not None else managers if len(managers) == 1 else own
         if not targets:
-            remedy = (
-                f"give the manager too, for instance {managers[0]}.{word}" if managers else "name the managers, too"
-            )
-            raise InputError(
-                f"{shown(word)} applies only to managers that are not built in", place="--manager-option", remedy=remedy
-            )
+            remedy = f"give the manager too, for instance {managers[0]}.{word}" if managers else "name the managers"
+            problem = f"{shown(word)} applies only to managers that are not built in"
+            raise InputError(problem, place="--manager-option", remedy=remedy)
         for target in targets:
             settings.setdefault(target, {})[key] = value
     return settings
-
-
-def grouped_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Turn each parameter of a command that is a dataclass into options, one for each field.
-
-    Example:
-        @grouped_options
-        def show(scenario: Scenario, *, files: Files) -> None:
-            loaded = load_scenario(scenario, **files.replacements)
-    """
-    hints = get_type_hints(command, include_extras=True)
-    groups: dict[str, Any] = {name: hint for name, hint in hints.items() if is_dataclass(hint)}
-    parameters = [
-        each.replace(annotation=hints[each.name], kind=inspect.Parameter.KEYWORD_ONLY)
-        for each in inspect.signature(command).parameters.values()
-        if each.name not in groups
-    ]
-    for group in groups.values():
-        annotations = get_type_hints(group, include_extras=True)
-        parameters += [
-            inspect.Parameter(
-                each.name, inspect.Parameter.KEYWORD_ONLY, default=each.default, annotation=annotations[each.name]
-            )
-            for each in fields(group)
-        ]
-
-    @functools.wraps(command)
-    def with_groups(**given: Any) -> None:
-        for name, group in groups.items():
-            given[name] = group(**{each.name: given.pop(each.name) for each in fields(group)})
-        command(**given)
-
-    vars(with_groups)["__signature__"] = inspect.Signature(parameters)
-    with_groups.__annotations__ = {each.name: each.annotation for each in parameters}
-    return with_groups
 
 
 _arguments: list[str] = []
@@ -264,6 +265,8 @@ def command_line() -> list[str]:
     return ["suave-des", *_arguments]
 
 
+# Commands are built of functions when they are called for: what their options are read from is slow to import.
+
 Command = Callable[..., None] | typer.Typer
 Headings = Mapping[str, tuple[Command, ...]]
 """Headings of a help page, and the commands under each, named as their functions."""
@@ -274,22 +277,83 @@ class CommandsUnderHeadings(TyperGroup):
 
     headings: ClassVar[Headings] = {}
 
+    def __init__(self, **settings: Any) -> None:
+        commands = {name_of(each): each for each in chain.from_iterable(self.headings.values())}
+        super().__init__(**(settings | {"commands": commands}))
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Build the command of a name; None if there is none."""
+        found: Any = self.commands.get(cmd_name)
+        return None if found is None else typer.main.get_command(_application(found))
+
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the commands."""
         for heading, commands in self.headings.items():
-            names = [_name(each) for each in commands]
             with formatter.section(heading):
-                formatter.write_dl([(name, self.commands[name].get_short_help_str(200)) for name in names])
+                formatter.write_dl([(name_of(each), _summary(each)) for each in commands])
 
 
-def add_commands(app: typer.Typer, headings: Headings) -> None:
-    """Add the commands to an application."""
-    for command in chain.from_iterable(headings.values()):
-        if isinstance(command, typer.Typer):
-            app.add_typer(command, name=_name(command))
-        else:
-            app.command(_name(command))(command)
+def _application(command: Command) -> typer.Typer:
+    if isinstance(command, typer.Typer):
+        return command
+    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+    app.command(name_of(command), context_settings=CONTEXT)(with_options(command))
+    return app
 
 
-def _name(command: Command) -> str:
+CONTEXT = {"help_option_names": ["-h", "--help"]}
+
+
+def _summary(command: Command) -> str:
+    text = command.info.help if isinstance(command, typer.Typer) else command.__doc__
+    return str(text).partition("\n")[0].rstrip(".")
+
+
+def name_of(command: Command) -> str:
+    """Return the name that a command is called by."""
     return str(command.info.name) if isinstance(command, typer.Typer) else command.__name__.strip("_").replace("_", "-")
+
+
+def with_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Turn each parameter of a command that is a dataclass, or has `Fields`, into options, one for each field.
+
+    Example:
+        def show(scenario: Scenario, *, files: Files) -> None:
+            loaded = load_scenario(scenario, **files.replacements)
+    """
+    hints = get_type_hints(command, include_extras=True)
+    parameters: list[inspect.Parameter] = []
+    grouped: list[inspect.Parameter] = []
+    groups: dict[str, Callable[[dict[str, Any]], Any]] = {}
+    for each in inspect.signature(command).parameters.values():
+        hint = hints[each.name]
+        declared = next((part for part in get_args(hint) if isinstance(part, Fields)), None)
+        if declared is not None:
+            parameters += declared.parameters()
+            groups[each.name] = declared.taken
+        elif is_dataclass(hint):
+            kinds = get_type_hints(hint, include_extras=True)
+            grouped += [_keyword(part.name, part.default, kinds[part.name]) for part in fields(hint)]
+            groups[each.name] = functools.partial(_group, hint)
+        else:
+            parameters.append(each.replace(annotation=hint, kind=inspect.Parameter.KEYWORD_ONLY))
+
+    parameters += grouped
+
+    @functools.wraps(command)
+    def with_groups(**given: Any) -> None:
+        for name, take in groups.items():
+            given[name] = take(given)
+        command(**given)
+
+    vars(with_groups)["__signature__"] = inspect.Signature(parameters)
+    with_groups.__annotations__ = {each.name: each.annotation for each in parameters}
+    return with_groups
+
+
+def _keyword(name: str, default: object, annotation: Any) -> inspect.Parameter:
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+
+
+def _group(kind: Any, given: dict[str, Any]) -> Any:
+    return kind(**{each.name: given.pop(each.name) for each in fields(kind)})

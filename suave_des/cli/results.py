@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from suave_des.cli.console import TEXT_WIDTH, output
-from suave_des.cli.options import Files, Results, SeedIfNew, check_no_use, comma_separated, grouped_options
+from suave_des.cli.options import Files, Results, SeedIfNew, check_no_use, comma_separated
 from suave_des.errors import InputError
 from suave_des.files import check_output_file, write_files
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from suave_des.report.mission_record import MissionRecord
+    from suave_des.records.mission_folder import MissionRecord
+    from suave_des.results.mission_figures import Rules
 
 
 class CompareFormat(StrEnum):
@@ -58,9 +59,6 @@ def compare(
     unpaired: Annotated[
         bool, typer.Option("--unpaired", help="Treat runs as independent although they share random numbers.")
     ] = False,
-    bootstrap: Annotated[
-        bool, typer.Option("--bootstrap", help="BCa bootstrap intervals of means instead of those of t.")
-    ] = False,
     as_format: Annotated[CompareFormat, typer.Option("--format", help="Output format.")] = CompareFormat.TABLE,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write .csv, .json, .md or .tex instead of printing.")
@@ -70,28 +68,27 @@ def compare(
 
     Runs that share their random numbers are compared in pairs, which takes fewer missions.
     """
-    from suave_des.report.compare import Choices, compare_folders
-    from suave_des.report.compare_files import ENDINGS, WRITERS, plain_text
+    from suave_des.results.compare import compare_folders
+    from suave_des.results.comparison import ENDINGS, FORMS
 
     if out is not None:
         _check_out(out, ENDINGS)
-    choices = Choices(
+    comparison = compare_folders(
+        results,
         managers=comma_separated(managers),
         metrics=comma_separated(metrics),
         by=comma_separated(by),
         against=against,
-        half_widths=tuple(half_width or ()),
+        half_widths=half_width or (),
         unpaired=unpaired,
-        bootstrap=bootstrap,
     )
-    comparison = compare_folders(results, choices)
     if out is not None:
-        write_files(out.parent, {out.name: WRITERS[ENDINGS[out.suffix.lower()]](comparison)})
+        write_files(out.parent, {out.name: FORMS[ENDINGS[out.suffix.lower()]](comparison)})
         print(f"compared in {out}")
     elif as_format is CompareFormat.TABLE:
-        print(plain_text(comparison, min(output().width, TEXT_WIDTH)), end="")
+        print(comparison.text(min(output().width, TEXT_WIDTH)), end="")
     else:
-        print(WRITERS[as_format.value](comparison), end="")
+        print(FORMS[as_format.value](comparison), end="")
 
 
 def _check_out(out: Path, endings: Iterable[str]) -> None:
@@ -137,20 +134,15 @@ def figure(
     By default the contents of DIR decide: the map of a mission, the paths of several, a campaign's distributions, or
     the means of a sweep.
     """
-    from suave_des.report.figures import draw_results
+    from suave_des.results.figures import draw_results
 
-    draw_results(
-        folders, out, kind.value, comma_separated(parameters), _with_rules if kind is FigureKind.TIMELINE else None
-    )
+    def rules_of(record: MissionRecord) -> Rules:
+        from suave_des.pages.decisions import adaptation_rules
+
+        return adaptation_rules(record)
+
+    draw_results(folders, out, kind.value, comma_separated(parameters), rules_of)
     print(f"drawn in {out}")
-
-
-def _with_rules(folder: Path, record: MissionRecord) -> MissionRecord:
-    from dataclasses import replace
-
-    from suave_des.pages.decisions import adaptation_rules
-
-    return replace(record, rules=adaptation_rules(folder, record))
 
 
 _SEED, _RUN, _POINT = 1, 1, 0
@@ -159,7 +151,6 @@ _PATHS, _MOST_PATHS = 12, 100
 Open = Annotated[bool, typer.Option("--open", help="Show the page in the browser.")]
 
 
-@grouped_options
 def replay(
     folders: Annotated[
         list[Path] | None,
@@ -193,6 +184,7 @@ def replay(
         typer.Option(metavar="FILE", help="Page to write.", show_default="replay.html, in DIR or the current folder"),
     ] = None,
     show: Open = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Trust the code that DIR names.")] = False,
     *,
     files: Files,
 ) -> None:
@@ -220,6 +212,7 @@ def replay(
         run=_RUN if run_number is None else run_number,
         seed=_SEED if seed is None else seed,
         point=point or _POINT,
+        confirmed=yes,
     )
     if out is not None or not folders:
         check_output_file(page_file, overwrite=True)

@@ -9,28 +9,23 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from suave_des.cli.campaign import exit_telling_failures
-from suave_des.cli.console import output, progress
+from suave_des.cli.console import output, print_table, progress
 from suave_des.cli.options import (
-    CampaignWorkers,
+    Fields,
     Files,
+    Given,
     ManagersInData,
-    Overwrite,
     Quiet,
-    Seed,
     check_no_use,
     command_line,
-    grouped_options,
 )
 from suave_des.files import check_output_folder, make_output_folder, write_files
 from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
 
 if TYPE_CHECKING:
-    import pandas
-
     from suave_des.campaign.campaign import CampaignResult
-    from suave_des.report.runs import Runs
-    from suave_des.validation.conditions import Conditions
-    from suave_des.validation.validation import Validation
+    from suave_des.records.runs import Runs
+    from suave_des.results.real import Conditions
 
 TARGETS_NOT_MET = 1
 """Exit status with --strict."""
@@ -48,7 +43,6 @@ _Data = Annotated[
 ]
 
 
-@grouped_options
 def validate(
     scenario: Annotated[
         str | None,
@@ -67,36 +61,36 @@ def validate(
         Path | None,
         typer.Option(metavar="FILE", help="Shares to compare; by default NAME.targets.yaml beside NAME.csv."),
     ] = None,
-    runs: Annotated[
-        int | None,
-        typer.Option(
-            help="Missions for each manager; with a campaign file, under each condition.",
-            show_default=f"{_RUNS}, over all conditions",
+    *,
+    options: Annotated[
+        Given,
+        Fields(
+            ("runs", "workers", "seed", "out", "overwrite"),
+            {
+                "runs": "Missions for each manager; with a campaign file, under each condition.",
+                "out": "Folder for tables, validation.json and figures.",
+            },
+            {"runs": f"{_RUNS}, over all conditions"},
         ),
-    ] = None,
-    workers: CampaignWorkers = None,
-    seed: Seed = 1,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder for tables, validation.json and figures.")
-    ] = None,
+    ],
     strict: Annotated[
         bool, typer.Option("--strict", help=f"Exit with status {TARGETS_NOT_MET} unless every target is met.")
     ] = False,
-    overwrite: Overwrite = False,
     quiet: Quiet = False,
-    *,
     files: Files,
 ) -> None:
     """Compare simulated missions with real ones: distributions, clusters, conclusions.
 
     With a campaign file that sweeps the conditions of the real missions, each is compared under its own condition.
     """
-    from suave_des.cli.validation_tables import print_validation
-    from suave_des.validation.conditions import CONDITION
-    from suave_des.validation.real import read_conditions, read_real, targets_of
-    from suave_des.validation.validation import validate as compare
+    from suave_des import __version__
+    from suave_des.results.real import CONDITION, read_conditions, read_real, targets_of
+    from suave_des.results.validation import DETECTIONS_FIGURE, DISTRIBUTIONS_FIGURE, FILES
+    from suave_des.results.validation import validate as compare
+    from suave_des.results.validation_output import detections_png, distributions_png, remarks, tables
 
     name = scenario or DEFAULT_SCENARIO
+    out, seed, overwrite = options.get("out"), options.get("seed", 1), "overwrite" in options
     if runs_file is not None:
         check_no_use(files.given, "with --runs-file", "leave one of them out")
     wants_conditions = runs_file is None or scenario is not None
@@ -120,22 +114,12 @@ def validate(
         from suave_des.campaign.campaign import run_campaign
 
         real.check_can_be_run(chosen)
-        runs = runs if runs is not None else -(-_RUNS // len(conditions or "1"))
+        runs = -(-_RUNS // len(conditions or "1"))
+        settings: Given = {"runs": runs, "workers": None, "command": command_line(), **options}
         with progress(name, quiet=quiet) as show:
-            campaign = run_campaign(
-                name,
-                chosen,
-                runs,
-                seed,
-                workers,
-                out,
-                overwrite=overwrite,
-                command=command_line(),
-                on_progress=show,
-                **files.replacements,
-            )
+            campaign = run_campaign(name, chosen, on_progress=show, **settings, **files.replacements)
         simulated = campaign.frame()
-        sources |= {"scenario": campaign.loaded.scenario.name, "runs": runs}
+        sources |= {"scenario": campaign.loaded.scenario.name, "runs": settings["runs"]}
         if not set(campaign.spec.managers) <= set(simulated["manager"]):  # one has no mission to compare
             exit_telling_failures(campaign)
     if conditions is not None:
@@ -143,15 +127,21 @@ def validate(
     validation = compare(real.frame, simulated, chosen, shares=shares, limits=limits, seed=seed)
     console = output()
     notes = [*real.notes, *(conditions.listing() if conditions is not None else ())]
-    for note in notes:
-        console.print(note)
-    if notes:
+    for line in [*notes, ""] if notes else ():
+        console.print(line)
+    for table in tables(validation, word):
+        print_table(console, table, {"NOT MET": "bold red"})
         console.print()
-    print_validation(console, validation, word)
+    console.print("\n".join(remarks(validation, word)))
     if out is None:
         console.print("\nNo files were written; --out DIR keeps tables and figures.")
     else:
-        _write(out, validation, real.frame, simulated, sources, word)
+        contents: dict[str, str | bytes] = {
+            **validation.texts({"version": __version__, "command": command_line(), **sources}),
+            DISTRIBUTIONS_FIGURE: distributions_png(validation, real.frame, simulated, word),
+            DETECTIONS_FIGURE: detections_png(validation, real.frame, simulated, word),
+        }
+        write_files(out, contents, stale=FILES)
         console.print(f"\nTables, figures and validation.json are in {out}")
     if campaign is not None:
         exit_telling_failures(campaign)
@@ -161,7 +151,7 @@ def validate(
 
 def _data_files(scenario: str, given: list[str] | None) -> list[Path]:
     """Return the files of real missions: those given, or those published for the scenario, or the paper's."""
-    from suave_des.validation.real import PAPERS_RUNS, published_for
+    from suave_des.results.real import PAPERS_RUNS, published_for
 
     if given:
         return [find(each, "scenarios/published") for each in given]
@@ -179,10 +169,10 @@ def _recorded(
 ) -> Runs:
     """Read the missions of an earlier campaign, and make the output folder."""
     from suave_des.campaign.spec import read_campaign_file
-    from suave_des.report.runs import read_runs
+    from suave_des.records.runs import read_runs
     from suave_des.scenario.loader import load_scenario
 
-    recorded = read_runs(path, further=() if conditions is None else conditions.names)
+    recorded = read_runs(path, () if conditions is None else conditions.names)
     if scenario is None:
         name = None
     else:
@@ -193,25 +183,6 @@ def _recorded(
         check_output_folder(out, "campaign", overwrite=overwrite)
         make_output_folder(out)
     return recorded
-
-
-def _write(
-    out: Path,
-    validation: Validation,
-    published: pandas.DataFrame,
-    simulated: pandas.DataFrame,
-    sources: dict[str, object],
-    real: str,
-) -> None:
-    from suave_des import __version__
-    from suave_des.validation import files
-    from suave_des.validation.figures import detections_png, distributions_png
-
-    provenance = {"version": __version__, "command": command_line(), **sources}
-    contents: dict[str, str | bytes] = {**files.texts(validation, provenance)}
-    contents[files.DISTRIBUTIONS_FIGURE] = distributions_png(validation, published, simulated, real)
-    contents[files.DETECTIONS_FIGURE] = detections_png(validation, published, simulated, real)
-    write_files(out, contents, stale=files.FILES)
 
 
 def _named(runs: Runs) -> dict[str, str | None]:

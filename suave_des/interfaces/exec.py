@@ -12,9 +12,11 @@ import json
 import os
 import select
 import shlex
+import signal
 import subprocess
 import time
 from collections.abc import Collection, Mapping
+from contextlib import suppress
 from dataclasses import asdict
 from functools import cache
 from operator import attrgetter
@@ -23,7 +25,7 @@ from typing import Any, ClassVar, Final
 
 from suave_des.domain import Task
 from suave_des.errors import InputError, did_you_mean, shown
-from suave_des.managing.base import Dependencies, ManagedSystem, ManagingSubsystem
+from suave_des.managing.base import Dependencies, ManagingSubsystem, System
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import EXEMPLAR_KINDS, Diagnostic, Kind
 
@@ -34,6 +36,7 @@ TIME_OUT_S: Final = 10.0
 """So long a program may take for an answer; the setting `time_out_s` changes it."""
 _END_S: Final = 1.0
 _READ_BYTES: Final = 65536
+_KILLS_AT_END_OF_INPUT: Final = 'read -r _; sleep 1; kill -s KILL -- "-$1"'
 KINDS: Final = {
     "measured": Kind.QA_STATUS,
     "component_status": Kind.COMPONENT_STATUS,
@@ -63,12 +66,19 @@ class _Program:
 
     def __init__(self, command: tuple[str, ...]) -> None:
         try:
-            self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0)
+            self._process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0, start_new_session=True
+            )
         except OSError as error:
             remedy = "give a program that can be run, such as exec:./my_manager or exec:perl my_manager.pl"
             raise InputError(f"cannot be run: {error.strerror}", file=command[0], remedy=remedy) from None
         assert self._process.stdin is not None and self._process.stdout is not None
         self._in, self._out = self._process.stdin.fileno(), self._process.stdout.fileno()
+        # If this process is killed, its end of the pipe closes, and the shell kills the program with its children.
+        group = str(self._process.pid)
+        self._watcher = subprocess.Popen(
+            ("sh", "-c", _KILLS_AT_END_OF_INPUT, "sh", group), stdin=subprocess.PIPE, start_new_session=True
+        )
         self._poll = select.poll()
         self._poll.register(self._out, select.POLLIN)
         self._rest = b""
@@ -114,15 +124,17 @@ class _Program:
         return ProgramError(f"ended with status {status}")
 
     def end(self) -> None:
-        """End the program: it sees the end of its input, and is killed if that is not enough."""
+        """End the program: it sees the end of its input; then whatever is left of it and its children is killed."""
         for stream in (self._process.stdin, self._process.stdout):
             assert stream is not None
             stream.close()
-        try:
+        with suppress(subprocess.TimeoutExpired):
             self._process.wait(_END_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        with suppress(ProcessLookupError, PermissionError):  # nobody is left; macOS says so by a PermissionError
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+        self._watcher.kill()
+        self._watcher.communicate()
 
 
 _programs: dict[tuple[str, ...], _Program] = {}
@@ -147,13 +159,24 @@ class ExecManager(ManagingSubsystem):
         words = shlex.split(cls.command)
         return (*(word for word in words if Path(word).is_file()), *super().input_files(settings))
 
-    def __init__(self, system: ManagedSystem) -> None:
+    def __init__(self, system: System) -> None:
         super().__init__(system)
-        words = shlex.split(self.command)
-        self._command = tuple(str(system.files[word].resolve()) if word in system.files else word for word in words)
-        settings = dict(system.settings)
-        self._time_out_s = float(settings.pop("time_out_s", TIME_OUT_S))
+        self._command = tuple(map(self._located, shlex.split(self.command)))
+        self._time_out_s = float(system.settings.get("time_out_s", TIME_OUT_S))
         self._depends_on: Dependencies | None = None
+        self._begin: dict[str, Any] = {}
+
+    def _located(self, word: str) -> str:
+        """Return where the file is that a word of the command names, or the word if it names none."""
+        try:
+            return str(self.system.file(word).resolve())
+        except InputError:
+            return word
+
+    def recall(self, learned: Mapping[str, Any], training: bool) -> None:
+        """Tell the program what there is, and take its settings."""
+        system = self.system
+        settings = {name: value for name, value in system.settings.items() if name != "time_out_s"}
         answer = self._ask(
             "mission_started",
             protocol=PROTOCOL,
@@ -161,10 +184,10 @@ class ExecManager(ManagingSubsystem):
             time_limit_s=system.scenario.mission.time_limit_s,
             seed=system.stream("exec").getrandbits(48),
             settings=settings,
-            learned=system.learned,
+            learned=learned,
             attributes=list(system.measurements),
             functions={function: system.modes.available_modes(function) for function in system.modes.nodes},
-            lasting_functions=system.lasting_functions,
+            mission_wide_functions=system.functions,
         )
         if answer.pop("protocol", PROTOCOL) != PROTOCOL:
             raise self._error(f"does not speak version {PROTOCOL} of the protocol")

@@ -1,41 +1,34 @@
-"""The mission as a Gymnasium environment, `gymnasium.make("suave_des/PipelineInspection-v0")`, and its vector form."""
+"""The mission as a Gymnasium environment: `gymnasium.make("suave_des/PipelineInspection-v0")`."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
-from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
-from suave_des.domain import (
-    BATTERY_LEVEL,
-    FOLLOW_PIPELINE,
-    GENERATE_RECHARGE_PATH,
-    MISSION_FUNCTIONS,
-    THRUSTER_NAMES,
-    THRUSTERS,
-)
+from suave_des.domain import BATTERY_LEVEL, FOLLOW_PIPELINE, GENERATE_RECHARGE_PATH, MISSION_FUNCTIONS, THRUSTER_NAMES
 from suave_des.errors import InputError
-from suave_des.interfaces.mission import CALLER, CallerManages
-from suave_des.managing.base import ManagedSystem
-from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
+from suave_des.monitor.diagnostics import FAILED
 from suave_des.resources import DEFAULT_SCENARIO
-from suave_des.scenario.loader import load_scenario
+from suave_des.scenario.loader import LoadedScenario, load_scenario
 from suave_des.scenario.modes import grounding_modes
+from suave_des.scenario.physical import ConstantSignal, SinusoidSignal, StepSignal, TableSignal
+from suave_des.scenario.quantities import AnyDistribution, Exponential, Normal, support
+from suave_des.simulation.mission import Mission
 from suave_des.simulation.simulator import Simulator
 
 Observation = NDArray[np.float32]
 NOT_MEASURED: Final = -1.0
-_GREATEST: Final = 1e6
-"""Bound of measured values and distances, for libraries that need one."""
 SEED_LIMIT: Final = 2**31
+_SPREADS: Final = 6.0
+"""So many standard deviations are taken for the bounds of a normal distribution that has none."""
 
 
 @dataclass(frozen=True)
@@ -57,152 +50,6 @@ class Reward:
     adaptation: float = 0.0
 
 
-class _Observing(CallerManages):
-    """Keeps track of which thrusters work."""
-
-    subscribes_to: ClassVar[Collection[Kind]] = (Kind.COMPONENT_STATUS,)
-
-    def __init__(self, system: ManagedSystem) -> None:
-        super().__init__(system)
-        self.works = [1.0] * THRUSTERS
-
-    def diagnostic(self, diagnostic: Diagnostic) -> None:
-        """Take a component's status."""
-        if diagnostic.key in THRUSTER_NAMES:
-            self.works[THRUSTER_NAMES.index(diagnostic.key)] = float(diagnostic.value != FAILED)
-
-
-class _Episodes:
-    """Successive missions as numbers: the part that the environment and its vector form share."""
-
-    def __init__(
-        self,
-        scenario: str | Path | Simulator = DEFAULT_SCENARIO,
-        period_s: float = 2.0,
-        reward: Reward | dict[str, float] | None = None,
-    ) -> None:
-        if not 0.05 <= period_s < inf:
-            raise InputError(f"period_s: {period_s} is out of range", remedy="give 0.05 s or more")
-        try:
-            self.weights = Reward(**(reward or {})) if not isinstance(reward, Reward) else reward
-        except TypeError as error:
-            raise InputError(f"reward: {error}", remedy=f"give {', '.join(Reward.__dataclass_fields__)}") from None
-        self.simulator = scenario if isinstance(scenario, Simulator) else Simulator(load_scenario(scenario))
-        self.period_s = period_s
-        loaded = self.simulator.loaded
-        self.limit_s = loaded.scenario.mission.time_limit_s
-        has_battery = loaded.scenario.battery is not None
-        self.attributes = (*sorted(loaded.scenario.signals), *((BATTERY_LEVEL,) if has_battery else ()))
-        self.choices = {
-            function: modes
-            for function in loaded.modes.functions
-            if (function in MISSION_FUNCTIONS or (function == GENERATE_RECHARGE_PATH and has_battery))
-            and len(modes := grounding_modes(loaded.modes.modes(function))) > 1
-        }
-        entries = (
-            *((name, -_GREATEST, _GREATEST) for name in self.attributes),
-            *((name, 0.0, 1.0) for name in (*THRUSTER_NAMES, "inspects")),
-            ("distance_inspected_m", 0.0, _GREATEST),
-            ("time_share", 0.0, 2.0),
-            *((function, -1.0, len(modes) - 1.0) for function, modes in self.choices.items()),
-        )
-        self.names, low, high = zip(*entries, strict=True)
-        self.observation_space = spaces.Box(np.array(low, np.float32), np.array(high, np.float32), dtype=np.float32)
-        self.action_space = spaces.MultiDiscrete([len(modes) for modes in self.choices.values()])
-        self.indices: list[tuple[str, dict[str | None, float]]] = [
-            (function, {mode: float(n) for n, mode in enumerate(modes)}) for function, modes in self.choices.items()
-        ]
-
-
-class _Episode:
-    """One mission as numbers: that of a seed, which is run 1 of a campaign with it."""
-
-    def __init__(self, of: _Episodes, seed: int) -> None:
-        self._of = of
-        self._run = run = of.simulator.start(CALLER, 1, seed, manager_type=_Observing)
-        self._system, self._modes = run.system, run.modes
-        assert isinstance(run.manager, _Observing)
-        self._works = run.manager.works
-        self._t_s = self._now_s = self._searched_s = self._distance_m = 0.0
-        self._requested: Sequence[int] = ()
-        self._adaptations, self._found, self._has_inspected, self._is_over = 0, False, False, False
-        run.advance(1e-9)  # the first task is requested at t = 0
-        self._task_changed()
-
-    def step(self, action: Sequence[int]) -> tuple[float, bool]:
-        """Request modes, and advance by a period; return the reward, and whether the mission is over."""
-        run = self._run
-        if action != self._requested:
-            self._request(action)
-        self._t_s += self._of.period_s
-        run.advance(self._t_s)
-        self._now_s, self._is_over = run.env.now, run.is_over
-        if run.task is not self._task:
-            self._task_changed()
-        return self._reward(), self._is_over
-
-    def _request(self, action: Sequence[int]) -> None:
-        for (function, modes), choice in zip(self._of.choices.items(), action, strict=True):
-            if not 0 <= choice < len(modes):
-                remedy = f"0 to {len(modes) - 1}: {', '.join(modes)}"
-                raise InputError(f"action {choice} for {function} is out of range", remedy=remedy)
-            if function in self._needed:
-                self._modes.change_mode(function, modes[choice])
-        self._requested = action
-        self._read_modes()
-
-    def _read_modes(self) -> None:
-        current_mode = self._modes.current_mode
-        self._mode_indices = [index.get(current_mode(function), -1.0) for function, index in self._of.indices]
-
-    def _task_changed(self) -> None:
-        self._requested = ()  # a task brings modes of its own
-        self._task = task = self._run.task
-        functions = task.functions if task is not None else ()
-        # The way to the recharge station belongs to no task: it may be taken at any time.
-        self._needed = frozenset((*self._system.lasting_functions, GENERATE_RECHARGE_PATH, *functions))
-        self._inspects = FOLLOW_PIPELINE in functions
-        self._has_inspected |= self._inspects
-        self._read_modes()
-
-    def _reward(self) -> float:
-        weights, found_s = self._of.weights, self._run.found_s
-        searched_s = self._now_s if found_s is None else found_s
-        reward = weights.searched_per_s * (searched_s - self._searched_s)
-        self._searched_s = searched_s
-        if self._has_inspected:
-            distance_m = self._system.distance_inspected_m()
-            reward += weights.inspected_per_m * (distance_m - self._distance_m)
-            self._distance_m = distance_m
-        if found_s is not None and not self._found:
-            reward, self._found = reward + weights.found, True
-        if weights.adaptation:
-            adaptations = self._modes.adaptations
-            reward += weights.adaptation * (adaptations - self._adaptations)
-            self._adaptations = adaptations
-        return float(reward)
-
-    def observation(self) -> Observation:
-        """Return the monitors' measurements and the state of the mission."""
-        of, measured = self._of, self._system.measured
-        values = [NOT_MEASURED if (value := measured(name)) is None else value for name in of.attributes]
-        values += self._works
-        values += self._inspects, self._distance_m, self._now_s / of.limit_s
-        values += self._mode_indices
-        return np.array(values, np.float32)
-
-    def info(self) -> dict[str, Any]:
-        """Mission time and task; at the end the metrics."""
-        info: dict[str, Any] = {"time_s": self._now_s, "task": self._task.name if self._task else ""}
-        if self._is_over:
-            info["metrics"] = self._run.metrics()
-        return info
-
-    def close(self) -> None:
-        """Give the mission's memory to the next one."""
-        self._of.simulator.give_back(self._run)
-
-
 class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
     """SUAVE's mission; an episode is a mission, a step is one adaptation period.
 
@@ -216,7 +63,7 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
 
     An episode terminates with the mission: at the time limit, which belongs to the task, or at the end of the path. It
     is never truncated. `reset(seed=s)` gives the mission of run 1 of a campaign with seed s; without a seed one is
-    drawn.
+    drawn. `gymnasium.make_vec(..., num_envs=8)` gives many side by side (gymnasium's SyncVectorEnv).
 
     Example:
         >>> environment = gymnasium.make("suave_des/PipelineInspection-v0", scenario="seams2023", period_s=2.0)
@@ -224,16 +71,20 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         >>> observation, reward, terminated, truncated, info = environment.step([2, 0])
 
     Args:
-        scenario: path of a scenario file, name of a shipped one, or a Simulator.
+        scenario: path of a scenario file, name of a shipped one, or a Simulator, which several environments may share.
         period_s: mission time of a step.
         reward: weights, see `Reward`.
-        render_mode: none; a mission is drawn by `suave-des run --out` and `suave-des figure`.
+        render_mode: "rgb_array": `render` draws the vehicle's way so far and the pipeline, from above.
+
+    Attributes:
+        observation_names: names of the observation's entries.
+        mode_names: functions with a choice, in the order of an action, and their modes in the order of its values.
 
     Raises:
         InputError: something given cannot be used, or an action is out of range.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 4}  # noqa: RUF012
 
     def __init__(
         self,
@@ -242,20 +93,37 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         reward: Reward | dict[str, float] | None = None,
         render_mode: str | None = None,
     ) -> None:
-        self._episodes = _Episodes(scenario, period_s, reward)
-        self.observation_space, self.action_space = self._episodes.observation_space, self._episodes.action_space
-        self.render_mode = render_mode
-        self._episode: _Episode | None = None
-
-    @property
-    def observation_names(self) -> tuple[str, ...]:
-        """Names of the observation's entries."""
-        return self._episodes.names
-
-    @property
-    def mode_names(self) -> dict[str, tuple[str, ...]]:
-        """Functions with a choice, in the order of an action, and their modes in the order of its values."""
-        return dict(self._episodes.choices)
+        if not 0.05 <= period_s < inf:
+            raise InputError(f"period_s: {period_s} is out of range", remedy="give 0.05 s or more")
+        try:
+            self._weights = Reward(**(reward or {})) if not isinstance(reward, Reward) else reward
+        except TypeError as error:
+            raise InputError(f"reward: {error}", remedy=f"give {', '.join(Reward.__dataclass_fields__)}") from None
+        self._simulator = scenario if isinstance(scenario, Simulator) else Simulator(load_scenario(scenario))
+        self._period_s, self.render_mode = period_s, render_mode
+        loaded, duration_s = self._simulator.loaded, self._simulator.duration_s
+        self._limit_s = loaded.scenario.mission.time_limit_s
+        has_battery = loaded.scenario.battery is not None
+        self._attributes = (*sorted(loaded.scenario.signals), *((BATTERY_LEVEL,) if has_battery else ()))
+        self.mode_names = {
+            function: modes
+            for function in loaded.modes.functions
+            if (function in MISSION_FUNCTIONS or (function == GENERATE_RECHARGE_PATH and has_battery))
+            and len(modes := grounding_modes(loaded.modes.modes(function))) > 1
+        }
+        entries = (
+            *((name, *_bounds(loaded, name)) for name in self._attributes),
+            *((name, 0.0, 1.0) for name in (*THRUSTER_NAMES, "inspects")),
+            ("distance_inspected_m", 0.0, 2.0 * sum(self._simulator.path.lengths_m)),
+            ("time_share", 0.0, duration_s / self._limit_s),
+            *((function, -1.0, len(modes) - 1.0) for function, modes in self.mode_names.items()),
+        )
+        self.observation_names, low, high = zip(*entries, strict=True)
+        self.observation_space = spaces.Box(np.array(low, np.float32), np.array(high, np.float32), dtype=np.float32)
+        self.action_space = spaces.MultiDiscrete([len(modes) for modes in self.mode_names.values()])
+        self._mission: Mission | None = None
+        self._requested: list[int] = []
+        self._needed: frozenset[str] = frozenset()
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -264,22 +132,114 @@ class PipelineInspection(gymnasium.Env[Observation, NDArray[np.int64]]):
         super().reset(seed=seed)
         self.close()
         drawn = int(self.np_random.integers(SEED_LIMIT)) if seed is None else seed
-        self._episode = _Episode(self._episodes, drawn)
-        return self._episode.observation(), {"seed": drawn, **self._episode.info()}
+        self._mission = mission = Mission(self._simulator, seed=drawn)
+        self._time_s = self._searched_s = self._distance_m = 0.0
+        self._adaptations, self._found = 0, False
+        mission.advance(1e-9)  # the first task is requested at t = 0
+        self._task_changed(mission)
+        return self._observation(mission), {"seed": drawn, **self._info(mission)}
 
     def step(self, action: Sequence[int] | NDArray[np.int64]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Request the modes of an action, and advance by a period."""
-        episode = self._episode
-        if episode is None:
+        mission = self._mission
+        if mission is None:
             raise InputError("there is no mission", remedy="call reset first")
-        reward, is_over = episode.step(_numbers(action, len(self._episodes.choices)))
-        return episode.observation(), reward, is_over, False, episode.info()
+        wanted = _numbers(action, len(self.mode_names))
+        if wanted != self._requested:
+            self._request(mission, wanted)
+        self._time_s += self._period_s
+        if not mission.is_over:
+            mission.advance(self._time_s)
+        if mission.task is not self._task:
+            self._task_changed(mission)
+        reward = self._reward(mission)
+        return self._observation(mission), reward, mission.is_over, False, self._info(mission)
+
+    def render(self) -> NDArray[np.uint8]:
+        """Draw the vehicle's way so far and the pipeline, from above.
+
+        Raises:
+            InputError: the environment was made without render_mode="rgb_array", or there is no mission.
+        """
+        if self.render_mode is None or self._mission is None:
+            raise InputError("there is nothing to draw", remedy='make it with render_mode="rgb_array", and call reset')
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(6.0, 4.0), dpi=100, layout="constrained")
+        axes = figure.add_subplot(aspect="equal", xlabel="x (east), m", ylabel="y (north), m")
+        way_m, pipeline_m, pose = self._mission.way_m(), self._simulator.points, self._mission.pose
+        axes.plot(pipeline_m[:, 0], pipeline_m[:, 1], color="0.6", linewidth=4.0, label="pipeline")
+        axes.plot(way_m[:, 0], way_m[:, 1], color="C0", label="vehicle")
+        axes.plot(pose.x_m, pose.y_m, "o", color="C0")
+        axes.set_title(f"{self._mission.now_s:.0f} s, {self._task.name if self._task else 'over'}")
+        axes.legend(loc="upper right")
+        canvas: Any = FigureCanvasAgg(figure)
+        canvas.draw()
+        return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
     def close(self) -> None:
         """End the mission."""
-        if self._episode is not None:
-            self._episode.close()
-            self._episode = None
+        if self._mission is not None:
+            self._mission.close()
+            self._mission = None
+
+    def _request(self, mission: Mission, wanted: list[int]) -> None:
+        for (function, modes), choice in zip(self.mode_names.items(), wanted, strict=True):
+            if not 0 <= choice < len(modes):
+                remedy = f"0 to {len(modes) - 1}: {', '.join(modes)}"
+                raise InputError(f"action {choice} for {function} is out of range", remedy=remedy)
+            if function in self._needed:
+                mission.change_mode(function, modes[choice])
+        self._requested = wanted
+        self._read_modes(mission)
+
+    def _read_modes(self, mission: Mission) -> None:
+        """Look up the indices of the modes that were requested last."""
+        requested = [(mission.current_mode(function), modes) for function, modes in self.mode_names.items()]
+        self._mode_indices = [float(modes.index(mode)) if mode in modes else -1.0 for mode, modes in requested]
+
+    def _task_changed(self, mission: Mission) -> None:
+        self._requested = []  # a task brings modes of its own
+        self._task = mission.task
+        # The way to the recharge station belongs to no task: it may be taken at any time.
+        self._needed = frozenset((*mission.functions, GENERATE_RECHARGE_PATH))
+        self._inspects = FOLLOW_PIPELINE in mission.functions
+        self._read_modes(mission)
+
+    def _reward(self, mission: Mission) -> float:
+        weights, found_s = self._weights, mission.found_s
+        searched_s = mission.now_s if found_s is None else found_s
+        reward = weights.searched_per_s * (searched_s - self._searched_s)
+        self._searched_s = searched_s
+        if found_s is not None:
+            distance_m = mission.distance_inspected_m
+            reward += weights.inspected_per_m * (distance_m - self._distance_m)
+            self._distance_m = distance_m
+            if not self._found:
+                reward, self._found = reward + weights.found, True
+        adaptations = mission.mode_manager.adaptations
+        reward += weights.adaptation * (adaptations - self._adaptations)
+        self._adaptations = adaptations
+        return float(reward)
+
+    def _observation(self, mission: Mission) -> Observation:
+        """Return the monitors' measurements and the state of the mission."""
+        values = [mission.measured(name, NOT_MEASURED) for name in self._attributes]
+        values += [float(mission.components.get(name) != FAILED) for name in THRUSTER_NAMES]
+        values += self._inspects, self._distance_m, min(self._time_s, mission.now_s) / self._limit_s
+        values += self._mode_indices
+        return np.array(values, np.float32)
+
+    def _info(self, mission: Mission) -> dict[str, Any]:
+        """Return mission time and task; at the end the metrics."""
+        info: dict[str, Any] = {
+            "time_s": min(self._time_s, mission.now_s),
+            "task": self._task.name if self._task else "",
+        }
+        if mission.is_over:
+            info["metrics"] = mission.metrics()
+        return info
 
 
 def _numbers(action: Any, count: int) -> list[int]:
@@ -291,78 +251,31 @@ def _numbers(action: Any, count: int) -> list[int]:
     return numbers
 
 
-class PipelineInspectionVector(VectorEnv[Observation, NDArray[np.int64], NDArray[Any]]):
-    """Many missions side by side in one process, which share what does not change between them.
+def _bounds(loaded: LoadedScenario, attribute: str) -> tuple[float, float]:
+    """Return the least and the greatest value that can be observed of a quality attribute."""
+    values: Sequence[AnyDistribution]
+    described = loaded.scenario.battery if attribute == BATTERY_LEVEL else loaded.scenario.signals[attribute]
+    match described:
+        case SinusoidSignal():
+            values = described.minimum, described.maximum
+        case ConstantSignal():
+            values = (described.value,)
+        case StepSignal():
+            values = described.before, described.after
+        case TableSignal():
+            values = loaded.tables[attribute][1]
+        case _:
+            values = 0.0, 1.0  # a battery
+    noise = _span(0.0 if described is None else described.noise)
+    lows, highs = zip(*map(_span, values), strict=True)
+    return min(NOT_MEASURED, min(lows) + noise[0]), max(highs) + noise[1]
 
-    As of `PipelineInspection`, with an array row for each mission. A mission that is over is followed by the next one
-    in the step after (`AutoresetMode.NEXT_STEP`); its metrics are in `infos["metrics"]`.
 
-    Example:
-        >>> environments = gymnasium.make_vec("suave_des/PipelineInspection-v0", num_envs=8)
-        >>> observations, infos = environments.reset(seed=1)
-    """
-
-    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
-
-    def __init__(
-        self,
-        num_envs: int = 1,
-        scenario: str | Path | Simulator = DEFAULT_SCENARIO,
-        period_s: float = 2.0,
-        reward: Reward | dict[str, float] | None = None,
-        render_mode: str | None = None,
-    ) -> None:
-        if num_envs < 1:
-            raise InputError(f"num_envs: {num_envs} is out of range", remedy="give 1 or more")
-        self.num_envs, self.render_mode = num_envs, render_mode
-        self._of = of = _Episodes(scenario, period_s, reward)
-        self.single_observation_space, self.single_action_space = of.observation_space, of.action_space
-        self.observation_space = gymnasium.vector.utils.batch_space(of.observation_space, num_envs)
-        self.action_space = gymnasium.vector.utils.batch_space(of.action_space, num_envs)
-        self._all: list[_Episode] = []
-        self._is_over = np.zeros(num_envs, np.bool_)
-
-    def reset(
-        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Begin all missions: those of seed, seed + 1 and so on."""
-        super().reset(seed=seed if isinstance(seed, int) else None)
-        self.close_extras()
-        numbers = range(self.num_envs)
-        seeds = list(seed) if isinstance(seed, list) else [None if seed is None else seed + n for n in numbers]
-        self._all = [_Episode(self._of, self._drawn() if one is None else one) for one in seeds]
-        self._is_over[:] = False
-        return self._observations(), {}
-
-    def step(
-        self, actions: NDArray[np.int64]
-    ) -> tuple[Observation, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
-        """Request the modes of all actions, and advance each mission by a period."""
-        rewards, over, infos = np.zeros(self.num_envs), np.zeros(self.num_envs, np.bool_), dict[str, Any]()
-        rows = np.asarray(actions)
-        if rows.shape != (self.num_envs, len(self._of.choices)) or rows.dtype.kind not in "iu":
-            raise InputError(
-                f"actions of shape {rows.shape} and type {rows.dtype}", remedy=f"see action_space: {self.action_space}"
-            )
-        for n, action in enumerate(rows.tolist()):
-            if self._is_over[n]:
-                self._all[n].close()
-                self._all[n] = _Episode(self._of, self._drawn())
-                continue
-            rewards[n], over[n] = self._all[n].step(action)
-            if over[n]:
-                infos = self._add_info(infos, self._all[n].info(), n)
-        self._is_over = over
-        return self._observations(), rewards, over, np.zeros(self.num_envs, np.bool_), infos
-
-    def close_extras(self, **_: Any) -> None:
-        """End all missions."""
-        for episode in self._all:
-            episode.close()
-        self._all = []
-
-    def _drawn(self) -> int:
-        return int(self.np_random.integers(SEED_LIMIT))
-
-    def _observations(self) -> Observation:
-        return np.stack([episode.observation() for episode in self._all])
+def _span(distribution: AnyDistribution) -> tuple[float, float]:
+    low, high = support(distribution)
+    if isinstance(distribution, Normal):
+        wide = _SPREADS * distribution.std
+        return max(low, distribution.mean - wide), min(high, distribution.mean + wide)
+    if isinstance(distribution, Exponential):
+        return low, low + _SPREADS**2 * distribution.mean
+    return low, high

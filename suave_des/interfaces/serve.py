@@ -7,6 +7,7 @@ dependency for ten paths.
 from __future__ import annotations
 
 import json
+import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -15,15 +16,19 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from math import inf
 from typing import Any, Final
+from urllib.parse import urlsplit
 
 from suave_des.domain import THRUSTER_NAMES
-from suave_des.errors import InputError, SuaveDesError, shown
-from suave_des.interfaces.mission import Mission
+from suave_des.errors import InputError, SuaveDesError, did_you_mean, shown
 from suave_des.scenario.modes import grounding_modes
+from suave_des.simulation.mission import Mission
 from suave_des.simulation.simulator import Simulator
 
 BODY_LIMIT_BYTES: Final = 100_000
 _READ_TIMEOUT_S: Final = 10.0
+_LENGTH_DIGITS: Final = 20
+_LOCAL: Final = ("localhost", "127.0.0.1", "::1")
+_JSON: Final = "application/json"
 _ADVANCE: Final = "advance_s"
 _LONGEST_S: Final = 1e6
 Json = dict[str, Any]
@@ -101,7 +106,9 @@ class Session:
         return {function: list(grounding_modes(modes)) for function, modes in self._mission.modes.items()}
 
     def _execute(self, content: Any) -> Json:
-        wanted = _object(content)
+        wanted = _object(content, (*self._mission.modes, _ADVANCE))
+        # UPISAS sends every key of the schema: null leaves things as they are, like a key that is not there.
+        wanted = {key: value for key, value in wanted.items() if value is not None}
         step_s = _seconds(wanted.pop(_ADVANCE, 0.0))
         for function, mode in wanted.items():
             self._mission.check_mode(function, mode)
@@ -133,8 +140,8 @@ class Session:
         return _schema({name: kinds.get(name, number) for name in self._monitor()}, required=True)
 
     def _execute_schema(self) -> Json:
-        modes = {function: {"type": "string", "enum": list(each)} for function, each in self._mission.modes.items()}
-        return _schema({**modes, _ADVANCE: {"type": "number", "minimum": 0}}, required=False)
+        modes = {function: {"enum": [*each, None]} for function, each in self._mission.modes.items()}
+        return _schema({**modes, _ADVANCE: {"type": ["number", "null"], "minimum": 0}}, required=False)
 
     def _options_schema(self) -> Json:
         return _schema(
@@ -152,12 +159,12 @@ def _schema(properties: Json, *, required: bool) -> Json:
     }
 
 
-def _object(content: Any, known: Sequence[str] = ()) -> Json:
-    """Return a copy of an object; where its keys are known beforehand, it may have no others."""
+def _object(content: Any, known: Sequence[str]) -> Json:
+    """Return a copy of an object, which may have no other keys than the known ones."""
     if not isinstance(content, dict):
         raise InputError(f"expected an object, got {shown(content)}", remedy='such as {"advance_s": 2.0}')
-    if known and (unknown := [key for key in content if key not in known]):
-        raise InputError(f"unknown key {shown(unknown[0])}", remedy=f"give {' or '.join(known)}")
+    if unknown := [key for key in content if key not in known]:
+        raise InputError(f"unknown key {shown(unknown[0])}", remedy=did_you_mean(unknown[0], known))
     return dict(content)
 
 
@@ -167,8 +174,16 @@ def _seconds(value: Any) -> float:
     return float(value)
 
 
+class _RefusedError(Exception):
+    """A request that does not reach the session: its status, and why."""
+
+
 class _Handler(BaseHTTPRequestHandler):
-    """Reads requests and writes answers; the session interprets them."""
+    """Reads requests and writes answers; the session interprets them.
+
+    Requests that a web page on another site may have a browser send are refused: a page can neither choose the address
+    in Host, nor hide the one in Origin, nor send JSON without asking this server first.
+    """
 
     server: Server
     protocol_version = "HTTP/1.1"
@@ -181,36 +196,56 @@ class _Handler(BaseHTTPRequestHandler):
         """Answer a request by any of the methods."""
         method, path = self.command, self.path.partition("?")[0].rstrip("/") or "/"
         try:
+            self._check_sender()
             content = self._content() if method != "GET" else None
             status, answer = HTTPStatus.OK, self.server.session.answer(method, path, content)
+        except _RefusedError as error:
+            self.close_connection = True  # a body would not be read
+            status, answer = error.args[0], {"error": error.args[1]}
         except LookupError:
             status, answer = HTTPStatus.NOT_FOUND, {"error": f"there is no {method} {path}"}
-        except OverflowError as error:
-            self.close_connection = True  # the rest of the body is not read
-            status, answer = HTTPStatus.REQUEST_ENTITY_TOO_LARGE, {"error": str(error)}
         except SuaveDesError as error:
             status, answer = HTTPStatus.BAD_REQUEST, {"error": str(error)}
         body = json.dumps(answer).encode()
         self.send_response(status)
-        self.send_header("Content-Type", "application/json")
+        self.send_header("Content-Type", _JSON)
         self.send_header("Content-Length", str(len(body)))
         self.end_headers()
         self.wfile.write(body)
 
     do_PUT = do_POST = do_GET  # noqa: N815 - names that http.server looks for
 
+    def _check_sender(self) -> None:
+        host, origin = self.headers.get("Host", ""), self.headers.get("Origin")
+        known = {*_LOCAL, self.server.host, self.connection.getsockname()[0]}
+        if _hostname(host) not in known:
+            raise _RefusedError(HTTPStatus.MISDIRECTED_REQUEST, f"Host {shown(host)} is not this server's address")
+        if origin is not None and origin != f"http://{host}":
+            raise _RefusedError(HTTPStatus.FORBIDDEN, f"pages of {shown(origin)} may not use this server")
+
     def _content(self) -> Any:
-        length = self.headers.get("Content-Length", "0")
+        length, kind = self.headers.get("Content-Length", "0"), self.headers.get_content_type()
         if not (length.isascii() and length.isdigit()) or self.headers.get("Transfer-Encoding"):
-            self.close_connection = True
-            raise InputError("the body's length is not given", remedy="send a Content-Length")
-        if int(length[:20]) > BODY_LIMIT_BYTES:
-            raise OverflowError(f"the body has more than {BODY_LIMIT_BYTES:,} bytes")
+            raise _RefusedError(HTTPStatus.BAD_REQUEST, "the body's length is not given (send a Content-Length)")
+        if len(length) > _LENGTH_DIGITS or int(length) > BODY_LIMIT_BYTES:
+            raise _RefusedError(
+                HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"the body has more than {BODY_LIMIT_BYTES:,} bytes"
+            )
+        if kind != _JSON:
+            raise _RefusedError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, f"the body is {kind} (send Content-Type: {_JSON})")
         body = self.rfile.read(int(length))
         try:
             return json.loads(body or b"{}")
         except (ValueError, RecursionError):
             raise InputError(f"the body is not JSON: {shown(body[:60].decode(errors='replace'))}") from None
+
+
+def _hostname(host: str) -> str | None:
+    """Return the address in a Host header, without its port; None if it is not one."""
+    try:
+        return urlsplit(f"//{host}").hostname
+    except ValueError:
+        return None
 
 
 class Server(ThreadingHTTPServer):
@@ -228,9 +263,14 @@ class Server(ThreadingHTTPServer):
     daemon_threads = True
 
     def __init__(self, session: Session, host: str = "127.0.0.1", port: int = 3000) -> None:
-        self.session = session
+        self.session, self.host = session, host
         try:
             super().__init__((host, port), _Handler)
         except (OSError, OverflowError) as error:
             why = getattr(error, "strerror", None) or error
             raise InputError(f"{host}:{port} cannot be used: {why}", remedy="give another --host or --port") from None
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Let clients leave in the middle of a request or an answer; report anything else."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)

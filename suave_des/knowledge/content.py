@@ -40,8 +40,8 @@ from suave_des.knowledge.rdf import (
     reached,
     term_of,
 )
-from suave_des.knowledge.rules.rdf import rules_of
-from suave_des.knowledge.rules.syntax import Rule
+from suave_des.knowledge.rules import Rule
+from suave_des.knowledge.rules.files import rules_of
 from suave_des.resources import shipped_folder
 
 _DECLARED: Final = frozenset(OWL + kind for kind in ("ObjectProperty", "DatatypeProperty", "Class"))

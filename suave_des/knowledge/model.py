@@ -19,6 +19,7 @@ from suave_des.knowledge.rdf import (
     HAS_VALUE,
     IS_QA_TYPE,
     MROS,
+    O_STATUS,
     OWL,
     QA_OPERATOR,
     RDF_TYPE,
@@ -44,7 +45,6 @@ OPERATORS: Final[Mapping[str, Callable[[Decimal, Decimal], bool]]] = {
     ">=": operator.ge,
 }
 _HAS_QA_ESTIMATION: Final = TOMASYS + "hasQAestimation"
-_O_STATUS: Final = TOMASYS + "o_status"
 _ALWAYS: Final = TOMASYS + "o_always_improve"
 _SOLVES_F: Final = TOMASYS + "solvesF"
 _SOLVES_O: Final = TOMASYS + "solvesO"
@@ -52,7 +52,7 @@ _TYPE_F: Final = TOMASYS + "typeF"
 _TYPE_FD: Final = TOMASYS + "typeFD"
 #: What a state asserts of an objective, a grounding or a measurement, in place of what an ontology asserts of it.
 _STATE_PROPERTIES: Final = frozenset(
-    {_TYPE_F, _TYPE_FD, _SOLVES_O, _O_STATUS, _ALWAYS, HAS_QA_VALUE, IS_QA_TYPE, HAS_VALUE}
+    {_TYPE_F, _TYPE_FD, _SOLVES_O, O_STATUS, _ALWAYS, HAS_QA_VALUE, IS_QA_TYPE, HAS_VALUE}
     | {TOMASYS + "fg_status", TOMASYS + "o_updatable"}
 )
 
@@ -127,7 +127,7 @@ class Model:
             yield from individual.own
             yield individual.iri, _TYPE_F, self.functions[objective.function]
             if objective.status is not None:
-                yield individual.iri, _O_STATUS, Lit(objective.status, XSD + "string")
+                yield individual.iri, O_STATUS, Lit(objective.status, XSD + "string")
             if objective.always_improve:
                 yield individual.iri, _ALWAYS, Lit("true", XSD + "boolean")
         yield from self._groundings(state)

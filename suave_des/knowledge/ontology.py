@@ -14,10 +14,9 @@ from suave_des.knowledge.content import Content, merge, with_rules
 from suave_des.knowledge.model import Model, assumption, build_model, check_values, expectations, with_operators
 from suave_des.knowledge.ontology_file import OntologyFile, collect, enumerated_texts
 from suave_des.knowledge.rdf import Names, Triple, facts_of
-from suave_des.knowledge.rules.checks import check_property_use
+from suave_des.knowledge.rules import Rule
+from suave_des.knowledge.rules.checks import Vocabulary, check_property_use
 from suave_des.knowledge.rules.files import RulesFile, hash_with_rules
-from suave_des.knowledge.rules.names import Vocabulary
-from suave_des.knowledge.rules.syntax import Rule
 from suave_des.knowledge.state import Fact, KnowledgeState
 from suave_des.resources import shipped_folder
 

@@ -2,8 +2,8 @@
 
 Files are in RDF/XML, or, according to their extension, in Turtle, N-Triples or JSON-LD.
 
-lxml reads the XML first: it stops at entities that expand too far, reads no other file, and knows line numbers. Simple
-internal entities, as Protégé writes them, are accepted.
+lxml reads the XML first: it stops at entities that expand too far, and knows line numbers. Simple internal entities, as
+Protégé writes them, are accepted.
 
 An import is looked for among the files that were given, then among the files beside the importing one, then among the
 shipped ones: by the IRI (of the ontology, or xml:base), then by the last part of the IRI, which for the exemplar's
@@ -12,7 +12,6 @@ ontologies is the name of the file (tomasys, mros, suave).
 
 from __future__ import annotations
 
-import logging
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -34,22 +33,16 @@ from rdflib.plugins.parsers.notation3 import BadSyntax
 
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.files import read_bytes
-from suave_des.knowledge.rdf import MROS, OWL, RDF, XSD, local_name
+from suave_des.knowledge.rdf import MROS, OWL, RDF, TOMASYS, XSD, local_name, without_log
 from suave_des.resources import shipped_folder
 
 MAX_BYTES: Final = 64 * 2**20
 _BASE: Final = "{http://www.w3.org/XML/1998/namespace}base"
 _SAVE_AS: Final = "an OWL ontology in RDF/XML is expected, as Protégé saves it"
+_OTHER_NOTATION: Final = "save it in Protégé as RDF/XML, or give it the ending of what it is: .ttl, .nt, .jsonld"
 #: Characters that no IRI may contain (RFC 3987) and that would break the N-Triples given to a reasoner.
 _NOT_IN_IRI: Final = frozenset('<>"{}|\\^`') | {chr(code) for code in range(0x21)}
-_OTHER_NOTATIONS: Final = (
-    (rb"@(prefix|base)\b|(prefix|base)\s+(\S*:\s*)?<", "Turtle", "give the file the ending .ttl"),
-    (rb"(prefix|ontology)\s*\(", "OWL in functional syntax", "save it in Protégé as RDF/XML"),
-    (rb"(prefix|ontology):", "OWL in Manchester syntax", "save it in Protégé as RDF/XML"),
-    (rb"[{\[]", "JSON", "give the file the ending .jsonld if it is JSON-LD"),
-    (rb"\x1f\x8b", "compressed by gzip", "unpack it: gunzip FILE"),
-)
-"""How files begin that are no XML: pattern, what they are, and what to do."""
+_EXTERNAL: Final = re.compile(r"<!(?:ENTITY\s+(?:%\s*)?|DOCTYPE\s+)\S+\s+(?:SYSTEM|PUBLIC)\b")
 _FORMATS: Final = {".ttl": ("turtle", "Turtle"), ".nt": ("nt", "N-Triples"), ".jsonld": ("json-ld", "JSON-LD")}
 _ENDINGS: Final = (".owl", ".rdf", ".xml", *_FORMATS)
 #: The shipped tomasys.owl also holds the terms that the exemplar keeps in mros.owl.
@@ -86,19 +79,17 @@ class OntologyFile:
         # about="...#name", about="&suave;name", ID="name", or the label of a rule
         own = re.escape(name)
         described = re.compile(rf"""(?:about|ID)=["'](?:[^"']*[#;/])?{own}["']|label(?: [^>]*)?>\s*{own}\s*<""")
-        if self.path.suffix in _FORMATS:  # mine:name, <...#name>, or "...#name"
+        if not self.is_xml:  # mine:name, <...#name>, or "...#name"
             described = re.compile(rf"""(?:^|[\s"])[\w.-]*:{own}(?=[\s"])|[<"][^<>"]*[#/]{own}[>"]|label\s+"{own}\"""")
-        for number, line in enumerate(text_of(self.content).splitlines(), start=1):
-            if described.search(line):
-                return number
-        return None
+        lines = enumerate(text_of(self.content, "replace").splitlines(), start=1)
+        return next((number for number, line in lines if described.search(line)), None)
 
     def line_of_rule(self, name: str) -> int | None:
         """The line of a rule's label, else the first line that describes a thing of its name.
 
         Of several things with that label it is the last one: editors write rules at the end.
         """
-        text = text_of(self.content)
+        text = text_of(self.content, "replace")
         labels = [found.start() for found in re.finditer(rf"label[^<>]*>\s*{re.escape(name)}\s*<", text)]
         return text.count("\n", 0, labels[-1]) + 1 if labels else self.line_of(name)
 
@@ -109,15 +100,15 @@ def place_of(name: str, sources: Sequence[OntologyFile]) -> tuple[Path, int | No
     return next((place for place in lines if place[1] is not None), (sources[0].path, None))
 
 
-def text_of(content: bytes) -> str:
-    """Decode a file by its byte order mark or XML declaration, else as UTF-8; wrong bytes are replaced."""
+def text_of(content: bytes, errors: str = "strict") -> str:
+    """Decode a file by its byte order mark or XML declaration, else as UTF-8."""
     declared = re.search(rb"^\s*<\?xml[^>]*\bencoding\s*=\s*[\"']([\w.-]+)[\"']", content[:200])
     marked = content.startswith((b"\xff\xfe", b"\xfe\xff"))
     encoding = "utf-16" if marked else declared.group(1).decode() if declared else "utf-8-sig"
     try:
-        return content.decode(encoding, "replace")
+        return content.decode(encoding, errors)
     except LookupError:
-        return content.decode("utf-8", "replace")
+        return content.decode("utf-8", errors)
 
 
 def read_ontology(path: Path, content: bytes | None = None) -> OntologyFile:
@@ -136,8 +127,12 @@ def read_ontology(path: Path, content: bytes | None = None) -> OntologyFile:
         content = read_bytes(path, MAX_BYTES)
     if not content.strip():
         raise KnowledgeError("the file is empty", file=path, remedy=_SAVE_AS)
-    root: Any = None if path.suffix in _FORMATS else _parse_xml(path, content)  # lxml-stubs lack sourceline
-    graph = _parse_rdf(path, content)
+    try:
+        text = re.sub(r"^\s*<\?xml[^>]*\?>", "", text_of(content), count=1)
+    except UnicodeDecodeError as error:
+        raise KnowledgeError(f"not text in {error.encoding}", file=path, remedy=_SAVE_AS) from error
+    root: Any = None if path.suffix in _FORMATS else _parse_xml(path, text)  # lxml-stubs lack sourceline
+    graph = _parse_rdf(path, text)
     ontologies = sorted(graph.subjects(RDF_TERMS.type, OWL_TERMS.Ontology), key=str)
     if not ontologies:
         raise KnowledgeError("not OWL: there is no owl:Ontology in it", file=path, remedy=_SAVE_AS)
@@ -157,69 +152,32 @@ def read_ontology(path: Path, content: bytes | None = None) -> OntologyFile:
     )
 
 
-_PLAIN: Final = re.compile(
-    rb"(\xef\xbb\xbf)?\s*<(?!\?xml[^>]*\bencoding\s*=\s*[\"'](?!(utf-8|us-ascii|iso-8859-\d+|windows-125\d)[\"']))",
-    re.IGNORECASE,
-)
-
-
-def _parse_xml(path: Path, content: bytes) -> etree._Element:
+def _parse_xml(path: Path, text: str) -> etree._Element:
     """Return the root element, after checking that no entity refers to other files or expands too far."""
-    if re.match(rb"\s*<!doctype\s+html", content, re.IGNORECASE):
-        raise KnowledgeError("this is a web page, not an ontology", file=path, place="line 1", remedy=_SAVE_AS)
-    # lxml-stubs knows neither "internal" nor what a DOCTYPE has.
+    if external := _EXTERNAL.search(text):
+        line, remedy = text.count("\n", 0, external.start()) + 1, "only simple internal entities are read"
+        raise KnowledgeError(
+            "its DOCTYPE or an entity refers to another file", file=path, place=f"line {line}", remedy=remedy
+        )
+    # lxml-stubs do not know "internal". Long rules are deeply nested: 256 levels, a hundred atoms, are too few. The
+    # larger limit takes the one on expansion away, so it is used only where no entity can be declared.
     options: Any = {"resolve_entities": "internal", "no_network": True, "load_dtd": False}
-    # Long rules are deeply nested: 256 levels, a hundred atoms, are too few. The larger limit takes the one on
-    # expansion away, so it is used only where no entity can be declared: in a plain encoding, without a DOCTYPE.
-    options["huge_tree"] = _PLAIN.match(content) is not None and b"<!DOCTYPE" not in content
+    options["huge_tree"] = "<!DOCTYPE" not in text
     try:
-        root = etree.fromstring(content, etree.XMLParser(**options))
+        root = etree.fromstring(text.encode(), etree.XMLParser(**options))
     except etree.XMLSyntaxError as error:
         line, column = error.position
-        place = f"line {line}, column {column}"
         reason = re.sub(r", line \d+, column \d+$", "", error.msg or "")
-        external = re.search(rb"<!ENTITY\s+(?:%\s*)?\S+\s+(?:SYSTEM|PUBLIC)\b", content)
         if "amplification" in reason:
             problem = "the entities in this file expand to far more than its size"
             raise KnowledgeError(problem, file=path, remedy="write their values out") from error
-        for begins, notation, what_to_do in _OTHER_NOTATIONS:
-            if re.match(rb"(\s|#.*\n)*(" + begins + rb")", content, re.IGNORECASE):
-                raise KnowledgeError(f"this is {notation}", file=path, remedy=what_to_do) from error
-        if external is None:
-            raise KnowledgeError(f"not well-formed XML: {reason}", file=path, place=place, remedy=_SAVE_AS) from error
-        raise _external_entity(path, external.group().split()[-2].decode(errors="replace"), content) from error
-    document: Any = root.getroottree().docinfo
-    if document.system_url or document.public_id:
-        remedy = "declare entities in the file itself"
-        raise KnowledgeError("the DOCTYPE refers to another file", file=path, place="line 1", remedy=remedy)
-    for entity in () if document.internalDTD is None else document.internalDTD.iterentities():
-        if entity.content is None or entity.system_url:
-            raise _external_entity(path, str(entity.name), content)
-    if root.tag == f"{{{OWL}}}Ontology":
-        raise KnowledgeError("this is OWL/XML", file=path, remedy="save it in Protégé as RDF/XML")
+        remedy = _SAVE_AS if text.lstrip().startswith("<") else _OTHER_NOTATION
+        place = f"line {line}, column {column}"
+        raise KnowledgeError(f"not well-formed XML: {reason}", file=path, place=place, remedy=remedy) from error
     if root.tag != f"{{{RDF}}}RDF":
         name = etree.QName(root).localname
-        raise KnowledgeError(f"not OWL: the root element is <{name}>", file=path, remedy=_SAVE_AS)
+        raise KnowledgeError(f"not RDF/XML: the root element is <{name}>", file=path, remedy=_SAVE_AS)
     return root
-
-
-def _external_entity(path: Path, name: str, content: bytes) -> KnowledgeError:
-    found = re.search(rb"<!ENTITY[^>]*\s" + re.escape(name.encode()) + rb"\s", content)
-    line = content.count(b"\n", 0, found.start()) + 1 if found else 1
-    remedy = "only simple internal entities are read"
-    return KnowledgeError(f"entity {name} is external", file=path, place=f"line {line}", remedy=remedy)
-
-
-@contextmanager
-def without_log() -> Iterator[None]:
-    """Keep rdflib's warnings about odd terms off the terminal."""
-    logger = logging.getLogger("rdflib.term")
-    before = logger.level
-    logger.setLevel(logging.CRITICAL)
-    try:
-        yield
-    finally:
-        logger.setLevel(before)
 
 
 @contextmanager
@@ -235,42 +193,36 @@ def _literals_as_written() -> Iterator[None]:
 
 
 @lru_cache(maxsize=4)  # what is imported is read again with each ontology that imports it
-def _parse_rdf(path: Path, content: bytes) -> Graph:
+def _parse_rdf(path: Path, text: str) -> Graph:
     """Parse a file; the graph is shared by all readers of the same content, and must not be changed."""
     graph = Graph()
     form, name = _FORMATS.get(path.suffix, ("xml", "RDF/XML"))
-    if form == "json-ld" and re.search(rb'"@(context|import)"\s*:\s*(\[[^\]]*)?"', content):
+    if form == "json-ld" and re.search(r'"@(context|import)"\s*:\s*(\[[^\]]*)?"', text):
         problem = "its @context is elsewhere, and nothing is fetched from the network"
         raise KnowledgeError(problem, file=path, remedy="write the @context out in the file")
-    if form == "xml":  # as UTF-8, which is all that rdflib reads
-        text = re.sub(r"^\s*<\?xml[^>]*\?>", "", text_of(content), count=1)
-        content = text.encode()
     try:
         with _literals_as_written():
             # A file without xml:base gets a base that reveals nothing of this machine's folders.
-            graph.parse(data=content, format=form, publicID=f"http://ontology.invalid/{path.stem}")
+            graph.parse(data=text, format=form, publicID=f"http://ontology.invalid/{path.stem}")
     except Exception as error:  # the parser raises many kinds; each means that this file is not of its format
-        text = error.getMessage() if isinstance(error, SAXParseException) else str(error)
-        place = f"line {error.getLineNumber()}" if isinstance(error, SAXParseException) else None
-        if isinstance(error, BadSyntax):
-            place, text = f"line {error.lines + 1}", str(error._why)
+        reason, place = str(error), None
+        if isinstance(error, SAXParseException):
+            reason, place = error.getMessage(), f"line {error.getLineNumber()}"
+        elif isinstance(error, BadSyntax):
+            reason, place = str(error._why), f"line {error.lines + 1}"
         remedy = _SAVE_AS if form == "xml" else f"by its ending the file is {name}"
-        raise KnowledgeError(f"not {name}: {' '.join(text.split())}", file=path, place=place, remedy=remedy) from error
-    _write_datatypes_out(graph)
-    for triple in graph:
-        for term in triple:
-            if isinstance(term, URIRef) and not _NOT_IN_IRI.isdisjoint(term):
-                raise KnowledgeError(f"{str(term)!r} is not an IRI", file=path, remedy='no spaces or <>"{}|\\^`')
-    return graph
-
-
-def _write_datatypes_out(graph: Graph) -> None:
-    """Correct rdf:datatype="xsd:string", as owlready2 saves it: RDF/XML has no prefixes in attributes."""
+        problem = f"not {name}: {' '.join(reason.split())}"
+        raise KnowledgeError(problem, file=path, place=place, remedy=remedy) from error
     for subject, predicate, value in list(graph):
         if isinstance(value, Literal) and value.datatype is not None and value.datatype.startswith("xsd:"):
+            # owlready2 saves rdf:datatype="xsd:string", and RDF/XML has no prefixes in attributes.
             datatype = URIRef(XSD + value.datatype.removeprefix("xsd:"))
             graph.remove((subject, predicate, value))
             graph.add((subject, predicate, Literal(str(value), datatype=datatype, normalize=False)))
+        for term in (subject, predicate, value):
+            if isinstance(term, URIRef) and not _NOT_IN_IRI.isdisjoint(term):
+                raise KnowledgeError(f"{str(term)!r} is not an IRI", file=path, remedy='no spaces or <>"{}|\\^`')
+    return graph
 
 
 def enumerated_texts(files: Iterable[OntologyFile]) -> dict[str, frozenset[str]]:
@@ -319,6 +271,11 @@ def supplies(file: OntologyFile, iri: str, *, by_name: bool = True) -> bool:
     return by_name and _name(iri) in {file.path.stem, *map(_name, file.iris)}
 
 
+def is_metamodel(file: OntologyFile) -> bool:
+    """Whether a file supplies TOMASys or its terms for robots (mros), which have rules for any model."""
+    return supplies(file, TOMASYS) or supplies(file, MROS)
+
+
 def _add(files: list[OntologyFile], new: OntologyFile) -> None:
     for old in files:
         if old.path.resolve() == new.path.resolve() or old.content == new.content:
@@ -347,21 +304,17 @@ def _supplier(files: Sequence[OntologyFile], iri: str) -> OntologyFile | None:
 
 def _beside(file: OntologyFile, iri: str) -> OntologyFile | None:
     """The file of that name, or else with that IRI, in the folder of the importing file."""
-    folder = file.path.parent
-    for path in (folder / (_name(iri) + ending) for ending in _ENDINGS):
-        if path.is_file() and path.resolve() != file.path.resolve():
+    name, own = _name(iri), file.path.resolve()
+    files = [path for path in sorted(file.path.parent.iterdir()) if path.suffix in _ENDINGS and path.resolve() != own]
+    for path in files:
+        if path.stem == name and path.is_file():
             return read_ontology(path)
-    for path in sorted(
-        entry for entry in folder.iterdir() if entry.suffix in (*_ENDINGS[:2], *_FORMATS) and entry.is_file()
-    ):
+    for path in files:
         try:
-            if _name(iri).encode() not in path.read_bytes():
-                continue
-            candidate = read_ontology(path)
+            if name.encode() in path.read_bytes() and supplies(found := read_ontology(path), iri, by_name=False):
+                return found
         except (InputError, OSError):
             continue  # an unrelated file that happens to be in the folder
-        if _comparable(iri) in map(_comparable, candidate.iris):
-            return candidate
     return None
 
 

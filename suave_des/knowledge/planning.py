@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from decimal import Decimal
+from itertools import product
 from typing import Final
 
 from suave_des.errors import KnowledgeError
@@ -108,10 +109,10 @@ def _rejection_reasons(inference: Inference, design: str, function: str) -> Iter
                 remedy=f"give {attribute} one of {' '.join(OPERATORS)}: "
                 "the way in which a value is worse than the required one",
             )
-        for expected in _expected(inference, design, attribute):
-            if OPERATORS[signs[0]](expected, required):
+        for expected, sign in product(_expected(inference, design, attribute), signs):
+            if OPERATORS[sign](expected, required):
                 left, right = _show_pair(expected, required)
-                yield f"{attribute} {left} expected {signs[0]} {right} required"
+                yield f"{attribute} {left} expected {sign} {right} required"
     for attribute, expected in _values(inference, design, "hasQAestimation"):
         for measured in inference.state.measured(attribute):
             for sign in _operators(inference, attribute):

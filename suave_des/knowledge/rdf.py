@@ -7,14 +7,16 @@ other's.
 
 from __future__ import annotations
 
+import logging
 import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from decimal import Decimal, InvalidOperation
 from typing import Final, NamedTuple, TypeVar, overload
 
-from rdflib import BNode, Literal
+from rdflib import BNode, Literal, URIRef
 from rdflib.term import Node
 
 from suave_des.knowledge.state import Fact, Value
@@ -34,12 +36,27 @@ SWRLA: Final = "http://swrl.stanford.edu/ontologies/3.3/swrla.owl#"
 #: Namespaces of OWL, RDF and SWRL: their terms describe no fact of the system.
 LANGUAGE_NAMESPACES: Final = (RDF, RDFS, OWL, XSD, SWRL, SWRLB, SWRLA)
 
+#: Prefixes that need not be declared.
+PREFIXES: Final[Mapping[str, str]] = {
+    "mros": MROS,
+    "owl": OWL,
+    "rdf": RDF,
+    "rdfs": RDFS,
+    "suave": SUAVE,
+    "swrl": SWRL,
+    "swrla": SWRLA,
+    "swrlb": SWRLB,
+    "tomasys": TOMASYS,
+    "xsd": XSD,
+}
+
 RDF_TYPE: Final = RDF + "type"
 HAS_VALUE: Final = TOMASYS + "hasValue"
 HAS_QA_VALUE: Final = TOMASYS + "hasQAvalue"
 IS_QA_TYPE: Final = TOMASYS + "isQAtype"
 QA_OPERATOR: Final = TOMASYS + "qa_comparison_operator"
 C_STATUS: Final = TOMASYS + "c_status"
+O_STATUS: Final = TOMASYS + "o_status"
 
 #: What the planner and the loop read, whether or not a rule can conclude it.
 DECISION_PROPERTIES: Final = tuple(
@@ -109,6 +126,12 @@ NUMERIC: Final = EXACT | {XSD + "float", XSD + "double"}
 _DECIMAL: Final = re.compile(r"([+-]?)(?=\.?[0-9])([0-9]*)\.?([0-9]*)")
 _WHOLE_NUMBER: Final = re.compile(r"[+-]?[0-9]{1,400}")
 _FLOAT: Final = re.compile(r"[+-]?(?=\.?[0-9])[0-9]*\.?[0-9]*(?:[eE][+-]?[0-9]+)?")
+#: How values of a datatype are written; rdflib, which takes more for them, knows the other datatypes of XML Schema.
+_LEXICAL: Final = (
+    dict.fromkeys((XSD + name for name in _WHOLE), re.compile(r"[+-]?[0-9]+"))
+    | dict.fromkeys((XSD + "double", XSD + "float"), re.compile(rf"{_FLOAT.pattern}|[+-]?INF|NaN"))
+    | {XSD + "boolean": re.compile(r"true|false|0|1"), XSD + "decimal": _DECIMAL}
+)
 #: Escapes in texts between quotes, of N-Triples and of rules.
 ESCAPES: Final = str.maketrans({"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"})
 
@@ -123,6 +146,37 @@ def literal(term: Literal) -> Lit:
 def term_of(term: Node) -> str | Lit:
     """Convert an IRI or a literal of rdflib."""
     return literal(term) if isinstance(term, Literal) else str(term)
+
+
+@contextmanager
+def without_log() -> Iterator[None]:
+    """Keep rdflib's warnings about odd terms off the terminal."""
+    logger = logging.getLogger("rdflib.term")
+    before = logger.level
+    logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
+
+
+def is_well_formed(value: Lit) -> bool:
+    """Whether a literal's text is a value of its datatype; of unknown datatypes every text is."""
+    form = _LEXICAL.get(value.datatype)
+    if form is not None:
+        return form.fullmatch(value.text.strip()) is not None
+    if not value.datatype.startswith(XSD):
+        return True
+    with without_log():
+        return not Literal(value.text, datatype=URIRef(value.datatype)).ill_typed
+
+
+def number_in(value: object) -> Decimal | None:
+    """Return the number that a literal is; None for other values, and for those that are not finite."""
+    if not isinstance(value, Lit) or value.datatype not in NUMERIC or not is_well_formed(value):
+        return None
+    number = Decimal(value.text.strip())
+    return number if number.is_finite() else None
 
 
 @overload

@@ -20,6 +20,9 @@ Number = Decimal | float | int | str
 UNGROUNDED: Final = "UNGROUNDED"
 #: What a record or a table shows in place of a function design where a function has none.
 NO_GROUNDING: Final = "ungrounded"
+#: What happens to a function's grounding that gets no other design.
+STAYS: Final = "stays"
+NONE_LEFT: Final = "none left"
 #: Beyond this power of ten (floats end at 308) a number is a mistake, and its text would fill the memory.
 MAX_EXPONENT: Final = 400
 
@@ -207,6 +210,21 @@ class Inference:
         """Whether a better function design may have become available."""
         return True in self.values(objective_name(function), "o_updatable")
 
+    @cached_property
+    def statuses(self) -> frozenset[str]:
+        """The inferred statuses of objectives and groundings, in words."""
+        found = []
+        for objective in self.state.objectives:
+            status = self.objective_status(objective.function)
+            if status is not None and status != objective.status:
+                found.append(f"objective of {objective.function} is {status}")
+            if self.is_updatable(objective.function) and not objective.always_improve:
+                found.append(f"objective of {objective.function} is updatable")
+        for function, design in self.state.groundings:
+            if (status := self.grounding_status(function)) is not None:
+                found.append(f"grounding of {design} is {status}")
+        return frozenset(found)
+
     def _one(self, subject: str, property_name: str) -> str | None:
         values = self.values(subject, property_name)
         return str(values[0]) if values else None
@@ -247,6 +265,31 @@ class Plan:
     def without_design(self) -> frozenset[str]:
         """The functions that have no function design left."""
         return frozenset([each.function for each in self.decisions if each.design is None])
+
+
+@dataclass(frozen=True)
+class Reasoning:
+    """The result of the loop's steps Analyze and Plan.
+
+    Attributes:
+        inference: what the reasoner added to the state.
+        plan: decisions for the objectives to adapt.
+    """
+
+    inference: Inference
+    plan: Plan
+
+    @cached_property
+    def changes(self) -> dict[str, str]:
+        """New design of each function whose grounding changes, or NONE_LEFT if no design is left."""
+        state = self.inference.state
+        outcomes = {each.function: each.design or NONE_LEFT for each in self.plan.decisions}
+        return {function: outcome for function, outcome in outcomes.items() if outcome != state.grounded(function)}
+
+    @property
+    def statuses(self) -> frozenset[str]:
+        """The inferred statuses of objectives and groundings, in words."""
+        return self.inference.statuses
 
 
 def objective_name(function: str) -> str:

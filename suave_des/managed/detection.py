@@ -8,7 +8,7 @@ import simpy
 from suave_des.clock import Alarm
 from suave_des.compiling import Array
 from suave_des.managed.node import Log
-from suave_des.vehicle.vehicle import STEP_S, Vehicle
+from suave_des.vehicle.vehicle import STEP_S, ArrivalCheck, Vehicle
 from suave_des.world.pipeline import first_detection
 
 _MIN_ROWS_AHEAD = 22
@@ -47,8 +47,11 @@ class PipelineDetector:
     def __post_init__(self) -> None:
         self.detected: simpy.Event = self.env.event()
         self._alarm = Alarm(self.env, self._ring)
-        self.vehicle.control_listeners.append(self._look_ahead)
+        self.vehicle.control_listeners.append(self._control_changed)
         self._look_ahead(0)
+
+    def _control_changed(self, row: int, check: ArrivalCheck | None) -> None:
+        self._look_ahead(row)
 
     def _look_ahead(self, row: int) -> None:
         """Check the rows from one on; set the alarm to the first sight, or to the last row that was checked."""
@@ -70,8 +73,8 @@ class PipelineDetector:
         if self._seen < 0:
             self._look_ahead(self._row)
             return
-        self.vehicle.control_listeners.remove(self._look_ahead)
+        self.vehicle.control_listeners.remove(self._control_changed)
         self.first_point = self._seen
-        self.detected_s = self._alarm.now_s
+        self.detected_s = float(self.env.now)
         self.log("detection", "pipeline_detected", f"point {self.first_point}")
         self.detected.succeed(self.first_point)

@@ -1,21 +1,23 @@
-"""Follow pipeline: visits the points of the path in order, and adds up the distance (facts: kas-lab/suave)."""
+"""Follow pipeline: visits the points of the path in order, and adds up the distance.
+
+Source: node f_follow_pipeline of kas-lab/suave, of 4 February 2023 and of 1.5.0.
+"""
+
+from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
 from itertools import pairwise
 from typing import NamedTuple, Self
 
 import numpy as np
 import simpy
 
-from suave_des.clock import Alarm
 from suave_des.compiling import Array
 from suave_des.domain import SEA_BED_Z_M
-from suave_des.managed.node import FunctionNode
+from suave_des.managed.detection import PipelineDetector
+from suave_des.managed.waypoints import WaypointFunction
 from suave_des.scenario.revision import FollowRevision
-from suave_des.vehicle.guidance import Guidance, SetPointSender, WaypointSource
 from suave_des.vehicle.vehicle import ArrivalCheck
 
 
@@ -31,9 +33,13 @@ class InspectionPath(NamedTuple):
     lengths_m: tuple[float, ...]
 
     @classmethod
-    def along(cls, points_m: Array, altitude_m: float) -> Self:
-        """Make the path above points: x and y in the first two columns, shape (points, at least 2)."""
-        x_y_m = points_m[:, :2]
+    def there_and_back(cls, points_m: Array, altitude_m: float) -> Self:
+        """Make the path above all points, shape (n, at least 2), and back: 2 n points.
+
+        From its element i on it is the path to follow when point i is seen first: on to the far end, then back along
+        all.
+        """
+        x_y_m = np.concatenate((points_m[:, :2], points_m[::-1, :2]))
         lengths_m = (math.dist(a, b) for a, b in pairwise(x_y_m.tolist()))
         return cls(np.insert(x_y_m, 2, SEA_BED_Z_M + altitude_m, axis=1), (0.0, *lengths_m))
 
@@ -42,35 +48,33 @@ class InspectionPath(NamedTuple):
         return type(self)(self.points_m[first:], self.lengths_m[first:])
 
 
-NO_PATH = InspectionPath(np.empty((0, 3)), ())
-
-
 @dataclass(eq=False)
-class FollowPipeline(FunctionNode, WaypointSource):
+class FollowPipeline(WaypointFunction):
     """The follow function: its way-points are the points of the path, each sent when the previous one is reached.
 
     Attributes:
-        path: gives the path to inspect; NO_PATH while the pipeline is not detected.
+        path: from the start of the pipeline to its end, and back.
+        detector: says from which of its points on the path is to be followed.
         finished: triggered when the last point of the path is reached.
     """
 
-    sender: SetPointSender
     revision: FollowRevision
-    path: Callable[[], InspectionPath]
-    _route: InspectionPath = field(default=NO_PATH, init=False)
+    path: InspectionPath
+    detector: PipelineDetector
+    _route: InspectionPath = field(init=False)  # the path from the point on that was seen first
     _next: int = field(default=0, init=False)
     _has_arrived: bool = field(default=False, init=False)
     _travelled_m: float = field(default=0.0, init=False)
     _published_m: float = field(default=0.0, init=False)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self.finished: simpy.Event = self.env.event()
-        self._guidance = Guidance(self.sender, self, partial(Alarm, self.env), self._arrival_check)
 
     @property
     def distance_m(self) -> float:
         """Last published distance inspected."""
-        self._guidance.catch_up()
+        self.catch_up()
         return self._published_m
 
     def activated(self) -> None:
@@ -78,26 +82,27 @@ class FollowPipeline(FunctionNode, WaypointSource):
 
         If the revision lets the distance accumulate, only the piece that was interrupted is lost.
         """
-        if not self.revision.distance_goes_on:
+        if not self.revision.keeps_distance_on_activation:
             self._travelled_m = 0.0
         self._has_arrived = False
         if self.revision.restarts_on_activation:
             self._next = 0
-        self._route = self.path()
-        if self._route.lengths_m and not self.finished.triggered:
-            self._guidance.start_at(self.env.now)
+        if self.detector.first_point is not None and not self.finished.triggered:
+            self._route = self.path.from_point(self.detector.first_point)
+            self.start_at(self.env.now)
 
     def deactivated(self) -> None:
         """Stop; revision 2023 adds the distance from the last point reached, if any, to the current position."""
         if self.finished.triggered:
             return
-        self._guidance.stop()
-        if self.revision.adds_remaining_way and self._has_arrived:
+        self.stop()
+        if self.revision.counts_interrupted_piece and self._has_arrived:
             x_m, y_m, _ = self.sender.vehicle.position(self.env.now)
             self._travelled_m += math.dist(self._route.points_m[self._next - 1, :2].tolist(), (x_m, y_m))
             self._published_m = self._travelled_m
 
-    def _arrival_check(self, start_s: float) -> ArrivalCheck:
+    def arrival_check(self, start_s: float) -> ArrivalCheck:
+        """Check at each poll, in x and y alone."""
         period_s, width_m = self.revision.poll_period_s, self.revision.acceptance_m
         # Otherwise the poll counter restarts with each resend; here it stays above the limit, so every later poll
         # resends.

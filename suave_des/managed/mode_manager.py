@@ -1,12 +1,15 @@
 """The mode manager: takes requests for modes and lets them take effect after a latency."""
 
+from __future__ import annotations
+
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 
 import simpy
 
-from suave_des.clock import Alarm
+from suave_des.clock import call_at
 from suave_des.domain import UNGROUND_MODE
 from suave_des.managed.node import FunctionNode, Log
 from suave_des.scenario.modes import Mode, ModeTable
@@ -39,7 +42,7 @@ class ModeManager:
     adaptation_listeners: list[Callable[[str, str, str], None]] = field(default_factory=list)
     adaptations: int = 0
     requests: int = 0
-    refused: dict[tuple[str, str], int] = field(default_factory=dict)
+    refused: Counter[tuple[str, str]] = field(default_factory=Counter)
     _requested: dict[str, str] = field(default_factory=dict)
     _effect_due_s: dict[str, float] = field(default_factory=dict)
     _in_use: set[str] = field(default_factory=set)
@@ -65,8 +68,8 @@ class ModeManager:
             return True
         chosen = self.table.get(function, mode)
         if chosen is None or function not in self.nodes:
-            self.refused[function, mode] = self.refused.get((function, mode), 0) + 1
-            self.log("mode_manager", "refused", self._missing(function, mode))
+            self.refused[function, mode] += 1
+            self.log("mode_manager", "refused", f"{function} -> {mode}")
             return False
         before, self._requested[function] = self._requested.get(function, ""), mode
         self.requests += 1
@@ -80,16 +83,8 @@ class ModeManager:
         delay_s = self.latency_s() if latency_s is None else latency_s
         due_s = max(self.env.now + delay_s, self._effect_due_s.get(function, 0.0))
         self._effect_due_s[function] = due_s
-        Alarm(self.env, partial(self._take_effect, function, chosen)).set(due_s)
+        call_at(self.env, due_s, partial(self._take_effect, function, chosen))
         return True
-
-    def _missing(self, function: str, mode: str) -> str:
-        """Say why a request is refused."""
-        if function not in self.table:
-            return f"{function}: the modes file has no such function"
-        if function not in self.nodes:
-            return f"{function}: has no node here; name its class under functions: in the scenario"
-        return f"{function}: no mode {mode}"
 
     def _take_effect(self, function: str, mode: Mode) -> None:
         self.nodes[function].apply(mode)

@@ -1,31 +1,35 @@
-"""Maintain motion: inactive in normal operation; activating it recovers the thrusters (facts: kas-lab/suave)."""
+"""Maintain motion: inactive in normal operation; activating it recovers the thrusters.
 
-from collections.abc import Callable, Collection
+Source: node f_maintain_motion of kas-lab/suave, of 4 February 2023 and of 1.5.0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import simpy
 
 from suave_des.clock import Process
-from suave_des.domain import THRUSTERS, thruster_name
+from suave_des.domain import THRUSTER_NAMES
 from suave_des.managed.node import FunctionNode
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, DiagnosticsBus, Kind
+from suave_des.monitor.thrusters import Thrusters
 from suave_des.scenario.revision import RecoveryRevision
 
 
 @dataclass(eq=False)
 class MaintainMotion(FunctionNode):
-    """The motion function: recovers the thrusters one by one after a delay, and reports each on the diagnostics bus.
+    """The motion function: recovers the thrusters one by one after a delay, and reports each that can be recovered.
 
     Attributes:
         delay_s: draws the time from the activation to the recovery of the first thruster.
-        unrecoverable: thrusters that cannot be recovered; they are skipped, and not reported.
     """
 
     bus: DiagnosticsBus
     revision: RecoveryRevision
-    set_health: Callable[[float, int, float], None]
+    thrusters: Thrusters
     delay_s: Callable[[], float]
-    unrecoverable: Collection[int] = ()
     _recovery: simpy.Process | None = field(default=None, init=False)
 
     def activated(self) -> None:
@@ -42,10 +46,8 @@ class MaintainMotion(FunctionNode):
     def _recover(self) -> Process:
         try:
             yield self.env.timeout(self.delay_s())
-            for thruster in range(1, THRUSTERS + 1):
-                if thruster not in self.unrecoverable:
-                    self.set_health(self.env.now, thruster, 1.0)
-                    name = thruster_name(thruster)
+            for number, name in enumerate(THRUSTER_NAMES, start=1):
+                if self.thrusters.recover(number):
                     self.bus.publish(Diagnostic(self.env.now, Kind.COMPONENT_STATUS, name, RECOVERED))
                 yield self.env.timeout(self.revision.thruster_period_s)
             self._recovery = None

@@ -1,13 +1,21 @@
-"""The base of every function of the managed subsystem: a node with a life cycle."""
+"""Functions of the managed subsystem: nodes with a life cycle; and the base of functions that the exemplar lacks."""
 
-from collections.abc import Callable
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from typing import Any
 
 import simpy
 
 from suave_des.clock import Process
+from suave_des.compiling import Array
+from suave_des.monitor.diagnostics import DiagnosticsBus
 from suave_des.scenario.modes import Mode
+from suave_des.vehicle.vehicle import ArrivalCheck, Point, Vehicle
 
 Log = Callable[[str, str, str], None]
 """Called with source, event and detail of something to record."""
@@ -36,7 +44,7 @@ class FunctionNode:
                 self.deactivated()
 
     def configure(self, mode: Mode) -> None:
-        """Apply the mode's parameters; also called before an activation."""
+        """Apply the mode's parameters, `mode.parameters`; also called before an activation."""
 
     def activated(self) -> None:
         """Start the function's activity."""
@@ -67,3 +75,116 @@ class ProcessNode(FunctionNode):
     def _until_interrupted(self) -> Process:
         with suppress(simpy.Interrupt):
             yield from self.activity()
+
+
+@dataclass(eq=False)
+class SetPointSender:
+    """A node's connection to the autopilot.
+
+    Attributes:
+        vehicle: the vehicle whose autopilot receives the set-points.
+        env: the mission's clock.
+        frame_error_m: where the vehicle goes minus where the node sends it, in x, y and z: its frame is a bit off.
+        loss_probability: probability that a message is lost.
+        stream: random stream that decides which messages are lost; not needed if none can be.
+    """
+
+    vehicle: Vehicle
+    env: simpy.Environment
+    frame_error_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    loss_probability: float = 0.0
+    stream: random.Random | None = None
+    _before_loss: int = field(default=0, init=False)  # messages that arrive before the next one that is lost
+
+    def __post_init__(self) -> None:
+        self._before_loss = self._draw()
+
+    def send(self, x_m: float, y_m: float, z_m: float) -> None:
+        """Send a set-point in the world frame; there is no acknowledgement.
+
+        Raises:
+            ValueError: a coordinate is not a finite number.
+        """
+        if not (math.isfinite(x_m) and math.isfinite(y_m) and math.isfinite(z_m)):
+            raise ValueError(f"the set-point ({x_m}, {y_m}, {z_m}) is not finite")
+        if not self._is_lost():
+            x_error_m, y_error_m, z_error_m = self.frame_error_m
+            self.vehicle.command(self.env.now, x_m + x_error_m, y_m + y_error_m, z_m + z_error_m)
+
+    def queue(
+        self, waypoints: Array, z_m: float, check: ArrivalCheck, *, first: int, last: int, send: bool
+    ) -> tuple[list[int], int]:
+        """Send and queue set-points (see `Vehicle.queue_waypoints`), up to the first whose message will be lost."""
+        if self.loss_probability > 0.0:
+            send = send and not self._is_lost()
+            waypoints = waypoints[: 1 + self._before_loss]
+        x_error_m, y_error_m, z_error_m = self.frame_error_m
+        sent_as_m = x_error_m, y_error_m, z_m + z_error_m
+        return self.vehicle.queue_waypoints(
+            self.env.now, waypoints, sent_as_m, check, first=first, last=last, send=send
+        )
+
+    def queued_were_sent(self, count: int) -> None:
+        """Count set-points that were sent from the queue."""
+        self._before_loss -= count
+
+    def _is_lost(self) -> bool:
+        is_lost = self.loss_probability > 0.0 and self._before_loss == 0
+        self._before_loss = self._draw() if is_lost else self._before_loss - 1
+        return is_lost
+
+    def _draw(self) -> int:
+        """Draw the number of messages that arrive before one is lost, from the geometric distribution, by inversion."""
+        if self.stream is None or self.loss_probability == 0.0:
+            return 0
+        return int(math.log(1.0 - self.stream.random()) / math.log(1.0 - self.loss_probability))
+
+
+@dataclass(frozen=True)
+class FunctionContext:
+    """What a user-defined function can see and do.
+
+    Attributes:
+        name: of the function.
+        env: the mission's clock.
+        settings: the scenario's entry for this function, under `functions:`.
+        sender: the function's connection to the autopilot.
+        bus: where diagnostics are published, and can be subscribed to.
+        stream: makes a named random stream of this run.
+        log: adds an event and its detail to the mission's record.
+    """
+
+    name: str
+    env: simpy.Environment
+    settings: Mapping[str, Any]
+    sender: SetPointSender
+    bus: DiagnosticsBus
+    stream: Callable[[str], random.Random]
+    log: Callable[[str, str], None]
+
+    def position(self) -> Point:
+        """Read the vehicle's position now: x, y, z in m, world frame."""
+        return self.sender.vehicle.position(self.env.now)
+
+
+class CustomFunction(FunctionNode):
+    """Base of user-defined functions: override what happens on activation, deactivation and a change of parameters.
+
+    The hooks are called at the mission time at which a mode takes effect. They must not block; what takes mission time
+    is a process: `self.env.process(...)`.
+
+    Attributes:
+        context: what can be seen and done.
+
+    Example:
+        >>> class Lights(CustomFunction):
+        ...     def configure(self, mode):
+        ...         self.power_w = mode.parameters["power_w"]
+        ...
+        ...     def activated(self):
+        ...         self.context.log("lights_on", f"{self.power_w:g} W")
+    """
+
+    def __init__(self, context: FunctionContext) -> None:
+        super().__init__(context.env)
+        self.context = context

@@ -1,18 +1,21 @@
-"""Generate search path: a spiral around the start, at the altitude that the mode sets (facts: kas-lab/suave)."""
+"""Generate search path: a spiral around the start, at the altitude that the mode sets.
+
+Source: node f_generate_search_path of kas-lab/suave, of 4 February 2023 and of 1.5.0.
+"""
+
+from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 
-from suave_des.clock import Alarm, tick_at_or_after
+from suave_des.clock import tick_at_or_after
 from suave_des.compiling import Array, compiled
 from suave_des.domain import SEA_BED_Z_M
-from suave_des.managed.node import FunctionNode
+from suave_des.managed.waypoints import WaypointFunction
 from suave_des.scenario.modes import Mode
 from suave_des.scenario.revision import SpiralRevision
-from suave_des.vehicle.guidance import Guidance, SetPointSender, WaypointSource
 from suave_des.vehicle.vehicle import ArrivalCheck
 
 
@@ -47,7 +50,7 @@ def spiral(
 
 
 @dataclass(eq=False)
-class GenerateSearchPath(FunctionNode, WaypointSource):
+class GenerateSearchPath(WaypointFunction):
     """The search function: generates the way-points of a spiral, each sent when the previous one is reached.
 
     Attributes:
@@ -58,20 +61,19 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         altitude_m: the node's altitude parameter.
     """
 
-    sender: SetPointSender
     revision: SpiralRevision
     centre_m: tuple[float, float]
     view_tangent: float
     phase_s: float
     start_latency_s: float = 0.0
     altitude_m: float = field(init=False)
-    _lowered_m: float = field(default=0.0, init=False)
+    _below_m: float = field(default=0.0, init=False)  # how far below the altitude the set-point is
     _ready_s: float | None = field(default=None, init=False)  # earliest mission time of the first tick
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         self.altitude_m = self.revision.initial_altitude_m
         self._restart()
-        self._guidance = Guidance(self.sender, self, partial(Alarm, self.env), self._arrival_check)
 
     def _restart(self) -> None:
         self._step = 0
@@ -83,27 +85,27 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         """Apply the mode's spiral_altitude; the spiral itself continues."""
         altitude = mode.parameters.get("spiral_altitude")
         if altitude is not None and altitude != self.altitude_m:
-            self._guidance.catch_up()
+            self.catch_up()
             self.altitude_m = float(altitude)
-            self._guidance.waypoints_changed()
+            self.waypoints_changed()
 
     def activated(self) -> None:
         """Start ticking; revision 1.5 begins a new spiral here."""
         if self.revision.restarts_on_activation:
             self._restart()
         if self.revision.workaround_cleared_on_activation:
-            self._lowered_m = 0.0
+            self._below_m = 0.0
         is_first = self._present is None
         if self.revision.centre == "activation" or (self.revision.centre == "first_activation" and is_first):
             self.centre_m = self.sender.vehicle.position(self.env.now)[:2]
         if self._ready_s is None:
             self._ready_s = self.env.now + self.start_latency_s
         first_s = tick_at_or_after(max(self.env.now, self._ready_s), self.phase_s, self.revision.tick_period_s)
-        self._guidance.start_at(first_s, resumes=not (is_first or self.revision.resends_on_activation))
+        self.start_at(first_s, resumes=not (is_first or self.revision.resends_on_activation))
 
     def deactivated(self) -> None:
         """Stop ticking."""
-        self._guidance.stop()
+        self.stop()
 
     def tick(self) -> None:
         """Count a step of the spiral if the altitude differs from that at the previous tick."""
@@ -121,8 +123,8 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         return waypoints
 
     def set_point_z_m(self) -> float:
-        """Return the z of the altitude minus the lowering so far; arrival is checked at the way-point's own z."""
-        return SEA_BED_Z_M + self.altitude_m - self._lowered_m
+        """Return the z of the altitude, lowered by the work-around; arrival is checked at the way-point's own z."""
+        return SEA_BED_Z_M + self.altitude_m - self._below_m
 
     def reached(self, count: int) -> None:
         """Advance to the next way-point."""
@@ -131,18 +133,22 @@ class GenerateSearchPath(FunctionNode, WaypointSource):
         self._step += count
 
     def not_reached(self) -> None:
-        """Command a lower altitude if only z is not reached: the autopilot stops short of its altitude set-point."""
+        """Command a lower altitude if only z is not reached.
+
+        This is the exemplar's work-around for an autopilot that stops short of its altitude set-point.
+        """
         x_m, y_m, _ = self.sender.vehicle.position(self.env.now)
         waypoint = self.waypoints(1)
         if max(abs(x_m - waypoint.item(0, 0)), abs(y_m - waypoint.item(0, 1))) <= self.revision.acceptance_m:
-            self._lowered_m += self.revision.workaround_step_m
+            self._below_m += self.revision.workaround_step_m
 
     def _spiral(self, waypoints: Array) -> Array:
         form = self.revision.angle_step_rad, self.view_tangent
         spiral(self._step, self._radius_m, self.altitude_m, form, self.centre_m, waypoints)
         return waypoints
 
-    def _arrival_check(self, start_s: float) -> ArrivalCheck:
+    def arrival_check(self, start_s: float) -> ArrivalCheck:
+        """Check at each tick, from the one after the way-point's on."""
         # The exemplar resends when its wait counter exceeds 10. Sending resets the counter; a resend also counts in
         # the same tick, hence one tick less.
         node = self.revision

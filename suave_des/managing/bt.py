@@ -1,7 +1,12 @@
-"""The behaviour tree managers of revision 1.5 (facts: kas-lab/suave, revision 1.5)."""
+"""The behaviour tree managers of revision 1.5, and the parts that their tree is made of.
 
-from collections.abc import Callable, Collection
-from functools import partial
+Source: the two trees of kas-lab/suave 1.5.0; suave_extended.xml is the one that recharges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 from suave_des.domain import (
@@ -15,13 +20,71 @@ from suave_des.domain import (
     UNGROUND_MODE,
     WATER_VISIBILITY,
 )
-from suave_des.managing import behaviours
-from suave_des.managing.base import Dependencies, FunctionsManager, ManagedSystem
-from suave_des.managing.behaviours import Behaviour, Condition, Fallback, Parallel, Sequence, SetMode
+from suave_des.managing.base import Dependencies, ManagingSubsystem, System
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
 
 
-class BehaviourTree(FunctionsManager):
+@dataclass(eq=False)
+class Behaviour:
+    """A part of a behaviour tree; nothing here takes longer than a tick.
+
+    Attributes:
+        kind: "->" (sequence) ticks its children until one fails, "?" (fallback) until one succeeds, "=>" (parallel)
+            ticks all; "!" requests a mode, and succeeds; "" is a condition.
+        name: for drawings and timelines.
+        children: the parts below, in the order in which they are ticked.
+        act: what a condition or request does; it returns whether it succeeded.
+        succeeded: whether the last tick of the tree succeeded here; None if it did not come here.
+    """
+
+    kind: str
+    name: str
+    children: tuple[Behaviour, ...] = ()
+    act: Callable[[], bool] = bool
+    succeeded: bool | None = field(default=None, init=False)
+
+    def tick(self) -> bool:
+        """Tick; return whether it succeeded."""
+        match self.kind:
+            case "->":
+                succeeded = all(child.tick() for child in self.children)
+            case "?":
+                succeeded = any(child.tick() for child in self.children)
+            case "=>":
+                ticked = [child.tick() for child in self.children]
+                succeeded = all(ticked)
+            case _:
+                succeeded = self.act()
+        self.succeeded = succeeded
+        return succeeded
+
+    def forget(self) -> None:
+        """Forget the last tick."""
+        self.succeeded = None
+        for child in self.children:
+            child.forget()
+
+    def drawing(self, first: str = "", further: str = "") -> Iterator[str]:
+        """Draw the tree as lines of text."""
+        yield f"{first}{self.kind} {self.name}" if self.kind else f"{first}{self.name}"
+        for child in self.children:
+            is_last = child is self.children[-1]
+            yield from child.drawing(further + ("└─ " if is_last else "├─ "), further + ("   " if is_last else "│  "))
+
+    def requests(self, held: tuple[str, ...] = ()) -> Iterator[str]:
+        """Summarise the last tick: each mode that was requested, with the conditions that held on the way to it."""
+        for child in self.children:
+            if child.succeeded is None:
+                continue
+            if child.kind == "!":
+                yield child.name + (f" ({', '.join(held)})" if held else "")
+            elif child.children:
+                yield from child.requests(held)
+            elif child.succeeded and self.kind == "->":
+                held = (*held, child.name)
+
+
+class BehaviourTree(ManagingSubsystem):
     """bt: recover a failed thruster; search as high as the visibility allows; follow once the pipeline is detected.
 
     Attributes:
@@ -30,18 +93,18 @@ class BehaviourTree(FunctionsManager):
 
     subscribes_to: ClassVar[Collection[Kind]] = (Kind.COMPONENT_STATUS,)
 
-    def __init__(self, system: ManagedSystem) -> None:
+    def __init__(self, system: System) -> None:
         super().__init__(system)
         self._settings = system.scenario.managers.bt
         self.period_s = self._settings.tick_period_s
-        self.starts_s = system.stream("bt/phase").uniform(0.0, self.period_s)
+        self.starts_s = system.first_tick_s("bt", self.period_s)
         self._failed: set[str] = set()
         self._logged = ""
         self.root = self.make_tree()
 
     def make_tree(self) -> Behaviour:
         """Make the tree; called once, before the mission."""
-        return Parallel("mission", self._branches())
+        return Behaviour("=>", "mission", self._branches())
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
         """Remember failed thrusters."""
@@ -55,14 +118,15 @@ class BehaviourTree(FunctionsManager):
         if not (self.system.recorded and self._settings.records_ticks):
             self.root.tick()
             return
-        behaviours.tick(self.root)
-        if (requested := behaviours.last_tick(self.root)) != self._logged:
+        self.root.forget()
+        self.root.tick()
+        if (requested := "; ".join(self.root.requests())) != self._logged:
             self._logged = requested
             self.system.log("tick", requested)
 
     def drawing(self) -> str:
         """Draw the tree as text."""
-        return behaviours.drawing(self.root)
+        return "\n".join(self.root.drawing())
 
     @property
     def depends_on(self) -> Dependencies:
@@ -72,46 +136,44 @@ class BehaviourTree(FunctionsManager):
     # The branches of the tree, one for each function.
 
     def _branches(self) -> tuple[Behaviour, ...]:
-        surface = (self._surface(),) if self.system.scenario.leak is not None else ()
-        return self._motion(), self._search(), *surface, self._follow()
+        surface = self._while_needed(SURFACE, self._set(SURFACE, SURFACE_MODE))
+        mode = self.system.scenario.default_modes.get(FOLLOW_PIPELINE, "fd_follow_pipeline")
+        follow = self._while_needed(FOLLOW_PIPELINE, self._set(FOLLOW_PIPELINE, mode))
+        return self._motion(), self._search(), *((surface,) if self.system.scenario.leak is not None else ()), follow
 
     def _motion(self) -> Behaviour:
-        failed = Condition("a thruster has failed", holds=lambda: bool(self._failed))
+        failed = Behaviour("", "a thruster has failed", act=lambda: bool(self._failed))
         recover = self._set(MAINTAIN_MOTION, "fd_recover_thrusters")
-        choices = (Sequence("recovery", (failed, recover)), self._set(MAINTAIN_MOTION, "fd_all_thrusters"))
-        return self._while_needed(MAINTAIN_MOTION, Fallback("thrusters", choices))
+        choices = (Behaviour("->", "recovery", (failed, recover)), self._set(MAINTAIN_MOTION, "fd_all_thrusters"))
+        return self._while_needed(MAINTAIN_MOTION, Behaviour("?", "thrusters", choices))
 
     def _search(self) -> Behaviour:
         # An unknown visibility counts as good; below the lowest threshold, the search stays at the lowest altitude.
         pairs = zip(self._settings.visibility_thresholds_m, self._settings.search_modes, strict=True)
         heights = [
-            Sequence(mode, (self._is_clear(least_m), self._set(GENERATE_SEARCH_PATH, mode))) for least_m, mode in pairs
+            Behaviour("->", mode, (self._is_clear(least_m), self._set(GENERATE_SEARCH_PATH, mode)))
+            for least_m, mode in pairs
         ]
         lowest = self._set(GENERATE_SEARCH_PATH, self._settings.search_modes[-1])
-        return self._while_needed(GENERATE_SEARCH_PATH, Fallback("altitude", (*heights, lowest)))
-
-    def _surface(self) -> Behaviour:
-        return self._while_needed(SURFACE, self._set(SURFACE, SURFACE_MODE))
-
-    def _follow(self) -> Behaviour:
-        mode = self.system.scenario.default_modes.get(FOLLOW_PIPELINE, "fd_follow_pipeline")
-        return self._while_needed(FOLLOW_PIPELINE, self._set(FOLLOW_PIPELINE, mode))
+        return self._while_needed(GENERATE_SEARCH_PATH, Behaviour("?", "altitude", (*heights, lowest)))
 
     def _while_needed(self, function: str, branch: Behaviour) -> Behaviour:
-        return Sequence(function, (Condition("is needed", holds=self._needs(function)), branch))
-
-    def _needs(self, function: str) -> Callable[[], bool]:
-        return lambda: function in self.functions
+        needed = Behaviour("", "is needed", act=lambda: function in self.system.functions)
+        return Behaviour("->", function, (needed, branch))
 
     def _is_clear(self, least_m: float) -> Behaviour:
         def holds() -> bool:
             visibility_m = self.system.measured(WATER_VISIBILITY)
             return visibility_m is None or visibility_m >= least_m
 
-        return Condition(f"visibility is at least {least_m:g} m, or unknown", holds=holds)
+        return Behaviour("", f"visibility is at least {least_m:g} m, or unknown", act=holds)
 
     def _set(self, function: str, mode: str) -> Behaviour:
-        return SetMode(f"{function} = {mode}", request=partial(self.system.change_mode, function, mode))
+        def request() -> bool:
+            self.system.change_mode(function, mode)
+            return True
+
+        return Behaviour("!", f"{function} = {mode}", act=request)
 
 
 class ExtendedBehaviourTree(BehaviourTree):
@@ -127,19 +189,19 @@ class ExtendedBehaviourTree(BehaviourTree):
         if self.system.scenario.battery is None:
             return super().make_tree()
         # Once under way, the vehicle continues until the level has risen: the station recharges the battery at once.
-        go = Sequence("low", (self._is_low(), self._set(GENERATE_RECHARGE_PATH, "normal")))
-        recharge = Fallback(GENERATE_RECHARGE_PATH, (go, self._set(GENERATE_RECHARGE_PATH, UNGROUND_MODE)))
-        return Parallel("mission", (*self._branches(), recharge))
+        go = Behaviour("->", "low", (self._is_low(), self._set(GENERATE_RECHARGE_PATH, "normal")))
+        stay = self._set(GENERATE_RECHARGE_PATH, UNGROUND_MODE)
+        return Behaviour("=>", "mission", (*self._branches(), Behaviour("?", GENERATE_RECHARGE_PATH, (go, stay))))
 
     def _while_needed(self, function: str, branch: Behaviour) -> Behaviour:
         if self.system.scenario.battery is not None and function in (GENERATE_SEARCH_PATH, FOLLOW_PIPELINE):
-            pause = Sequence("pause", (self._is_low(), self._set(function, UNGROUND_MODE)))
-            branch = Fallback("unless the battery is low", (pause, branch))
+            pause = Behaviour("->", "pause", (self._is_low(), self._set(function, UNGROUND_MODE)))
+            branch = Behaviour("?", "unless the battery is low", (pause, branch))
         return super()._while_needed(function, branch)
 
     def _is_low(self) -> Behaviour:
         def holds() -> bool:
             level = self.system.measured(BATTERY_LEVEL)
-            return level is not None and level < self._settings.battery_limit and SURFACE not in self.functions
+            return level is not None and level < self._settings.battery_limit and SURFACE not in self.system.functions
 
-        return Condition(f"battery is below {self._settings.battery_limit:g}", holds=holds)
+        return Behaviour("", f"battery is below {self._settings.battery_limit:g}", act=holds)

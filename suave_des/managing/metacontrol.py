@@ -1,8 +1,8 @@
-"""Metacontrol: a MAPE-K loop over an OWL knowledge base (paper, section on Metacontrol; kas-lab/suave).
+"""Metacontrol: a MAPE-K loop over an OWL knowledge base (paper, section on Metacontrol).
 
 Monitor: read the measured values; component statuses arrive as diagnostics. Analyze: a reasoner infers what the rules
 say about that state. Plan: the best function design for each objective that needs one. Execute: request the mode of the
-design's name.
+design's name. Source of what revisions do differently: kas-lab/suave with its reasoner, 4 February 2023 to 1.5.0.
 """
 
 from collections.abc import Callable, Collection, Hashable
@@ -10,18 +10,75 @@ from functools import partial
 from typing import ClassVar, Final
 from weakref import WeakKeyDictionary
 
-from suave_des.domain import GENERATE_SEARCH_PATH, UNGROUND_MODE, Task
-from suave_des.knowledge.deliberation import Conclusion
-from suave_des.knowledge.state import UNGROUNDED, Inference, KnowledgeState, ObjectiveState, Plan
-from suave_des.managing.adapter import Adapter, TaskBridge
-from suave_des.managing.base import AdaptationProcess, Dependencies, Knowledge, ManagedSystem, ManagingSubsystem
+from suave_des.clock import Alarm, call_at, tick_at_or_after
+from suave_des.domain import UNGROUND_MODE, Task
+from suave_des.knowledge.reasoner import Reasoner
+from suave_des.knowledge.state import (
+    NO_GROUNDING,
+    UNGROUNDED,
+    Decision,
+    Inference,
+    KnowledgeState,
+    ObjectiveState,
+    Plan,
+    Reasoning,
+)
+from suave_des.managing.base import AdaptationProcess, Dependencies, ManagingSubsystem, System
 from suave_des.monitor.diagnostics import RECOVERED, Diagnostic, Kind
 from suave_des.scenario.quantities import draw
 from suave_des.scenario.revision import MetacontrolRevision
 
-_cached: WeakKeyDictionary[Knowledge, dict[MetacontrolRevision, dict[Hashable, Conclusion]]] = WeakKeyDictionary()
-"""Conclusions by symbolic state: missions of one scenario go through the same few states."""
+_cached: WeakKeyDictionary[Reasoner, dict[MetacontrolRevision, dict[Hashable, Reasoning]]] = WeakKeyDictionary()
+"""What follows and is planned, by symbolic state: missions of one scenario go through the same few states."""
 _MAX_CACHED: Final = 16384
+
+
+class Adapter:
+    """Maps plans to mode changes: a function design is carried out by the mode of its name."""
+
+    def __init__(self, system: System) -> None:
+        self._system = system
+        self._without_design: frozenset[str] = frozenset()  # functions for which the last plan had no design
+
+    def is_in_force(self, plan: Plan) -> bool:
+        """Return whether carrying a plan out would neither change a mode nor record anything."""
+        current_mode = self._system.modes.current_mode
+        for decision in plan.decisions:
+            if decision.design is not None and current_mode(decision.function) != decision.design:
+                return False
+        return plan.without_design == self._without_design
+
+    def carry_out(self, plan: Plan, groundings: dict[str, str], functions: Collection[str]) -> dict[str, str]:
+        """Request the modes of a plan.
+
+        Args:
+            plan: the decisions.
+            groundings: the function designs in use, by function.
+            functions: those that still have an objective; decisions on others are dropped.
+
+        Returns:
+            The function designs that are in use from now on, by function.
+        """
+        grounded = {}
+        for decision in plan.decisions:
+            function, design = decision.function, decision.design
+            if function not in functions:
+                continue
+            if design is None:
+                if function not in self._without_design:
+                    self._log("no_design_left", function, decision)
+            elif self._system.change_mode(function, design):
+                grounded[function] = design
+                before = groundings.get(function, NO_GROUNDING)
+                if before != design:
+                    self._log("adaptation", f"{function}: {before} -> {design}", decision)
+        self._without_design = plan.without_design
+        return grounded
+
+    def _log(self, event: str, what: str, decision: Decision) -> None:
+        if self._system.recorded:
+            left_out = "".join([f"; not {each.design}: {each.reason}" for each in decision.rejected])
+            self._system.log(event, f"{what}: {decision.reason}{left_out}")
 
 
 class Metacontrol(ManagingSubsystem):
@@ -35,21 +92,27 @@ class Metacontrol(ManagingSubsystem):
         groundings: the function designs in use, by function.
         components: the reported statuses, by component.
         measurements: the last measured values, by quality attribute.
+
+    Example:
+        >>> class Cautious(Metacontrol):
+        ...     def measured(self, attribute):
+        ...         value = super().measured(attribute)
+        ...         return value if value is None else 0.9 * value
     """
 
     needs_knowledge: ClassVar[bool] = True
     subscribes_to: ClassVar[Collection[Kind]] = (Kind.COMPONENT_STATUS,)
 
-    def __init__(self, system: ManagedSystem) -> None:
+    def __init__(self, system: System) -> None:
         super().__init__(system)
         scenario, revision = system.scenario, system.scenario.revision.metacontrol
         self._revision = revision
-        self._knowledge = system.knowledge()
+        self._reasoner = system.knowledge()
         # In a derived class analyze and plan may depend on more than the state, so their results are not cached.
         methods = type(self).analyze, type(self).plan
         self._is_cacheable = methods == (Metacontrol.analyze, Metacontrol.plan)
-        cached = _cached.setdefault(self._knowledge, {}).setdefault(revision, {})
-        self._conclusions: dict[Hashable, Conclusion] = cached if self._is_cacheable else {}
+        cached = _cached.setdefault(self._reasoner, {}).setdefault(revision, {})
+        self._reasonings: dict[Hashable, Reasoning] = cached if self._is_cacheable else {}
         self.objectives: dict[str, str | None] = {}
         self.groundings: dict[str, str] = {}
         self.components: dict[str, str] = {}
@@ -63,14 +126,12 @@ class Metacontrol(ManagingSubsystem):
             latency if isinstance(latency, float) else partial(draw, latency, system.stream(stream))
         )
         self.period_s: float = scenario.managers.metacontrol.reasoning_period_s
-        self.starts_s = system.first_cycle_s()
+        self.starts_s = system.first_tick_s("metacontrol", self.period_s)
         self._adapter = Adapter(system)
         bridge_s = revision.task_bridge_period_s
-        phase_s = system.stream("metacontrol/bridge").uniform(0.0, bridge_s) if bridge_s > 0.0 else 0.0
-        self._bridge = TaskBridge(system, bridge_s, phase_s)
-        self._add_objectives(system.lasting_functions)
-        if revision.objectives_at_launch:
-            self._add_objectives((GENERATE_SEARCH_PATH,))
+        self._bridge_phase_s = system.stream("metacontrol/bridge").uniform(0.0, bridge_s) if bridge_s > 0.0 else 0.0
+        self._has_objectives_from_launch = bool(system.functions)
+        self._add_objectives((*system.functions, *revision.objectives_at_launch))
 
     # The loop.
 
@@ -80,16 +141,16 @@ class Metacontrol(ManagingSubsystem):
         if not self.objectives or not self._awaited <= self.measurements.keys():
             return None
         self._cancelled.clear()
-        conclusion = self._analyze_and_plan()
-        self.system.record_state(conclusion.inference.state)
+        reasoning = self._analyze_and_plan()
+        if self.system.recorded:
+            self.system.log_state(reasoning.inference.state)
         latency_s = self._latency_s
         if callable(latency_s):
-            return self.execute(conclusion, latency_s())
+            return self.execute(reasoning, latency_s())
         # A latency of a period or more must pass even so: cycles that come due meanwhile are skipped.
-        if latency_s < self.period_s and self._changes_nothing(conclusion):
-            self._recorded_statuses = conclusion.statuses
+        if latency_s < self.period_s and self._changes_nothing(reasoning):
             return None
-        return self.execute(conclusion, latency_s)
+        return self.execute(reasoning, latency_s)
 
     def monitor(self) -> None:
         """Read the measured values; components report by themselves, see `diagnostic`."""
@@ -100,9 +161,9 @@ class Metacontrol(ManagingSubsystem):
 
     def analyze(self) -> Inference:
         """Infer what the rules say about the current state."""
-        improves = {GENERATE_SEARCH_PATH} if self._revision.search_always_improves else set()
+        improves = self._revision.always_improve
         objectives = [ObjectiveState(name, status, name in improves) for name, status in self.objectives.items()]
-        return self._knowledge.analyze(
+        return self._reasoner.analyze(
             KnowledgeState.of(
                 objectives, groundings=self.groundings, components=self.components, measurements=self.measurements
             )
@@ -110,20 +171,20 @@ class Metacontrol(ManagingSubsystem):
 
     def plan(self, inference: Inference) -> Plan:
         """Choose function designs for the objectives that need a different one."""
-        return self._knowledge.plan(inference, improve_exceeded=self._revision.search_improves_when_exceeded)
+        return self._reasoner.plan(inference, improve_exceeded=self._revision.improve_when_exceeded)
 
-    def execute(self, conclusion: Conclusion, latency_s: float) -> AdaptationProcess:
+    def execute(self, reasoning: Reasoning, latency_s: float) -> AdaptationProcess:
         """Request the plan's modes after the reasoner's latency; their objectives lose their status."""
         recovered = [component for component, status in self.components.items() if status == RECOVERED]
         yield self.system.env.timeout(latency_s)
         if self.system.recorded:
-            for line in sorted(conclusion.statuses - self._recorded_statuses):
+            for line in sorted(reasoning.statuses - self._recorded_statuses):
                 self.system.log("inferred", line)
-            self._recorded_statuses = conclusion.statuses
+            self._recorded_statuses = reasoning.statuses
         needed = self.objectives.keys() - self._cancelled
-        grounded = self._adapter.carry_out(conclusion.plan, self.groundings, needed)
+        grounded = self._adapter.carry_out(reasoning.plan, self.groundings, needed)
         if not grounded.items() <= self.groundings.items():
-            self.system.record_reasoning_time(latency_s)
+            self.reasoning_time_s += latency_s
         self.groundings |= grounded
         self.objectives |= dict.fromkeys(grounded)
         # From now on a recovered component counts as never failed. Otherwise its status would make every objective
@@ -141,11 +202,24 @@ class Metacontrol(ManagingSubsystem):
 
     def task_requested(self, task: Task) -> None:
         """Add an objective for each function of the task, when the task bridge passes it on."""
-        self._bridge.pass_on(task, self._add_objectives)
+        self._pass_on(task, self._add_objectives)
 
     def task_cancelled(self, task: Task) -> None:
         """Remove the task's objectives with their groundings, when the task bridge passes it on."""
-        self._bridge.pass_on(task, self._remove_objectives)
+        self._pass_on(task, self._remove_objectives)
+
+    def _pass_on(self, task: Task, update: Callable[[tuple[str, ...]], None]) -> None:
+        """Call `update` with the task's functions at the next tick of the exemplar's task bridge, if it has a timer."""
+
+        def deliver() -> None:
+            update(task.functions)
+            self.system.state_changed()
+
+        env, period_s = self.system.env, self._revision.task_bridge_period_s
+        if period_s > 0.0:
+            call_at(env, tick_at_or_after(env.now, self._bridge_phase_s, period_s), deliver)
+        else:
+            Alarm(env, deliver).set_now()
 
     def _add_objectives(self, functions: tuple[str, ...]) -> None:
         if not self._is_listening():
@@ -166,49 +240,52 @@ class Metacontrol(ManagingSubsystem):
     # Queries of the loop.
 
     def measured(self, attribute: str) -> float | None:
-        """Look up the value of a quality attribute for `monitor`; none if nothing was published."""
+        """Look up the value of a quality attribute for `monitor`; None if nothing was published."""
         return self.system.measured(attribute, self._listens_since_s)
 
     @property
     def depends_on(self) -> Dependencies | None:
         """The numbers in the knowledge base, if the rules only compare measured values with them."""
-        thresholds = self._knowledge.thresholds
+        thresholds = self._reasoner.thresholds
         if thresholds is None:
             return None
-        if self._revision.ignores_diagnostics_without_objective and not self.system.lasting_functions:
+        if self._revision.ignores_diagnostics_without_objective and not self._has_objectives_from_launch:
             return None  # then it also depends on when a value was published
         return dict.fromkeys(self.system.measurements, thresholds)
 
-    def _analyze_and_plan(self) -> Conclusion:
+    def _analyze_and_plan(self) -> Reasoning:
         """Analyze and plan, or look up the cached result for an equal state."""
         state = self._symbolic_state()
-        conclusion = self._conclusions.get(state)
-        if conclusion is None:
+        reasoning = self._reasonings.get(state)
+        if reasoning is None:
             inference = self.analyze()
-            conclusion = Conclusion(inference, self.plan(inference))
+            reasoning = Reasoning(inference, self.plan(inference))
             if self._is_cacheable:
-                if len(self._conclusions) >= _MAX_CACHED:
-                    self._conclusions.clear()
-                self._conclusions[state] = conclusion
-        return conclusion
+                if len(self._reasonings) >= _MAX_CACHED:
+                    self._reasonings.clear()
+                self._reasonings[state] = reasoning
+        return reasoning
 
     def _symbolic_state(self) -> Hashable:
         """Make the key of the state: with regions of measured values, or with the values if the mission is recorded."""
         measured = self.measurements.values()
-        values = tuple(measured) if self.system.recorded else self._knowledge.distinguished(measured)
+        values = tuple(measured) if self.system.recorded else self._reasoner.distinguished(measured)
         known = tuple(self.objectives.items()), tuple(self.groundings.items()), tuple(self.components.items())
         return known, tuple(self.measurements), values
 
-    def _changes_nothing(self, conclusion: Conclusion) -> bool:
-        """Return whether executing a plan would change nothing."""
-        adds_statuses = self.system.recorded and conclusion.statuses - self._recorded_statuses
-        if adds_statuses or RECOVERED in self.components.values():
+    def _changes_nothing(self, reasoning: Reasoning) -> bool:
+        """Return whether executing a plan would change nothing, and record nothing."""
+        if RECOVERED in self.components.values():
             return False
-        for decision in conclusion.plan.decisions:
+        if self.system.recorded:
+            if reasoning.statuses - self._recorded_statuses:
+                return False
+            self._recorded_statuses = reasoning.statuses
+        for decision in reasoning.plan.decisions:
             function, design = decision.function, decision.design
             if design is not None and (self.groundings.get(function), self.objectives[function]) != (design, None):
                 return False
-        return self._adapter.is_in_force(conclusion.plan)
+        return self._adapter.is_in_force(reasoning.plan)
 
     def _is_listening(self) -> bool:
         return bool(self.objectives) or not self._revision.ignores_diagnostics_without_objective
@@ -217,4 +294,4 @@ class Metacontrol(ManagingSubsystem):
         """Find the signals to be measured before the first cycle: those of which function designs expect a value."""
         if not self._revision.waits_for_first_measurement:
             return frozenset()
-        return self._knowledge.expected_attributes.intersection(self.system.measurements, self.system.scenario.signals)
+        return self._reasoner.expected_attributes.intersection(self.system.measurements, self.system.scenario.signals)

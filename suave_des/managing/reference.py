@@ -1,76 +1,44 @@
-"""Managers to compare others with: a fixed mode, plain thresholds without an ontology, and perfect knowledge."""
+"""Managers to compare others with: plain thresholds without an ontology, and perfect knowledge."""
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Collection, Iterator
-from functools import cache
 from itertools import count
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
-from suave_des.domain import (
-    FOLLOW_PIPELINE,
-    GENERATE_SEARCH_PATH,
-    MAINTAIN_MOTION,
-    WATER_VISIBILITY,
-    Task,
-)
-from suave_des.errors import InputError, did_you_mean, shown
-from suave_des.managing.base import AdaptationProcess, Dependencies, FunctionsManager, ManagedSystem, ManagingSubsystem
-from suave_des.managing.simple import NoManager
+from suave_des.domain import FOLLOW_PIPELINE, GENERATE_SEARCH_PATH, MAINTAIN_MOTION, WATER_VISIBILITY, Task
+from suave_des.managing.base import AdaptationProcess, Dependencies, ManagingSubsystem, System
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
-from suave_des.scenario.modes import grounding_modes
-
-if TYPE_CHECKING:
-    from suave_des.scenario.loader import LoadedScenario
 
 _LOOK_PERIOD_S = 0.05
 """The vehicle's time step: a mode requested between two steps takes effect no earlier."""
 
 
-class FixedMode(NoManager):
-    """fixed:MODE: functions that have this mode get it, others their default mode; it never adapts."""
-
-    mode: ClassVar[str]
-
-    @classmethod
-    def check(cls, loaded: LoadedScenario) -> None:
-        """Check that some function has the mode."""
-        known = sorted({mode for function in loaded.modes.functions for mode in loaded.modes.modes(function)})
-        if cls.mode not in known:
-            remedy = did_you_mean(cls.mode, grounding_modes(known), f"modes in {loaded.modes_path.name}")
-            raise InputError(f"manager fixed:{cls.mode}: no function has a mode {shown(cls.mode)}", remedy=remedy)
-
-    def task_requested(self, task: Task) -> None:
-        """Set the modes of the task's functions."""
-        others = []
-        for function in task.functions:
-            if self.mode in self.system.modes.available_modes(function):
-                self.system.change_mode(function, self.mode)
-            else:
-                others.append(function)
-        super().task_requested(Task(task.name, tuple(others)))
-
-
-@cache
-def fixed_mode(mode: str) -> type[ManagingSubsystem]:
-    """Make the class of the manager `fixed:MODE`."""
-    return type("FixedMode", (FixedMode,), {"mode": mode, "__doc__": FixedMode.__doc__})
-
-
-class Threshold(FunctionsManager):
+class Threshold(ManagingSubsystem):
     """threshold: metacontrol's decisions as plain conditions; the difference is the cost of the ontology.
 
     It adapts at metacontrol's times (`managers.metacontrol.reasoning_period_s`, from the same first cycle on in each
     run), takes no time to reason, and searches by the thresholds of `managers.bt`.
+
+    Attributes:
+        thresholds_m: least visibility for each of the search modes; the first one that is reached decides.
+        search_modes: a mode for each threshold; the last one is also for a visibility below all.
+        failed: thrusters that were reported as failed.
+
+    Example:
+        >>> class Bold(Threshold):
+        ...     def __init__(self, system):
+        ...         super().__init__(system)
+        ...         self.thresholds_m = (3.0, 2.0, 1.0)
     """
 
     subscribes_to: ClassVar[Collection[Kind]] = (Kind.COMPONENT_STATUS,)
 
-    def __init__(self, system: ManagedSystem) -> None:
+    def __init__(self, system: System) -> None:
         super().__init__(system)
-        self.period_s: float | None = system.scenario.managers.metacontrol.reasoning_period_s
-        self.starts_s = system.first_cycle_s()
+        period_s = system.scenario.managers.metacontrol.reasoning_period_s
+        self.period_s: float | None = period_s
+        self.starts_s = system.first_tick_s("metacontrol", period_s)
         self.thresholds_m = system.scenario.managers.bt.visibility_thresholds_m
         self.search_modes = system.scenario.managers.bt.search_modes
         self.failed: set[str] = set()
@@ -94,7 +62,7 @@ class Threshold(FunctionsManager):
 
     def wanted(self, visibility_m: float | None) -> Iterator[tuple[str, str]]:
         """Choose the mode that fits, for each function; a visibility that is not known yet counts as good."""
-        for function in self.functions:
+        for function in self.system.functions:
             if function == MAINTAIN_MOTION:
                 yield function, "fd_recover_thrusters" if self.failed else "fd_all_thrusters"
             elif function == GENERATE_SEARCH_PATH:
@@ -111,10 +79,10 @@ class Oracle(Threshold):
     The difference to a manager of the same thresholds is the cost of measuring, deciding and changing modes.
     """
 
-    def __init__(self, system: ManagedSystem) -> None:
+    def __init__(self, system: System) -> None:
         super().__init__(system)
         self.period_s = None
-        self._visibility_m = system.true_signal(WATER_VISIBILITY)
+        self._visibility_m = system.measurements[WATER_VISIBILITY].signal  # which no real manager could know
 
     def mission_started(self) -> None:
         """Start watching the true visibility."""
@@ -122,7 +90,6 @@ class Oracle(Threshold):
 
     def task_requested(self, task: Task) -> None:
         """Request the modes of the task's functions at once."""
-        super().task_requested(task)
         self.adapt()
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
@@ -133,17 +100,21 @@ class Oracle(Threshold):
     def adapt(self) -> None:
         """Request the modes that fit the true visibility, with effect at once."""
         for function, mode in self.wanted(self._visibility_m(self.system.now_s)):
-            self.system.change_mode(function, mode, latency_s=0.0)
+            self.system.modes.change_mode(function, mode, latency_s=0.0)
 
     def _watch(self) -> AdaptationProcess:
         """Adapt whenever the true visibility crosses a threshold."""
-        env, thresholds_m = self.system.env, tuple(sorted(self.thresholds_m))
-        region = bisect_right(thresholds_m, self._visibility_m(0.0))
+        env = self.system.env
+        reached = self._thresholds_reached(0.0)
         for step in count(1):
             t_s = step * _LOOK_PERIOD_S
-            if (now_in := bisect_right(thresholds_m, self._visibility_m(t_s))) != region:
-                region = now_in
+            if (now_reached := self._thresholds_reached(t_s)) != reached:
+                reached = now_reached
                 yield env.timeout(t_s - env.now)
                 self.adapt()
             elif step % 1000 == 0:  # or the search for the next crossing would go on beyond the mission's end
                 yield env.timeout(t_s - env.now)
+
+    def _thresholds_reached(self, t_s: float) -> int:
+        visibility_m = self._visibility_m(t_s)
+        return sum(visibility_m >= least_m for least_m in self.thresholds_m)

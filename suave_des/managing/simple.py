@@ -1,11 +1,22 @@
-"""The paper's two managers without knowledge: none and random (SEAMS 2023 paper; kas-lab/suave)."""
+"""Managers without knowledge: the paper's none and random, and a fixed mode (SEAMS 2023 paper, section on managers).
+
+Source: nodes task_bridge and task_bridge_random of kas-lab/suave, of 4 February 2023 and of 1.5.0.
+"""
+
+from __future__ import annotations
 
 from collections.abc import Collection
-from typing import ClassVar
+from functools import cache
+from typing import TYPE_CHECKING, ClassVar
 
 from suave_des.domain import GENERATE_SEARCH_PATH, MAINTAIN_MOTION, UNGROUND_MODE, Task
-from suave_des.managing.base import ManagedSystem, ManagingSubsystem
+from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.managing.base import ManagingSubsystem, System
 from suave_des.monitor.diagnostics import Diagnostic, Kind
+from suave_des.scenario.modes import grounding_modes
+
+if TYPE_CHECKING:
+    from suave_des.scenario.loader import LoadedScenario
 
 
 class NoManager(ManagingSubsystem):
@@ -19,6 +30,36 @@ class NoManager(ManagingSubsystem):
                 self.system.change_mode(function, mode)
 
 
+class FixedMode(NoManager):
+    """fixed:MODE: functions that have this mode get it, others their default mode; it never adapts."""
+
+    mode: ClassVar[str]
+
+    @classmethod
+    def check(cls, loaded: LoadedScenario) -> None:
+        """Check that some function has the mode."""
+        known = sorted({mode for function in loaded.modes.functions for mode in loaded.modes.modes(function)})
+        if cls.mode not in known:
+            remedy = did_you_mean(cls.mode, grounding_modes(known), f"modes in {loaded.modes_path.name}")
+            raise InputError(f"manager fixed:{cls.mode}: no function has a mode {shown(cls.mode)}", remedy=remedy)
+
+    def task_requested(self, task: Task) -> None:
+        """Set the modes of the task's functions."""
+        others = []
+        for function in task.functions:
+            if self.mode in self.system.modes.available_modes(function):
+                self.system.change_mode(function, self.mode)
+            else:
+                others.append(function)
+        super().task_requested(Task(task.name, tuple(others)))
+
+
+@cache
+def fixed_mode(mode: str) -> type[ManagingSubsystem]:
+    """Make the class of the manager `fixed:MODE`."""
+    return type("FixedMode", (FixedMode,), {"mode": mode, "__doc__": FixedMode.__doc__})
+
+
 class RandomManager(ManagingSubsystem):
     """random: every period, each function of the task gets one of its modes, with equal probability.
 
@@ -29,18 +70,18 @@ class RandomManager(ManagingSubsystem):
 
     subscribes_to: ClassVar[Collection[Kind]] = (Kind.DETECTION,)
 
-    def __init__(self, system: ManagedSystem) -> None:
+    def __init__(self, system: System) -> None:
         super().__init__(system)
-        self.period_s = system.scenario.managers.random.adaptation_period_s
+        self._revision = system.scenario.revision.random
+        self.period_s: float = system.scenario.managers.random.adaptation_period_s
+        self.starts_s = system.first_tick_s("random_manager", self.period_s)
         self._stream = system.stream("random_manager/picks")
-        # Timers of nodes have been running since launch: the phase at t = 0 differs from run to run.
-        self.starts_s = system.stream("random_manager/phase").uniform(0.0, self.period_s)
         self._functions: tuple[str, ...] = ()
 
     def task_requested(self, task: Task) -> None:
         """Remember the task's functions."""
         self._functions = tuple(name for name in task.functions if name != MAINTAIN_MOTION)
-        if self.system.scenario.revision.random.on_task_request:
+        if self._revision.on_task_request:
             self.adapt()
 
     def task_cancelled(self, task: Task) -> None:
@@ -50,10 +91,7 @@ class RandomManager(ManagingSubsystem):
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
         """End the search when the pipeline is detected."""
-        if (
-            self.system.scenario.revision.random.ungrounds_search_at_detection
-            and GENERATE_SEARCH_PATH in self._functions
-        ):
+        if self._revision.ungrounds_search_at_detection and GENERATE_SEARCH_PATH in self._functions:
             self._functions = tuple(name for name in self._functions if name != GENERATE_SEARCH_PATH)
             self.system.change_mode(GENERATE_SEARCH_PATH, UNGROUND_MODE)
 

@@ -9,15 +9,15 @@ from itertools import pairwise
 import numpy as np
 import simpy
 
-from suave_des.clock import Process
 from suave_des.compiling import Array
-from suave_des.domain import SEA_BED_Z_M
+from suave_des.domain import BATTERY_LEVEL, SEA_BED_Z_M, WATER_VISIBILITY
+from suave_des.metrics.coverage import covered_area_m2
 from suave_des.metrics.result import MissionMetrics
-from suave_des.monitor.measurements import BatteryLevel, Measured
+from suave_des.monitor.measurements import BatteryMeasurements, Measurements
+from suave_des.monitor.thrusters import Thrusters
 from suave_des.scenario.models import FURTHER_METRICS, Requirement, Scenario
 from suave_des.scenario.modes import Mode
-from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at
-from suave_des.world.coverage import covered_area_m2
+from suave_des.vehicle.vehicle import STEP_S, row_at
 
 MetricValue = float | int | None
 
@@ -29,19 +29,17 @@ class FurtherMetrics:
     Attributes:
         env: the mission's clock.
         scenario: says which are asked for.
-        vehicle: has the track.
-        measured: what monitors have measured, by quality attribute.
-        battery: its level; none if there is no battery.
+        thrusters: with the vehicle, which has the track.
+        measurements: what monitors have measured, by quality attribute.
         adaptations_undone: changes of a function's mode that were soon taken back: indecision.
         reasoning_time_s: mission time that the reasoner took in cycles that changed a function design.
-        surfacing_time_s: from the leak to the surface; none while the vehicle has not surfaced.
+        surfacing_time_s: from the leak to the surface; None while the vehicle has not surfaced.
     """
 
     env: simpy.Environment
     scenario: Scenario
-    vehicle: Vehicle
-    measured: Mapping[str, Measured]
-    battery: BatteryLevel | None
+    thrusters: Thrusters
+    measurements: Mapping[str, Measurements]
     adaptations_undone: int = 0
     reasoning_time_s: float = 0.0
     surfacing_time_s: float | None = None
@@ -49,7 +47,6 @@ class FurtherMetrics:
     _in_force: dict[str, str] = field(default_factory=dict)
     _in_force_since_s: float = 0.0
     _configurations: set[frozenset[tuple[str, str]]] = field(default_factory=set)
-    _working: list[tuple[float, int]] = field(default_factory=list)
 
     def adapted(self, function: str, before: str, after: str) -> None:
         """Count a mode change of a function in use."""
@@ -71,93 +68,78 @@ class FurtherMetrics:
             self._configurations.add(frozenset(self._in_force.items()))
         self._in_force_since_s = self.env.now
 
-    def reasoning_took(self, duration_s: float) -> None:
-        """Note the time that the reasoner took in a cycle that changed something."""
-        self.reasoning_time_s += duration_s
-
-    def watch_surfacing(self, surfaced: simpy.Event, leak_s: float) -> Process:
-        """Note the moment at which the vehicle has surfaced after a leak."""
-        yield surfaced
-        self.surfacing_time_s = float(self.env.now) - leak_s
-
-    def thrusters_changed(self) -> None:
-        """Note a change of the thrusters that work."""
-        self._working.append((self.env.now, self.vehicle.working_thrusters))
-
     def columns(self, metrics: MissionMetrics) -> dict[str, MetricValue]:
-        """The further metrics and the satisfaction of requirements as of now, by column."""
-        scenario, now_s = self.scenario, float(self.env.now)
+        """Compute the further metrics and the satisfaction of requirements as of now, by column."""
+        scenario = self.scenario
         asked = (*scenario.metrics, *(str(each.metric) for each in scenario.requirements.values()))
         found = {metric: self.value(metric) for metric in asked if metric in FURTHER_METRICS}
-        degrees = satisfaction_degrees(scenario.requirements, metrics, found, self.measured, now_s)
-        columns = {**found, **{f"requirement_{name}": degree for name, degree in degrees.items()}}
-        return {name: columns[name] for name in scenario.further_columns}
+        for name, requirement in scenario.requirements.items():
+            found[f"requirement_{name}"] = self._satisfaction(requirement, metrics, found)
+        return {name: found[name] for name in scenario.further_columns}
 
     def value(self, metric: str) -> MetricValue:
-        """A further metric as of now."""
+        """Compute a further metric as of now."""
         now_s = float(self.env.now)
         match metric:
-            case "adaptations_undone":
-                return self.adaptations_undone
             case "configurations":
                 self._count_configuration()
                 return len(self._configurations)
-            case "reasoning_time_s":
-                return self.reasoning_time_s
             case "operational_thrusters":
-                return self._operational_thrusters()
+                return self._operational_thrusters(now_s)
             case "area_covered_m2":
-                self.vehicle.position(now_s)  # fills the track until now
-                track, tangent = self.vehicle.track, self.scenario.vehicle.camera.tangent
-                visibility = self.measured["water_visibility"]
-                visibility_m = measured_at_rows(visibility.times_s, visibility.values, len(track))
-                return covered_area_m2(track, row_at(now_s), visibility_m, SEA_BED_Z_M, tangent)
-            case "surfacing_time_s":
-                return self.surfacing_time_s
-        assert self.battery is not None
-        level = self.battery.level(now_s)
-        return self.battery.recharges if metric == "recharges" else level
+                return self._area_covered_m2(now_s)
+            case "battery_level":
+                return self._battery.level(now_s)
+            case "recharges":
+                self._battery.count_until(now_s)
+                return self._battery.recharges
+        noted: MetricValue = getattr(self, metric)
+        return noted
 
-    def _operational_thrusters(self) -> float:
-        """Mean over mission time of the number of thrusters that work."""
-        all_thrusters = len(self.vehicle.model.thrusters)
-        if self.env.now <= 0.0:
+    @property
+    def _battery(self) -> BatteryMeasurements:
+        battery = self.measurements[BATTERY_LEVEL]
+        assert isinstance(battery, BatteryMeasurements)
+        return battery
+
+    def _operational_thrusters(self, now_s: float) -> float:
+        """Compute the mean over mission time of the number of thrusters that work."""
+        all_thrusters = len(self.thrusters.vehicle.model.thrusters)
+        if now_s <= 0.0:
             return float(all_thrusters)
-        steps = [(0.0, all_thrusters), *self._working, (self.env.now, 0)]
-        return sum((later - since) * count for (since, count), (later, _) in pairwise(steps)) / self.env.now
+        steps = [(0.0, all_thrusters), *self.thrusters.working, (now_s, 0)]
+        return sum((later_s - since_s) * count for (since_s, count), (later_s, _) in pairwise(steps)) / now_s
+
+    def _area_covered_m2(self, now_s: float) -> float:
+        vehicle, visibility = self.thrusters.vehicle, self.measurements[WATER_VISIBILITY]
+        vehicle.position(now_s)  # fills the track until now
+        visibility_m = measured_at_rows(visibility.times_s, visibility.values, len(vehicle.track))
+        tangent = self.scenario.vehicle.camera.tangent
+        return covered_area_m2(vehicle.track, row_at(now_s), visibility_m, SEA_BED_Z_M, tangent)
+
+    def _satisfaction(
+        self, requirement: Requirement, metrics: MissionMetrics, further: Mapping[str, MetricValue]
+    ) -> float | None:
+        """Compute the degree to which a requirement is satisfied as of now, from 0 to 1; None if there is no value."""
+        if requirement.attribute is not None:
+            return self._satisfaction_over_time(requirement, self.measurements[requirement.attribute])
+        metric = str(requirement.metric)
+        value = further[metric] if metric in further else getattr(metrics, metric)
+        return None if value is None else requirement.satisfaction(float(value))
+
+    def _satisfaction_over_time(self, requirement: Requirement, measured: Measurements) -> float | None:
+        now_s = float(self.env.now)
+        count = measured.count_until(now_s)
+        times_s, values = measured.times_s[:count], measured.values[:count]
+        if not count or now_s <= times_s[0]:
+            return None
+        ends_s = (*times_s[1:], now_s)
+        shares = zip(times_s, ends_s, values, strict=True)
+        total_s = sum((end_s - since_s) * requirement.satisfaction(value) for since_s, end_s, value in shares)
+        return float(total_s / (now_s - times_s[0]))
 
 
 def measured_at_rows(times_s: Sequence[float], values: Sequence[float], rows: int) -> Array:
-    """The value measured last at each row of a track, shape (rows,); nan before the first."""
+    """Find the value measured last at each row of a track, shape (rows,); nan before the first."""
     since_rows = np.minimum(np.rint(np.array(times_s) / STEP_S), rows).astype(np.int64)  # rounded as Vehicle does
     return np.repeat(np.append(np.nan, values), np.diff(since_rows, prepend=0, append=rows))
-
-
-def satisfaction_degrees(
-    requirements: Mapping[str, Requirement],
-    metrics: MissionMetrics,
-    further: Mapping[str, MetricValue],
-    measured: Mapping[str, Measured],
-    now_s: float,
-) -> dict[str, float | None]:
-    """Compute the degree to which each requirement is satisfied as of now, from 0 to 1; None if there is no value."""
-    found: dict[str, float | None] = {}
-    for name, requirement in requirements.items():
-        if requirement.attribute is not None:
-            found[name] = _over_time(requirement, measured[requirement.attribute], now_s)
-            continue
-        metric = str(requirement.metric)
-        value = further[metric] if metric in further else getattr(metrics, metric)
-        found[name] = None if value is None else requirement.satisfaction(float(value))
-    return found
-
-
-def _over_time(requirement: Requirement, measured: Measured, now_s: float) -> float | None:
-    count = measured.count_until(now_s)
-    times_s, values = measured.times_s[:count], measured.values[:count]
-    if not count or now_s <= times_s[0]:
-        return None
-    ends_s = (*times_s[1:], now_s)
-    shares = zip(times_s, ends_s, values, strict=True)
-    total_s = sum((end_s - since_s) * requirement.satisfaction(value) for since_s, end_s, value in shares)
-    return float(total_s / (now_s - times_s[0]))

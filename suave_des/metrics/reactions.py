@@ -1,8 +1,9 @@
-"""Mean reaction time, the metric of revision 1.5's metrics node (facts: kas-lab/suave, revision 1.5)."""
+"""Mean reaction time, the metric of revision 1.5 (source: node mission_metrics of kas-lab/suave 1.5.0)."""
 
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from operator import itemgetter
@@ -12,7 +13,7 @@ import simpy
 
 from suave_des.domain import GENERATE_RECHARGE_PATH, MAINTAIN_MOTION
 from suave_des.monitor.diagnostics import FAILED, Diagnostic
-from suave_des.monitor.measurements import Measured, Measurements
+from suave_des.monitor.measurements import Measurements, SignalMeasurements
 from suave_des.scenario.models import ReactionMetric
 from suave_des.scenario.modes import Mode
 
@@ -31,9 +32,9 @@ class ReactionMeter:
 
     env: simpy.Environment
     settings: ReactionMetric
-    visibility: Measurements
+    visibility: SignalMeasurements
     initial_altitude_m: float
-    battery: Measured | None = None
+    battery: Measurements | None = None
     _entries: list[_Entry] = field(default_factory=list, init=False)
 
     def diagnostic(self, diagnostic: Diagnostic) -> None:
@@ -54,22 +55,21 @@ class ReactionMeter:
         return open_events.completed_s
 
     def mean_s(self) -> float | None:
-        """Mean of the completed reactions; none if there was none."""
+        """Mean of the completed reactions; None if there was none."""
         reactions_s = self.reactions_s()
         return sum(reactions_s) / len(reactions_s) if reactions_s else None
 
     def _fitting_altitudes(self) -> Iterator[_Entry]:
         """The messages from which on another altitude fits than before."""
         altitudes_m = (None, *self.settings.expected_altitudes_m[::-1])
-        crossings = self.visibility.crossings(self.settings.visibility_thresholds_m[::-1])
-        band_before = -1
-        for t_s, region in zip(*crossings, strict=True):
-            band = (region + 1) // 2  # a threshold itself belongs to what lies above it
+        thresholds_m, reached_before = self.settings.visibility_thresholds_m[::-1], -1
+        for t_s in self.visibility.crossings_s(thresholds_m):
             if t_s > self.env.now:
                 break
-            if band != band_before:
-                yield t_s, _OpenEvents.expect, altitudes_m[band]
-            band_before = band
+            reached = bisect_right(thresholds_m, self.visibility.values[self.visibility.count_until(t_s) - 1])
+            if reached != reached_before:
+                yield t_s, _OpenEvents.expect, altitudes_m[reached]
+            reached_before = reached
 
     def _low_battery(self) -> Iterator[_Entry]:
         if self.battery is not None:
@@ -104,7 +104,7 @@ class _OpenEvents:
             self._since_s.setdefault("failure", t_s)
 
     def expect(self, t_s: float, altitude_m: float | None) -> None:
-        """From this visibility message on another altitude fits; none: no altitude does."""
+        """From this visibility message on another altitude fits, or none does."""
         self._expected_m = altitude_m
         self._compare_at(t_s)
 

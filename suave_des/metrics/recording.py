@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,8 @@ import simpy
 from suave_des.domain import BATTERY_LEVEL, MOVING_FUNCTIONS, WATER_VISIBILITY
 from suave_des.metrics.result import Event, KnowledgeRecord, TrajectoryPoint
 from suave_des.monitor.diagnostics import HULL, Diagnostic, Kind
-from suave_des.monitor.measurements import Measured, Measurements
+from suave_des.monitor.measurements import Measurements
+from suave_des.scenario.models import ReactionMetric
 from suave_des.scenario.modes import Mode
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
 
@@ -24,12 +25,20 @@ TRAJECTORY_PERIOD_ROWS = 4
 
 @dataclass(eq=False)
 class Recorder:
-    """Records what happens, if it is enabled; missions of a campaign are not recorded."""
+    """Records what happens, if it is enabled; missions of a campaign are not recorded.
+
+    Attributes:
+        env: the mission's clock.
+        enabled: whether anything is kept.
+        metric: has the values of quality attributes whose crossing is kept.
+    """
 
     env: simpy.Environment
     enabled: bool
+    metric: ReactionMetric
     events: list[Event] = field(default_factory=list)
     knowledge: list[KnowledgeRecord] = field(default_factory=list)
+    _reached: dict[str, int] = field(default_factory=dict)  # how many limits the last measured value has reached
     _moving: str | None = None  # the function that the last of these modes is one of
     _modes: list[tuple[float, str]] = field(default_factory=lambda: [(0.0, "")])
 
@@ -38,33 +47,27 @@ class Recorder:
         if self.enabled:
             self.events.append(Event(float(self.env.now), source, event, detail))
 
-    def record_state(self, state: KnowledgeState) -> None:
+    def log_state(self, state: KnowledgeState) -> None:
         """Keep a state that is reasoned about, if it differs from the one before."""
         if self.enabled and (not self.knowledge or self.knowledge[-1].state != state):
             self.knowledge.append(KnowledgeRecord(float(self.env.now), state))
 
-    def diagnostic_of(self, thresholds_m: Sequence[float], battery_limit: float) -> Callable[[Diagnostic], None]:
-        """A subscriber that keeps component reports, and measurements of visibility and battery that cross a limit."""
-        bands: dict[str, int] = {}
-        edges = {WATER_VISIBILITY: sorted(thresholds_m), BATTERY_LEVEL: [battery_limit]}
-
-        def take(diagnostic: Diagnostic) -> None:
-            if diagnostic.kind == Kind.COMPONENT_STATUS:
-                source = "leak_monitor" if diagnostic.key == HULL else "thruster_monitor"
-                self.log(source, "component_status", f"{diagnostic.key} {diagnostic.value}")
-            elif diagnostic.key in edges:
-                value, rising = diagnostic.value, edges[diagnostic.key]
-                assert isinstance(value, float)
-                word, unit = ("visibility", " m") if diagnostic.key == WATER_VISIBILITY else ("battery", "")
-                band, now_in = bands.get(diagnostic.key), bisect_right(rising, value)
-                if band is None:
-                    self.log(f"{word}_monitor", "first_measurement", f"{value:.2f}{unit}")
-                elif now_in != band:
-                    way, edge = ("rises to", rising[now_in - 1]) if now_in > band else ("falls below", rising[now_in])
-                    self.log(f"{word}_monitor", f"{word}_crossing", f"{way} {edge:g}{unit} ({value:.2f}{unit})")
-                bands[diagnostic.key] = now_in
-
-        return take
+    def diagnostic(self, diagnostic: Diagnostic) -> None:
+        """Keep a component's report, or the first value and the crossings of a measured quality attribute."""
+        key, value = diagnostic.key, diagnostic.value
+        if diagnostic.kind == Kind.COMPONENT_STATUS:
+            self.log("leak_monitor" if key == HULL else "thruster_monitor", "component_status", f"{key} {value}")
+        elif key in (WATER_VISIBILITY, BATTERY_LEVEL) and isinstance(value, float):
+            word, unit, limits = "battery", "", [self.metric.battery_limit]
+            if key == WATER_VISIBILITY:
+                word, unit, limits = "visibility", " m", sorted(self.metric.visibility_thresholds_m)
+            before, reached = self._reached.get(key), bisect_right(limits, value)
+            if before is None:
+                self.log(f"{word}_monitor", "first_measurement", f"{value:.2f}{unit}")
+            elif reached != before:
+                way, limit = ("rises to", limits[reached - 1]) if reached > before else ("falls below", limits[reached])
+                self.log(f"{word}_monitor", f"{word}_crossing", f"{way} {limit:g}{unit} ({value:.2f}{unit})")
+            self._reached[key] = reached
 
     def mode_effect(self, function: str, mode: Mode) -> None:
         """Keep the mode of the function that moves the vehicle, for the trajectory."""
@@ -73,7 +76,7 @@ class Recorder:
             self._modes.append((float(self.env.now), mode.name))
 
     def trajectory(
-        self, vehicle: Vehicle, visibility: Measurements, further: Mapping[str, Measured]
+        self, vehicle: Vehicle, visibility: Measurements, further: Mapping[str, Measurements]
     ) -> tuple[TrajectoryPoint, ...]:
         """The vehicle's path so far: at each point the mode in force, the visibility, and the battery's level."""
         if not self.enabled:

@@ -97,8 +97,8 @@ class MissionResult:
     knowledge: tuple[KnowledgeRecord, ...] = ()
     drawn: dict[str, float] = field(default_factory=dict)
     """Values drawn for the scenario's distributions in this run, by key path."""
-    refused: dict[tuple[str, str], int] = field(default_factory=dict)
-    """How many requests of a mode were refused, by function and mode."""
+    refused: dict[str, int] = field(default_factory=dict)
+    """How many requests of a mode were refused, by the reason."""
     further: dict[str, float | int | None] = field(default_factory=dict)
     """Further metrics and the satisfaction of requirements, if the scenario asks for them, by column."""
     remarks: tuple[str, ...] = ()

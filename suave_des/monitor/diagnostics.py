@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from suave_des.domain import THRUSTER_NAMES
 
 if TYPE_CHECKING:  # or looking a manager up would load the compiler
-    from suave_des.vehicle.frames import Pose
+    from suave_des.vehicle.model import Pose
 
 
 class Kind(StrEnum):
@@ -31,9 +31,10 @@ EXEMPLAR_KINDS = (Kind.QA_STATUS, Kind.COMPONENT_STATUS)
 """The kinds that the exemplar's monitors publish."""
 
 
-FAILED = "FALSE"
-RECOVERED = "RECOVERED"
+FAILED, RECOVERED = "FALSE", "RECOVERED"
+"""Statuses of a thruster, as the ontology's property c_status has them: FALSE, it cannot be used."""
 HULL, LEAK = "hull", "LEAK"
+"""The component that leaks, and its status then."""
 REPORTED_STATUSES = {**dict.fromkeys(THRUSTER_NAMES, (FAILED, RECOVERED)), HULL: (LEAK,)}
 """The statuses that monitors report of each component."""
 

@@ -1,34 +1,88 @@
-"""Monitors: processes that watch signals, thrusters and battery, and publish diagnostics (facts: kas-lab/suave)."""
+"""The monitors of a mission: what they measure, and processes that publish what somebody subscribes to."""
 
-from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
 
 import simpy
 
-from suave_des.clock import Process, tick_at_or_after, until
-from suave_des.domain import thruster_name
-from suave_des.monitor.diagnostics import FAILED, HULL, LEAK, RECOVERED, Diagnostic, DiagnosticsBus, Kind
-from suave_des.monitor.measurements import BatteryLevel, Measurements, MonitorTiming
-from suave_des.vehicle.frames import Pose
+from suave_des.clock import Process, until
+from suave_des.draws import Draws
+from suave_des.monitor.diagnostics import HULL, LEAK, Diagnostic, DiagnosticsBus, Kind
+from suave_des.monitor.measurements import BatteryMeasurements, Measurements, SignalMeasurements, Timing, message_loss
+from suave_des.scenario.loader import LoadedScenario
+from suave_des.scenario.models import Scenario
+from suave_des.scenario.physical import ConstantSignal, SinusoidSignal, StepSignal, TableSignal
+from suave_des.vehicle.model import Pose
+from suave_des.vehicle.vehicle import Vehicle
+from suave_des.world import signals
+from suave_des.world.signals import Signal
 
 
-def signal_monitor(env: simpy.Environment, bus: DiagnosticsBus, measurements: Measurements) -> Process:
-    """Publish a signal's measurements at their times."""
-    for t_s, value in zip(measurements.times_s, measurements.values, strict=True):
-        yield until(env, t_s)
-        bus.publish(Diagnostic(env.now, Kind.QA_STATUS, measurements.key, value))
+def measure_signals(loaded: LoadedScenario, draws: Draws, duration_s: float) -> Iterator[SignalMeasurements]:
+    """Measure the signals of a scenario in a run, in the order of their names."""
+    scenario = loaded.scenario
+    for name in sorted(scenario.signals):
+        described, key = scenario.signals[name], f"signals.{name}"
+        signal: Signal
+        match described:
+            case SinusoidSignal():
+                shift_s = draws.value(f"{key}.shift_s", described.shift_s)
+                signal = signals.sinusoid(described.period_s, described.minimum, described.maximum, shift_s)
+            case ConstantSignal():
+                signal = signals.constant(draws.value(f"{key}.value", described.value))
+            case StepSignal():
+                time_s = draws.value(f"{key}.time_s", described.time_s)
+                signal = signals.step(time_s, described.before, described.after)
+            case TableSignal():
+                signal = signals.table(*loaded.tables[name], linear=described.interpolation == "linear")
+        period_s = described.publishing_period_s or scenario.revision.monitors.visibility_publishing_period_s
+        timing = Timing.of(scenario, draws, key, period_s)
+        noise = None if described.noise == 0.0 else draws.each_time(f"{key}.noise", described.noise)
+        lost = message_loss(key, described, draws)
+        yield SignalMeasurements.of(name, signal, duration_s, timing, described.time_step_s, noise, lost)
 
 
-def battery_monitor(env: simpy.Environment, bus: DiagnosticsBus, level: BatteryLevel) -> Process:
-    """Publish the battery's level, once a period."""
-    published_before = 0
-    yield until(env, level.timing.phase_s)
-    while True:
-        published = level.count_until(env.now)
-        if published > published_before:  # else the message was lost
-            bus.publish(Diagnostic(env.now, Kind.QA_STATUS, level.key, level.values[published - 1]))
-        published_before = published
-        yield env.timeout(level.timing.period_s)
+def measure_battery(scenario: Scenario, draws: Draws, vehicle: Vehicle) -> BatteryMeasurements | None:
+    """Make the measurements of the battery's level in a run; None without a battery."""
+    battery = scenario.battery
+    if battery is None:
+        return None
+
+    def is_at_station(t_s: float) -> bool:
+        x_m, y_m, _ = vehicle.position(t_s)
+        return max(abs(x_m - battery.station_x_m), abs(y_m - battery.station_y_m)) <= battery.station_radius_m
+
+    timing = Timing.of(scenario, draws, "battery_monitor", battery.publishing_period_s)
+    noise = None if battery.noise == 0.0 else draws.each_time("battery.noise", battery.noise)
+    lost = message_loss("battery", battery, draws)
+    return BatteryMeasurements(is_at_station, battery.discharge_time_s, timing, noise, lost)
+
+
+def start_monitors(
+    env: simpy.Environment,
+    bus: DiagnosticsBus,
+    measurements: Iterable[Measurements],
+    states: dict[tuple[Kind, str], Callable[[], Pose | float]],
+    detected: simpy.Event,
+) -> None:
+    """Start the monitors of what has subscribers.
+
+    Args:
+        env: the mission's clock.
+        bus: where they publish.
+        measurements: of quality attributes; for lookups they need no monitor.
+        states: what is published once a second, by kind and key.
+        detected: the event of the pipeline's first sight; its value is the index of the point seen.
+    """
+    if bus.has_subscribers(Kind.QA_STATUS):
+        for each in measurements:
+            env.process(each.publish(env, bus))
+    for (kind, key), state in states.items():
+        if bus.has_subscribers(kind):
+            env.process(_each_second(env, bus, kind, key, state))
+    if bus.has_subscribers(Kind.DETECTION):
+        env.process(_detection(env, bus, detected))
 
 
 def leak_monitor(env: simpy.Environment, bus: DiagnosticsBus, time_s: float, leak: Callable[[], None]) -> Process:
@@ -38,66 +92,14 @@ def leak_monitor(env: simpy.Environment, bus: DiagnosticsBus, time_s: float, lea
     leak()
 
 
-def detection_monitor(env: simpy.Environment, bus: DiagnosticsBus, detected: simpy.Event) -> Process:
-    """Publish the first sight of the pipeline; the value of the event `detected` is the index of the point seen."""
+def _detection(env: simpy.Environment, bus: DiagnosticsBus, detected: simpy.Event) -> Process:
     point = yield detected
     bus.publish(Diagnostic(env.now, Kind.DETECTION, "pipeline", float(point)))
 
 
-class ScheduledEvent(NamedTuple):
-    """A thruster that fails or recovers in a run.
-
-    Attributes:
-        thruster: its number, from 1.
-        fails: whether it fails; otherwise it recovers.
-        time_s: its time, as the revision counts it.
-        recoverable: whether f_maintain_motion can recover it after this failure.
-    """
-
-    thruster: int
-    fails: bool
-    time_s: float
-    recoverable: bool = True
-
-
-def thruster_monitor(
-    env: simpy.Environment,
-    publish: Callable[[Diagnostic], None],
-    events: Sequence[ScheduledEvent],
-    inject: Callable[[float, ScheduledEvent], None],
-    timing: MonitorTiming,
-    after_previous: bool,
-) -> Process:
-    """Inject the scheduled faults and recoveries, and publish them.
-
-    Once a period the monitor checks the first event of the list that has not happened yet: so several that are due
-    come one period apart, in list order, and a later one waits for the one before it.
-
-    Args:
-        env: the mission's clock.
-        publish: publishes a diagnostic.
-        events: the schedule.
-        inject: makes an event happen to the vehicle; called with mission time and event.
-        timing: when the monitor checks.
-        after_previous: whether each time counts from the event before it (rev 2023) or from the start (rev 1.5).
-    """
-    counted_from_s, earliest_s = 0.0, 0.0
-    for event in events:
-        due_s = max(counted_from_s + event.time_s, earliest_s)
-        tick_s = tick_at_or_after(due_s, timing.phase_s, timing.period_s)
-        yield until(env, tick_s)
-        inject(env.now, event)
-        status = FAILED if event.fails else RECOVERED
-        publish(Diagnostic(env.now, Kind.COMPONENT_STATUS, thruster_name(event.thruster), status))
-        earliest_s = tick_s + timing.period_s
-        if after_previous:
-            counted_from_s = tick_s
-
-
-def state_monitor(
+def _each_second(
     env: simpy.Environment, bus: DiagnosticsBus, kind: Kind, key: str, state: Callable[[], Pose | float]
 ) -> Process:
-    """Publish the vehicle's pose, or the distance inspected so far, once a second from t = 0 on."""
     while True:
         bus.publish(Diagnostic(env.now, kind, key, state()))
         yield env.timeout(1.0)

@@ -8,21 +8,24 @@ from decimal import Decimal
 from pathlib import Path
 
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.knowledge.deliberation import Conclusion
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet.limit import TIME_LIMIT_S, TimeLimit
+from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.planning import performance
 from suave_des.knowledge.rdf import local_name
-from suave_des.knowledge.rules.writer import write_rule
+from suave_des.knowledge.rules import write_rule
+from suave_des.knowledge.state import Reasoning
 from suave_des.metrics.result import KnowledgeRecord
-from suave_des.pages.recorded import Recorded, read_recorded
-from suave_des.report.mission_record import MissionRecord, adaptations
+from suave_des.pages.recorded import Recorded, recorded
+from suave_des.records.mission_folder import MissionRecord
 from suave_des.resources import find
-from suave_des.scenario.layers import InputFiles
+from suave_des.results.mission import adaptations
+from suave_des.results.mission_figures import Rules
+from suave_des.scenario.loader import InputFiles
 from suave_des.scenario_knowledge import open_base, read_base
+from suave_des.workbench.explain import LEFT_OUT, verdicts
 from suave_des.workbench.knowledge_base import KnowledgeBase
-from suave_des.workbench.reasons.tracing import Derivation
-from suave_des.workbench.state_input import ManagingSettings
+from suave_des.workbench.states import ManagingSettings
+from suave_des.workbench.tracing import Derivation
 
 _TIME_DIGITS = 2
 
@@ -119,14 +122,14 @@ def explain_cycles(mission: Recorded) -> Cycles:
 
     Where the ontologies are not there any more, only the states are given, with a note.
     """
-    if not mission.knowledge:
+    if not mission.record.knowledge:
         return Cycles()
     try:
         base, note = _base(mission)
         settings, reasoner = ManagingSettings.of(mission.scenario), mission.scenario.knowledge.reasoner
         knowledge = KnowledgeBase.of(base, settings, reasoner, TimeLimit(TIME_LIMIT_S, "the reasoner"))
     except InputError as error:
-        cycles = tuple(_cycle(record, -1, ()) for record in mission.knowledge)
+        cycles = tuple(_cycle(record, -1, ()) for record in mission.record.knowledge)
         return Cycles(cycles, note=f"Decisions are not explained: {error}")
     return _Explainer(knowledge).cycles(mission, note)
 
@@ -139,7 +142,7 @@ def _base(mission: Recorded) -> tuple[Ontology, str]:
     files = InputFiles()
     for name in (*mission.scenario.knowledge.ontologies, *mission.scenario.knowledge.rules):
         files.ontology(find(name, "ontology"))
-    before = {Path(name).name: digest for name, digest in mission.inputs.items()}
+    before = {Path(name).name: digest for name, digest in mission.record.inputs.items()}
     changed = [
         Path(name).name for name, digest in files.inputs.items() if before.get(Path(name).name, digest) != digest
     ]
@@ -158,10 +161,10 @@ class _Explainer:
 
     def cycles(self, mission: Recorded, note: str) -> Cycles:
         cycles = []
-        for record in mission.knowledge:
+        for record in mission.record.knowledge:
             try:
-                conclusion = self.knowledge.infer(record.state)
-                inferred, decided = self._inferred(record.t_s, conclusion), tuple(self._decided(conclusion))
+                reasoning = self.knowledge.infer(record.state)
+                inferred, decided = self._inferred(record.t_s, reasoning), tuple(self._decided(reasoning))
             except KnowledgeError as error:
                 note = note or f"At {record.t_s:.1f} s the knowledge base gives no conclusion: {error.problem}"
                 inferred, decided = -1, ()
@@ -174,9 +177,9 @@ class _Explainer:
         }
         return Cycles(tuple(cycles), tuple(self.inferences), texts, note)
 
-    def _inferred(self, t_s: float, conclusion: Conclusion) -> int:
+    def _inferred(self, t_s: float, reasoning: Reasoning) -> int:
         """The index of what follows; the numbers in its derivations are those of the first such cycle."""
-        facts, state = conclusion.inference.facts, conclusion.inference.state
+        facts, state = reasoning.inference.facts, reasoning.inference.state
         if not facts:
             return -1
         key = facts, state.objectives, state.groundings, state.components
@@ -188,16 +191,15 @@ class _Explainer:
             self.inferences.append(Inferred(t_s, tuple(map(_step, derived))))
         return self.index[key]
 
-    def _decided(self, conclusion: Conclusion) -> Iterator[FunctionDecision]:
-        base, inference = self.knowledge.base, conclusion.inference
-        for decision in conclusion.plan.decisions:
-            rejected = {each.design: each.reason for each in decision.rejected}
+    def _decided(self, reasoning: Reasoning) -> Iterator[FunctionDecision]:
+        base, inference = self.knowledge.base, reasoning.inference
+        for decision in reasoning.plan.decisions:
             designs = []
-            for name in base.designs(decision.function):
-                is_chosen = name == decision.design
-                verdict = "chosen" if is_chosen else "left out" if name in rejected else "not the best"
-                expected = float(performance(inference, name))
-                designs.append(Design(name, verdict, expected, rejected.get(name, "")))
+            for each in verdicts(base, reasoning, decision):
+                expected = float(performance(inference, each.design))
+                designs.append(
+                    Design(each.design, each.verdict, expected, each.reason if each.verdict == LEFT_OUT else "")
+                )
             designs.sort(key=lambda each: (-each.performance, each.name))
             before = inference.state.grounded(decision.function)
             yield FunctionDecision(decision.function, before, decision.design, decision.reason, tuple(designs))
@@ -227,16 +229,16 @@ def _shown(value: object) -> str:
     return f"{float(value):.3f}".rstrip("0").rstrip(".") if isinstance(value, Decimal) else str(value)
 
 
-def adaptation_rules(folder: Path, record: MissionRecord) -> Mapping[tuple[float, str], tuple[str, ...]]:
-    """Find the rules that fired in the reasoning cycle from which each adaptation in a mission's folder comes.
+def adaptation_rules(record: MissionRecord) -> Rules:
+    """Find the rules that fired in the reasoning cycle from which each adaptation of a mission comes.
 
     Returns:
         Names of rules, by mission time (s) and function of the adaptation; empty for a manager that does not reason.
 
     Raises:
-        InputError: the mission's files cannot be read.
+        InputError: the mission's scenario is of another version.
     """
-    known = explain_cycles(read_recorded(folder))
+    known = explain_cycles(recorded(record))
     found = {}
     for each in adaptations(record):
         cycle = _decided_in(known.cycles, each.t_s, each.function, each.after)

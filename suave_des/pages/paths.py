@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pandas
 
-from suave_des.campaign.single import OpenedCampaign, opened_campaign
+from suave_des.campaign.campaign import opened_campaign
+from suave_des.campaign.missions import MissionRunner
 from suave_des.domain import SEA_BED_Z_M
 from suave_des.errors import SuaveDesError
 from suave_des.metrics.result import MissionResult
@@ -67,25 +68,22 @@ def paths_of(folder: Path, frame: pandas.DataFrame, groups: Sequence[str], runs:
     if runs == 0:
         return Paths(note="Paths and timelines are left out; suave-des report --paths N adds those of N runs")
     try:
-        with opened_campaign(folder) as campaign:
-            vertices = [(x, y) for x, y, *_ in campaign.loaded.scenario.pipeline.vertices_m]
-            paths = list(_paths(campaign, frame, groups, runs))
-            return Paths(vertices, paths, "" if paths else "No mission could be run again as it was")
+        opened = opened_campaign(folder)
+        vertices = [(x, y) for x, y, *_ in opened.campaign.loaded.scenario.pipeline.vertices_m]
+        paths = list(_paths(opened, frame, groups, runs))
+        return Paths(vertices, paths, "" if paths else "No mission could be run again as it was")
     except SuaveDesError as error:
         return Paths(note=f"Paths and timelines are left out: {error}")
 
 
-def _paths(
-    campaign: OpenedCampaign, frame: pandas.DataFrame, groups: Sequence[str], runs: int
-) -> Iterator[MissionPath]:
-    simulator = campaign.simulator(0)
+def _paths(opened: MissionRunner, frame: pandas.DataFrame, groups: Sequence[str], runs: int) -> Iterator[MissionPath]:
     wanted = representative_runs(frame, groups, runs)
     known = frame.drop_duplicates(["manager", "run"]).set_index(["manager", "run"])["search_time_s"]
     for number, manager in enumerate(groups):
         for run in wanted:
             if (manager, run) in known.index:
-                result = campaign.run(manager, run, simulator=simulator)
-                is_same = campaign.variation.sweep.points > 1 or (
+                _, result = opened.run(manager, run)
+                is_same = opened.campaign.variation.sweep.points > 1 or (
                     abs(result.metrics.search_time_s - float(known[manager, run])) < _TOLERANCE_S
                 )
                 if is_same:

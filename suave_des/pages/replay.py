@@ -9,15 +9,15 @@ from itertools import accumulate
 from typing import Any, Final
 
 from suave_des import __version__
-from suave_des.domain import FOLLOW_PIPELINE, SEA_BED_Z_M, THRUSTERS, UNGROUND_MODE
+from suave_des.domain import FOLLOW_PIPELINE, SEA_BED_Z_M, THRUSTER_NAMES, UNGROUND_MODE
 from suave_des.managed.follow import InspectionPath
 from suave_des.monitor.diagnostics import FAILED
 from suave_des.pages.decisions import Cycles, explain_cycles
 from suave_des.pages.page import page
 from suave_des.pages.recorded import Recorded
-from suave_des.report.mission_record import details, mode_spans
+from suave_des.results.mission import details, mode_spans
 from suave_des.scenario.models import Scenario
-from suave_des.world.pipeline import sample_points, there_and_back
+from suave_des.world.pipeline import sample_points
 
 _DECIMALS: Final = 3
 STYLES: Final = ("common.css", "replay.css")
@@ -73,7 +73,7 @@ def replay_page(missions: Sequence[Recorded]) -> str:
             "pipeline": [list(vertex) for vertex in scenario.pipeline.vertices_m],
             "sea_bed_z_m": SEA_BED_Z_M,
             "view_tangent": scenario.vehicle.camera.tangent,
-            "thrusters": THRUSTERS,
+            "thrusters": len(THRUSTER_NAMES),
             "station": _station(scenario),
         },
         "missions": [asdict(mission_on_page(each)) for each in missions],
@@ -130,7 +130,7 @@ def _way(mission: Recorded) -> InspectionPath | None:
     for _, detail in details(mission.record, "pipeline_detected"):
         number = detail.rpartition(" ")[2]
         if number.isdecimal() and int(number) < len(points):
-            return InspectionPath.along(there_and_back(points), altitude_m).from_point(int(number))
+            return InspectionPath.there_and_back(points, altitude_m).from_point(int(number))
     return None
 
 

@@ -18,19 +18,12 @@ from suave_des import __version__
 from suave_des.errors import InputError
 from suave_des.pages.page import compressed, page
 from suave_des.pages.paths import Paths, paths_of
-from suave_des.report.compare import Choices, Comparison, compare
-from suave_des.report.compare_files import (
-    Table,
-    capital,
-    difference_table,
-    remarks,
-    runs_table,
-    search_table,
-    summary_table,
-)
-from suave_des.report.compared_metrics import KNOWN, PAPER_METRICS
-from suave_des.report.grouping import grouped
-from suave_des.report.result_files import Missions, read_missions
+from suave_des.records.metrics import METRICS, PAPER_METRICS, REACTION_TIME
+from suave_des.records.store import read_manifest
+from suave_des.results.compare import compare
+from suave_des.results.comparison import capital
+from suave_des.results.missions import Missions, grouped, read_missions
+from suave_des.tables import Table
 
 LIMIT_BYTES: Final = 5_000_000
 PATHS: Final = 12
@@ -41,12 +34,12 @@ _SCRIPTS: Final = ("common.js", "charts.js", "report.js")
 MOST_DRAWN: Final = 20_000
 """Missions whose values are in a page; of more, every second, third, ... run is, under all managers."""
 _DIGITS = 2
-_TITLES = {
-    **PAPER_METRICS,
-    **{name: KNOWN[name].heading for name in ("mean_reaction_time_s", "adaptations")},
-    "detection_x_m": "x of the first sight (m)",
-}
-"""Of the metrics in charts."""
+_CHARTED = (*PAPER_METRICS, REACTION_TIME, "adaptations", "detection_x_m")
+"""Metrics in charts."""
+
+
+PlainTable = tuple[Sequence[str], Sequence[Sequence[str]]]
+"""Headings and rows."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +53,7 @@ class Section:
     """
 
     title: str
-    tables: Sequence[tuple[str, Table]]
+    tables: Sequence[tuple[str, PlainTable]]
     conclusions: Sequence[str]
 
 
@@ -122,7 +115,7 @@ class ReportContent:
     conclusion: str
     notes: Sequence[str]
     sections: Sequence[Section]
-    needed: Table | None
+    needed: PlainTable | None
     remarks: Sequence[str]
     drawn: ChartColumns
 
@@ -193,21 +186,17 @@ def results_of(missions: Missions) -> ReportContent:
     Raises:
         InputError: they cannot be compared.
     """
-    found = compare(missions, Choices())
-    needed = runs_table(found) if found.differences else None
-    sections = [_section(found, metric.name) for metric in found.metrics]
-    return ReportContent(found.conclusion, found.notes, sections, needed, remarks(found), chart_columns(missions))
+    found = compare(missions)
+    needed = _plain_table(found.runs_needed()) if found.differences else None
+    sections = [
+        Section(capital(title), [(table.title, _plain_table(table)) for table in tables], conclusions)
+        for title, tables, conclusions in found.sections()
+    ]
+    return ReportContent(found.conclusion, found.notes, sections, needed, found.remarks(), chart_columns(missions))
 
 
-def _section(found: Comparison, name: str) -> Section:
-    metric = found.metric(name)
-    summaries, differences = found.of_metric(name)
-    tables: list[tuple[str, Table]] = [("", summary_table(metric, summaries))]
-    if censored := search_table(summaries):
-        tables.append(("with missions that never found the pipeline as censored (Kaplan-Meier)", censored))
-    if differences:
-        tables.append(("differences", difference_table(metric, differences)))
-    return Section(capital(metric.heading), tables, [each.conclusion for each in differences])
+def _plain_table(table: Table) -> PlainTable:
+    return table.headings, table.rows
 
 
 def chart_columns(missions: Missions) -> ChartColumns:
@@ -225,7 +214,8 @@ def chart_columns(missions: Missions) -> ChartColumns:
     columns["seed"] = frame["seed"].astype(str).tolist()
     if len(set(columns["seed"])) == 1:
         columns["seed"] = columns["seed"][:1]
-    titles = {name: title for name, title in _TITLES.items() if name in frame and frame[name].notna().any()}
+    known = [name for name in _CHARTED if name in frame and frame[name].notna().any()]
+    titles = {name: METRICS[name].heading for name in known}
     found = frame["pipeline_found"].astype(float)
     columns["found"] = [None if value != value else int(value) for value in found.tolist()]
     for name in (*titles, *missions.swept):
@@ -246,7 +236,7 @@ def _plain(column: pandas.Series) -> list[Any]:
 def provenance_of(folder: Path) -> Provenance:
     """Read how the campaign in a folder was made; little is known of other folders."""
     try:
-        manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+        manifest = read_manifest(folder)
         return Provenance(
             str(folder),
             list(_facts(manifest)),
@@ -254,7 +244,7 @@ def provenance_of(folder: Path) -> Provenance:
             dict(manifest.get("inputs_sha256", {})),
             dict(manifest.get("versions", {})),
         )
-    except (OSError, ValueError, AttributeError, TypeError):
+    except (InputError, ValueError, AttributeError, TypeError):
         return Provenance(str(folder))
 
 

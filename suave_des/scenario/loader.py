@@ -1,23 +1,21 @@
-"""Loads a scenario by its name, with everything that its missions need, and checks it once."""
+"""Loads a scenario by its name, merged over its bases, with everything that its missions need; checks it once."""
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, Protocol, TypedDict, Unpack
 
-from suave_des.domain import GENERATE_SEARCH_PATH, MANAGER_GROUP, UNGROUND_MODE
 from suave_des.errors import InputError, KeyPath, did_you_mean, shown
-from suave_des.resources import find
-from suave_des.scenario.layers import InputFiles, find_named, holder_of, scenario_layer
-from suave_des.scenario.models import REASONERS, ManagerSettings, Scenario
+from suave_des.files import read_bytes
+from suave_des.resources import find, shipped_folder
+from suave_des.scenario.models import REASONERS, Scenario
 from suave_des.scenario.modes import ModeTable, modes_of
-from suave_des.scenario.problems import validated
-from suave_des.scenario.signal_kinds import SignalTable, TableSignal, read_table
-from suave_des.scenario.yamlfile import Layer, Location
+from suave_des.scenario.physical import SignalTable, TableSignal, read_table
+from suave_des.scenario.yamlfile import Layer, Location, YamlDocument, read_yaml, validated
 
 _FILE_NAMES = "return a list of file names as text"
 
@@ -45,7 +43,7 @@ class LoadedScenario:
         inputs: SHA-256 of each file read, by its name as shown to the user.
         layer: content of the scenario's files, with its lines.
         rules: files of rules as text, in the order in which they count.
-        manager_files: where the files are that managers read, by their names as given.
+        manager_files: where the files are that managers read, by manager and their names as given.
     """
 
     scenario: Scenario
@@ -57,7 +55,7 @@ class LoadedScenario:
     inputs: Mapping[str, str]
     layer: Layer = field(repr=False)
     rules: tuple[Path, ...] = ()
-    manager_files: Mapping[str, Path] = field(default_factory=dict)
+    manager_files: Mapping[tuple[str, str], Path] = field(default_factory=dict)
 
     def manager_settings(self, manager: str) -> Mapping[str, Any]:
         """Settings of a manager that is not built in."""
@@ -72,8 +70,8 @@ class LoadedScenario:
         Raises:
             InputError: there is none.
         """
-        if name in self.manager_files:
-            return self.manager_files[name]
+        if (manager, name) in self.manager_files:
+            return self.manager_files[manager, name]
         places = [Path(name), self.path.parent / name]
         if self.layer.has(("managers", manager)):
             places.reverse()
@@ -115,13 +113,12 @@ class LoadedScenario:
         part, _, name = (error.place or "").partition(".")
         if error.file is not None or part not in ("values", "disabled_rules"):
             return error
-        key_path: KeyPath = ("knowledge", part, name)
-        if part == "disabled_rules":
-            in_file = self.layer.data.get("knowledge", {}).get(part, [])
-            if name not in in_file:
-                return InputError(error.problem, place="--disable-rule", remedy=error.remedy)
-            key_path = ("knowledge", part, in_file.index(name))
-        return self.layer.error(error.problem, key_path, error.remedy)
+        if part == "values":
+            return self.layer.error(error.problem, ("knowledge", part, name), error.remedy)
+        in_file = self.layer.data.get("knowledge", {}).get(part, [])
+        if name not in in_file:
+            return InputError(error.problem, place="--disable-rule", remedy=error.remedy)
+        return self.layer.error(error.problem, ("knowledge", part, in_file.index(name)), error.remedy)
 
 
 class Replacements(TypedDict, total=False):
@@ -146,7 +143,9 @@ class Replacements(TypedDict, total=False):
     manager_options: Mapping[str, Mapping[str, Any]]
 
 
-def load_scenario(name: str | Path | LoadedScenario, **replacements: Unpack[Replacements]) -> LoadedScenario:
+def load_scenario(
+    name: str | Path | LoadedScenario, *, over: Layer | None = None, **replacements: Unpack[Replacements]
+) -> LoadedScenario:
     """Read and check a scenario and the files that it names.
 
     Files named inside a file are looked for beside it, then among the shipped ones.
@@ -156,6 +155,7 @@ def load_scenario(name: str | Path | LoadedScenario, **replacements: Unpack[Repl
     Args:
         name: path of a scenario file, or name of a shipped one with or without ".yaml"; a loaded scenario comes back
             unchanged, and its files cannot be replaced.
+        over: content that goes over the file's, as that of a file of which it is the base.
         replacements: ontologies, modes_file and reasoner to use in place of the scenario's; rules (files of rules as
             text) and disabled_rules (names of rules to switch off) besides the scenario's; values by key path and
             settings of managers over all that.
@@ -168,161 +168,71 @@ def load_scenario(name: str | Path | LoadedScenario, **replacements: Unpack[Repl
             problem = f"{given[0]}: the scenario {name.scenario.name} is loaded already, with its files"
             raise InputError(problem, remedy=f"give {given[0]} to load_scenario")
         return name
-    reasoner = replacements.get("reasoner")
+    reasoner, modes_file = replacements.get("reasoner"), replacements.get("modes_file")
     if reasoner is not None and reasoner not in REASONERS:
         remedy = did_you_mean(reasoner, REASONERS)
         raise InputError(f"there is no reasoner {shown(reasoner)}", place="--reasoner", remedy=remedy)
     files = InputFiles()
     path = find(name, "scenarios")
-    return load_layer(files, scenario_layer(files, path), path, **replacements)
-
-
-def load_layer(files: InputFiles, layer: Layer, path: Path, **replacements: Unpack[Replacements]) -> LoadedScenario:
-    """Check a scenario that is merged over its base already, and read the other files that it names.
-
-    Args:
-        files: reader of the files.
-        layer: the scenario.
-        path: the scenario's file.
-        replacements: as of load_scenario.
-
-    Raises:
-        InputError: as load_scenario does.
-    """
-    if "campaign" in layer.data and "scenario" in layer.data:
-        remedy = f"suave-des campaign {path} --out DIR runs it; its scenario is {layer.data['scenario']}"
-        raise layer.error("this is a campaign file, not a scenario", ("campaign",), remedy)
-    layer = Layer({**layer.data, "name": _name(layer, path)}, layer.places)
+    layer = scenario_layer(files, path, over)
     scenario = validated(layer, Scenario)
     knowledge = scenario.knowledge
 
-    def named(key_path: KeyPath, name: str, kind: str, remedy: str | None = None) -> Path:
-        if layer.has(key_path):
-            return find_named(layer, key_path, name, kind, remedy)
-        return find(name, kind, beside=path.parent)  # a default
-
-    modes_file = replacements.get("modes_file")
     if modes_file is None:
-        modes_path = named(("modes_file",), scenario.modes_file, "scenarios")
+        modes_path = find_named(layer, ("modes_file",), scenario.modes_file, "scenarios")
     else:
         modes_path = find(modes_file, "scenarios")
     modes = modes_of(files.yaml(modes_path))
-    _check_modes(layer, scenario, modes)
-    _check_managers(layer, scenario)
-
+    modes.check(scenario, layer)
     ontologies = tuple(find(each, "ontology") for each in replacements.get("ontologies", ())) or tuple(
-        named(("knowledge", "ontologies", index), each, "ontology") for index, each in enumerate(knowledge.ontologies)
+        find_named(layer, ("knowledge", "ontologies", index), each, "ontology")
+        for index, each in enumerate(knowledge.ontologies)
     )
     remedy = "a file of rules as text, named relative to this"
     rules = (
-        *(named(("knowledge", "rules", index), each, "ontology", remedy) for index, each in enumerate(knowledge.rules)),
+        *(
+            find_named(layer, ("knowledge", "rules", index), each, "ontology", remedy)
+            for index, each in enumerate(knowledge.rules)
+        ),
         *map(Path, replacements.get("rules", ())),
     )
     for each in (*ontologies, *rules):
         files.ontology(each)
-
     tables = {}
     for signal_name, signal in scenario.signals.items():
         if isinstance(signal, TableSignal):
             remedy = "a CSV file with columns t_s,value, named relative to the file that names it"
-            table_path = named(("signals", signal_name, "file"), signal.file, "scenarios", remedy)
+            table_path = find_named(layer, ("signals", signal_name, "file"), signal.file, "scenarios", remedy)
             tables[signal_name], digest = read_table(table_path)
             files.note(table_path, digest)
 
-    scenario = _replaced(scenario, replacements)
+    changed = {
+        "ontologies": tuple(map(str, replacements.get("ontologies", ()))) or knowledge.ontologies,
+        "rules": (*knowledge.rules, *map(str, replacements.get("rules", ()))),
+        "disabled_rules": (*knowledge.disabled_rules, *replacements.get("disabled_rules", ())),
+        "reasoner": reasoner or knowledge.reasoner,
+    }
+    update = {"knowledge": knowledge.model_copy(update=changed), "modes_file": str(modes_file or scenario.modes_file)}
+    scenario = scenario.model_copy(update=update)
     loaded = LoadedScenario(scenario, path, ontologies, modes, modes_path, tables, files.inputs, layer, rules)
-    return _with_options(loaded, replacements.get("values") or {}, replacements.get("manager_options") or {})
+    loaded = _set(loaded, replacements.get("values") or {}, "--set")
+    if options := replacements.get("manager_options"):
+        managers = loaded.scenario.managers.model_dump(mode="json")
+        managers |= {name: {**managers.get(name, {}), **settings} for name, settings in options.items()}
+        loaded = _set(loaded, {"managers": managers}, "--manager-option")
+    return loaded
 
 
-def _with_options(
-    loaded: LoadedScenario, values: Mapping[str, Any], options: Mapping[str, Mapping[str, Any]]
-) -> LoadedScenario:
-    """Replace values by key path, and settings of managers."""
+def _set(loaded: LoadedScenario, values: Mapping[str, Any], option: str) -> LoadedScenario:
+    """Replace the values that an option of the command line gives."""
     for path, value in values.items():
         try:
             loaded = with_values(loaded, {path: value})
         except InputError as error:
-            inside = error.problem if path in error.problem else f"{path}: {error.problem}"
-            raise InputError(inside, place="--set", remedy=error.remedy) from None
-    if options:
-        managers = loaded.scenario.managers.model_dump(mode="json")
-        for manager, settings in options.items():
-            managers[manager] = {**managers.get(manager, {}), **settings}
-        try:
-            loaded = with_values(loaded, {"managers": managers})
-        except InputError as error:
-            raise InputError(error.problem, place="--manager-option", remedy=error.remedy) from None
+            _, _, key_path = (error.place or "").partition(", ")
+            problem = f"{key_path}: {error.problem}" if key_path else error.problem
+            raise InputError(problem, place=option, remedy=error.remedy) from None
     return loaded
-
-
-def _replaced(scenario: Scenario, replacements: Replacements) -> Scenario:
-    """The scenario as if it had given the replacements itself."""
-    knowledge: dict[str, object] = {}
-    if ontologies := replacements.get("ontologies"):
-        knowledge["ontologies"] = tuple(map(str, ontologies))
-    if reasoner := replacements.get("reasoner"):
-        knowledge["reasoner"] = reasoner
-    knowledge["rules"] = (*scenario.knowledge.rules, *map(str, replacements.get("rules", ())))
-    knowledge["disabled_rules"] = (*scenario.knowledge.disabled_rules, *replacements.get("disabled_rules", ()))
-    update: dict[str, object] = {"knowledge": scenario.knowledge.model_copy(update=knowledge)}
-    if modes_file := replacements.get("modes_file"):
-        update["modes_file"] = str(modes_file)
-    return scenario.model_copy(update=update)
-
-
-def _name(layer: Layer, path: Path) -> object:
-    """The scenario's name: its own, or its file's; a base's would make its results look like the base's."""
-    if "name" in layer.data and layer.place(("name",)).depth == 0:
-        return layer.data["name"]
-    stem = re.sub(r"[^A-Za-z0-9_.-]", "_", path.stem)[:90]
-    return stem if re.match(r"[A-Za-z_]", stem) else f"_{stem}"
-
-
-def _check_modes(layer: Layer, scenario: Scenario, modes: ModeTable) -> None:
-    """Check that the modes file has the functions and modes that the mission and the scenario use."""
-    for function in scenario.needed_functions():
-        if function not in modes:
-            remedy = did_you_mean(function, modes.functions, "its functions")
-            problem = f"defines no function {function}, which the mission needs"
-            raise InputError(problem, file=modes.source, remedy=remedy)
-        if UNGROUND_MODE not in modes.modes(function):
-            remedy = f"add {UNGROUND_MODE}: {{NODE: inactive}}, which a cancelled task sets"
-            raise InputError(f"function {function} has no mode {UNGROUND_MODE}", file=modes.source, remedy=remedy)
-
-    def check_function(function: str, problem: str, key_path: KeyPath) -> None:
-        if function not in modes:
-            remedy = did_you_mean(function, modes.functions, f"functions in {modes.source}")
-            raise layer.error(f"{problem} {shown(function)}", key_path, remedy)
-
-    def check_mode(function: str, mode: str, key_path: KeyPath) -> None:
-        known = modes.modes(function)
-        if mode not in known:
-            remedy = did_you_mean(mode, known, f"its modes in {modes.source}")
-            raise layer.error(f"function {function} has no mode {shown(mode)}", key_path, remedy)
-
-    for function in scenario.functions:
-        check_function(function, "the modes file has no function", ("functions", function))
-    for function, mode in scenario.default_modes.items():
-        check_function(function, "there is no function", ("default_modes", function))
-        check_mode(function, mode, ("default_modes", function))
-    for index, mode in enumerate(scenario.managers.bt.search_modes):
-        key_path: KeyPath = ("managers", "bt", "search_modes", index)
-        # The default names the shipped modes, which another modes file need not have: it matters only to bt.
-        if layer.has(key_path):
-            check_mode(GENERATE_SEARCH_PATH, mode, key_path)
-
-
-def _check_managers(layer: Layer, scenario: Scenario) -> None:
-    """Check that settings are for a manager that can exist: built in, registered, or given as module:Class."""
-    others = scenario.managers.model_extra or {}
-    registered = [point.name for point in entry_points(group=MANAGER_GROUP)] if others else []
-    for name, settings in others.items():
-        key_path = ("managers", name)
-        if name not in registered and ":" not in name:
-            remedy = did_you_mean(name, [*ManagerSettings.model_fields, *sorted(registered)])
-            raise layer.error(f"there is no manager {shown(name)} with settings", key_path, f"{remedy}, module:Class")
-        if not isinstance(settings, dict):
-            raise layer.error(f"{shown(settings)} is not a mapping", key_path, "write `key: value` lines under it")
 
 
 def with_values(loaded: LoadedScenario, values: Mapping[str, Any]) -> LoadedScenario:
@@ -348,7 +258,7 @@ def with_values(loaded: LoadedScenario, values: Mapping[str, Any]) -> LoadedScen
     if _named_files(scenario) != _named_files(loaded.scenario):
         remedy = "write a scenario for each, with `base` and the files that differ"
         raise InputError("files were read with the scenario and stay as they are", remedy=remedy)
-    _check_modes(layer, scenario, loaded.modes)
+    loaded.modes.check(scenario, layer)
     return replace(loaded, scenario=scenario)
 
 
@@ -365,3 +275,195 @@ def value_at(loaded: LoadedScenario, path: str) -> Any:
     """
     holder, key = holder_of(loaded.scenario.model_dump(mode="json"), path)
     return holder[key]
+
+
+# A scenario's files, merged over those that they build on.
+
+_KIND_KEYS = ("kind", "distribution")
+"""Keys for the kind of a mapping: one of another kind replaces the base's, whose keys would not fit."""
+_REMOVABLE_IN: tuple[KeyPath, ...] = (("signals",), ("knowledge", "values"))
+"""Mappings of freely named entries, in which a null removes the base's entry."""
+_PARTS = {"revision": "scenarios/revisions", "vehicle": "scenarios/vehicles"}
+"""Parts of a scenario that may be the name of a file, or differ from one that they name as their base."""
+_ONTOLOGY_LIMIT_BYTES = 100_000_000
+_CHAIN_LIMIT = 20
+_DEFAULT_VEHICLE = "bluerov2"
+
+
+class InputFiles:
+    """Reads files and keeps the hash of each, for a manifest.
+
+    Attributes:
+        inputs: SHA-256 of each file read, as "shipped/KIND/NAME" if it is shipped, else its path as given.
+    """
+
+    def __init__(self) -> None:
+        self.inputs: dict[str, str] = {}
+
+    def yaml(self, path: Path, depth: int = 0) -> YamlDocument:
+        """Read a YAML file."""
+        document = read_yaml(path, depth)
+        self.note(path, document.sha256)
+        return document
+
+    def ontology(self, path: Path) -> None:
+        """Hash an ontology or a file of rules, which is parsed elsewhere."""
+        self.note(path, sha256_of(path, _ONTOLOGY_LIMIT_BYTES))
+
+    def note(self, path: Path, sha256: str) -> None:
+        """Store the hash of a file that was read."""
+        self.inputs[shown_name(path)] = sha256
+
+
+def sha256_of(path: Path, limit: int) -> str:
+    """SHA-256 of a file; raises as read_bytes does."""
+    return hashlib.sha256(read_bytes(path, limit)).hexdigest()
+
+
+def shown_name(path: Path) -> str:
+    """Return the name of a file for users: "shipped/KIND/NAME" if it is shipped, else its path as given."""
+    for kind in ("ontology", "scenarios"):
+        if path.is_relative_to(folder := shipped_folder(kind)):
+            return f"shipped/{kind}/{path.relative_to(folder).as_posix()}"
+    return path.as_posix()
+
+
+def find_named(layer: Layer, key_path: KeyPath, name: object, kind: str, remedy: str | None = None) -> Path:
+    """Find a file that a layer names: beside the file in which its name is given, or shipped.
+
+    Raises:
+        InputError: there is none, with the line that names it.
+    """
+    if isinstance(name, int | float) and not isinstance(name, bool):
+        name = f"{name:g}"  # revisions 2023 and 1.5 need no quotes
+    if not isinstance(name, str) or not name:
+        raise layer.error(f"{shown(name)} is not a file name", key_path, "a path, or the name of a shipped file")
+    try:
+        return find(name, kind, beside=layer.place(key_path).file.parent)
+    except InputError as error:
+        raise layer.error(f"{error.problem}: {shown(name)}", key_path, remedy or error.remedy) from None
+
+
+def scenario_layer(files: InputFiles, path: Path, over: Layer | None = None) -> Layer:
+    """Merge a scenario file over its bases, with its revision and its vehicle written out in full.
+
+    Args:
+        files: reader.
+        path: of the scenario.
+        over: what differs from it; None: nothing.
+
+    Returns:
+        The layer. Its name is its file's if it gives none: a base's would make its results look like the base's.
+
+    Raises:
+        InputError: a file that cannot be read, or is its own base; a revision that is not known.
+    """
+    own: Layer = files.yaml(path)
+    if "campaign" in own.data and "scenario" in own.data:
+        remedy = f"suave-des campaign {path} --out DIR runs it; its scenario is {own.data['scenario']}"
+        raise own.error("this is a campaign file, not a scenario", ("campaign",), remedy)
+    stem = re.sub(r"[^A-Za-z0-9_.-]", "_", path.stem)[:90]
+    name = own.data.get("name", stem if re.match(r"[A-Za-z_]", stem) else f"_{stem}")
+    layer = _over_its_base(files, _with_named_parts(own), "scenarios", (path,))
+    layer = layer if over is None else merge(layer, _with_named_parts(over))
+    layer = merge(Layer({"vehicle": {"base": str(find(_DEFAULT_VEHICLE, _PARTS["vehicle"]))}}, {}), layer)
+    for part, folder in _PARTS.items():
+        if "base" in (layer.data.get(part) or ()):
+            layer = layer.replaced(part, _over_its_base(files, layer.below(part), folder, (layer.place((part,)).file,)))
+    return Layer({**layer.data, "name": name}, layer.places)
+
+
+def _with_named_parts(layer: Layer) -> Layer:
+    """The layer, with the name of a part as the base of one that does not differ from it."""
+    data, places = dict(layer.data), dict(layer.places)
+    for part in _PARTS:
+        if isinstance(data.get(part), str | int | float):
+            data[part] = {"base": data[part]}
+            places[(part, "base")] = layer.place((part,))
+    return Layer(data, places)
+
+
+def _over_its_base(files: InputFiles, layer: Layer, kind: str, chain: tuple[Path, ...]) -> Layer:
+    """Merge a layer over the file that it names as its base, if any; `chain` is how that was reached."""
+    if "base" not in layer.data:
+        return layer
+    path = find_named(layer, ("base",), layer.data["base"], kind)
+    chain = (*chain, path)
+    if len({each.resolve() for each in chain}) < len(chain) or len(chain) > _CHAIN_LIMIT:
+        names = " -> ".join(each.name for each in chain)
+        raise layer.error(f"the bases never end: {names}", ("base",), "a file must not be its own base")
+    below: Layer = files.yaml(path, len(chain) - 1)
+    below = _over_its_base(files, _with_named_parts(below) if kind == "scenarios" else below, kind, chain)
+    return merge(below, layer.without("base"))
+
+
+def merge(base: Layer, over: Layer) -> Layer:
+    """Merge one layer over another: mappings are merged, all other values replaced."""
+    replaced: set[KeyPath] = set()
+    data = _merge(base.data, over.data, (), replaced)
+    kept = {
+        path: place
+        for path, place in base.places.items()
+        if not any(path[:length] in replaced for length in range(1, len(path) + 1))
+    }
+    return Layer(data, {**kept, **over.places})
+
+
+def _merge(base: dict[str, Any], over: dict[str, Any], path: KeyPath, replaced: set[KeyPath]) -> dict[str, Any]:
+    merged = dict(base)
+    for key, value in over.items():
+        below, known = (*path, key), base.get(key)
+        is_whole = not path and key in _PARTS and "base" in (value or ())
+        if isinstance(known, dict) and isinstance(value, dict) and _same_kind(known, value) and not is_whole:
+            merged[key] = _merge(known, value, below, replaced)
+            continue
+        replaced.add(below)
+        if value is None and key in base and path in _REMOVABLE_IN:
+            del merged[key]
+        else:
+            merged[key] = value
+    return merged
+
+
+def _same_kind(base: dict[str, Any], over: dict[str, Any]) -> bool:
+    return all(over[key] == base.get(key, over[key]) for key in _KIND_KEYS if key in over)
+
+
+# Values by their key paths, such as signals.water_visibility.period_s.
+
+
+def _keys(data: dict[str, Any], path: str) -> list[str]:
+    """The keys of a key path; names of managers may contain dots, and their settings may be missing."""
+    first, _, rest = path.partition(".")
+    if first != "managers" or ":" not in rest:
+        return path.split(".")
+    managers = data["managers"]
+    named = max((name for name in managers if rest.startswith(f"{name}.")), key=len, default=None)
+    if named is None:
+        module, _, below = rest.partition(":")
+        named = f"{module}:{below.partition('.')[0]}"
+    keys = rest.removeprefix(named).removeprefix(".").split(".")
+    settings = managers.setdefault(named, {})
+    if isinstance(settings, dict) and keys != [""]:
+        settings.setdefault(keys[0], None)
+    return ["managers", named, *(keys if keys != [""] else [])]
+
+
+def holder_of(data: dict[str, Any], path: str) -> tuple[Any, Any]:
+    """The mapping or list that holds the value at a key path of a scenario as plain data, and its key there.
+
+    Raises:
+        InputError: the path leads nowhere.
+    """
+    here, parts = data, _keys(data, path)
+    for depth, part in enumerate(parts):
+        if isinstance(here, list):
+            if not (part.isascii() and part.isdigit() and len(part) < 10) or int(part) >= len(here):
+                raise InputError(f"{path}: there is no entry {part}", remedy=f"entries are 0 to {len(here) - 1}")
+        elif not isinstance(here, dict):
+            raise InputError(f"{path}: {'.'.join(parts[:depth])} is a plain value", remedy="leave out what follows it")
+        elif part not in here:
+            raise InputError(f"{path}: unknown key", remedy=did_you_mean(part, sorted(map(str, here))))
+        holder, key = here, int(part) if isinstance(here, list) else part
+        here = here[key]
+    return holder, key

@@ -2,21 +2,35 @@
 
 from __future__ import annotations
 
+import math
+from importlib.metadata import entry_points
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import ConfigDict, Field, field_validator, model_validator
+from pydantic import AfterValidator, ConfigDict, Field, field_validator, model_validator
 
 from suave_des.domain import (
     BATTERY_LEVEL,
     FOLLOW_PIPELINE,
     GENERATE_SEARCH_PATH,
+    MANAGER_GROUP,
     MISSION_FUNCTIONS,
     SURFACE,
     SURFACE_MODE,
     WATER_VISIBILITY,
 )
-from suave_des.scenario.physical import Battery, Current, Leak, Pipeline, Start, ThrusterEvent, VehicleDescription
+from suave_des.errors import did_you_mean, shown
+from suave_des.scenario.physical import (
+    Battery,
+    Current,
+    Leak,
+    Monitor,
+    Pipeline,
+    SignalDescription,
+    Start,
+    ThrusterEvent,
+    VehicleDescription,
+)
 from suave_des.scenario.quantities import (
     CoordinateDistribution,
     DelayDistribution,
@@ -34,7 +48,6 @@ from suave_des.scenario.quantities import (
     wrong,
 )
 from suave_des.scenario.revision import Revision
-from suave_des.scenario.signal_kinds import Monitor, SignalDescription
 
 FileName = Annotated[str, Field(min_length=1)]
 
@@ -47,7 +60,7 @@ _LONGEST_MISSION_S = 100_000.0
 class MissionFunctions(Strict):
     """Functions that the mission needs in addition to the exemplar's."""
 
-    lasting: tuple[Name, ...] = ()
+    mission_wide: tuple[Name, ...] = ()
     """Needed from launch to the end."""
     search_pipeline: tuple[Name, ...] = ()
     """Needed by the first task."""
@@ -67,7 +80,7 @@ class FunctionSettings(Strict):
 class MissionSettings(Strict):
     """The coordinator's time limit, and further functions that its tasks need."""
 
-    time_limit_s: Annotated[Real, Within(gt=0, le=_LONGEST_MISSION_S, unit="s")] = 300.0
+    time_limit_s: Annotated[Real, Field(gt=0, le=_LONGEST_MISSION_S)] = 300.0
     """Time at which the current task is cancelled and the metrics are taken."""
     functions: MissionFunctions = MissionFunctions()
     """Functions that are needed in addition to the exemplar's."""
@@ -89,17 +102,17 @@ class Latencies(Strict):
 class Calibration(Strict):
     """Parameters of vehicle, autopilot and simulator that the sources do not give, the same for every manager."""
 
-    position_gain_per_s: Annotated[Real, Within(gt=0, le=100, unit="1/s")] = 1.0
+    position_gain_per_s: Annotated[Real, Field(gt=0, le=100)] = 1.0
     """Horizontal velocity demanded for each metre of position error; ArduSub's default."""
-    jerk_m_per_s3: Annotated[Real, Within(gt=0, le=1000, unit="m/s^3")] = 0.5
+    jerk_m_per_s3: Annotated[Real, Field(gt=0, le=1000)] = 0.5
     """Jerk with which the autopilot's target moves along a leg to a set-point."""
-    velocity_gain_per_s: Annotated[Real, Within(gt=0, le=10, unit="1/s")] = 4.0
+    velocity_gain_per_s: Annotated[Real, Field(gt=0, le=10)] = 4.0
     """Horizontal acceleration demanded for each m/s of velocity error."""
-    velocity_integral_gain_per_s2: Annotated[Real, Within(0, 10, unit="1/s^2")] = 1.2
+    velocity_integral_gain_per_s2: Annotated[Real, Field(ge=0, le=10)] = 1.2
     """Horizontal acceleration demanded for each metre of the integrated velocity error; reset at each new leg."""
-    heading_frequency_rad_per_s: Annotated[Real, Within(gt=0, le=10, unit="rad/s")] = 4.5
+    heading_frequency_rad_per_s: Annotated[Real, Field(gt=0, le=10)] = 4.5
     """Natural frequency of heading control."""
-    heading_integral_gain_per_s3: Annotated[Real, Within(0, 100, unit="1/s^3")] = 0.0
+    heading_integral_gain_per_s3: Annotated[Real, Field(ge=0, le=100)] = 0.0
     """Angular acceleration demanded for each rad s of the integrated heading error."""
     altitude_error_m: OffsetDistribution = 0.0
     """Steady, unexplained error of the held altitude, drawn once per run: the held altitude is the set-point plus
@@ -199,10 +212,20 @@ class BehaviourTreeSettings(Strict):
         return self
 
 
+def _finite(value: Any) -> Any:
+    """Check that no number in a manager's settings is infinite or none at all."""
+    if isinstance(value, float) and not math.isfinite(value):
+        raise wrong(f"{shown(value)} is not finite", "give a finite number")
+    for each in value.values() if isinstance(value, dict) else value if isinstance(value, list | tuple) else ():
+        _finite(each)
+    return value
+
+
 class ManagerSettings(Strict):
     """Settings of managing subsystems by name; an outside manager finds its own under its own name."""
 
     model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, Annotated[dict[str, Any], AfterValidator(_finite)]] = Field(init=False)
 
     random: RandomSettings = RandomSettings()
     """The random manager."""
@@ -210,6 +233,16 @@ class ManagerSettings(Strict):
     """The metacontrol manager."""
     bt: BehaviourTreeSettings = BehaviourTreeSettings()
     """The behaviour tree manager."""
+
+    @model_validator(mode="after")
+    def _are_for_managers(self) -> Self:
+        others = [name for name in self.model_extra or {} if ":" not in name]
+        registered = sorted(point.name for point in entry_points(group=MANAGER_GROUP)) if others else []
+        for name in others:
+            if name not in registered:
+                remedy = f"{did_you_mean(name, [*type(self).model_fields, *registered])}, module:Class"
+                raise wrong(f"there is no manager {shown(name)} with settings", remedy, name)
+        return self
 
 
 FurtherMetric = Literal[
@@ -345,7 +378,9 @@ class Scenario(Strict):
         """The functions that the mission needs."""
         own, surface = self.mission.functions, (SURFACE,) if self.leak is not None else ()
         return tuple(
-            dict.fromkeys((*MISSION_FUNCTIONS, *own.lasting, *own.search_pipeline, *own.inspect_pipeline, *surface))
+            dict.fromkeys(
+                (*MISSION_FUNCTIONS, *own.mission_wide, *own.search_pipeline, *own.inspect_pipeline, *surface)
+            )
         )
 
     def reasoning_share(self) -> float:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
@@ -19,11 +18,11 @@ from pydantic import (
     model_validator,
 )
 
-from suave_des.domain import DEFAULT_MODE, SEA_BED_Z_M, SURFACE_Z_M, UNGROUND_MODE
-from suave_des.errors import InputError, KeyPath, did_you_mean, shown
-from suave_des.scenario.problems import input_error
-from suave_des.scenario.quantities import Real, Strict, Within, wrong
-from suave_des.scenario.yamlfile import YamlDocument
+from suave_des.domain import DEFAULT_MODE, GENERATE_SEARCH_PATH, SEA_BED_Z_M, SURFACE_Z_M, UNGROUND_MODE
+from suave_des.errors import InputError, KeyPath, did_you_mean, shown, similar
+from suave_des.scenario.models import Scenario
+from suave_des.scenario.quantities import Real, Strict, wrong
+from suave_des.scenario.yamlfile import Layer, YamlDocument, input_error
 
 ParameterValue = float | str | bool
 _STATES = "inactive, active or active.NODE_MODE"
@@ -46,7 +45,7 @@ class Mode:
 
     name: str
     active: bool
-    parameters: Mapping[str, float | str | bool]
+    parameters: Mapping[str, ParameterValue]
 
 
 @dataclass(frozen=True)
@@ -75,7 +74,10 @@ class ModeTable:
         Raises:
             InputError: there is no such function.
         """
-        return tuple(self._function(function))
+        if function not in self.table:
+            remedy = did_you_mean(function, self.table, f"functions in {self.source}")
+            raise InputError(f"there is no function {shown(function)}", file=self.source, remedy=remedy)
+        return tuple(self.table[function])
 
     def mode(self, function: str, mode: str) -> Mode:
         """Return one mode of a function.
@@ -83,30 +85,52 @@ class ModeTable:
         Raises:
             InputError: there is no such function, or it has no such mode.
         """
-        modes = self._function(function)
-        if mode not in modes:
-            remedy = did_you_mean(mode, modes, "its modes")
+        known = self.modes(function)
+        if mode not in known:
+            remedy = did_you_mean(mode, known, f"its modes in {self.source}")
             raise InputError(f"function {function} has no mode {shown(mode)}", file=self.source, remedy=remedy)
-        return modes[mode]
+        return self.table[function][mode]
 
-    def _function(self, function: str) -> Mapping[str, Mode]:
-        if function not in self.table:
-            remedy = did_you_mean(function, self.table, "its functions")
-            raise InputError(f"there is no function {shown(function)}", file=self.source, remedy=remedy)
-        return self.table[function]
+    def check(self, scenario: Scenario, layer: Layer) -> None:
+        """Check that the file has the functions and modes that a mission and its scenario use.
+
+        Args:
+            scenario: the scenario.
+            layer: its content, with lines.
+
+        Raises:
+            InputError: one is missing.
+        """
+        for function in scenario.needed_functions():
+            if UNGROUND_MODE not in self.modes(function):
+                remedy = f"add {UNGROUND_MODE}: {{NODE: inactive}}, which a cancelled task sets"
+                raise InputError(f"function {function} has no mode {UNGROUND_MODE}", file=self.source, remedy=remedy)
+        used: list[tuple[KeyPath, str, str | None]] = [
+            *((("functions", function), function, None) for function in scenario.functions),
+            *((("default_modes", function), function, mode) for function, mode in scenario.default_modes.items()),
+            *(
+                (("managers", "bt", "search_modes", index), GENERATE_SEARCH_PATH, mode)
+                for index, mode in enumerate(scenario.managers.bt.search_modes)
+                # The default names the shipped modes, which another modes file need not have: it matters only to bt.
+                if layer.has(("managers", "bt", "search_modes", index))
+            ),
+        ]
+        for key_path, function, mode in used:
+            try:
+                self.modes(function) if mode is None else self.mode(function, mode)
+            except InputError as error:
+                raise layer.error(error.problem, key_path, error.remedy) from None
+
+
+# The file.
 
 
 def _value(value: Any) -> ParameterValue:
     if isinstance(value, bool | str):
         return value
-    if not isinstance(value, int | float):
-        raise wrong(f"{shown(value)} is not a value", "a number, text, true or false is needed")
-    if not math.isfinite(value):
-        raise wrong(f"{shown(value)} is not finite", "give a finite number")
+    if not isinstance(value, int | float) or not math.isfinite(value):
+        raise wrong(f"{shown(value)} is not a value", "a finite number, text, true or false is needed")
     return float(value)
-
-
-_Altitude = Annotated[Real, Within(gt=0, le=SURFACE_Z_M - SEA_BED_Z_M, unit="m, the depth of the water")]
 
 
 class _Parameters(BaseModel):
@@ -115,14 +139,14 @@ class _Parameters(BaseModel):
     model_config = ConfigDict(extra="allow", allow_inf_nan=False)
     __pydantic_extra__: dict[str, Annotated[ParameterValue, PlainValidator(_value)]]
 
-    spiral_altitude: _Altitude | None = None
+    spiral_altitude: Annotated[Real, Field(gt=0, le=SURFACE_Z_M - SEA_BED_Z_M)] | None = None
 
     @model_validator(mode="after")
     def _misspelt(self) -> Self:
         known = type(self).model_fields.keys() - self.model_fields_set
         for name in self.model_extra or {}:
-            if near := get_close_matches(name, known, n=1, cutoff=0.85):
-                raise wrong(f"nothing reads {shown(name)}", f"did you mean {near[0]}?")
+            if near := similar(name, known, cutoff=0.85):
+                raise wrong(f"nothing reads {shown(name)}", f"did you mean {near}?")
         return self
 
 
@@ -181,22 +205,18 @@ def modes_of(document: YamlDocument) -> ModeTable:
         content = _FILE.validate_python(document.data)
     except ValidationError as error:
         raise input_error(error, document, dict[str, _Entry]) from None
-    systems: dict[str, _System] = {}
-    nodes: dict[str, dict[str, dict[str, ParameterValue]]] = {}
-    for name, key in keys.items():
-        part = content[key].ros__parameters
-        if isinstance(part, _System):
-            systems[name] = part
-        else:
-            nodes[name] = part.parameters()
+    entries = {name: content[key].ros__parameters for name, key in keys.items()}
+    nodes = {name: entry.parameters() for name, entry in entries.items() if isinstance(entry, _Node)}
     functions: dict[str, Mapping[str, Mode]] = {}
-    for name, system in systems.items():
+    for name, system in entries.items():
+        if isinstance(system, _Node):
+            continue
         path: KeyPath = (keys[name], "ros__parameters")
         parts = [part.removeprefix("/") for part in system.parts]
         if unknown := [part for part in parts if part not in keys]:
             remedy = did_you_mean(unknown[0], keys, "defined")
             raise document.error(f"unknown part {shown(unknown[0])} of {name}", (*path, "parts"), remedy)
-        if not any(part in systems for part in parts):
+        if all(part in nodes for part in parts):
             known = {part: nodes[part] for part in parts}
             functions[name] = {DEFAULT_MODE: Mode(DEFAULT_MODE, False, {})} | {
                 mode: _mode(document, (*path, "modes", mode), states, known) for mode, states in system.modes.items()
@@ -214,26 +234,24 @@ def _mode(
     nodes: Mapping[str, Mapping[str, dict[str, ParameterValue]]],
 ) -> Mode:
     """A mode of a function: the parameters that it sets on each of the function's nodes that are active in it."""
-    function, name = str(path[0]).removeprefix("/"), str(path[-1])
     keys = {key.removeprefix("/"): key for key in states}
     for part, key in keys.items():
         if part not in nodes:
-            problem = f"mode {name} sets {shown(part)}, which is not a part of {function}"
-            raise document.error(problem, (*path, key), did_you_mean(part, nodes, "its parts"))
+            raise document.error(f"{shown(part)} is not a part", (*path, key), did_you_mean(part, nodes, "its parts"))
     active, parameters = False, dict[str, ParameterValue]()
     for node, modes in nodes.items():
         if node not in keys:
-            raise document.error(f"mode {name} of {function} does not set {node}", path, f"add {node}: {_STATES}")
-        state = states[keys[node]]
+            raise document.error(f"does not set {node}", path, f"add {node}: {_STATES}")
+        below, state = (*path, keys[node]), states[keys[node]]
         if state == "inactive":
             continue
-        below = (*path, keys[node])
-        if state != "active" and not str(state).startswith("active."):
+        kind, _, node_mode = str(state).partition(".")
+        if kind != "active":
             raise document.error(f"{shown(state)} is not a state of a node", below, f"write {_STATES}")
-        node_mode = DEFAULT_MODE if state == "active" else str(state).removeprefix("active.")
-        if node_mode not in modes and node_mode != DEFAULT_MODE:
+        node_mode = node_mode or DEFAULT_MODE
+        if node_mode not in (*modes, DEFAULT_MODE):
             remedy = did_you_mean(node_mode, modes, "its modes")
             raise document.error(f"{node} has no mode {shown(node_mode)}", below, remedy)
         active = True
         parameters |= modes.get(node_mode, {})
-    return Mode(name, active, parameters)
+    return Mode(str(path[-1]), active, parameters)

@@ -1,4 +1,4 @@
-"""The physical part of a scenario: the vehicle, its start, pipeline, water, battery, and failures.
+"""The physical part of a scenario: the vehicle, its start, pipeline, water, signals, battery, and failures.
 
 Values of vehicles with their sources: scenarios/vehicles.
 """
@@ -7,14 +7,16 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Any, Literal
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from suave_des.domain import SEA_BED_Z_M, SURFACE_Z_M, THRUSTERS
-from suave_des.errors import shown
+from suave_des.domain import SEA_BED_Z_M, SURFACE_Z_M, THRUSTER_NAMES
+from suave_des.errors import line_error, shown
+from suave_des.files import read_csv
 from suave_des.scenario.quantities import (
-    FARTHEST_M,
+    LARGEST,
     LONGEST_S,
     Coordinate,
     CoordinateDistribution,
@@ -23,27 +25,120 @@ from suave_des.scenario.quantities import (
     Duration,
     HeadingDistribution,
     Length,
+    NotNegative,
+    Number,
     Period,
     Real,
+    Share,
     ShiftDistribution,
     Strict,
     TimeDistribution,
     ValueDistribution,
     Within,
+    ordered,
     wrong,
 )
-from suave_des.scenario.signal_kinds import Monitor
 
-Positive = Annotated[Real, Within(gt=0, le=1e6)]
-Offset = Annotated[Real, Within(-FARTHEST_M, FARTHEST_M, unit="m")]
-Component = Annotated[Real, Within(-1.0, 1.0)]
+Positive = Annotated[Real, Field(gt=0, le=1e6)]
+Offset = Coordinate
+Component = Annotated[Real, Field(ge=-1, le=1)]
 _UNIT_TOLERANCE = 1e-3
+
+
+class Monitor(Strict):
+    """Faults that any monitor can have."""
+
+    dropout_probability: Share = 0.0
+    """Probability that a message is lost, independently for each message."""
+    outages_s: tuple[tuple[NotNegative, NotNegative], ...] = ()
+    """Intervals of mission time, [from, to], in which every message is lost."""
+
+    @field_validator("outages_s", mode="after")
+    @classmethod
+    def _are_in_order(cls, value: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+        for since_s, to_s in value:
+            if since_s > to_s:
+                raise wrong(f"the outage [{since_s:g}, {to_s:g}] ends before it begins", "give [from, to]")
+        return value
+
+    @property
+    def loses_messages(self) -> bool:
+        """Whether any message can be lost."""
+        return self.dropout_probability > 0.0 or bool(self.outages_s)
+
+
+class _Signal(Monitor):
+    publishing_period_s: Period | None = None
+    """Period of the monitor that measures it; by default the revision's visibility_publishing_period_s."""
+    time_step_s: NotNegative = 1.0
+    """Time is first truncated to a multiple of this (whole seconds in the exemplar); 0: not truncated."""
+    noise: ValueDistribution = 0.0
+    """Added to each measurement, drawn each time."""
+
+
+class SinusoidSignal(_Signal):
+    """A cosine that starts at its maximum.
+
+    a cos(2 pi (t + shift) / period) + a + minimum, with a = (maximum - minimum) / 2, as in the exemplar.
+    """
+
+    kind: Literal["sinusoid"]
+    """A cosine between minimum and maximum."""
+    period_s: Period
+    """Time from one maximum to the next."""
+    minimum: Number
+    """Smallest value."""
+    maximum: Number
+    """Greatest value, reached at t = -shift_s."""
+    shift_s: ShiftDistribution = 0.0
+    """Phase shift, drawn once per run."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        ordered(self.minimum, self.maximum)
+        return self
+
+
+class ConstantSignal(_Signal):
+    """A constant value."""
+
+    kind: Literal["constant"]
+    """A constant value."""
+    value: ValueDistribution
+    """The value, drawn once per run."""
+
+
+class StepSignal(_Signal):
+    """One value until a time, another from then on."""
+
+    kind: Literal["step"]
+    """One value until a time, another from then on."""
+    time_s: ShiftDistribution
+    """Mission time of the step, drawn once per run."""
+    before: Number
+    """Value before the step."""
+    after: Number
+    """Value from the step on."""
+
+
+class TableSignal(_Signal):
+    """Values over time from a CSV file."""
+
+    kind: Literal["table"]
+    """Values over time from a CSV file."""
+    file: Annotated[str, Field(min_length=1)]
+    """CSV file with columns t_s and value."""
+    interpolation: Literal["previous", "linear"] = "previous"
+    """Between two rows: the earlier row's value, or a straight line."""
+
+
+SignalDescription = Annotated[SinusoidSignal | ConstantSignal | StepSignal | TableSignal, Field(discriminator="kind")]
 
 
 class Camera(Strict):
     """The camera, which looks straight down."""
 
-    field_of_view_deg: Annotated[Real, Within(gt=0, lt=180, unit="degrees")]
+    field_of_view_deg: Annotated[Real, Field(gt=0, lt=180)]
     """Full angle of view, the same in x and y; it also determines the spacing of the search spiral's turns."""
 
     @property
@@ -101,7 +196,7 @@ class CurrentWaveDescription(Strict):
     """Mean speed, drawn once per run."""
     amplitude_m_per_s: CurrentDistribution = 0.0
     """Amplitude of the oscillation, drawn once per run."""
-    period_s: Annotated[Real, Within(1.0, LONGEST_S, unit="s")] = 120.0
+    period_s: Annotated[Real, Field(ge=1, le=LONGEST_S)] = 120.0
     """Time from one maximum of the speed to the next."""
     shift_s: ShiftDistribution = 0.0
     """Added to mission time, drawn once per run."""
@@ -136,7 +231,7 @@ class Start(Strict):
     """East."""
     y_m: CoordinateDistribution = 2.57
     """North."""
-    z_m: Annotated[Distribution, Within(gt=SEA_BED_Z_M, le=SURFACE_Z_M, unit="m, between sea bed and surface")] = -18.5
+    z_m: Annotated[Distribution, Within(SEA_BED_Z_M + 0.01, SURFACE_Z_M)] = -18.5
     """Up; the sea bed is at -20, the surface at 0."""
     heading_rad: HeadingDistribution = 0.0
     """Yaw, from east towards north."""
@@ -156,17 +251,19 @@ class Pipeline(Strict):
         (-51.56, -15.14, -20.0),
     )
     """Vertices [x, y, z] in order. The default is the exemplar's pipeline (kas-lab/suave)."""
-    points_per_piece: Annotated[int, Field(strict=True), Within(1, 1000)] = 20
+    points_per_piece: Annotated[int, Field(strict=True, ge=1, le=1000)] = 20
     """Evenly spaced points on each straight piece, its first vertex excluded and its last included."""
 
 
-_EVENT_TEXT = re.compile(r"^\(\s*(?P<thruster>[^,]*?)\s*,\s*(?P<event>[^,]*?)\s*,\s*(?P<time_s>[^,]*?)\s*\)$")
+_EVENT_TEXT = re.compile(
+    r"\(\s*(?P<thruster>[0-9]{1,9})\s*,\s*(?P<event>\w+)\s*,\s*(?P<time_s>[-+.0-9eE]+|nan|[-+]?inf)\s*\)", re.ASCII
+)
 
 
 class ThrusterEvent(Strict):
     """A failure or recovery of one thruster; also given as the exemplar writes it: "(1,failure,35)"."""
 
-    thruster: Annotated[int, Field(strict=True), Within(1, THRUSTERS)]
+    thruster: Annotated[int, Field(strict=True, ge=1, le=len(THRUSTER_NAMES))]
     """1 to 4 horizontal (front right, front left, rear right, rear left), 5 and 6 vertical (right, left)."""
     event: Literal["failure", "recovery"]
     """What happens to it."""
@@ -181,19 +278,14 @@ class ThrusterEvent(Strict):
     def _from_text(cls, value: Any) -> Any:
         if not isinstance(value, str):
             return value
-        match = _EVENT_TEXT.match(value.strip())
-        if match is None:
-            remedy = "write (THRUSTER,failure or recovery,TIME), as in (1,failure,35)"
-            raise wrong(f"{shown(value)} is not a thruster event", remedy)
-        parts: dict[str, Any] = match.groupdict()
-        for key, convert, expected in (("thruster", int, "a whole number from 1 to 6"), ("time_s", float, "a number")):
-            try:
-                if not parts[key].isascii() or "_" in parts[key]:  # digits to Python, and to nobody else
-                    raise ValueError
-                parts[key] = convert(parts[key])
-            except ValueError:
-                raise wrong(f"expected {expected} as {key}, got {shown(parts[key])}", "as in (1,failure,35)") from None
-        return parts
+        match = _EVENT_TEXT.fullmatch(value.strip())
+        try:
+            if match is not None:
+                return {"thruster": int(match[1]), "event": match[2], "time_s": float(match[3])}
+        except ValueError:
+            pass
+        remedy = "write (THRUSTER,failure or recovery,TIME), as in (1,failure,35)"
+        raise wrong(f"{shown(value)} is not a thruster event", remedy)
 
 
 class Battery(Monitor):
@@ -213,7 +305,48 @@ class Battery(Monitor):
     """Added to each measurement of the level, drawn each time."""
     approach_altitude_m: Length = 1.25
     """Altitude above the sea bed at which the station is approached."""
-    mission_ends_at_level: Annotated[Real, Within(0.0, lt=1.0)] | None = None
+    mission_ends_at_level: Annotated[Real, Field(ge=0, lt=1)] | None = None
     """Level at or below which the mission ends; by default it continues with an empty battery."""
     resend_period_s: Period = 10.0
     """Period at which the station is sent to the autopilot again as a set-point."""
+
+
+# Tables of signals.
+
+SignalTable = tuple[tuple[float, ...], tuple[float, ...]]
+"""Times in s, strictly increasing, and the value at each."""
+_LARGEST = {"t_s": LONGEST_S, "value": LARGEST}
+"""Columns of a table, and the greatest magnitude in each."""
+_SIZE_LIMIT_BYTES = 20_000_000
+
+
+def read_table(path: Path) -> tuple[SignalTable, str]:
+    """Read the CSV file of a table signal: its times and values, and the SHA-256 of the file.
+
+    Raises:
+        InputError: with file and line: another header, a value that is not a finite number, times that do not
+            increase, no row.
+    """
+    remedy = f"write lines of two numbers: {','.join(_LARGEST)}"
+    header, rows, digest = read_csv(path, _SIZE_LIMIT_BYTES, remedy)
+    if sorted(header) != sorted(_LARGEST):
+        problem = f"the columns are {shown(','.join(header))}"
+        raise line_error(path, 1, problem, f"the first line must be {','.join(_LARGEST)}")
+    table: list[tuple[float, float]] = []
+    for line, row in rows:
+        try:
+            cells = dict(zip(header, map(float, row), strict=True))
+        except ValueError:
+            raise line_error(path, line, f"{shown(','.join(row))} is not two numbers", remedy) from None
+        for column, largest in _LARGEST.items():
+            if not abs(cells[column]) <= largest:  # or nan
+                problem = f"{column} {cells[column]:g} is out of range"
+                raise line_error(path, line, problem, f"must be at least {-largest:g} and at most {largest:g}")
+        if table and cells["t_s"] <= table[-1][0]:
+            problem = f"t_s {cells['t_s']:g} does not come after {table[-1][0]:g}"
+            raise line_error(path, line, problem, "sort the rows, and give each time once")
+        table.append((cells["t_s"], cells["value"]))
+    if not table:
+        raise line_error(path, 1, "has no row under its header", remedy)
+    times_s, values = zip(*table, strict=True)
+    return (times_s, values), digest

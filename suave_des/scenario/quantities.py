@@ -28,7 +28,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 LARGEST = 1e12
 """Greatest magnitude of a number without bounds of its own, such as a measured value in a unit of the user's."""
 LONGEST_S = 1e9
-"""Longest time: 31 years, in other words never. Bounds of this magnitude are shown only to those who exceed them."""
+"""Longest time: 31 years, in other words never."""
 FARTHEST_M = 10_000.0
 _LEAST_SHARE = 0.001
 
@@ -55,23 +55,17 @@ def ordered(low: float, high: float, low_key: str = "minimum", high_key: str = "
 
 @dataclass(frozen=True)
 class Within:
-    """Bounds of a number, or of the values that a distribution states; its spread is at most their distance.
+    """Bounds of a number or of what a distribution in its place states; its spread is at most their distance.
 
     Attributes:
         ge: least value.
         le: greatest value.
-        gt: value that must be exceeded.
-        lt: value that must not be reached.
-        unit: for the message.
         is_floor: whether a distribution must not be able to give values below `ge` either.
         draws_are_cut: whether values that are drawn below `ge` count as `ge`, so that they may be stated.
     """
 
-    ge: float | None = None
-    le: float | None = None
-    gt: float | None = None
-    lt: float | None = None
-    unit: str = ""
+    ge: float
+    le: float
     is_floor: bool = False
     draws_are_cut: bool = False
 
@@ -81,52 +75,35 @@ class Within:
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Bounds of a plain number; JSON Schema does not apply them to mappings."""
-        bounds = {
-            "minimum": self.ge,
-            "maximum": self.le,
-            "exclusiveMinimum": self.gt,
-            "exclusiveMaximum": self.lt,
-        }
-        return {**handler(schema), **{key: bound for key, bound in bounds.items() if bound is not None}}
+        return {**handler(schema), "minimum": self.ge, "maximum": self.le}
 
     def _check(self, value: AnyDistribution) -> AnyDistribution:
-        low = max((bound for bound in (self.ge, self.gt) if bound is not None), default=-math.inf)
-        high = min((bound for bound in (self.le, self.lt) if bound is not None), default=math.inf)
+        low, high = self.ge, self.le
         for key, part in _stated(value):
             # A normal distribution that is cut at the floor may have its mean below.
             reaches_below = self.draws_are_cut and bool(key)
             least = -high if reaches_below or (self.is_floor and key == "mean") else low
-            if not least <= part <= high or part in (self.gt, self.lt):
-                raise wrong(f"{part:.12g} is out of range", f"must be {self.text(part)}", key)
-        widest = high - (low if math.isfinite(low) else 0.0)
-        if isinstance(value, Normal) and value.std > widest:
-            raise wrong(f"{value.std:g} is out of range", f"must be at most {widest:g} {self.unit}".rstrip(), "std")
+            if not least <= part <= high:
+                raise wrong(f"{part:.12g} is out of range", f"must be at least {low:.12g} and at most {high:.12g}", key)
+        if isinstance(value, Normal) and value.std > high - low:
+            raise wrong(f"{value.std:g} is out of range", f"must be at most {high - low:g}", "std")
         if self.is_floor and support(value)[0] < low:
             raise wrong(f"values below {low:g} can be drawn", f"give a minimum that is at least {low:g}")
         if self.draws_are_cut and support(value)[1] < low:
             raise wrong(f"only values below {low:g} can be drawn", f"give a greatest value that is at least {low:g}")
         return value
 
-    def text(self, part: float | None = None) -> str:
-        """The bounds in words, but those that no value comes near, unless `part` exceeds them."""
-        bounds = (("greater than", self.gt), ("at least", self.ge), ("less than", self.lt), ("at most", self.le))
-        near = [
-            f"{words} {bound:g}"
-            for words, bound in bounds
-            if bound is not None and (abs(bound) < LONGEST_S or (part is not None and abs(part) > abs(bound)))
-        ]
-        return f"{' and '.join(near)} {self.unit}".rstrip()
-
 
 Real = Annotated[float, Field(strict=True)]
 """A number written as one: "80" in quotes and true are none."""
 Name = Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_.-]*$", max_length=100)]
-Number = Annotated[Real, Within(-LARGEST, LARGEST)]
-NotNegative = Annotated[Real, Within(0, LARGEST)]
-Coordinate = Annotated[Real, Within(-FARTHEST_M, FARTHEST_M, unit="m")]
-Length = Annotated[Real, Within(gt=0, le=FARTHEST_M, unit="m")]
-Duration = Annotated[Real, Within(gt=0, le=LONGEST_S, unit="s")]
-Period = Annotated[Real, Within(0.001, LONGEST_S, unit="s")]
+Number = Annotated[Real, Field(ge=-LARGEST, le=LARGEST)]
+NotNegative = Annotated[Real, Field(ge=0, le=LARGEST)]
+Share = Annotated[Real, Field(ge=0, le=1)]
+Coordinate = Annotated[Real, Field(ge=-FARTHEST_M, le=FARTHEST_M)]
+Length = Annotated[Real, Field(gt=0, le=FARTHEST_M)]
+Duration = Annotated[Real, Field(gt=0, le=LONGEST_S)]
+Period = Annotated[Real, Field(ge=0.001, le=LONGEST_S)]
 """Period of something that happens in mission time; the lower limit keeps a slip from stopping the clock."""
 
 
@@ -243,17 +220,26 @@ Distribution = Annotated[
     | Annotated[Uniform, Tag("uniform")]
     | Annotated[Exponential, Tag("exponential")]
     | Annotated[Choice, Tag("choice")],
-    Discriminator(_tag),
+    Discriminator(
+        _tag,
+        custom_error_type="wrong",
+        custom_error_message="{problem}",
+        custom_error_context={
+            "problem": "is no distribution that is known",
+            "remedy": "give a number, or distribution: normal, uniform, exponential or choice",
+            "keys": "distribution",
+        },
+    ),
 ]
 
-CoordinateDistribution = Annotated[Distribution, Within(-FARTHEST_M, FARTHEST_M, unit="m")]
-HeadingDistribution = Annotated[Distribution, Within(-6.3, 6.3, unit="rad")]
-CurrentDistribution = Annotated[Distribution, Within(-10.0, 10.0, unit="m/s")]
-OffsetDistribution = Annotated[Distribution, Within(-100.0, 100.0, unit="m")]
-DelayDistribution = Annotated[Distribution, Within(0.0, LONGEST_S, unit="s", is_floor=True)]
-TimeDistribution = Annotated[Distribution, Within(0.0, LONGEST_S, unit="s", draws_are_cut=True)]
+CoordinateDistribution = Annotated[Distribution, Within(-FARTHEST_M, FARTHEST_M)]
+HeadingDistribution = Annotated[Distribution, Within(-6.3, 6.3)]
+CurrentDistribution = Annotated[Distribution, Within(-10.0, 10.0)]
+OffsetDistribution = Annotated[Distribution, Within(-100.0, 100.0)]
+DelayDistribution = Annotated[Distribution, Within(0.0, LONGEST_S, is_floor=True)]
+TimeDistribution = Annotated[Distribution, Within(0.0, LONGEST_S, draws_are_cut=True)]
 """A time; one that is drawn below 0 counts as 0."""
-ShiftDistribution = Annotated[Distribution, Within(-LONGEST_S, LONGEST_S, unit="s")]
+ShiftDistribution = Annotated[Distribution, Within(-LONGEST_S, LONGEST_S)]
 ValueDistribution = Annotated[Distribution, Within(-LARGEST, LARGEST)]
 
 

@@ -11,17 +11,19 @@ from suave_des.scenario.quantities import (
     DelayDistribution,
     Distribution,
     Length,
+    Name,
     NotNegative,
     OffsetDistribution,
     Period,
     Real,
+    Share,
     Strict,
     Within,
     support,
     wrong,
 )
 
-Count = Annotated[int, Field(strict=True), Within(1, 1_000_000)]
+Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
 
 
 class CoordinatorRevision(Strict):
@@ -29,7 +31,7 @@ class CoordinatorRevision(Strict):
 
     poll_period_s: Period
     """Period of its loop."""
-    limit_check_period_s: Annotated[Real, Within(0.001, 1000, unit="s")]
+    limit_check_period_s: Annotated[Real, Field(ge=0.001, le=1000)]
     """Period at which the time limit is checked."""
     search_time: Literal["poll", "detection"]
     """Time of the poll that saw the detection, or of the detection itself; truncated to whole seconds."""
@@ -49,7 +51,7 @@ class SpiralRevision(Strict):
     passed)."""
     tick_period_s: Period
     """Period of its timer; at most one way-point is reached per tick."""
-    angle_step_rad: Annotated[Real, Within(gt=0, le=6.3, unit="rad")]
+    angle_step_rad: Annotated[Real, Field(gt=0, le=6.3)]
     """Angle from one way-point to the next."""
     acceptance_m: Length
     """A way-point is reached when dx, dy and dz are all at most this."""
@@ -76,10 +78,10 @@ class FollowRevision(Strict):
     """A point that is not reached is sent again after this many polls."""
     restarts_on_activation: bool
     """Whether the path restarts from its first point (otherwise it continues with those not yet reached)."""
-    distance_goes_on: bool = False
+    keeps_distance_on_activation: bool = False
     """Whether the distance keeps accumulating after an activation (otherwise it restarts at zero); an interrupted
     piece does not count."""
-    adds_remaining_way: bool
+    counts_interrupted_piece: bool
     """Whether a deactivation adds the stretch from the last point to the current position to the distance."""
     resends_at_each_poll: bool
     """Whether a point that is not reached after the tenth poll is sent again at each poll (otherwise after ten
@@ -106,7 +108,7 @@ class MonitorsRevision(Strict):
     """Period at which the monitor checks whether a thruster event is due; at most one happens at a time."""
     visibility_publishing_period_s: Period
     """Period at which signals are measured that do not give their own."""
-    detected_point_height_m: Annotated[Real, Within(0, FARTHEST_M, unit="m")]
+    detected_point_height_m: Annotated[Real, Field(ge=0, le=FARTHEST_M)]
     """Height above the pipeline's points at which the detection mock-up looks for them."""
 
 
@@ -115,14 +117,14 @@ class ThrusterFailureRevision(Strict):
 
     effective_from_s: NotNegative = 0.0
     """Before this mission time, the first failure has no effect."""
-    loss_probability: Annotated[Real, Within(0.0, 1.0)] = 0.0
+    loss_probability: Share = 0.0
     """Probability that the first failure has no effect after that time."""
 
 
 class SetPointRevision(Strict):
     """How functions send set-points to the autopilot."""
 
-    loss_probability: Annotated[Distribution, Within(0.0, lt=1.0, is_floor=True)]
+    loss_probability: Annotated[Distribution, Within(0.0, 1.0, is_floor=True)]
     """Probability that a set-point is lost, drawn once per run: a new publisher may publish before it is discovered."""
     node_frame_offset_x_m: OffsetDistribution
     """Steady offset of a node's frame from the simulator's, east; drawn once per node and run."""
@@ -154,14 +156,14 @@ class MetacontrolRevision(Strict):
 
     task_bridge_period_s: NotNegative
     """Tasks reach the reasoner at ticks of this period; 0: at once."""
-    objectives_at_launch: bool
-    """Whether the first task's objectives exist from launch."""
+    objectives_at_launch: tuple[Name, ...]
+    """Functions whose objectives exist from launch, besides those of the whole mission."""
     waits_for_first_measurement: bool
     """Whether reasoning waits for the first measurement of each attribute of which a design expects a value."""
-    search_always_improves: bool
-    """Whether search objectives have o_always_improve (1.5); see search_improves_when_exceeded."""
-    search_improves_when_exceeded: bool
-    """Whether the search is also adapted when a measured value exceeds what its current design expects."""
+    always_improve: tuple[Name, ...]
+    """Functions whose objectives have o_always_improve (1.5); see improve_when_exceeded."""
+    improve_when_exceeded: bool
+    """Whether an objective is also adapted when a measured value exceeds what its current design expects."""
     ignores_diagnostics_without_objective: bool
     """Whether diagnostics are ignored while there is no objective."""
 

@@ -6,97 +6,67 @@ import ast
 import inspect
 import sys
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 from pydantic import BaseModel
 
 from suave_des.scenario.models import Scenario
-from suave_des.scenario.problems import models_within
+from suave_des.scenario.yamlfile import models_within
 
-_PARTIAL = "Partial"
-_REFERENCE = "#/$defs/"
+_WITH_NAMED_ENTRIES = (("Scenario", "signals"), ("KnowledgeSettings", "values"))
+_WHOLE = ("ThrusterEvent", "ThrusterDescription")
+"""Entries of lists, which no base completes."""
 _EVENT_TEXT = r"^\s*\(\s*[1-6]\s*,\s*(failure|recovery)\s*,[^,]+\)\s*$"
 
 
 def scenario_schema() -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of a scenario file.
 
-    A file with `base` may give any part of a scenario; one without must give what has no default. Relations between
-    values, such as a minimum that must not be above its maximum, are checked by the loader only.
+    What a mapping needs may stand in the base that it differs from: the loader alone checks that, and relations
+    between values, such as a minimum that must not be above its maximum.
     """
-    whole = Scenario.model_json_schema(ref_template=_REFERENCE + "{model}")
+    whole = Scenario.model_json_schema()
     definitions: dict[str, Any] = whole.pop("$defs")
     definitions["Scenario"] = whole
+    for model in dict.fromkeys(model for _, model in models_within(Scenario)):
+        for name, text in field_docs(model).items():
+            definitions[model.__name__]["properties"][name]["description"] = text
+    for name, definition in definitions.items():
+        definitions[name] = _partial(definition, keep=name in _WHOLE)
+    event = {"anyOf": [definitions["ThrusterEvent"], {"type": "string", "pattern": _EVENT_TEXT}]}
+    definitions["ThrusterEvent"] = event
     for named in ("signals", "default_modes"):
-        whole["properties"][named]["additionalProperties"] = False  # of other names than the pattern allows
-    _describe(definitions)
-    definitions["ThrusterEvent"] = {"anyOf": [definitions["ThrusterEvent"], {"type": "string", "pattern": _EVENT_TEXT}]}
-    definitions |= {_PARTIAL + name: _partial(definition) for name, definition in definitions.items()}
-    _allow_removal(definitions)
-    _allow_bases(definitions)
+        definitions["Scenario"]["properties"][named]["additionalProperties"] = False  # other names than are allowed
+    for name, key in _WITH_NAMED_ENTRIES:  # over a base, a null removes an entry
+        entries = definitions[name]["properties"][key]
+        allowed = entries.get("patternProperties", entries)
+        for each in ("additionalProperties",) if allowed is entries else tuple(allowed):
+            allowed[each] = {"anyOf": [allowed[each], {"type": "null"}]}
+    base = {"type": ["string", "number"], "description": "Name or path of what this differs from."}
+    for key, model_name in (("revision", "Revision"), ("vehicle", "VehicleDescription")):
+        definitions[model_name]["properties"]["base"] = base
+        part = definitions["Scenario"]["properties"][key]
+        definitions["Scenario"]["properties"][key] = {"anyOf": [base, part], "description": part["description"]}
+    definitions["Scenario"]["properties"]["base"] = base
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "suave-des scenario",
-        "if": {"required": ["base"]},
-        "then": {"$ref": f"{_REFERENCE}{_PARTIAL}Scenario"},
-        "else": {"$ref": f"{_REFERENCE}Scenario"},
+        "$ref": "#/$defs/Scenario",
+        "anyOf": [{"required": ["base"]}, {"required": ["revision", "signals"]}],
         "$defs": definitions,
     }
 
 
-def _describe(definitions: dict[str, Any]) -> None:
-    for model in {model: None for _, model in models_within(Scenario)}:
-        for name, text in field_docs(model).items():
-            definitions[model.__name__]["properties"][name]["description"] = text
-
-
-def _partial(schema: Any) -> Any:
-    """The same schema with nothing required, referring to definitions of which the same holds."""
+def _partial(schema: Any, *, keep: bool) -> Any:
+    """The same schema with nothing required, unless `keep`; a mapping may then fit several members of a union."""
     if isinstance(schema, list):
-        return [_partial(each) for each in schema]
+        return [_partial(each, keep=keep) for each in schema]
     if not isinstance(schema, dict):
         return schema
-    partial = {
-        key: _partial(value)
-        for key, value in schema.items()
-        if key not in ("required", "oneOf", "$ref", "discriminator")
-    }
-    if "oneOf" in schema:  # without what is required, a mapping may fit several members
-        partial["anyOf"] = _partial(schema["oneOf"])
-    if "$ref" in schema:
-        partial["$ref"] = schema["$ref"].replace(_REFERENCE, _REFERENCE + _PARTIAL)
-    return partial
-
-
-def _allow_removal(definitions: dict[str, Any]) -> None:
-    """Over a base, a null removes a signal or a replaced value."""
-    for name, key in (("Scenario", "signals"), ("KnowledgeSettings", "values")):
-        entries = definitions[_PARTIAL + name]["properties"][key]
-        names = entries.get("patternProperties", {})
-        for pattern, entry in names.items():
-            names[pattern] = {"anyOf": [entry, {"type": "null"}]}
-        if not names:
-            entries["additionalProperties"] = {"anyOf": [entries["additionalProperties"], {"type": "null"}]}
-
-
-def _allow_bases(definitions: dict[str, Any]) -> None:
-    """A scenario, a revision and a vehicle may name what they build on; the last two may be no more than their name."""
-    names = {"type": ["string", "number"]}
-    for key, model in (("revision", "Revision"), ("vehicle", "VehicleDescription")):
-        base = {**names, "description": f"Name or path of the {key} that this one differs from."}
-        over = {**definitions[_PARTIAL + model], "required": ["base"]}
-        over["properties"] = {"base": base, **over["properties"]}
-        definitions[f"{model}OverBase"] = over
-        forms = [names, {"$ref": f"{_REFERENCE}{model}OverBase"}, {"$ref": f"{_REFERENCE}{model}"}]
-        for scenario, extra in (("Scenario", []), ("PartialScenario", [{"$ref": f"{_REFERENCE}{_PARTIAL}{model}"}])):
-            properties = definitions[scenario]["properties"]
-            properties[key] = {"anyOf": [*forms, *extra], "description": properties[key]["description"]}
-    definitions["Scenario"]["required"].remove("vehicle")  # left out, it is the shipped one
-    definitions["Scenario"]["required"].remove("name")  # left out, it is the file's name
-    definitions["PartialScenario"]["properties"]["base"] = {
-        "type": "string",
-        "description": "Scenario that this one differs from.",
-    }
+    left_out = ("discriminator",) if keep else ("discriminator", "required")
+    names = {"oneOf": "anyOf"}
+    return {names.get(key, key): _partial(each, keep=keep) for key, each in schema.items() if key not in left_out}
 
 
 def field_docs(model: type[BaseModel]) -> dict[str, str]:
@@ -105,8 +75,8 @@ def field_docs(model: type[BaseModel]) -> dict[str, str]:
     for part in reversed(model.__mro__):
         if part is BaseModel or not issubclass(part, BaseModel):
             continue
-        definition = _classes(part.__module__)[part.__name__]
-        for field, text in zip(definition.body, definition.body[1:], strict=False):
+        body = _classes(part.__module__)[part.__name__].body
+        for field, text in pairwise(body):
             if (
                 isinstance(field, ast.AnnAssign)
                 and isinstance(field.target, ast.Name)

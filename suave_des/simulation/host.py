@@ -1,20 +1,22 @@
 """Hosts a managing subsystem in a mission: calls its hooks; an exception fails only its mission."""
 
-from collections.abc import Callable, Generator
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
-from math import inf, isnan
-from typing import Any, SupportsFloat, TypeVar
+from math import inf
+from typing import Any, TypeVar
 
 import simpy
 
 from suave_des.clock import Process, exactly_at, until
-from suave_des.domain import WATER_VISIBILITY, Task
-from suave_des.errors import InputError, MissionError, SuaveDesError, shown
-from suave_des.managing.base import AdaptationProcess, Dependencies, ManagedSystem, ManagingSubsystem
+from suave_des.domain import Task
+from suave_des.errors import InputError, SuaveDesError
+from suave_des.managing.base import AdaptationProcess, ManagingSubsystem, System
 from suave_des.metrics.result import MissionMetrics
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus
-from suave_des.registry import is_built_in
-from suave_des.simulation.remarks import remarks_at_end, remarks_at_start
+from suave_des.monitor.measurements import Measurements, Thresholds
+from suave_des.registry import checked_dependencies, checked_times
 
 RAISED = (Exception, SystemExit)
 """Exceptions of a manager: sys.exit must neither end a campaign, nor end a mission without an error."""
@@ -33,71 +35,50 @@ class ManagerHost:
     an earlier one changed nothing is left out.
 
     Attributes:
-        name: the manager's name, or module:Class.
-        manager_type: its class.
-        run: number of the run, for errors.
-        system: the manager's view of the managed subsystem.
+        manager_type: the manager's class.
+        system: what the manager sees and can do.
         bus: where the diagnostics come from that the manager subscribes to.
-        skips_idle_calls: whether calls are skipped at all.
+        error_of: makes the error that ends the mission from one that the manager raised.
+        learned, training: see `ManagingSubsystem.recall`.
 
     Raises:
         MissionError: the manager raised; here, or in any hook later.
         InputError: the manager cannot work with the mission's input.
     """
 
-    name: str
     manager_type: type[ManagingSubsystem]
-    run: int
-    system: ManagedSystem
+    system: System
     bus: DiagnosticsBus
-    skips_idle_calls: bool
+    error_of: Callable[[BaseException], SuaveDesError]
+    learned: Mapping[str, Any]
+    training: bool
     manager: ManagingSubsystem = field(init=False)
-    remarks: tuple[str, ...] = ()  # for its author
-    _is_waiting: bool = False  # for an event
-    _idle_regions: set[tuple[int, ...]] = field(default_factory=set)  # in which calls change nothing
+    _is_waiting: bool = field(default=False, init=False)  # for an event
+    _idle_regions: set[tuple[int, ...]] = field(default_factory=set, init=False)  # in which calls change nothing
+    _depends_on: list[tuple[Measurements, Thresholds]] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
-        manager_type = self.manager_type
+        self.system.state_changed = self.state_changed
+        kind, measurements = self.manager_type, self.system.measurements
         try:
-            self.manager = manager_type(self.system)
+            self.manager = kind(self.system)
             if not hasattr(self.manager, "system"):
-                raise TypeError(f"{manager_type.__name__}.__init__ does not begin with super().__init__(system)")
-            declared = self._declared() if "depends_on" in vars(manager_type) else None  # a derived class may add to it
+                raise TypeError(f"{kind.__name__}.__init__ does not begin with super().__init__(system)")
+            self.manager.recall(self.learned, self.training)
+            times = checked_times(self.manager)
+            declared = checked_dependencies(self.manager)
         except InputError:
             raise  # such as an unusable ontology, which concerns every mission
         except RAISED as error:
-            raise self.mission_error(error) from error
-        if not is_built_in(self.name):
-            self.remarks = remarks_at_start(self.manager, declared or ())
-        self._is_event_triggered = declared is not None and self.skips_idle_calls
-        thresholds = (declared or {}) if self._is_event_triggered else {}
-        measured = self.system.measurements
-        self._depends_on = [(measured[name], thresholds[name]) for name in measured if name in thresholds]
-        self._is_tabulated = all(each.is_tabulated for each, _ in self._depends_on)
-        if manager_type.diagnostic is not ManagingSubsystem.diagnostic:
+            raise self.error_of(error) from error
+        is_event_triggered = declared is not None and not self.system.recorded  # a recorded mission makes every call
+        if declared is not None and is_event_triggered:
+            self._depends_on = [(measurements[name], declared[name]) for name in measurements if name in declared]
+        self._are_known = all(each.are_known for each, _ in self._depends_on)
+        if kind.diagnostic is not ManagingSubsystem.diagnostic:
             self.bus.subscribe(self._diagnostic, self.manager.subscribes_to)
-        period_s = self.manager.period_s
-        if period_s is not None:
-            if not (isinstance(period_s, SupportsFloat) and period_s > 0.0):
-                raise self.mission_error(ValueError(f"period_s is {period_s!r}; it must be a number above 0, or None"))
-            if not isinstance(starts_s := self.manager.starts_s, SupportsFloat) or isnan(starts_s):
-                raise self.mission_error(ValueError(f"starts_s is {starts_s!r}; it must be a number"))
-            self._process = self.system.env.process(self._adapt_periodically(period_s))
-
-    def _declared(self) -> Dependencies | None:
-        """Read the manager's `depends_on`, for skipping calls, or to check it for its author."""
-        if not self.skips_idle_calls and is_built_in(self.name):
-            return None
-        declared = self.manager.depends_on
-        if declared is None:
-            return None
-        try:
-            return {name: tuple(sorted(map(float, each))) for name, each in declared.items()}
-        except (AttributeError, TypeError, ValueError):
-            problem = (
-                f"depends_on is {shown(declared)}; it must be like {{'{WATER_VISIBILITY}': (2.25, 3.25)}}, or None"
-            )
-            raise ValueError(problem) from None
+        if times is not None:
+            self._process = self.system.env.process(self._adapt_periodically(*times, is_event_triggered))
 
     def start(self) -> None:
         """Tell the manager that the mission begins."""
@@ -106,8 +87,6 @@ class ManagerHost:
     def end(self, metrics: MissionMetrics) -> None:
         """Tell the manager how the mission ended."""
         self._guarded(self.manager.mission_ended, metrics)
-        if not is_built_in(self.name):
-            self.remarks += remarks_at_end(self.system)
 
     def request(self, task: Task) -> None:
         """Pass a task that begins to the manager."""
@@ -127,33 +106,27 @@ class ManagerHost:
             self._is_waiting = False
             self._process.interrupt()
 
-    def mission_error(self, error: BaseException) -> SuaveDesError:
-        """Convert a manager's exception into the error that ends its mission."""
-        if isinstance(error, MissionError):
-            return error
-        cause = str(error) if isinstance(error, SuaveDesError) else f"{type(error).__name__}: {error}"
-        return MissionError(self.name, self.run, self.system.now_s, cause)
-
     def _diagnostic(self, diagnostic: Diagnostic) -> None:
         self._guarded(self.manager.diagnostic, diagnostic)
         self.state_changed()
 
-    def _adapt_periodically(self, period_s: float) -> Process:
+    def _adapt_periodically(self, period_s: float, starts_s: float, is_event_triggered: bool) -> Process:
         env, modes = self.system.env, self.system.modes
-        yield until(env, self.manager.starts_s)
+        yield until(env, starts_s)
         due_s = env.now
         while True:
             requests = modes.requests
             adaptation = self._guarded(self.manager.adapt)
             if adaptation is not None:
                 if not isinstance(adaptation, Generator):
-                    raise self.mission_error(TypeError(f"adapt returned {adaptation!r}; {_MAY_RETURN}"))
+                    raise self.error_of(TypeError(f"adapt returned {adaptation!r}; {_MAY_RETURN}"))
                 yield from self._guarded_process(adaptation)
             if adaptation is not None or modes.requests > requests:
                 self._idle_regions.clear()
-            while due_s <= env.now:
+            now_s = env.now
+            while due_s <= now_s:
                 due_s += period_s
-            if adaptation is None and self._is_event_triggered and period_s <= env.now:
+            if adaptation is None and is_event_triggered and period_s <= now_s:
                 due_s = yield from self._wait_for_event(due_s, period_s)
             else:
                 yield until(env, due_s)
@@ -188,7 +161,7 @@ class ManagerHost:
             if event_s == inf:
                 return inf
             tick_s = _tick_at_or_after(event_s, due_s, period_s)
-            if not self._is_tabulated or self._regions(tick_s) not in self._idle_regions:
+            if not self._are_known or self._regions(tick_s) not in self._idle_regions:
                 return tick_s
             due_s = tick_s + period_s
 
@@ -209,7 +182,7 @@ class ManagerHost:
             except StopIteration:
                 return
             except RAISED as error:
-                raise self.mission_error(error) from error
+                raise self.error_of(error) from error
             try:
                 outcome, resume = (yield event), adaptation.send
             except Exception as error:  # the event has failed, which `adapt` may handle
@@ -219,7 +192,7 @@ class ManagerHost:
         try:
             return hook(*arguments)
         except RAISED as error:
-            raise self.mission_error(error) from error
+            raise self.error_of(error) from error
 
 
 def _tick_at_or_after(t_s: float, due_s: float, period_s: float) -> float:

@@ -1,127 +1,256 @@
-"""One mission: scenario, manager, run and seed, wired into a SimPy environment."""
+"""One mission: vehicle, monitors, managed and managing subsystem, wired into a SimPy environment and advanced in it."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
+from math import inf, isnan
+from pathlib import Path
+from typing import ClassVar, Self, Unpack
 
 import simpy
 
 from suave_des import domain
-from suave_des.chance import Chance
 from suave_des.clock import advance, stop_at
 from suave_des.compiling import Array
-from suave_des.errors import MissionError, SuaveDesError
-from suave_des.managed.coordinator import MissionCoordinator, MissionTiming
-from suave_des.managed.custom import CustomFunction, FunctionContext, function_that_raised
+from suave_des.domain import BATTERY_LEVEL, WATER_VISIBILITY, Task
+from suave_des.draws import Draws
+from suave_des.errors import InputError, MissionError, SuaveDesError, did_you_mean, shown
+from suave_des.managed.coordinator import MissionCoordinator
+from suave_des.managed.destinations import GenerateRechargePath, Surface
 from suave_des.managed.detection import PipelineDetector
-from suave_des.managed.follow import NO_PATH, FollowPipeline, InspectionPath
+from suave_des.managed.follow import FollowPipeline
 from suave_des.managed.mode_manager import ModeManager
 from suave_des.managed.motion import MaintainMotion
-from suave_des.managed.node import FunctionNode
-from suave_des.managed.recharge import GenerateRechargePath
+from suave_des.managed.node import FunctionContext, FunctionNode, SetPointSender
 from suave_des.managed.search import GenerateSearchPath
-from suave_des.managed.surface import Surface
-from suave_des.managing.base import ManagedSystem, ManagingSubsystem
+from suave_des.managing.base import System
+from suave_des.managing.simple import NoManager
 from suave_des.metrics.further import FurtherMetrics
 from suave_des.metrics.reactions import ReactionMeter
 from suave_des.metrics.recording import Recorder
 from suave_des.metrics.result import MissionMetrics, MissionResult
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
-from suave_des.monitor.measurements import Measured
-from suave_des.monitor.monitors import (
-    battery_monitor,
-    detection_monitor,
-    leak_monitor,
-    signal_monitor,
-    state_monitor,
-    thruster_monitor,
-)
-from suave_des.registry import manager_class
-from suave_des.simulation.faults import ThrusterFaults, schedule
+from suave_des.monitor.measurements import Measurements, Timing, message_loss
+from suave_des.monitor.monitors import leak_monitor, measure_battery, measure_signals, start_monitors
+from suave_des.monitor.thrusters import Thrusters, draw_schedule, thruster_monitor
+from suave_des.registry import ManagerLike, cause_of, is_built_in, manager_class, name_of, refusals, remarks
+from suave_des.resources import DEFAULT_SCENARIO
+from suave_des.scenario.loader import Replacements, load_scenario
 from suave_des.simulation.host import RAISED, ManagerHost
-from suave_des.simulation.measuring import measure_battery, measure_signal, monitor_timing
-from suave_des.simulation.prepared import PreparedScenario
-from suave_des.simulation.vehicles import draw_start, make_vehicle
-from suave_des.vehicle.guidance import SetPointSender
+from suave_des.simulation.prepared import PreparedScenario, StartPlace
+from suave_des.vehicle.kernel import POSITION
+from suave_des.vehicle.model import Pose
+from suave_des.vehicle.vehicle import row_at
+
+CALLER = "caller"
+"""Name, in the metrics, of a managing subsystem that is the program which advances the mission."""
 
 
-@dataclass(frozen=True, slots=True)
-class RunSpec:
-    """The mission of a scenario to run; see `Simulator.start`."""
+class CallerManages(NoManager):
+    """Leaves adaptation to the caller; a task begins with the default modes of its functions."""
 
-    manager: str
-    run: int
-    seed: int
-    record: bool
-    manager_type: type[ManagingSubsystem] | None
+    subscribes_to: ClassVar[Collection[Kind]] = ()
 
 
-class MissionRun:
-    """The parts of one mission, made and connected.
+class Mission:
+    """One mission, advanced step by step, or at once by `result`.
+
+    Without a manager the caller is the managing subsystem: each task begins with the default modes of its functions,
+    and everything after that is up to `change_mode`. Missions that are advanced in other steps are the same missions:
+    only what is requested, and when, makes a difference.
+
+    Example:
+        >>> mission = Mission("seams2023", run=1, seed=8)
+        >>> while not mission.is_over:
+        ...     mission.advance(mission.now_s + 2.0)
+        ...     if mission.searches and mission.measured("water_visibility", 0.0) >= 3.25:
+        ...         mission.change_mode("f_generate_search_path", "fd_spiral_high")
+        >>> mission.metrics().search_time_s
+        61.0
 
     Args:
-        prepared: the scenario.
-        spec: the mission to run.
-        track: to be filled with the vehicle's states.
+        scenario: path of a scenario file, name of a shipped one, or a Simulator of a loaded one, which saves loading
+            it for each of many missions.
+        manager: name of a managing subsystem, module:Class, or a class, which the caller then watches; None: the
+            caller.
+        run: number of the run in a campaign with this seed.
+        seed: of everything that is random.
+        record: whether events and trajectory are kept, for `result`.
+        replacements: as of `load_scenario`, unless the scenario is a Simulator.
+
+    Attributes:
+        env: the mission's clock.
+        bus: the diagnostics.
+        mode_manager: takes requests for modes.
+        manager: the managing subsystem.
+        components: the last reported statuses of components, FALSE or RECOVERED.
+
+    Raises:
+        InputError: something given cannot be used.
+        MissionError: the manager raised.
     """
 
-    def __init__(self, prepared: PreparedScenario, spec: RunSpec, track: Array) -> None:
-        self._prepared, self._spec = prepared, spec
-        self._manager_type = spec.manager_type or manager_class(spec.manager)
-        self._scenario = scenario = prepared.loaded.scenario
-        self._revision = scenario.revision
-        self.track = track
-        self._chance = chance = Chance(prepared.distributions, spec.seed, spec.run, prepared.runs_per_draw)
-        self.env = simpy.Environment()
+    def __init__(
+        self,
+        scenario: str | Path | PreparedScenario = DEFAULT_SCENARIO,
+        manager: ManagerLike | None = None,
+        *,
+        run: int = 1,
+        seed: int = 1,
+        record: bool = False,
+        **replacements: Unpack[Replacements],
+    ) -> None:
+        for name, number in (("run", run), ("seed", seed)):
+            if isinstance(number, bool) or not isinstance(number, int) or number < 0:
+                raise InputError(f"{name}: {shown(number)} is not a number of a {name}", remedy="give a whole number")
+        if not isinstance(scenario, PreparedScenario):
+            scenario = PreparedScenario(load_scenario(scenario, **replacements))
+        self._prepared = prepared = scenario
+        self._scenario = described = prepared.loaded.scenario
+        self._manager_name = CALLER if manager is None else name_of(manager)
+        manager_type = CallerManages if manager is None else manager_class(self._manager_name)
+        self._run, self._seed = run, seed
+        self._result: MissionResult | None = None
+        revision, loaded = described.revision, prepared.loaded
+        self.env = env = simpy.Environment()
         self.bus = DiagnosticsBus()
-        self._recorder = Recorder(self.env, enabled=spec.record)
+        self._draws = draws = Draws(described, seed, run, prepared.runs_per_draw)
+        self._recorder = recorder = Recorder(env, record, described.reaction_metric)
 
-        # The vehicle.
-        self._start = draw_start(chance)
-        self._vehicle = make_vehicle(prepared, chance, self._start, track, reasons=self._manager_type.needs_knowledge)
-        self._faults = ThrusterFaults(scenario, chance, self._vehicle, self._recorder.log)
-
-        # Measurements.
-        described, tables = scenario.signals, prepared.loaded.tables
-        self._true_signals = {name: chance.signal(name, described[name], tables) for name in sorted(described)}
-        self._signals = {
-            name: measure_signal(scenario, chance, name, signal, prepared.duration_s)
-            for name, signal in self._true_signals.items()
-        }
-        self._battery = measure_battery(scenario, chance, self._vehicle)
-        self._measured: dict[str, Measured] = {**self._signals}
-        if self._battery is not None:
-            self._measured[self._battery.key] = self._battery
+        # The vehicle, and what is measured.
+        self._start = StartPlace.of(draws)
+        self._track = prepared.take_track()
+        self._vehicle = prepared.make_vehicle(draws, self._start, self._track, manager_type.needs_knowledge)
+        self._thrusters = Thrusters(env, self._vehicle, revision.thruster_failures, draws, recorder.log)
+        signals = {each.key: each for each in measure_signals(loaded, draws, prepared.duration_s)}
+        self._visibility = signals[WATER_VISIBILITY]
+        self._battery = measure_battery(described, draws, self._vehicle)
+        battery = {} if self._battery is None else {BATTERY_LEVEL: self._battery}
+        self._measurements: Mapping[str, Measurements] = {**signals, **battery}
 
         # The managed subsystem.
-        self._detector = self._make_detector()
-        self.modes = self._make_mode_manager(self._make_functions())
+        visible = self._visibility.arrays, prepared.detection_points, prepared.view_tangent
+        self._detector = PipelineDetector(env, self._vehicle, *visible, recorder.log)
+        mode_latency_s = draws.each_time("latencies.mode_change_s", described.latencies.mode_change_s)
+        self.mode_manager = ModeManager(env, loaded.modes, self._make_nodes(), mode_latency_s, recorder.log)
         self._coordinator = self._make_coordinator()
 
-        # Metrics and record.
-        self._reactions = self._make_reaction_meter()
-        self._further = self._make_further_metrics()
-        if spec.record:
-            self._record_changes()
+        # What is observed of it.
+        self._reactions = ReactionMeter(
+            env, described.reaction_metric, self._visibility, revision.spiral.initial_altitude_m, self._battery
+        )
+        self._further = FurtherMetrics(env, described, self._thrusters, self._measurements)
+        self._observe()
 
         # The managing subsystem.
-        self._host = self._make_host()
+        system = System(
+            env=env,
+            modes=self.mode_manager,
+            measurements=self._measurements,
+            scenario=described,
+            settings=loaded.manager_settings(self._manager_name),
+            _manager=self._manager_name,
+            _coordinator=self._coordinator,
+            _vehicle=self._vehicle,
+            _draws=draws,
+            _recorder=recorder,
+            _files={} if manager is None else prepared.manager_files(self._manager_name),
+            _open_knowledge=lambda: prepared.knowledge,
+        )
+        learned = prepared.learned(self._manager_name), prepared.training is not None
+        self._host = ManagerHost(manager_type, system, self.bus, self._error_of, *learned)
+        self.manager = self._host.manager
         self._start_processes()
 
-    @property
-    def manager(self) -> ManagingSubsystem:
-        """The managing subsystem."""
-        return self._host.manager
+    # Advancing.
+
+    def advance(self, until: float | None = None) -> None:
+        """Advance mission time.
+
+        Args:
+            until: mission time in s, which comes before whatever happens at that very time; None: the mission's end,
+                beyond which it does not go in any case.
+
+        Raises:
+            InputError: that time has already passed.
+            MissionError: the manager raised.
+        """
+        until_s = inf if until is None else float(until)
+        if isnan(until_s) or until_s < self.env.now:
+            problem = f"the mission cannot go to {until_s:g} s: it is at {self.now_s:g} s"
+            raise InputError(problem, remedy="give a later mission time")
+        if until_s == inf:
+            self.result()
+        elif until_s > self.env.now and not self.is_over:
+            self._guarded(advance, self.env, until_s)
+
+    def change_mode(self, function: str, mode: str) -> None:
+        """Request a mode of a function, which takes effect after the scenario's latency.
+
+        Raises:
+            InputError: there is no such function or mode, or the mission has a manager.
+        """
+        if self._manager_name != CALLER:
+            raise InputError("the mission has a manager, which changes modes", remedy="leave the manager out")
+        if not self.mode_manager.change_mode(function, mode):
+            self.check_mode(function, mode)
+
+    def check_mode(self, function: str, mode: str) -> None:
+        """Check that a mode can be requested.
+
+        Raises:
+            InputError: there is no such function or mode.
+        """
+        known = self.modes
+        if function not in known:
+            raise InputError(f"there is no function {shown(function)}", remedy=did_you_mean(function, known))
+        if mode not in known[function]:
+            remedy = did_you_mean(mode, known[function], "its modes")
+            raise InputError(f"function {function} has no mode {shown(mode)}", remedy=remedy)
+
+    def result(self) -> MissionResult:
+        """Run to the end, and return the metrics with the record, if one was kept."""
+        if self._result is None:
+            if not self.is_over:
+                self._guarded(self.env.run, self._coordinator.ended)
+            self._result = self._make_result()
+        return self._result
+
+    def close(self) -> None:
+        """Give the mission's memory back to its Simulator, for the next mission; this one cannot continue."""
+        self._prepared.give_back(self._track)
+
+    def __enter__(self) -> Self:
+        """Use the mission until the end of a `with` block."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close it."""
+        self.close()
+
+    # What can be seen.
 
     @property
-    def system(self) -> ManagedSystem:
-        """What the manager sees and can do."""
-        return self._host.system
+    def now_s(self) -> float:
+        """Mission time."""
+        return float(self.env.now)
 
     @property
-    def task(self) -> domain.Task | None:
-        """The current task."""
+    def is_over(self) -> bool:
+        """Whether the mission has ended."""
+        return self._coordinator.ended.triggered
+
+    @property
+    def task(self) -> Task | None:
+        """The current task, with the functions that it needs."""
         return self._coordinator.task
+
+    @property
+    def searches(self) -> bool:
+        """Whether the pipeline is searched for."""
+        return self.task is not None and self.task.name == "search_pipeline"
 
     @property
     def found_s(self) -> float | None:
@@ -129,53 +258,200 @@ class MissionRun:
         return self._coordinator.search_time_s
 
     @property
-    def is_over(self) -> bool:
-        """Whether the mission has ended."""
-        return self._coordinator.ended.triggered
+    def functions(self) -> tuple[str, ...]:
+        """The functions that are currently needed: those of the whole mission, and those of the task."""
+        return self._coordinator.functions
 
-    def advance(self, until_s: float) -> None:
-        """Advance to `until_s`, excluding events at that time, or to the mission's end.
+    @property
+    def modes(self) -> Mapping[str, tuple[str, ...]]:
+        """The modes of each function that can be requested."""
+        return {function: self.mode_manager.available_modes(function) for function in self.mode_manager.nodes}
 
-        Raises:
-            MissionError: the manager raised.
-        """
-        if until_s > self.env.now and not self.is_over:
-            self._guarded(advance, self.env, until_s)
+    def current_mode(self, function: str) -> str | None:
+        """Return the last requested mode of a function; None before the first request."""
+        return self.mode_manager.current_mode(function)
 
-    def result(self) -> MissionResult:
-        """Run to the end, and read the metrics."""
-        if not self.is_over:
-            self._guarded(self.env.run, self._coordinator.ended)
-        recorder, drawn, metrics = self._recorder, self._chance.drawn, self.metrics()
-        self._host.end(metrics)
-        measured = {} if self._battery is None else {self._battery.key: self._battery}
-        trajectory = recorder.trajectory(self._vehicle, self._signals[domain.WATER_VISIBILITY], measured)
-        events, knowledge = tuple(recorder.events), tuple(recorder.knowledge)
-        further = {} if self._further is None else self._further.columns(metrics)
-        remarks = self._host.remarks
-        return MissionResult(metrics, events, trajectory, knowledge, drawn, self.modes.refused, further, remarks)
+    @property
+    def attributes(self) -> tuple[str, ...]:
+        """Names of the quality attributes that are measured."""
+        return tuple(self._measurements)
+
+    def measured(self, attribute: str, default: float | None = None) -> float | None:
+        """Return the last published value of a quality attribute; `default` before the first."""
+        measurements = self._measurements.get(attribute)
+        value = None if measurements is None else measurements.value(self.env.now)
+        return default if value is None else value
+
+    @property
+    def pose(self) -> Pose:
+        """The vehicle's pose."""
+        return self._vehicle.pose(self.env.now)
+
+    def way_m(self) -> Array:
+        """Return the vehicle's positions so far, one each 0.05 s: x, y and z, shape (n, 3)."""
+        self._vehicle.position(self.env.now)
+        return self._vehicle.track[: row_at(self.env.now) + 1, POSITION].copy()
+
+    @property
+    def distance_inspected_m(self) -> float:
+        """The last published distance inspected."""
+        return self._coordinator.distance_inspected_m
 
     def metrics(self) -> MissionMetrics:
-        """Compute the metrics, as of now if the mission is not over."""
+        """Compute the metrics, a row of runs.csv; as of now while the mission is not over."""
         coordinator, detector = self._coordinator, self._detector
         found = coordinator.search_time_s is not None
         x_m, y_m = self._prepared.points[detector.first_point, :2].tolist() if found else (None, None)
         return MissionMetrics(
             scenario=self._scenario.name,
-            manager=self._spec.manager,
-            run=self._spec.run,
-            seed=self._spec.seed,
+            manager=self._manager_name,
+            run=self._run,
+            seed=self._seed,
             initial_x_m=self._start.position_m[0],
             initial_y_m=self._start.position_m[1],
             mission_duration_s=float(self.env.now),
             pipeline_found=found,
-            search_time_s=coordinator.search_time_or_limit_s(),
+            search_time_s=coordinator.search_time_or_limit_s,
             distance_inspected_m=coordinator.distance_inspected_m,
             mean_reaction_time_s=self._reactions.mean_s(),
-            adaptations=self.modes.adaptations,
+            adaptations=self.mode_manager.adaptations,
             detection_time_s=detector.detected_s if found else None,
             detection_x_m=x_m,
             detection_y_m=y_m,
+        )
+
+    # The parts.
+
+    def _make_nodes(self) -> dict[str, FunctionNode]:
+        """Make the functions' nodes: those of the exemplar, and those that the scenario names."""
+        env, described, draws = self.env, self._scenario, self._draws
+        revision, loss_probability = described.revision, draws.value("revision.set_points.loss_probability")
+
+        def sender(function: str) -> SetPointSender:
+            keys = [f"revision.set_points.node_frame_offset_{axis}_m" for axis in "xyz"]
+            x_m, y_m, z_m = (draws.value(f"{key}/{function}", draws.entry(key)) for key in keys)
+            stream = draws.stream(f"set_points/{function}") if loss_probability else None
+            return SetPointSender(self._vehicle, env, (x_m, y_m, z_m), loss_probability, stream)
+
+        def stream(function: str, name: str) -> random.Random:
+            return draws.stream(f"functions/{function}/{name}")
+
+        recovery_s = draws.each_time("revision.recovery.delay_s", revision.recovery.delay_s)
+        nodes: dict[str, FunctionNode] = {
+            domain.MAINTAIN_MOTION: MaintainMotion(env, self.bus, revision.recovery, self._thrusters, recovery_s),
+            domain.GENERATE_SEARCH_PATH: GenerateSearchPath(
+                env,
+                sender(domain.GENERATE_SEARCH_PATH),
+                revision.spiral,
+                self._start.origin_m,
+                self._prepared.view_tangent,
+                draws.phase(domain.GENERATE_SEARCH_PATH, revision.spiral.tick_period_s),
+                draws.value("latencies.search_start_s"),
+            ),
+        }
+        self._follow = FollowPipeline(
+            env, sender(domain.FOLLOW_PIPELINE), revision.follow, self._prepared.path, self._detector
+        )
+        nodes[domain.FOLLOW_PIPELINE] = self._follow
+        if (battery := described.battery) is not None:
+            station_m = battery.station_x_m, battery.station_y_m, domain.SEA_BED_Z_M + battery.approach_altitude_m
+            recharge = domain.GENERATE_RECHARGE_PATH
+            nodes[recharge] = GenerateRechargePath(env, sender(recharge), station_m, battery.resend_period_s)
+        self._surface = None if described.leak is None else Surface(env, sender(domain.SURFACE))
+        if self._surface is not None:
+            nodes[domain.SURFACE] = self._surface
+        for name, kind in self._prepared.custom_functions.items():
+            settings = described.functions.get(name)
+            context = FunctionContext(
+                name=name,
+                env=env,
+                settings=(settings.model_extra or {}) if settings is not None else {},
+                sender=sender(name),
+                bus=self.bus,
+                stream=partial(stream, name),
+                log=partial(self._recorder.log, name),
+            )
+            try:
+                nodes[name] = node = kind(context)
+                if not hasattr(node, "context"):
+                    raise TypeError(f"{kind.__name__}.__init__ does not begin with super().__init__(context)")
+            except RAISED as error:
+                raise self._error_of(error, name) from error
+        return nodes
+
+    def _make_coordinator(self) -> MissionCoordinator:
+        described, draws = self._scenario, self._draws
+        surfaced = None if self._surface is None else self._surface.surfaced
+        coordinator = MissionCoordinator(
+            self.env, described, draws, self._detector, self._follow, self._recorder.log, surfaced
+        )
+        level = None if described.battery is None else described.battery.mission_ends_at_level
+        if self._battery is not None and level is not None:
+            coordinator.end_at_battery_level(self._battery, level)
+        if described.leak is not None:
+            self.env.process(leak_monitor(self.env, self.bus, draws.value("leak.time_s"), coordinator.give_up))
+        return coordinator
+
+    def _observe(self) -> None:
+        """Have metrics and record told what they are made of."""
+        modes, bus = self.mode_manager, self.bus
+        self.components: dict[str, str] = {}
+        bus.subscribe(self._component_reported, (Kind.COMPONENT_STATUS,))
+        bus.subscribe(self._reactions.diagnostic, (Kind.COMPONENT_STATUS,))
+        modes.listeners.append(self._reactions.mode_effect)
+        if self._scenario.further_columns:
+            modes.listeners.append(self._further.mode_effect)
+            modes.adaptation_listeners.append(self._further.adapted)
+        if self._recorder.enabled:
+            bus.subscribe(self._recorder.diagnostic)
+            modes.listeners.append(self._recorder.mode_effect)
+
+    def _component_reported(self, diagnostic: Diagnostic) -> None:
+        self.components[diagnostic.key] = str(diagnostic.value)
+
+    def _start_processes(self) -> None:
+        """Start the coordinator, the monitors and the manager."""
+        scenario, draws, monitors = self._scenario, self._draws, self._scenario.revision.monitors
+        self._coordinator.start(self._host.request, self._host.cancel)
+        states: dict[tuple[Kind, str], Callable[[], Pose | float]] = {
+            (Kind.POSE, "pose"): lambda: self.pose,
+            (Kind.DISTANCE, "distance_inspected_m"): lambda: self._follow.distance_m,
+        }
+        start_monitors(self.env, self.bus, self._measurements.values(), states, self._detector.detected)
+        self.env.process(
+            thruster_monitor(
+                self._thrusters,
+                self.bus,
+                draw_schedule(scenario, draws),
+                Timing.of(scenario, draws, "thruster_monitor", monitors.thruster_check_period_s),
+                monitors.thruster_event_times == "after_previous",
+                message_loss("thruster_monitor", scenario.thruster_monitor, draws),
+            )
+        )
+        stop_at(self._coordinator.ended)
+        self._host.start()
+
+    # The end.
+
+    def _make_result(self) -> MissionResult:
+        metrics, recorder = self.metrics(), self._recorder
+        self._host.end(metrics)
+        further: dict[str, float | int | None] = {}
+        if self._scenario.further_columns:
+            self._further.reasoning_time_s = self.manager.reasoning_time_s
+            if self._surface is not None and self._surface.surfaced_s is not None:
+                self._further.surfacing_time_s = self._surface.surfaced_s - self._draws.drawn["leak.time_s"]
+            further = self._further.columns(metrics)
+        battery = {} if self._battery is None else {BATTERY_LEVEL: self._battery}
+        return MissionResult(
+            metrics,
+            tuple(recorder.events),
+            recorder.trajectory(self._vehicle, self._visibility, battery),
+            tuple(recorder.knowledge),
+            self._draws.drawn,
+            refusals(self.mode_manager),
+            further,
+            () if is_built_in(self._manager_name) else tuple(remarks(self.manager)),
         )
 
     def _guarded(self, run: Callable[..., object], *arguments: object) -> None:
@@ -184,185 +460,11 @@ class MissionRun:
         except SuaveDesError:
             raise
         except RAISED as error:  # in a user-defined function, or in a process that the manager started by itself
-            if (function := function_that_raised(error)) is not None:
-                raise self._function_error(function.context.name, error) from error
-            raise self._host.mission_error(error) from error
+            raise self._error_of(error) from error
 
-    def _function_error(self, name: str, error: BaseException) -> MissionError:
-        cause = f"function {name}: {type(error).__name__}: {error}"
-        return MissionError(self._spec.manager, self._spec.run, self.env.now, cause)
-
-    # The parts.
-
-    def _make_detector(self) -> PipelineDetector:
-        prepared, visibility = self._prepared, self._signals[domain.WATER_VISIBILITY].arrays
-        points, view_tangent, log = prepared.detection_points, prepared.view_tangent, self._recorder.log
-        return PipelineDetector(self.env, self._vehicle, visibility, points, view_tangent, log)
-
-    def _make_mode_manager(self, nodes: Mapping[str, FunctionNode]) -> ModeManager:
-        latency_s = self._chance.sampler("latencies.mode_change_s", self._scenario.latencies.mode_change_s)
-        return ModeManager(self.env, self._prepared.loaded.modes, nodes, latency_s, self._recorder.log)
-
-    def _make_functions(self) -> dict[str, FunctionNode]:
-        env, revision, chance = self.env, self._revision, self._chance
-        loss_probability = chance.value("revision.set_points.loss_probability")
-        follow, search, recharge = domain.FOLLOW_PIPELINE, domain.GENERATE_SEARCH_PATH, domain.GENERATE_RECHARGE_PATH
-        make_sender = partial(self._make_sender, loss_probability)
-        phase_s = chance.phase(search, revision.spiral.tick_period_s)
-        latency_s, view_tangent = chance.value("latencies.search_start_s"), self._prepared.view_tangent
-        recovery_s = chance.sampler("revision.recovery.delay_s", revision.recovery.delay_s)
-        self._follow = FollowPipeline(env, make_sender(follow), revision.follow, self._path)
-        nodes: dict[str, FunctionNode] = {
-            domain.MAINTAIN_MOTION: MaintainMotion(
-                env, self.bus, revision.recovery, self._faults.set_health, recovery_s, self._faults.unrecoverable
-            ),
-            search: GenerateSearchPath(
-                env, make_sender(search), revision.spiral, self._start.origin_m, view_tangent, phase_s, latency_s
-            ),
-            follow: self._follow,
-        }
-        if (battery := self._scenario.battery) is not None:
-            station_m = battery.station_x_m, battery.station_y_m, domain.SEA_BED_Z_M + battery.approach_altitude_m
-            nodes[recharge] = GenerateRechargePath(env, make_sender(recharge), station_m, battery.resend_period_s)
-        if self._scenario.leak is not None:
-            self._surface = Surface(env, make_sender(domain.SURFACE))
-            nodes[domain.SURFACE] = self._surface
-        for name, function_type in self._prepared.custom_functions.items():
-            nodes[name] = self._make_custom_function(function_type, self._function_context(name, make_sender(name)))
-        return nodes
-
-    def _make_custom_function(self, function_type: type[CustomFunction], context: FunctionContext) -> CustomFunction:
-        try:
-            node = function_type(context)
-            if not hasattr(node, "context"):
-                raise TypeError(f"{function_type.__name__}.__init__ does not begin with super().__init__(context)")
-        except RAISED as error:
-            raise self._function_error(context.name, error) from error
-        return node
-
-    def _function_context(self, name: str, sender: SetPointSender) -> FunctionContext:
-        settings = self._scenario.functions.get(name)
-        return FunctionContext(
-            name=name,
-            env=self.env,
-            settings=(settings.model_extra or {}) if settings is not None else {},
-            sender=sender,
-            bus=self.bus,
-            stream=lambda stream: self._chance.stream(f"functions/{name}/{stream}"),
-            log=partial(self._recorder.log, name),
-        )
-
-    def _make_sender(self, loss_probability: float, node: str) -> SetPointSender:
-        value, offset = self._chance.value, "revision.set_points.node_frame_offset_"
-        frame_error_m = value(f"{offset}x_m", node), value(f"{offset}y_m", node), value(f"{offset}z_m", node)
-        stream = self._chance.stream(f"set_points/{node}") if loss_probability else None
-        return SetPointSender(self._vehicle, lambda: self.env.now, frame_error_m, loss_probability, stream)
-
-    def _path(self) -> InspectionPath:
-        first = self._detector.first_point
-        return NO_PATH if first is None else self._prepared.path.from_point(first)
-
-    def _make_coordinator(self) -> MissionCoordinator:
-        settings, phase = self._revision.coordinator, self._chance.phase
-        timing = MissionTiming(
-            time_limit_s=self._scenario.mission.time_limit_s,
-            start_delay_s=self._chance.value("latencies.task_start_s"),
-            poll_phase_s=phase("coordinator", settings.poll_period_s),
-            limit_phase_s=phase("limit", settings.limit_check_period_s),
-        )
-        functions = self._scenario.mission.functions
-        coordinator = MissionCoordinator(
-            self.env, settings, timing, functions, self._detector, self._follow, self._recorder.log
-        )
-        battery = self._scenario.battery
-        if self._battery is not None and battery is not None and battery.mission_ends_at_level is not None:
-            coordinator.end_at_battery_level(self._battery, battery.mission_ends_at_level)
-        if self._scenario.leak is not None:
-            leak = coordinator.leak_handler(self._surface.surfaced)
-            self.env.process(leak_monitor(self.env, self.bus, self._chance.value("leak.time_s"), leak))
-        return coordinator
-
-    def _make_reaction_meter(self) -> ReactionMeter:
-        settings, altitude_m = self._scenario.reaction_metric, self._revision.spiral.initial_altitude_m
-        meter = ReactionMeter(self.env, settings, self._signals[domain.WATER_VISIBILITY], altitude_m, self._battery)
-        self.bus.subscribe(meter.diagnostic, (Kind.COMPONENT_STATUS,))
-        self.modes.listeners.append(meter.mode_effect)
-        return meter
-
-    def _make_further_metrics(self) -> FurtherMetrics | None:
-        if not self._scenario.further_columns:
-            return None
-        further = FurtherMetrics(self.env, self._scenario, self._vehicle, self._measured, self._battery)
-        self._faults.listeners.append(further.thrusters_changed)
-        self.modes.listeners.append(further.mode_effect)
-        self.modes.adaptation_listeners.append(further.adapted)
-        if self._scenario.leak is not None:
-            self.env.process(further.watch_surfacing(self._surface.surfaced, self._chance.value("leak.time_s")))
-        return further
-
-    def _record_changes(self) -> None:
-        metric = self._scenario.reaction_metric
-        self.bus.subscribe(self._recorder.diagnostic_of(metric.visibility_thresholds_m, metric.battery_limit))
-        self.modes.listeners.append(self._recorder.mode_effect)
-
-    def _make_host(self) -> ManagerHost:
-        spec, name = self._spec, self._spec.manager
-        system = ManagedSystem(
-            env=self.env,
-            scenario=self._scenario,
-            settings=self._prepared.loaded.manager_settings(name),
-            modes=self.modes,
-            lasting_functions=self._coordinator.lasting_functions,
-            stream=lambda stream: self._chance.stream(f"manager/{stream}"),
-            log=partial(self._recorder.log, name),
-            knowledge=lambda: self._prepared.knowledge,
-            record_state=self._recorder.record_state,
-            state_changed=lambda: self._host.state_changed(),
-            measurements=self._measured,
-            record_reasoning_time=(lambda duration_s: None) if self._further is None else self._further.reasoning_took,
-            recorded=spec.record,
-            pose=lambda: self._vehicle.pose(self.env.now),
-            distance_inspected_m=lambda: self._follow.distance_m,
-            true_signal=self._true_signals.__getitem__,
-            files={} if spec.manager_type else self._prepared.manager_files(name),
-            learned=self._prepared.learned(name),
-            training=self._prepared.training is not None,
-        )
-        return ManagerHost(name, self._manager_type, spec.run, system, self.bus, skips_idle_calls=not spec.record)
-
-    # The start.
-
-    def _start_processes(self) -> None:
-        """Start the coordinator, the monitors and the manager."""
-        self._coordinator.start(self._host.request, self._host.cancel)
-        self._start_monitors()
-        stop_at(self._coordinator.ended)
-        self._host.start()
-
-    def _start_monitors(self) -> None:
-        if self.bus.has_subscribers(Kind.QA_STATUS):  # for lookups, the measurements are enough
-            for measurements in self._signals.values():
-                self.env.process(signal_monitor(self.env, self.bus, measurements))
-            if self._battery is not None:
-                self.env.process(battery_monitor(self.env, self.bus, self._battery))
-        for kind, key, state in (
-            (Kind.POSE, "pose", lambda: self._vehicle.pose(self.env.now)),
-            (Kind.DISTANCE, "distance_inspected_m", lambda: self._follow.distance_m),
-        ):
-            if self.bus.has_subscribers(kind):
-                self.env.process(state_monitor(self.env, self.bus, kind, key, state))
-        if self.bus.has_subscribers(Kind.DETECTION):
-            self.env.process(detection_monitor(self.env, self.bus, self._detector.detected))
-        self._start_thruster_monitor()
-
-    def _start_thruster_monitor(self) -> None:
-        monitors, lost = self._revision.monitors, self._chance.loss("thruster_monitor", self._scenario.thruster_monitor)
-        timing = monitor_timing(self._scenario, self._chance, "thruster_monitor", monitors.thruster_check_period_s)
-        events = schedule(self._scenario, self._chance)
-        after_previous = monitors.thruster_event_times == "after_previous"
-
-        def publish(diagnostic: Diagnostic) -> None:
-            if lost is None or not lost(diagnostic.time_s):
-                self.bus.publish(diagnostic)
-
-        self.env.process(thruster_monitor(self.env, publish, events, self._faults.apply, timing, after_previous))
+    def _error_of(self, error: BaseException, function: str = "") -> SuaveDesError:
+        """Convert an exception in a user's code into the error that ends the mission."""
+        if isinstance(error, MissionError):
+            return error
+        cause = str(error) if isinstance(error, SuaveDesError) else cause_of(error, function)
+        return MissionError(self._manager_name, self._run, self.env.now, cause)

@@ -1,26 +1,52 @@
-"""The parts that all missions of one scenario share."""
+"""The parts that all missions of one scenario share, and the vehicle of each."""
+
+from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from functools import cached_property, lru_cache
+from math import cos, pi, sin
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from suave_des.chance import Distributions
 from suave_des.compiling import Array
+from suave_des.domain import SEA_BED_Z_M, SURFACE_Z_M
+from suave_des.draws import Draws
+from suave_des.learned import read_learned
 from suave_des.managed.follow import InspectionPath
-from suave_des.managing.learned import read_learned
-from suave_des.registry import manager_class
+from suave_des.registry import custom_functions, manager_class
 from suave_des.scenario.loader import LoadedScenario
-from suave_des.scenario.physical import VehicleDescription
-from suave_des.simulation.functions import custom_functions
-from suave_des.vehicle.model import Thruster, VehicleModel
-from suave_des.world.pipeline import sample_points, there_and_back
+from suave_des.scenario.models import Calibration
+from suave_des.scenario.physical import CurrentWaveDescription, VehicleDescription
+from suave_des.vehicle.kernel import COLUMNS
+from suave_des.vehicle.model import Autopilot, Pose, Thruster, VehicleModel
+from suave_des.vehicle.vehicle import STEP_S, Point, Vehicle, track_rows
+from suave_des.world.pipeline import sample_points
 
 if TYPE_CHECKING:  # owlready2 is loaded only when it is needed
-    from suave_des.knowledge.deliberation import Deliberation
+    from suave_des.knowledge.reasoner import Reasoner
+
+
+class StartPlace(NamedTuple):
+    """The place where a mission begins.
+
+    Attributes:
+        position_m: x and y of the vehicle, world frame.
+        origin_m: x and y of the origin of the search, world frame.
+    """
+
+    position_m: tuple[float, float]
+    origin_m: tuple[float, float]
+
+    @classmethod
+    def of(cls, draws: Draws) -> StartPlace:
+        """Draw it for a run, including the drift before the mission."""
+        value = draws.value
+        x_m, y_m = (value(f"start.{axis}_m") + value(f"calibration.drift_{axis}_m") for axis in "xy")
+        return cls((x_m, y_m), (x_m + value("calibration.origin_x_m"), y_m + value("calibration.origin_y_m")))
 
 
 class PreparedScenario:
@@ -32,23 +58,21 @@ class PreparedScenario:
         runs_per_draw: Mapping[str, int] = MappingProxyType({}),
         training: dict[str, dict[str, Any]] | None = None,
     ) -> None:
-        self.loaded, self.training = loaded, training
-        self.runs_per_draw = dict(runs_per_draw)
+        self.loaded, self.runs_per_draw, self.training = loaded, dict(runs_per_draw), training
         scenario = loaded.scenario
-        self.distributions = Distributions(scenario)
         self.points = sample_points(scenario.pipeline.vertices_m, scenario.pipeline.points_per_piece)
-        self.path = InspectionPath.along(there_and_back(self.points), scenario.revision.follow.altitude_m)
+        self.path = InspectionPath.there_and_back(self.points, scenario.revision.follow.altitude_m)
         self.detection_points = self.points + np.array([0.0, 0.0, scenario.revision.monitors.detected_point_height_m])
         self.duration_s = scenario.mission.time_limit_s + scenario.revision.coordinator.limit_check_period_s
         self.custom_functions = custom_functions(loaded)
-        self.vehicle_model = vehicle_model(scenario.vehicle)
+        self.vehicle_model, self.autopilot = vehicle_model(scenario.vehicle), autopilot_of(scenario.calibration)
         self.view_tangent = scenario.vehicle.camera.tangent
-        self.spare_tracks: list[Array] = []  # to allocate one for each mission would fragment memory
+        self._spare_tracks: list[Array] = []
         self._learned: dict[str, Mapping[str, Any]] = {}
         self._manager_files: dict[str, Mapping[str, Path]] = {}
 
     @cached_property
-    def knowledge(self) -> "Deliberation":
+    def knowledge(self) -> Reasoner:
         """The scenario's knowledge base with its reasoner, opened and checked on first use."""
         from suave_des.scenario_knowledge import open_knowledge
 
@@ -78,17 +102,65 @@ class PreparedScenario:
             self._manager_files[manager] = dict(self.loaded.declared_files(manager, manager_class(manager)))
         return self._manager_files[manager]
 
+    def make_vehicle(self, draws: Draws, start: StartPlace, track: Array, reasons: bool) -> Vehicle:
+        """Make the vehicle of one mission.
+
+        Args:
+            draws: of the run.
+            start: where it begins.
+            track: to be filled with the vehicle's states, a row for each time step.
+            reasons: whether a reasoner runs on the simulator's computer, and slows it down.
+        """
+        scenario, value = self.loaded.scenario, draws.value
+        loss = value("calibration.real_time_factor_loss")
+        if reasons:
+            loss += scenario.reasoning_share() * value("calibration.reasoning_slowdown")
+        current_m_per_s, wave = _draw_current(scenario.current.wave, draws)
+        return Vehicle(
+            self.vehicle_model,
+            self.autopilot,
+            Pose(*start.position_m, value("start.z_m"), 0.0, 0.0, value("start.heading_rad")),
+            self.duration_s,
+            altitude_error_m=value("calibration.altitude_error_m"),
+            current_m_per_s=current_m_per_s,
+            current_wave=wave,
+            time_scale=1.0 / (1.0 + loss),
+            z_limits_m=(SEA_BED_Z_M, SURFACE_Z_M),
+            memory=track,
+        )
+
+    def take_track(self) -> Array:
+        """Return memory for a vehicle's track; to allocate it for each mission would fragment memory."""
+        return self._spare_tracks.pop() if self._spare_tracks else np.empty((track_rows(self.duration_s), COLUMNS))
+
+    def give_back(self, track: Array) -> None:
+        """Keep the memory of a mission that is no longer needed for the next one."""
+        self._spare_tracks.append(track)
+
 
 @lru_cache(maxsize=64)
 def vehicle_model(description: VehicleDescription) -> VehicleModel:
-    """Return a vehicle's constants; equal descriptions give the same object, which is the key of cached matrices."""
+    """Return a vehicle's constants; equal descriptions give the same object, which is the key of cached results."""
+    values = {each.name: getattr(description, each.name) for each in fields(VehicleModel)}
     return VehicleModel(
-        mass_kg=description.mass_kg,
-        inertia_kg_m2=description.inertia_kg_m2,
-        displaced_volume_m3=description.displaced_volume_m3,
-        water_density_kg_per_m3=description.water_density_kg_per_m3,
-        centre_of_buoyancy_m=description.centre_of_buoyancy_m,
-        quadratic_drag=description.quadratic_drag,
-        thrust_limit_n=description.thrust_limit_n,
-        thrusters=tuple(Thruster(each.position_m, each.direction) for each in description.thrusters),
+        **values | {"thrusters": tuple(Thruster(t.position_m, t.direction) for t in values["thrusters"])}
     )
+
+
+def autopilot_of(calibration: Calibration) -> Autopilot:
+    """Return the autopilot's settings, those that are calibrated and the others."""
+    given = {name: getattr(calibration, name) for name in Autopilot._fields if name in Calibration.model_fields}
+    return Autopilot(**given)
+
+
+def _draw_current(wave: CurrentWaveDescription | None, draws: Draws) -> tuple[Point, tuple[float, float, float, float]]:
+    """Draw the current: its constant part, and the part that varies over time, as the vehicle needs it."""
+    value = draws.value
+    x, y, z = (value(f"current.{axis}_m_per_s") for axis in "xyz")
+    if wave is None:
+        return (x, y, z), (0.0, 0.0, 0.0, 0.0)
+    east, north = cos(direction_rad := value("current.wave.direction_rad")), sin(direction_rad)
+    mean, amplitude = value("current.wave.mean_m_per_s"), value("current.wave.amplitude_m_per_s")
+    rate = 2.0 * pi / wave.period_s
+    varying = amplitude * east, amplitude * north, rate * STEP_S, rate * value("current.wave.shift_s")
+    return (x + mean * east, y + mean * north, z), varying

@@ -1,12 +1,16 @@
-"""Constants of a vehicle, and how its thrusters make a generalised force.
+"""Constants of a vehicle and its autopilot, its pose, and how its thrusters make a generalised force.
 
 Body frame: x forward, y left, z up, origin at the centre of mass. Generalised force tau = (X, Y, Z, K, M, N) in N and N
 m, generalised velocity nu = (u, v, w, p, q, r) in m/s and rad/s (Fossen, Handbook of Marine Craft Hydrodynamics and
 Motion Control, section 2.1; the axes here follow the exemplar, z up, and so do the signs).
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
-from functools import cache
+from functools import cached_property, lru_cache
+from math import asin, atan2, cos, sin, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +18,34 @@ from numpy.typing import ArrayLike
 from suave_des.compiling import Array
 
 GRAVITY_M_PER_S2 = 9.80665
+
+
+class Pose(NamedTuple):
+    """eta in the world frame: position in m, attitude as Euler angles in rad (order z, y, x; Handbook, 2.2.1)."""
+
+    x_m: float
+    y_m: float
+    z_m: float
+    roll_rad: float
+    pitch_rad: float
+    yaw_rad: float
+
+
+def quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> tuple[float, float, float, float]:
+    """Convert Euler angles to a unit quaternion (w, x, y, z) (Handbook, 2.2.3)."""
+    cr, cp, cy = cos(roll_rad / 2), cos(pitch_rad / 2), cos(yaw_rad / 2)
+    sr, sp, sy = sin(roll_rad / 2), sin(pitch_rad / 2), sin(yaw_rad / 2)
+    w, x = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
+    return w, x, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
+
+
+def euler_angles(attitude: Array) -> tuple[float, float, float]:
+    """Convert a unit quaternion (w, x, y, z), shape (4,), to roll, pitch and yaw in rad (Handbook, 2.2.3)."""
+    w, x, y, z = attitude.tolist()
+    roll = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    pitch = asin(min(1.0, max(-1.0, 2.0 * (w * y - z * x))))
+    yaw = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return roll, pitch, yaw
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +56,7 @@ class Thruster:
     direction: tuple[float, float, float]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class VehicleModel:
     """A rigid body with thrusters in water; compared by identity, which makes cached results quick to look up.
 
@@ -54,25 +86,72 @@ class VehicleModel:
         """Weight of the body."""
         return self.mass_kg * GRAVITY_M_PER_S2
 
+    @cached_property
+    def wrenches(self) -> Array:
+        """B in tau = B u, shape (6, number of thrusters); column i: thruster i's wrench at 1 N (Handbook, 12.3)."""
+        wrenches = [(*each.direction, *np.cross(each.position_m, each.direction)) for each in self.thrusters]
+        return _read_only(np.array(wrenches).T)
 
-@cache
-def allocation_matrix(model: VehicleModel) -> Array:
-    """Compute B in tau = B u, shape (6, number of thrusters); column i: thruster i's wrench at 1 N (Handbook, 12.3)."""
-    wrenches = [(*each.direction, *np.cross(each.position_m, each.direction)) for each in model.thrusters]
-    return _read_only(np.array(wrenches).T)
+    @cached_property
+    def allocation(self) -> Array:
+        """B's pseudo-inverse, shape (number of thrusters, 6), by which the autopilot spreads a demanded wrench.
+
+        It allocates as if every thruster worked; a wrench that no thruster can make (pitch, on a BlueROV2) gets none.
+        """
+        return _read_only(np.linalg.pinv(self.wrenches, rcond=1e-9))
 
 
-@cache
-def autopilot_allocation(model: VehicleModel) -> Array:
-    """Compute B's pseudo-inverse, shape (number of thrusters, 6), by which an autopilot spreads a demanded wrench.
+class Autopilot(NamedTuple):
+    """The guided controller of ArduSub: legs from set-point to set-point, and loops that follow the target on them.
 
-    The autopilot allocates as if every thruster worked; a wrench that no thruster can make (pitch, on a BlueROV2) gets
-    none.
+    A new set-point is the end of a leg; a target moves along it, from rest to rest with a limited jerk. Position errors
+    to the target demand a velocity, velocity errors a force (ArduPilot, AC_WPNav, SCurve and AC_PosControl). Its limits
+    of a leg's speed and acceleration are left out: only legs of more than 30 m, or 2 m up or down, would reach them.
+
+    Attributes:
+        position_gain_per_s: horizontal velocity demanded for each metre of position error; ArduSub's default is 1.0.
+        jerk_m_per_s3: of a leg. ArduSub's default is 1.0 with gradual changes of jerk; a constant 0.5 takes about as
+            long on legs of 0.3 m.
+        velocity_gain_per_s: horizontal acceleration demanded for each m/s of velocity error.
+        velocity_integral_gain_per_s2: horizontal acceleration demanded for each metre of integrated velocity error.
+        heading_frequency_rad_per_s: natural frequency of heading control, critically damped.
+        heading_integral_gain_per_s3: angular acceleration demanded for each rad s of integrated heading error.
+        vertical_position_gain_per_s: as the horizontal one; ArduSub's default is 3.0.
+        vertical_velocity_gain_per_s, vertical_velocity_integral_gain_per_s2: as the horizontal ones.
+        roll_frequency_rad_per_s: natural frequency of roll control; missions are not sensitive to it.
     """
-    return _read_only(np.linalg.pinv(allocation_matrix(model), rcond=1e-9))
+
+    position_gain_per_s: float = 1.0
+    jerk_m_per_s3: float = 0.5
+    velocity_gain_per_s: float = 4.0
+    velocity_integral_gain_per_s2: float = 1.2
+    heading_frequency_rad_per_s: float = 4.5
+    heading_integral_gain_per_s3: float = 0.0
+    vertical_position_gain_per_s: float = 3.0
+    vertical_velocity_gain_per_s: float = 4.0
+    vertical_velocity_integral_gain_per_s2: float = 1.0
+    roll_frequency_rad_per_s: float = 3.0
+
+
+@lru_cache(maxsize=64)
+def kernel_parameters(model: VehicleModel, autopilot: Autopilot, z_limits_m: tuple[float, float]) -> Array:
+    """Put the constants of vehicle and autopilot into the places that `kernel` names, in water at rest."""
+    ap = autopilot
+    # The integral is limited to the force that the four horizontal thrusters together give along one axis.
+    integral_limit = 4.0 * model.thrust_limit_n * sqrt(0.5) / model.mass_kg
+    forces = model.buoyancy_n - model.weight_n, model.buoyancy_n * model.centre_of_buoyancy_m, *model.quadratic_drag
+    legs = model.thrust_limit_n, ap.position_gain_per_s, ap.vertical_position_gain_per_s, ap.jerk_m_per_s3
+    horizontal = ap.velocity_gain_per_s, ap.velocity_integral_gain_per_s2
+    vertical = ap.vertical_velocity_gain_per_s, ap.vertical_velocity_integral_gain_per_s2
+    roll, heading = ap.roll_frequency_rad_per_s, ap.heading_frequency_rad_per_s
+    attitude = roll * roll, 2.0 * roll, heading * heading, 2.0 * heading
+    turning = ap.heading_integral_gain_per_s3, 4.0 * heading * heading
+    body = model.mass_kg, *model.inertia_kg_m2, *forces
+    loops = *horizontal, *vertical, integral_limit, *attitude, *turning
+    return _read_only((*body, *legs, *loops, *[0.0] * 3, *z_limits_m, *[0.0] * 4))
 
 
 def _read_only(values: ArrayLike) -> Array:
-    matrix: Array = np.ascontiguousarray(values)
+    matrix: Array = np.ascontiguousarray(values, dtype=np.float64)
     matrix.flags.writeable = False
     return matrix

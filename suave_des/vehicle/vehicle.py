@@ -10,12 +10,14 @@ import numpy as np
 
 from suave_des.compiling import Array
 from suave_des.vehicle import kernel
-from suave_des.vehicle.autopilot import Autopilot, kernel_parameters
-from suave_des.vehicle.frames import Pose, euler_angles, quaternion
-from suave_des.vehicle.model import VehicleModel, allocation_matrix, autopilot_allocation
+from suave_des.vehicle.model import Autopilot, Pose, VehicleModel, euler_angles, kernel_parameters, quaternion
 
 STEP_S = 0.05
 Point = tuple[float, float, float]
+ControlListener = Callable[[int, "ArrivalCheck | None"], None]
+"""Called after a change of control with the first row that it affects; and with the arrival check of the way-points
+that were sent or cancelled, unless something else has changed control.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,28 +66,6 @@ class _Queue(NamedTuple):
         return bisect_right(self.ticks, self.check.last_tick_until(t_s))
 
 
-class CurrentWave(NamedTuple):
-    """The part of the water's velocity that varies over time: amplitude sin(2 pi (t + shift) / period).
-
-    Attributes:
-        amplitude_m_per_s: east and north.
-        period_s: time from one maximum of the velocity to the next.
-        shift_s: added to mission time.
-    """
-
-    amplitude_m_per_s: tuple[float, float] = (0.0, 0.0)
-    period_s: float = math.inf
-    shift_s: float = 0.0
-
-    def parameters(self) -> tuple[float, float, float, float]:
-        """Return what `kernel.advance` needs: east and north, angle per row of the track, and angle at row 0."""
-        rate = 2.0 * math.pi / self.period_s
-        return *self.amplitude_m_per_s, rate * STEP_S, rate * self.shift_s
-
-
-STEADY = CurrentWave()
-
-
 @dataclass(eq=False)
 class Vehicle:
     """The vehicle of one mission.
@@ -100,13 +80,14 @@ class Vehicle:
         autopilot: the guided controller.
         start: pose at t = 0, at rest; the autopilot's first set-point is this place with heading 0.
         duration_s: length of the mission; nothing can be read beyond it.
-        altitude_error_m: steady error: the autopilot holds its altitude set-point plus this.
+        altitude_error_m: how far above its set-point the autopilot holds the vehicle (seen in the real runs).
         current_m_per_s: velocity of the water, world frame.
-        current_wave: its part that varies over time.
+        current_wave: amplitude of a part that varies as a sine, east and north, m/s; and the sine's angle per row of
+            the track and at row 0, rad.
         time_scale: simulated seconds that pass in a second of mission time (the simulator's real-time factor).
         z_limits_m: sea bed and surface, which stop the vehicle.
         memory: where to keep the track, instead of memory of its own; see `track_rows`.
-        control_listeners: each is called after a change of control, with the first row that it affects.
+        control_listeners: each is called after a change of control.
         computed_row: last row of the track that is filled.
 
     Example:
@@ -122,11 +103,11 @@ class Vehicle:
     _: KW_ONLY
     altitude_error_m: float = 0.0
     current_m_per_s: Point = (0.0, 0.0, 0.0)
-    current_wave: CurrentWave = STEADY
+    current_wave: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     time_scale: float = 1.0
     z_limits_m: tuple[float, float] = (-math.inf, math.inf)
     memory: InitVar[Array | None] = None
-    control_listeners: list[Callable[[int], None]] = field(default_factory=list, init=False)
+    control_listeners: list[ControlListener] = field(default_factory=list, init=False)
     computed_row: int = field(default=0, init=False)
     _queue: _Queue | None = field(default=None, init=False)
 
@@ -138,13 +119,13 @@ class Vehicle:
         self.track[0, kernel.POSITION] = self.track[0, kernel.LEG_START] = self.track[0, kernel.LEG_END] = start[:3]
         self.track[0, kernel.ATTITUDE] = quaternion(*start[3:])
         self._health = np.array([1.0] * len(model.thrusters))
-        self._effectiveness = allocation_matrix(model).copy()
+        self._effectiveness = model.wrenches.copy()
         self._set_point = np.array([*start[:3], 1.0, 0.0, 0.0])  # heading 0, number 0
         parameters = kernel_parameters(model, self.autopilot, self.z_limits_m).copy()
         parameters[kernel.CURRENT : kernel.FLOOR] = self.current_m_per_s
-        parameters[kernel.WAVE_X :] = self.current_wave.parameters()
-        step_s, allocation = STEP_S * self.time_scale, autopilot_allocation(model)
-        self._dynamics = step_s, self._set_point, parameters, allocation, self._effectiveness
+        parameters[kernel.WAVE_X :] = self.current_wave
+        step_s = STEP_S * self.time_scale
+        self._dynamics = step_s, self._set_point, parameters, model.allocation, self._effectiveness
 
     def command(self, t_s: float, x_m: float, y_m: float, z_m: float) -> None:
         """Give the autopilot a new position set-point, which replaces the previous one."""
@@ -158,7 +139,7 @@ class Vehicle:
         if self._health[thruster - 1] != health:
             self._cancel_after(t_s)
             self._health[thruster - 1] = health
-            self._effectiveness[:] = allocation_matrix(self.model) * self._health
+            self._effectiveness[:] = self.model.wrenches * self._health
             self._notify(t_s)
 
     @property
@@ -204,7 +185,7 @@ class Vehicle:
         if is_queued:
             self._queue = _Queue(check, arrivals[: count - 1], before, waypoints, sent_as_m)
         if is_queued or send:
-            self._notify(t_s)
+            self._notify(t_s, check)
         if reached == count:
             return arrivals, arrivals[-1]
         return arrivals, arrivals[-1] + check.resend_ticks if arrivals else last
@@ -213,7 +194,7 @@ class Vehicle:
         """Cancel the set-points after time t that were queued with a check, if any remain."""
         if self._queue is not None and self._queue.check is check:
             self._cancel_after(t_s)
-            self._notify(t_s)
+            self._notify(t_s, check)
 
     def position(self, t_s: float) -> Point:
         """Read the position at time t: x, y, z in m."""
@@ -223,10 +204,6 @@ class Vehicle:
     def pose(self, t_s: float) -> Pose:
         """Read the pose eta at time t."""
         return Pose(*self.position(t_s), *euler_angles(self.track[self._row(t_s), kernel.ATTITUDE]))
-
-    def nu(self, t_s: float) -> tuple[float, ...]:
-        """Read the velocity nu at time t: body frame, six components in m/s and rad/s."""
-        return tuple(self.track[self._row(t_s), kernel.VELOCITY].tolist())
 
     def look_ahead(self, row: int) -> None:
         """Fill the track up to a row as it will be if control does not change.
@@ -261,10 +238,10 @@ class Vehicle:
             if sent := queue.sent_until(t_s):
                 self._replace_set_point(queue.waypoints, sent, queue.sent_as_m, new=sent)
 
-    def _notify(self, t_s: float) -> None:
+    def _notify(self, t_s: float, check: ArrivalCheck | None = None) -> None:
         row = row_at(t_s)
         for listener in self.control_listeners:
-            listener(row)
+            listener(row, check)
 
 
 def track_rows(duration_s: float) -> int:

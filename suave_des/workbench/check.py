@@ -8,17 +8,23 @@ from itertools import islice
 from typing import Final
 
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.knowledge.checks.findings import Finding, Level, finding_from, has_level, ordered
-from suave_des.knowledge.checks.static import Subject, static_findings
+from suave_des.findings import Finding, Level, has_level, ordered
+from suave_des.knowledge.checks import Subject, static_findings
+from suave_des.knowledge.checks.model import check_revision, rules_of_2023
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import collect
-from suave_des.knowledge.pellet.limit import ReasonerTimeoutError, TimeLimit
-from suave_des.knowledge.reasoners import make_reasoner
-from suave_des.knowledge.regions import regions_of
+from suave_des.knowledge.pellet import ReasonerTimeoutError, TimeLimit
+from suave_des.knowledge.reasoner import Reasoner, regions_of
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
-from suave_des.workbench.policy.space import component_statuses, has_effect, interchangeable_components
-from suave_des.workbench.ranges import numbers_in, ranges_between
+from suave_des.monitor.diagnostics import RECOVERED
 from suave_des.workbench.shapes import check_shapes
+from suave_des.workbench.space import (
+    component_statuses,
+    has_effect,
+    interchangeable_components,
+    numbers_in,
+    ranges_between,
+)
 
 __all__ = ["MAX_STATES", "Subject", "check", "combined", "simple_states"]
 
@@ -38,10 +44,8 @@ def check(subject: Subject) -> tuple[Finding, ...]:
         InputError: a file cannot be read at all.
     """
     sources = collect(subject.given)
-    static = static_findings(subject, sources)
-    findings = [*static.findings, *check_shapes(sources, subject.shapes, static.assumed)]
-    findings += _ask_pellet(subject, findings)
-    return ordered(findings)
+    findings = [*static_findings(subject, sources), *check_shapes(sources, subject.shapes)]
+    return ordered([*findings, *_ask_pellet(subject, findings)])
 
 
 def _ask_pellet(subject: Subject, before: Sequence[Finding]) -> Iterator[Finding]:
@@ -57,25 +61,29 @@ def _ask_pellet(subject: Subject, before: Sequence[Finding]) -> Iterator[Finding
         )
     except KnowledgeError as error:
         message = "contradictions were not checked with Pellet: first correct the errors that prevent loading"
-        yield Finding(Level.INFO, message) if is_wrong else finding_from(error)
+        yield Finding(Level.INFO, message) if is_wrong else Finding.of(error)
+        return
+    try:
+        check_revision(base, subject.measured or (), subject.revision)
+    except KnowledgeError:  # it is among the findings, and contradictions follow from it
         return
     for reason in regions_of(base).reasons:
         yield Finding(Level.INFO, f"inferences are cached for equal measured values only, which is slower: {reason}")
     try:
         # What is in its cache has been asked with this very knowledge base, without a contradiction or a dropped rule.
-        pellet = make_reasoner("cached", base, TimeLimit(subject.time_limit_s, "--time-limit"))
+        pellet = Reasoner(base, "cached", TimeLimit(subject.time_limit_s, "--time-limit"))
         states = tuple(islice(simple_states(base, subject.measured), MAX_STATES)) or (KnowledgeState(),)
         try:
-            for state in combined(states):
-                pellet.infer(state)
+            for state in combined(states, apart=bool(rules_of_2023(base.content))):
+                pellet.analyze(state)
         except ReasonerTimeoutError:
             raise
         except KnowledgeError:
             for state in states:  # the first that contradicts itself is the easiest to understand
-                pellet.infer(state)
+                pellet.analyze(state)
             raise  # only a combination does
     except InputError as error:
-        found = finding_from(error)
+        found = Finding.of(error)
         if found.rule not in {one.rule for one in before if one.rule and one.level is Level.ERROR}:
             yield found
         else:
@@ -85,16 +93,26 @@ def _ask_pellet(subject: Subject, before: Sequence[Finding]) -> Iterator[Finding
             yield Finding(Level.INFO, message)
 
 
-def combined(states: Sequence[KnowledgeState]) -> tuple[KnowledgeState, ...]:
+def combined(states: Sequence[KnowledgeState], *, apart: bool = False) -> tuple[KnowledgeState, ...]:
     """Combine states that do not exclude one another: 45 instead of 186 for the shipped ontologies.
 
     A contradiction occurs in every state that contains it: Pellet's reasoning is monotonic.
+
+    Args:
+        states: the states.
+        apart: whether recovered components are left in states of their own, because the rules of 2023 contradict any
+            other problem then.
     """
     joined: list[tuple[dict[str, str], dict[str, str], dict[str, Decimal]]] = []
     for state in states:
         groundings, components, measurements = dict(state.groundings), dict(state.components), dict(state.measurements)
         for designs, reports, values in joined:
-            if _agree(designs, groundings) and _agree(reports, components) and _agree(values, measurements):
+            if (
+                not (apart and RECOVERED in {*components.values(), *reports.values()})
+                and _agree(designs, groundings)
+                and _agree(reports, components)
+                and _agree(values, measurements)
+            ):
                 designs.update(groundings)
                 reports.update(components)
                 values.update(measurements)

@@ -5,63 +5,56 @@ Campaigns and statistics are imported when missions are compared: a knowledge ba
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import rdflib
 from rdflib.term import Node
 
 from suave_des.errors import InputError, number_of
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import RDF_TYPE, Lit, Triple, fact_of, is_fact, local_name, term_of
-from suave_des.knowledge.rules.writer import literal_text
-from suave_des.workbench.policy.cases import Policy, PolicyCase, no_proof
-from suave_des.workbench.ranges import ValueRange
+from suave_des.knowledge.pellet import TimeLimit
+from suave_des.knowledge.rdf import RDF_TYPE, SWRL, Lit, Triple, fact_of, is_fact, local_name, term_of
+from suave_des.knowledge.reasoner import regions_of
+from suave_des.knowledge.rules import literal_text
+from suave_des.records.metrics import DISTANCE, SEARCH_TIME
+from suave_des.scenario.loader import Replacements, load_scenario
+from suave_des.scenario_knowledge import open_base
+from suave_des.workbench.policy import Policy, PolicyCase, no_proof
+from suave_des.workbench.situations import Difference, Probes, Situation, compare
+from suave_des.workbench.space import ValueRange
 
 if TYPE_CHECKING:
     import pandas
 
     from suave_des.campaign.progress import OnProgress
-    from suave_des.estimates import Interval
-    from suave_des.scenario.loader import Replacements
+    from suave_des.estimates import Estimate
 
-#: Metrics of missions that are compared, with words for it.
-METRICS: Final = {"search_time_s": "search time, s", "distance_inspected_m": "distance, m"}
+#: Metrics of missions that are always compared; others are where they differ.
+METRICS: Final = (SEARCH_TIME, DISTANCE)
 _MANAGER: Final = "metacontrol"
+_PLACES: Final = ("initial_", "detection_")
 
 
-@dataclass(frozen=True)
-class AxiomDifference:
-    """Axioms and rules that only one of two knowledge bases has, as text.
-
-    Attributes:
-        removed: that only the first has.
-        added: that only the second has.
-    """
+class AxiomDifference(NamedTuple):
+    """Axioms and rules that only the first of two knowledge bases has, and those that only the second has, as text."""
 
     removed: tuple[str, ...]
     added: tuple[str, ...]
 
-    def lines(self) -> Iterator[str]:
-        """The difference as `kb diff` prints it; nothing where there is none."""
-        if not self.removed and not self.added:
-            return
-        yield f"axioms and rules: {len(self.removed)} removed, {len(self.added)} added"
-        yield from (f"  - {text}" for text in self.removed)
-        yield from (f"  + {text}" for text in self.added)
-
 
 def compare_axioms(one: Ontology, other: Ontology) -> AxiomDifference:
     """Compare the axioms, facts and rules of two knowledge bases; labels and comments do not count."""
-    before, after = frozenset(axioms_of(one)), frozenset(axioms_of(other))
+    before, after = frozenset(_axioms(one)), frozenset(_axioms(other))
     return AxiomDifference(tuple(sorted(before - after)), tuple(sorted(after - before)))
 
 
-def axioms_of(base: Ontology) -> Iterator[str]:
-    """Write every axiom, fact and rule as text."""
+def _axioms(base: Ontology) -> Iterator[str]:
+    """Write every axiom, fact and rule as text; what a rule consists of is no axiom of its own."""
     for triple in (*base.content.triples, *base.model.triples()):
-        yield _triple(base, triple)
+        if not str(triple[2]).startswith(SWRL):
+            yield _triple(base, triple)
     yield from _structure(base)
     for rule in base.rules:
         yield f"rule {rule.name}: {rule.text}" + ("" if rule.enabled else " (switched off)")
@@ -102,19 +95,6 @@ def _structure(base: Ontology) -> Iterator[str]:
 
 
 @dataclass(frozen=True)
-class CasePair:
-    """One kind of state, as both knowledge bases decide it."""
-
-    one: PolicyCase
-    other: PolicyCase
-
-    @property
-    def functions(self) -> tuple[str, ...]:
-        """Functions whose grounding is decided differently."""
-        return tuple(name for name in self.one.asked if self.one.outcome(name) != self.other.outcome(name))
-
-
-@dataclass(frozen=True)
 class PolicyDifference:
     """The difference between two policies.
 
@@ -122,28 +102,25 @@ class PolicyDifference:
         compared: number of states that both have.
         differing: kinds of states that they decide differently.
         reported: kinds in which they decide alike, but infer different statuses.
-        only_one: function designs that only the first has; likewise only_other.
-        without_designs: (A or B, function) for each function that has designs in the other one only.
+        ranges: of each attribute, ascending.
         computing: rules that compute with numbers; if there are any, the ranges are samples and prove nothing.
     """
 
     compared: int
-    differing: tuple[CasePair, ...] = field(repr=False)
-    reported: tuple[CasePair, ...] = field(repr=False)
-    only_one: tuple[str, ...]
-    only_other: tuple[str, ...]
-    without_designs: tuple[tuple[str, str], ...]
+    differing: tuple[Difference[PolicyCase], ...] = field(repr=False)
+    reported: tuple[Difference[PolicyCase], ...] = field(repr=False)
+    ranges: dict[str, tuple[ValueRange, ...]] = field(repr=False)
     computing: tuple[str, ...]
 
     @property
     def states(self) -> int:
         """Number of states that are decided differently."""
-        return sum(pair.one.reports.combinations for pair in self.differing)
+        return sum(each.situation.reports.combinations for each in self.differing)
 
     @property
     def states_reported(self) -> int:
         """Number of states in which only statuses differ."""
-        return sum(pair.one.reports.combinations for pair in self.reported)
+        return sum(each.situation.reports.combinations for each in self.reported)
 
     def lines(self) -> Iterator[str]:
         """The difference as `kb diff` prints it."""
@@ -153,135 +130,124 @@ class PolicyDifference:
             yield f"{self.states_reported} more have other statuses, but the same decisions"
         if self.computing:
             yield no_proof(self.computing)
-        for which, designs in (("A", self.only_one), ("B", self.only_other)):
-            if designs:
-                yield f"only {which} has {', '.join(designs)}"
-        for which, function in self.without_designs:
-            yield f"{function} has no design in {which}"
-        groups: dict[str, list[CasePair]] = {}
-        for pair in self.differing:
-            for name in pair.functions or pair.one.asked:
-                before, after = (case.outcome_text(name) for case in (pair.one, pair.other))
-                groups.setdefault(f"{name}, now {pair.one.present(name)}: A {before}, B {after}", []).append(pair)
-        for heading, pairs in groups.items():
+        groups: dict[str, list[PolicyCase]] = {}
+        for each in self.differing:
+            case = each.situation
+            for name in each.functions or case.asked:
+                heading = f"{name}, now {case.present(name)}: A {each.one.choice(name)}, B {each.other.choice(name)}"
+                groups.setdefault(heading, []).append(case)
+        for heading, cases in groups.items():
             yield heading
-            for ranges, states in _joined(pairs):
-                yield f"  {'; '.join(map(str, ranges))}: {number_of(states, 'state')}"
-            yield f"  for instance {pairs[0].one.state}"
+            for ranges, states in _joined(cases, list(self.ranges.values())):
+                names = [f"{name} " if len(self.ranges) > 1 else "" for name in self.ranges]
+                words = [f"{name}{text}" for name, text in zip(names, ranges, strict=True) if text]
+                yield f"  {'; '.join(words) or 'whatever is measured'}: {number_of(states, 'state')}"
+            yield f"  for instance {cases[0].state}"
 
 
 def compare_policies(one: Policy, other: Policy) -> PolicyDifference:
     """Compare two policies over the same space."""
-    there = {(case.ranges, case.state, case.asked): case for case in other.cases}
-    pairs = [
-        CasePair(case, there[case.ranges, case.state, case.asked])
-        for case in one.cases
-        if (case.ranges, case.state, case.asked) in there
-    ]
-    designs = [{design for case in policy.cases for _, design in case.state.groundings} for policy in (one, other)]
-    differing: list[CasePair] = []
-    alike: list[CasePair] = []
-    for pair in pairs:
-        (differing if pair.functions or pair.one.marks != pair.other.marks else alike).append(pair)
+
+    def key(case: PolicyCase) -> Hashable:
+        return case.ranges, case.state, case.asked
+
+    there = {key(case): case for case in other.cases}
+    common = [case for case in one.cases if key(case) in there]
+    found = list(compare(lambda case: case.decided, lambda case: there[key(case)].decided, common))
     return PolicyDifference(
-        compared=sum(pair.one.reports.combinations for pair in pairs),
-        differing=tuple(differing),
-        reported=tuple(pair for pair in alike if pair.one.statuses != pair.other.statuses),
-        only_one=tuple(sorted(designs[0] - designs[1])),
-        only_other=tuple(sorted(designs[1] - designs[0])),
-        without_designs=tuple(
-            (which, function)
-            for which, policy in (("A", one), ("B", other))
-            for function in policy.functions
-            if not any(function in dict(case.state.groundings) for case in policy.cases)
-        ),
+        compared=sum(case.reports.combinations for case in common),
+        differing=tuple(each for each in found if each.is_decided),
+        reported=tuple(each for each in found if not each.is_decided and each.one.statuses != each.other.statuses),
+        ranges=dict(one.ranges),
         computing=tuple(sorted({*one.computing, *other.computing})),
     )
 
 
-def _joined(pairs: Sequence[CasePair]) -> list[tuple[tuple[ValueRange, ...], int]]:
-    """Ranges of measured values with the number of states; neighbouring ranges of a single attribute are joined."""
-    counts: dict[tuple[ValueRange, ...], int] = {}
-    for pair in pairs:
-        counts[pair.one.ranges] = counts.get(pair.one.ranges, 0) + pair.one.reports.combinations
-    joined: list[tuple[tuple[ValueRange, ...], int]] = []
-    for ranges, states in counts.items():
-        last = joined[-1][0] if joined else ()
-        if len(ranges) == len(last) == 1 and last[0].high == ranges[0].low is not None:
-            joined[-1] = (last[0].joined(ranges[0]),), joined[-1][1] + states
-        else:
-            joined.append((ranges, states))
-    return joined
+def _joined(
+    cases: Sequence[PolicyCase], ranges: Sequence[Sequence[ValueRange]]
+) -> Iterator[tuple[tuple[str, ...], int]]:
+    """Join neighbouring ranges of measured values, with their number of states; a text is empty for any value."""
+    counts: dict[tuple[tuple[int, int], ...], int] = {}
+    for case in cases:
+        places = (known.index(one) for known, one in zip(ranges, case.ranges, strict=True))
+        at = tuple((place, place) for place in places)
+        counts[at] = counts.get(at, 0) + case.reports.combinations
+    for place in reversed(range(len(ranges))):
+        joined: dict[tuple[tuple[int, int], ...], int] = {}
+        ends: dict[Hashable, tuple[tuple[int, int], ...]] = {}
+        for at, states in sorted(counts.items(), key=lambda entry: entry[0][place]):
+            others = at[:place], at[place + 1 :]
+            last = ends.get(others)
+            if last is not None and last[place][1] + 1 == at[place][0]:
+                states += joined.pop(last)
+                at = (*at[:place], (last[place][0], at[place][1]), *at[place + 1 :])
+            joined[at] = states
+            ends[others] = at
+        counts = joined
+    for at, states in sorted(counts.items()):
+        yield tuple(_span(known, *span) for known, span in zip(ranges, at, strict=True)), states
 
 
-@dataclass(frozen=True)
-class PairedDifference:
+def _span(ranges: Sequence[ValueRange], first: int, last: int) -> str:
+    """Words for neighbouring ranges; "not measured" is the first of all, and joins no number."""
+    if (first, last) == (0, len(ranges) - 1):
+        return ""
+    if first == 0 and last > 0:
+        return f"{ranges[0]} or {_span(ranges, 1, last)}"
+    return str(ranges[first] if first == last else ranges[first].joined(ranges[last]))
+
+
+class PairedDifference(NamedTuple):
     """One metric of the same missions under two knowledge bases.
 
     Attributes:
         metric: column of runs.csv.
         one, other: means.
-        difference: mean of other - one, run by run.
-        interval: its 95% interval (Student's t); None where no mission differs, or there is one.
+        difference: mean of other - one, run by run, with its 95% interval (Student's t).
         changed: number of missions in which the metric differs.
+        extremes: (run, value with one, value with the other) of the largest changes each way.
     """
 
     metric: str
     one: float
     other: float
-    difference: float
-    interval: Interval | None
+    difference: Estimate
     changed: int
+    extremes: tuple[tuple[int, float, float], ...]
 
 
-@dataclass(frozen=True)
-class MissionDifference:
+class MissionDifference(NamedTuple):
     """Missions under two knowledge bases, with common random numbers.
 
     Attributes:
         missions: number of pairs.
         changed: run numbers of the missions in which any column of runs.csv differs.
-        metrics: what differs on average.
-        extremes: (run, metric, value with one, value with the other): the largest change each way of each metric.
+        metrics: search time, distance, and what else differs.
     """
 
     missions: int
     changed: tuple[int, ...]
     metrics: tuple[PairedDifference, ...]
-    extremes: tuple[tuple[int, str, float, float], ...]
-
-    def lines(self) -> Iterator[str]:
-        """Which missions change most, as `kb diff` prints it below its table."""
-        for run, metric, before, after in self.extremes:
-            name, _, unit = METRICS[metric].partition(", ")
-            yield f"  run {run}: {name} {before:.1f} {unit} -> {after:.1f} {unit}"
-
-
-@dataclass(frozen=True)
-class MissionsToCompare:
-    """Which missions to run.
-
-    Attributes:
-        scenario: name or path.
-        runs: number of missions with each knowledge base.
-        seed: of everything that is random.
-        workers: processes.
-    """
-
-    scenario: str
-    runs: int
-    seed: int = 1
-    workers: int = 1
 
 
 def compare_missions(
-    missions: MissionsToCompare, one: Replacements, other: Replacements, on_progress: OnProgress | None = None
+    scenario: str,
+    runs: int,
+    one: Replacements,
+    other: Replacements,
+    *,
+    seed: int = 1,
+    workers: int = 1,
+    on_progress: OnProgress | None = None,
 ) -> MissionDifference:
     """Run the same missions with two knowledge bases, and compare them pair by pair.
 
     Args:
-        missions: which.
+        scenario: name or path.
+        runs: number of missions with each knowledge base.
         one, other: ontologies, rules and values of the scenario, as load_scenario takes them.
+        seed: of everything that is random.
+        workers: processes.
         on_progress: called when missions are done.
 
     Raises:
@@ -291,50 +257,68 @@ def compare_missions(
 
     frames = []
     for replacements in (one, other):
-        result = run_campaign(
-            missions.scenario,
-            [_MANAGER],
-            missions.runs,
-            missions.seed,
-            missions.workers,
-            on_progress=on_progress,
-            **replacements,
-        )
+        result = run_campaign(scenario, [_MANAGER], runs, seed, workers, on_progress=on_progress, **replacements)
         frames.append(result.frame().set_index("run"))
     before, after = frames
-    runs = before.index.intersection(after.index)
-    if len(runs) < missions.runs:
-        raise InputError(
-            f"{missions.runs - len(runs)} of {missions.runs} missions failed",
-            remedy="suave-des campaign with the same files says why",
-        )
-    return _compared(before.loc[runs], after.loc[runs])
+    common = before.index.intersection(after.index)
+    if len(common) < runs:
+        remedy = "suave-des campaign with the same files says why"
+        raise InputError(f"{runs - len(common)} of {runs} missions failed", remedy=remedy)
+    return paired(before.loc[common], after.loc[common])
 
 
-def _compared(before: pandas.DataFrame, after: pandas.DataFrame) -> MissionDifference:
-    from suave_des.report.statistics import mean_interval
+def firing_states(
+    scenario: str, runs: int, one: Replacements, other: Replacements, *, seed: int, limit: TimeLimit
+) -> tuple[int, int]:
+    """Count the states of missions with one knowledge base in which a rule fires that only one of the two has.
 
-    differs = (before.ne(after) & ~(before.isna() & after.isna())).any(axis=1)
+    Args:
+        scenario, runs, one, other, seed: as of compare_missions.
+        limit: of Pellet's time for one state.
+
+    Returns:
+        how many states, and of how many.
+    """
+    from suave_des.campaign.single import run_mission
+
+    loaded = [load_scenario(scenario, **replacements) for replacements in (one, other)]
+    bases = list(map(open_base, loaded))
+    texts = [{rule.text for rule in base.content.enabled_rules} for base in bases]
+    changed = [
+        rule.body for base in bases for rule in base.content.enabled_rules if not all(rule.text in t for t in texts)
+    ]
+    probes = Probes(bases[1], limit, changed)
+    regions = regions_of(bases[1])
+    fires: dict[Hashable, bool] = {}
+    states = 0
+    firing = 0
+    for run in range(1, runs + 1):
+        for record in run_mission(loaded[0], _MANAGER, run, seed).knowledge:
+            key = regions.key(record.state)
+            if key not in fires:
+                fires[key] = bool(probes.holding(Situation(record.state)))
+            states += 1
+            firing += fires[key]
+    return firing, states
+
+
+def paired(before: pandas.DataFrame, after: pandas.DataFrame) -> MissionDifference:
+    """Compare rows of runs.csv with the same run numbers, which are their index."""
+    from numpy import isnan, nan
+
+    from suave_des.results.statistics import mean_interval
+
+    differs = before.ne(after) & ~(before.isna() & after.isna())
+    others = [str(name) for name in before.select_dtypes("number") if differs[name].any()]
     metrics = []
-    extremes: dict[tuple[int, str], tuple[int, str, float, float]] = {}
-    for name in METRICS:
+    for name in dict.fromkeys((*METRICS, *(each for each in others if not each.startswith(_PLACES)))):
         x, y = before[name].to_numpy(float), after[name].to_numpy(float)
+        known = ~(isnan(x) | isnan(y))
+        runs, x, y = before.index.to_numpy()[known], x[known], y[known]
         change = y - x
-        estimated = mean_interval(change)
-        metrics.append(
-            PairedDifference(
-                name,
-                float(x.mean()),
-                float(y.mean()),
-                estimated.value,
-                estimated.interval,
-                int((change != 0.0).sum()),
-            )
-        )
-        for place in (int(change.argmin()), int(change.argmax())):
-            if change[place]:
-                run = int(before.index[place])
-                extremes[run, name] = (run, name, float(x[place]), float(y[place]))
-    return MissionDifference(
-        len(before), tuple(int(run) for run in before.index[differs]), tuple(metrics), tuple(extremes.values())
-    )
+        places = {int(change.argmin()), int(change.argmax())} if len(change) else ()
+        extremes = tuple((int(runs[at]), float(x[at]), float(y[at])) for at in sorted(places) if change[at])
+        means = (float(x.mean()), float(y.mean())) if len(change) else (nan, nan)
+        changed = int(differs[name].sum())
+        metrics.append(PairedDifference(name, *means, mean_interval(change), changed, extremes))
+    return MissionDifference(len(before), tuple(int(run) for run in before.index[differs.any(axis=1)]), tuple(metrics))

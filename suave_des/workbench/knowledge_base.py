@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from suave_des.knowledge.deliberation import Conclusion, Deliberation
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet.limit import TIME_LIMIT_S, TimeLimit
-from suave_des.knowledge.reasoners import make_reasoner
-from suave_des.knowledge.state import KnowledgeState, Number
+from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
+from suave_des.knowledge.pellet.in_process import InProcessPellet
+from suave_des.knowledge.rdf import Triple
+from suave_des.knowledge.reasoner import Reasoner
+from suave_des.knowledge.state import ContradictionError, KnowledgeState, Number, Reasoning
 from suave_des.resources import DEFAULT_SCENARIO
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario_knowledge import open_base
 from suave_des.workbench.difference import PolicyDifference, compare_policies
-from suave_des.workbench.policy.cases import OnCount, Policy, make_policy
-from suave_des.workbench.policy.space import PolicySpace
+from suave_des.workbench.explain import Explanation, explain
+from suave_des.workbench.policy import OnCount, Policy, make_policy
 from suave_des.workbench.query import QueryResult, answer, graph_of
-from suave_des.workbench.reasons.explain import Explanation, explain
-from suave_des.workbench.state_input import ManagingSettings, StateBuilder
+from suave_des.workbench.situations import Outcome, Situation
+from suave_des.workbench.space import PolicySpace
+from suave_des.workbench.states import ManagingSettings, StateBuilder
+from suave_des.workbench.tracing import pellet_for
 
 
 def _several(given: str | Path | Sequence[str | Path]) -> Sequence[str | Path]:
@@ -94,25 +98,59 @@ class KnowledgeBase:
     def of(cls, base: Ontology, settings: ManagingSettings, reasoner: str, limit: TimeLimit) -> KnowledgeBase:
         """Start a reasoner on ontologies that are loaded already."""
         made = cls(base, settings, reasoner, limit)
-        _ = made._deliberation  # what cannot be reasoned with is reported here
+        _ = made._reasoner  # what cannot be reasoned with is reported here
         return made
 
-    @cached_property
-    def _deliberation(self) -> Deliberation:
-        return Deliberation(self.base, make_reasoner(self.reasoner, self.base, self.limit))
-
-    @cached_property
-    def _with_all_terms(self) -> Deliberation:
-        terms = self.base.content.all_terms()
-        return Deliberation(self.base, make_reasoner(self.reasoner, self.base, self.limit, terms))
-
-    def decide(self, state: KnowledgeState) -> Conclusion:
-        """Decide as a mission does: infer the terms on which decisions depend and those that rules assert, and plan.
+    def changed(self, base: Ontology) -> KnowledgeBase:
+        """Return the same with ontologies or rules changed in this process: the cache on disk knows files only.
 
         Raises:
-            KnowledgeError: the state contradicts the ontologies, or the reasoner takes too long.
+            KnowledgeError: Pellet cannot use them.
         """
-        return self._deliberation.analyze_and_plan(state, improve_exceeded=self.settings.improves_exceeded)
+        return KnowledgeBase.of(base, self.settings, "pellet", self.limit)
+
+    def without(self, rules: Iterable[str]) -> KnowledgeBase:
+        """Return the same without some rules."""
+        names = frozenset(rules)
+        if names not in self._without:
+            self._without[names] = self.changed(self.base.with_rules(r for r in self.base.rules if r.name not in names))
+        return self._without[names]
+
+    @cached_property
+    def _without(self) -> dict[frozenset[str], KnowledgeBase]:
+        return {}
+
+    @cached_property
+    def _reasoner(self) -> Reasoner:
+        return Reasoner(self.base, self.reasoner, self.limit)
+
+    @cached_property
+    def _with_all_terms(self) -> Reasoner:
+        return Reasoner(self.base, self.reasoner, self.limit, self.base.content.all_terms())
+
+    @cached_property
+    def _tracing_pellet(self) -> InProcessPellet:
+        return pellet_for(self.base)
+
+    def decide(self, state: KnowledgeState, facts: tuple[Triple, ...] = ()) -> Reasoning:
+        """Decide as a mission does: infer the terms on which decisions depend and those that rules assert, and plan.
+
+        Args:
+            state: the state.
+            facts: further assertions.
+
+        Raises:
+            KnowledgeError: the state contradicts the ontologies, planning needs what they do not say, or the reasoner
+                takes too long.
+        """
+        return self._reasoner.analyze_and_plan(state, facts, improve_exceeded=self.settings.improves_exceeded)
+
+    def outcome(self, situation: Situation) -> Outcome:
+        """Decide as `decide` does, in a situation that may contradict itself."""
+        try:
+            return Outcome(self.decide(situation.state, situation.facts))
+        except ContradictionError as error:
+            return Outcome(None, error.problem.removeprefix("contradiction: "))
 
     def state(
         self,
@@ -153,7 +191,7 @@ class KnowledgeBase:
                 builder.add(kind, name, value)
         return builder.state()
 
-    def infer(self, state: KnowledgeState) -> Conclusion:
+    def infer(self, state: KnowledgeState) -> Reasoning:
         """Infer all that follows in a state, from rules and axioms, and plan on it.
 
         Raises:
@@ -173,42 +211,73 @@ class KnowledgeBase:
             InputError: the question is none of these, or names what the knowledge base does not have.
             KnowledgeError: the reasoner takes too long.
         """
-        doing = f"explaining the state {state}"
+        reasoning: Reasoning | ContradictionError
+        try:
+            reasoning = self.infer(state)
+        except ContradictionError as error:
+            reasoning = error
         return self.limit.run(
-            lambda: explain(self.base, state, question, self.settings.improves_exceeded), doing, self.base.rules
+            lambda: explain(self.base, state, question, reasoning, self._tracing_pellet),
+            f"explaining the state {state}",
+            self.base.rules,
         )
 
-    def policy(self, max_failed: int = 2, on_count: OnCount = lambda done, total: None) -> Policy:
+    def policy(
+        self,
+        max_failed: int = 2,
+        on_count: OnCount = lambda done, total: None,
+        on_start: OnCount = lambda kinds, different: None,
+        space: PolicySpace | None = None,
+    ) -> Policy:
         """Decide every state, with at most `max_failed` components that report a status.
 
-        `on_count` is called repeatedly with the number of kinds of states decided so far, and their total.
+        Args:
+            max_failed: that many components at most.
+            on_count: called with the number of kinds of states that have been inferred so far, and how many have to be.
+            on_start: called before any is, with the number of kinds of states, and how many of them have to be
+                inferred.
+            space: what to tell apart; None: what can have an effect.
 
         Raises:
             InputError: there would be too many states.
             KnowledgeError: the reasoner takes too long for one of them.
         """
-        return make_policy(self.base, self.settings, self.decide, max_failed, on_count=on_count)
+        return make_policy(self.base, self.settings, self.outcome, max_failed, space, on_count, on_start)
+
+    @cached_property
+    def space(self) -> PolicySpace:
+        """What its policy tells apart."""
+        return PolicySpace.of(self.base, self.settings)
 
     def diff(
-        self, other: KnowledgeBase, max_failed: int = 2, on_count: OnCount = lambda done, total: None
+        self,
+        other: KnowledgeBase,
+        max_failed: int = 2,
+        on_count: OnCount = lambda done, total: None,
+        on_start: OnCount = lambda kinds, different: None,
     ) -> PolicyDifference:
         """Find the states that another knowledge base decides differently, over all states that either distinguishes.
 
+        `on_count` is called as by `policy`, for this one and then for the other; `on_start` for this one.
+
         Raises:
             InputError: there would be too many states.
             KnowledgeError: the reasoner takes too long for one of them.
         """
-        space = PolicySpace.of(self.base, self.settings).common(PolicySpace.of(other.base, other.settings))
-        return compare_policies(
-            make_policy(self.base, self.settings, self.decide, max_failed, space, on_count),
-            make_policy(other.base, other.settings, other.decide, max_failed, space, on_count),
-        )
+        space = self.space.common(other.space)
+        one = self.policy(max_failed, on_count, on_start, space)
+        # Java has Python search for cycles while it infers: without the first policy's cases that takes half the time.
+        gc.freeze()
+        try:
+            return compare_policies(one, other.policy(max_failed, on_count, space=space))
+        finally:
+            gc.unfreeze()
 
     def query(self, text: str, state: KnowledgeState | None = None, *, inferred: bool = False) -> QueryResult:
         """Answer a query in SPARQL.
 
         Args:
-            text: the query; see suave_des.workbench.query.answer.
+            text: the query; see `suave_des.kb.query.answer`.
             state: adds what it asserts; None: the ontologies alone.
             inferred: adds what Pellet infers.
 

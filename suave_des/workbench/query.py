@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Final
 
 import rdflib
@@ -15,16 +14,11 @@ from rdflib.namespace import RDFS
 from suave_des.errors import InputError, nearest
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import InProcessPellet
-from suave_des.knowledge.rdf import Triple, n_triple
-from suave_des.knowledge.rules.parser import PREFIXES
+from suave_des.knowledge.rdf import PREFIXES, Triple, n_triple
 from suave_des.knowledge.state import KnowledgeState
 
 _UNNAMED: Final = re.compile(r"(?<![^\s])_:([A-Za-z0-9]+)(?=\s)")
 _MODEL_NAME: Final = re.compile(r"\b(?:suave|tomasys|mros):\w(?:[\w.-]*\w)?")
-#: SELECT * as the first SELECT.
-_ALL_VARIABLES: Final = re.compile(
-    r"\A(?:(?!\bselect\b).)*select(\s+(distinct|reduced))?\s*\*", re.IGNORECASE | re.DOTALL
-)
 _PREFIXES: Final = {name: PREFIXES[name] for name in ("suave", "tomasys", "mros", "rdf", "rdfs", "owl", "xsd", "swrl")}
 
 
@@ -110,8 +104,8 @@ def answer(graph: rdflib.Graph, text: str) -> QueryResult:
             return QueryResult(("answer",), ((str(result.askAnswer).lower(),),), unknown)
         if result.type == "SELECT":
             columns = list(map(str, result.vars or ()))
-            if _ALL_VARIABLES.search(text):  # which rdflib returns in any order
-                columns.sort(key=partial(_first_place, text))
+            if "*" in text.partition("{")[0]:  # all variables, which rdflib returns in any order
+                columns.sort()
             rows = [tuple(_text(graph, row[name]) for name in columns) for row in result]  # type: ignore
             ordered = "OrderBy" in str(query.algebra)
             return QueryResult(tuple(columns), tuple(rows if ordered else sorted(rows, key=_sortable)), unknown)
@@ -129,12 +123,6 @@ def _unknown(graph: rdflib.Graph, text: str) -> Iterator[str]:
     for name in sorted({*_MODEL_NAME.findall(text)} - known):
         near = nearest(name, known)
         yield f"{name} ({near})" if near else name
-
-
-def _first_place(text: str, variable: str) -> int:
-    """Find where a query first mentions a variable; one that it writes with escapes comes last."""
-    found = re.search(rf"[?$]{re.escape(variable)}(?!\w)", text)
-    return len(text) if found is None else found.start()
 
 
 def _sortable(row: tuple[str | None, ...]) -> tuple[str, ...]:

@@ -1,199 +1,81 @@
-"""Edit the rules of an OWL file in place: every byte outside of the edited rule stays as it is.
+"""Edit the rules of an OWL file in place: what is not edited stays as it is, to the byte.
 
-lxml finds the rules in the file and builds the elements of a new one. It cannot write the file back: its serializer
-normalises the line ends, the layout of tags, and the quotes of attributes. So expat gives the byte offsets of the
-elements under the root, and the bytes are cut and joined there. Before the result replaces the file it is read back,
-and must contain the intended change and no other.
+The elements of a new rule go before the end of the file, and declare all that they need themselves. expat gives the
+places of elements in the file, so that those of a rule can be changed or cut out. Before the result replaces the file
+it is read back, and must have the intended rules, and no other change.
 """
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
-import tempfile
-from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+import stat
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 from xml.parsers import expat
+from xml.sax.saxutils import escape, quoteattr
 
 from lxml import etree
 from rdflib import BNode, Literal, URIRef
-from rdflib.namespace import OWL, RDF
+from rdflib.namespace import RDF
 from rdflib.term import Node
 
 from suave_des.errors import InputError, KnowledgeError, nearest
+from suave_des.files import write_files
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, read_ontology
 from suave_des.knowledge.rdf import RDF as RDF_NS
 from suave_des.knowledge.rdf import RDFS, SWRL, SWRLA, XSD, RdfTriple, local_name
-from suave_des.knowledge.rules.files import read_rule
-from suave_des.knowledge.rules.parser import PREFIXES
-from suave_des.knowledge.rules.rdf import ENABLED, rules_of
-from suave_des.knowledge.rules.syntax import Rule
+from suave_des.knowledge.rules import Rule
+from suave_des.knowledge.rules.files import ENABLED, rules_of
+from suave_des.workbench.states import read_rules
 
-#: Stands for the file of a rule that was given on the command line.
-_GIVEN: Final = Path("the rule")
-_INDENT: Final = "    "
 _TAG: Final = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
 _MARK: Final = re.compile(rb"(<[\w.-]*:?isRuleEnabled\b[^>]*>)[^<]*(?=</)")
-_NAMESPACES: Final = {name: PREFIXES[name] for name in ("rdf", "rdfs", "owl", "swrl", "swrla")}
-#: In these encodings, markup and references to characters are written in the bytes of ASCII.
-_ENCODINGS: Final = ("UTF-8", "US-ASCII", "ASCII", "ISO-8859-1")
-#: What a file says of a rule: its name, whether it is enabled, its body and head.
-_Statement = tuple[str, bool, tuple[Any, Any]]
+_PREFIXES: Final = {"rdf": RDF_NS, "rdfs": RDFS, "swrl": SWRL, "swrla": SWRLA}
+_DECLARED: Final = " ".join(f'xmlns:{prefix}="{iri}"' for prefix, iri in _PREFIXES.items())
+_TYPE, _VARIABLE = f"{{{RDF_NS}}}type", URIRef(SWRL + "Variable")
+_NODE_ID: Final = f"{{{RDF_NS}}}nodeID"
+_Span = tuple[int, int]
 
 
-def _clark(iri: str) -> str:
-    """The name of an element or attribute as lxml writes it: {namespace}name."""
-    name = re.split(r"(?<=[#/])", iri)[-1]
-    return f"{{{iri[: len(iri) - len(name)]}}}{name}"
-
-
-_ABOUT, _RESOURCE, _NODE_ID, _TYPE = (_clark(RDF_NS + name) for name in ("about", "resource", "nodeID", "type"))
-_DESCRIPTION: Final = _clark(RDF_NS + "Description")
-
-
-class _Document:
-    """The elements directly under the root of an RDF/XML file, with their places in its bytes."""
-
-    def __init__(self, file: OntologyFile) -> None:
-        if not file.is_xml:
-            raise InputError(
-                "only RDF/XML is edited in place", file=file.path, remedy="keep the rules as text, for --rules"
-            )
-        self.newline = b"\r\n" if b"\r\n" in file.content else b"\n"
-        parser = etree.XMLParser(huge_tree=True, no_network=True)  # read_ontology has refused entity bombs
-        root = etree.fromstring(file.content, parser)
-        if (root.getroottree().docinfo.encoding or "UTF-8").upper() not in _ENCODINGS:
-            raise InputError("is not encoded in UTF-8", file=file.path, remedy="save it as UTF-8")
-        self.prefixes = {prefix: iri for prefix, iri in root.nsmap.items() if prefix}
-        self.elements = [element for element in root if isinstance(element.tag, str)]
-        spans, self.closing = _spans(file.content)
-        if len(spans) != len(self.elements):
-            raise _cannot(file.path)
-        self.spans = dict(zip(self.elements, spans, strict=True))
-
-    def rules(self, name: str) -> list[etree._Element]:
-        """Elements of the rules of a name."""
-        return [
-            element
-            for element in self.elements
-            if (element.tag == _clark(SWRL + "Imp") or SWRL + "Imp" in _types(element)) and _rule_name(element) == name
-        ]
-
-    def parts(self, rule: etree._Element) -> list[etree._Element]:
-        """A rule's element, and the elements elsewhere in the file that hold its lists and atoms."""
-        found, waiting = [rule], _nodes(rule)
-        while waiting:
-            node = waiting.pop()
-            for element in self.elements:
-                if element.get(_NODE_ID) == node and element not in found:
-                    found.append(element)
-                    waiting |= _nodes(element)
-        return found
-
-
-def _spans(content: bytes) -> tuple[list[tuple[int, int]], int]:
-    """Byte offsets of the beginning and the end of the elements under the root, and of the end tag of the root."""
-    parser = expat.ParserCreate()
-    beginnings: list[int] = []
-    ends: list[int] = []
-    depth = closing = 0
-
-    def start(_name: str, _attributes: dict[str, str]) -> None:
-        nonlocal depth
-        depth += 1
-        if depth == 2:
-            beginnings.append(parser.CurrentByteIndex)
-
-    def end(_name: str) -> None:
-        nonlocal depth, closing
-        closing = parser.CurrentByteIndex
-        if depth == 2:
-            tag = _TAG.match(content, closing)  # the end tag; of an empty element, its only tag
-            ends.append(tag.end() if tag else closing)
-        depth -= 1
-
-    parser.StartElementHandler, parser.EndElementHandler = start, end
-    parser.Parse(content, True)
-    return list(zip(beginnings, ends, strict=True)), closing
-
-
-def _types(element: etree._Element) -> list[str]:
-    return [child.get(_RESOURCE, "") for child in element.iterfind(_TYPE)]
-
-
-def _nodes(element: etree._Element) -> set[str]:
-    """Names of the blank nodes that an element speaks of."""
-    return {each.get(_NODE_ID, "") for each in element.iter() if _NODE_ID in each.attrib}
-
-
-def _rule_name(element: etree._Element) -> str | None:
-    """The label of a rule, or the last part of its IRI; None where it has neither."""
-    label = element.find(_clark(RDFS + "label"))
-    iri = element.get(_ABOUT) or element.get(_clark(RDF_NS + "ID"))
-    named = element.get(_clark(RDFS + "label")) or (local_name(iri) if iri else None)
-    return named if label is None else label.text
-
-
-def _declares(element: etree._Element) -> str | None:
-    """The IRI that an element only declares, as add_rule declares variables and built-ins; None for another element."""
-    iri = element.get(_ABOUT)
-    types = _types(element) if element.tag == _DESCRIPTION else [re.sub("[{}]", "", str(element.tag)), *_types(element)]
-    alone = len(element.attrib) == 1 and len(element) == len(_types(element)) and len(types) == 1
-    return iri if iri is not None and alone and _is_declaration(iri, types[0]) else None
-
-
-def _is_declaration(iri: str, kind: str) -> bool:
-    """Whether a type only declares a variable, a built-in, or the mark of rules that are switched off."""
-    return kind in (SWRL + "Variable", SWRL + "Builtin") or (
-        kind == str(OWL.AnnotationProperty) and iri.startswith(SWRLA)
-    )
-
-
-def add_rule(path: Path, text: str) -> Rule:
-    """Add a rule, written "name: body -> head", to an OWL file.
+def add_rules(path: Path, given: str) -> list[Rule]:
+    """Add a rule, written "name: body -> head", or the rules of a .swrl file to an OWL file.
 
     Raises:
         InputError: the file cannot be edited.
-        KnowledgeError: the file cannot be read or has a rule of that name already, or the rule is wrong.
+        KnowledgeError: the file cannot be read or has a rule of that name already, or a rule is wrong.
     """
-    base = Ontology.load([path])
-    rule = read_rule(text, base.vocabulary, _GIVEN)
-    file = read_ontology(path)
-    if rule.name in {each.name for each in rules_of(file)}:
-        raise KnowledgeError(
-            f"there is a rule {rule.name} already", file=path, remedy="remove it first, or choose another name"
-        )
-    document = _Document(file)
-    known = {str(subject) for subject in file.graph.subjects(RDF.type, None)}
-    added = _rule_xml(rule, document.prefixes, known).replace(b"\n", document.newline)
-    at = file.content.rfind(b"\n", 0, document.closing) + 1
-    if file.content[at : document.closing].strip():
-        at = document.closing
-    _replace(file, file.content[:at] + added + file.content[at:], lambda rules: [*rules, _statement(rule)])
-    return rule
+    rules = list(read_rules(given, Ontology.load([path]).vocabulary))
+    file = _read(path)
+    for name in {rule.name for rule in rules} & {rule.name for rule in rules_of(file)}:
+        remedy = "remove it first, or choose another name"
+        raise KnowledgeError(f"there is a rule {name} already", file=path, remedy=remedy)
+    newline = b"\r\n" if b"\r\n" in file.content else b"\n"
+    added = b"".join(_rule_xml(rule).encode() for rule in rules).replace(b"\n", newline)
+    end = file.content.rindex(b"</")
+    at = file.content.rfind(b"\n", 0, end) + 1
+    at = end if file.content[at:end].strip() else at
+    _replace(file, file.content[:at] + added + file.content[at:], lambda known: [*known, *rules])
+    return rules
 
 
 def remove_rule(path: Path, name: str) -> None:
-    """Remove a rule from an OWL file, with the declarations of variables and built-ins that nothing else uses.
+    """Remove a rule from an OWL file.
 
     Raises:
         InputError: the file cannot be edited.
         KnowledgeError: the file cannot be read, or has no such rule.
     """
-    file, document, rules = _find(path, name)
-    inside = {triple for rule in rules_of(file) if rule.name == name for triple in rule.triples}
-    elsewhere = Counter(term for triple in file.graph if triple not in inside for term in triple)
-    unused = {str(term) for triple in inside for term in triple if isinstance(term, URIRef) and elsewhere[term] <= 1}
-    parts = {part for rule in rules for part in document.parts(rule)}
-    parts |= {element for element in document.elements if _declares(element) in unused}
+    file = _read(path)
     content = file.content
-    for start, end in sorted((document.spans[part] for part in parts), reverse=True):
-        content = _without(content, start, end)
-    _replace(file, content, lambda rules: [each for each in rules if each[0] != name])
+    for start, end in sorted(_spans_of(file, name, with_parts=True), reverse=True):
+        line = content.rfind(b"\n", 0, start) + 1
+        start = start if content[line:start].strip() else line
+        blank = re.compile(rb"[ \t]*\r?\n").match(content, end)  # no empty line is left
+        content = content[:start] + content[blank.end() if blank and start == line else end :]
+    _replace(file, content, lambda rules: [each for each in rules if each.name != name])
 
 
 def set_enabled(path: Path, name: str, *, enabled: bool) -> bool:
@@ -206,173 +88,154 @@ def set_enabled(path: Path, name: str, *, enabled: bool) -> bool:
         InputError: the file cannot be edited.
         KnowledgeError: the file cannot be read, or has no such rule.
     """
-    file, document, rules = _find(path, name)
+    file = _read(path)
+    content, word = file.content, str(enabled).lower().encode()
+    spans = _spans_of(file, name)
     if all(rule.enabled == enabled for rule in rules_of(file) if rule.name == name):
         return False
-    content = file.content
-    word = b"true" if enabled else b"false"
-    for start, end in sorted((document.spans[rule] for rule in rules), reverse=True):
+    for start, end in sorted(spans, reverse=True):
         changed, marks = _MARK.subn(rb"\g<1>" + word, content[start:end])
-        if not marks:
-            tag = _TAG.match(changed)
-            at = tag.end() if tag else 0
-            mark = _mark_xml(document.prefixes, enabled=enabled).replace(b"\n", document.newline)
-            changed = changed[:at] + mark + changed[at:]
+        if not marks and (tag := _TAG.match(changed)):
+            declared = f'<swrla:isRuleEnabled xmlns:swrla="{SWRLA}" xmlns:rdf="{RDF_NS}"'
+            mark = _property_xml(ENABLED, _truth(enabled), {}).replace("<swrla:isRuleEnabled", declared, 1)
+            changed = changed[: tag.end()] + mark.encode() + changed[tag.end() :]
         content = content[:start] + changed + content[end:]
-    _replace(file, content, lambda rules: [(each[0], enabled, each[2]) if each[0] == name else each for each in rules])
+    _replace(file, content, lambda rules: [replace(r, enabled=enabled) if r.name == name else r for r in rules])
     return True
 
 
-def _find(path: Path, name: str) -> tuple[OntologyFile, _Document, list[etree._Element]]:
+def _read(path: Path) -> OntologyFile:
     file = read_ontology(path)
+    if not file.is_xml:
+        raise InputError("only RDF/XML is edited in place", file=path, remedy="keep the rules as text, for --rules")
+    try:
+        file.content.decode()
+    except UnicodeDecodeError:
+        raise InputError("is not encoded in UTF-8", file=path, remedy="save it as UTF-8") from None
+    return file
+
+
+def _spans_of(file: OntologyFile, name: str, *, with_parts: bool = False) -> list[_Span]:
+    """Places of the elements of rules; with those elsewhere in the file that hold their lists and atoms, if wanted."""
     names = [rule.name for rule in rules_of(file)]
     if name not in names:
         remedy = nearest(name, names) or f"its rules: {', '.join(names) or 'none'}"
-        raise KnowledgeError(f"there is no rule {name}", file=path, remedy=remedy)
-    document = _Document(file)
-    rules = document.rules(name)
-    if len(rules) != names.count(name):
-        raise _cannot(path)
-    return file, document, rules
+        raise KnowledgeError(f"there is no rule {name}", file=file.path, remedy=remedy)
+    root = etree.fromstring(file.content, etree.XMLParser(huge_tree=True, no_network=True))
+    elements = [element for element in root if isinstance(element.tag, str)]
+    spans = dict(zip(elements, _spans(file.content), strict=True))
+    found = [element for element in elements if _is_rule(element) and _name(element) == name]
+    if len(found) != names.count(name):
+        raise _cannot(file.path)
+    for element in found if with_parts else ():  # which grows on the way
+        nodes = {each.get(_NODE_ID) for each in element.iter() if _NODE_ID in each.attrib}
+        found += [each for each in elements if each.get(_NODE_ID) in nodes and each not in found]
+    return [spans[element] for element in found]
 
 
-def _without(content: bytes, start: int, end: int) -> bytes:
-    """The content without a span, and without the line that would be left empty."""
-    line = content.rfind(b"\n", 0, start) + 1
-    start = start if content[line:start].strip() else line
-    blank = re.compile(rb"[ \t]*\r?\n").match(content, end)
-    return content[:start] + content[blank.end() if blank and start == line else end :]
+def _spans(content: bytes) -> list[_Span]:
+    """Byte offsets of the beginning and the end of the elements under the root."""
+    parser = expat.ParserCreate()
+    beginnings: list[int] = []
+    ends: list[int] = []
+    depth = 0
+
+    def start(_name: str, _attributes: dict[str, str]) -> None:
+        nonlocal depth
+        depth += 1
+        if depth == 2:
+            beginnings.append(parser.CurrentByteIndex)
+
+    def end(_name: str) -> None:
+        nonlocal depth
+        if depth == 2:
+            tag = _TAG.match(content, parser.CurrentByteIndex)  # the end tag; of an empty element, its only tag
+            ends.append(tag.end() if tag else parser.CurrentByteIndex)
+        depth -= 1
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.Parse(content, True)
+    return list(zip(beginnings, ends, strict=True))
 
 
-def _rule_xml(rule: Rule, prefixes: Mapping[str, str], declared: Collection[str]) -> bytes:
-    """The elements to add to a file for a rule: declarations of what the file does not declare, and the rule."""
-    variables = [triple[0] for triple in rule.triples if triple[2] == URIRef(SWRL + "Variable")]
-    kinds = {
-        **dict.fromkeys(variables, SWRL + "Variable"),
-        **{URIRef(atom.predicate): SWRL + "Builtin" for atom in rule.body if atom.kind == "builtin"},
-        ENABLED: str(OWL.AnnotationProperty),
-    }
-    root = etree.Element(_clark(RDF_NS + "RDF"), nsmap=prefixes)
-    for iri, kind in kinds.items():
-        if str(iri) not in declared:
-            _describe(root, iri, [(iri, RDF.type, URIRef(kind))])
-    own = [triple for triple in rule.triples if triple[0] not in variables]
-    _describe(root, rule.node, [(rule.node, ENABLED, _mark(rule.enabled)), *own])
-    return _inside(root)
+def _is_rule(element: etree._Element) -> bool:
+    types = (child.get(f"{{{RDF_NS}}}resource") for child in element.iterfind(_TYPE))
+    return element.tag == f"{{{SWRL}}}Imp" or SWRL + "Imp" in types
 
 
-def _mark_xml(prefixes: Mapping[str, str], *, enabled: bool) -> bytes:
-    """The mark swrla:isRuleEnabled, as a line to insert below the first tag of a rule."""
-    root = etree.Element(_DESCRIPTION, nsmap=prefixes)
-    _add_property(root, ENABLED, _mark(enabled))
-    return b"\n" + _INDENT.encode() + _inside(root).rstrip()
+def _name(element: etree._Element) -> str | None:
+    """The label of a rule, or the last part of its IRI; None where it has neither."""
+    label = element.findtext(f"{{{RDFS}}}label", element.get(f"{{{RDFS}}}label"))
+    iri = element.get(f"{{{RDF_NS}}}about") or element.get(f"{{{RDF_NS}}}ID")
+    return local_name(iri) if label is None and iri else label
 
 
-def _mark(enabled: bool) -> Literal:
-    return Literal(str(enabled).lower(), datatype=URIRef(XSD + "boolean"))
-
-
-def _missing(prefixes: Mapping[str | None, str]) -> dict[str, str]:
-    """Prefixes for the namespaces that a file has none for; they are declared in the elements that are added."""
-    missing = {wish: iri for wish, iri in _NAMESPACES.items() if iri not in prefixes.values()}
-    return {wish + "_" if wish in prefixes else wish: iri for wish, iri in missing.items()}
-
-
-def _describe(root: etree._Element, subject: Node, triples: Sequence[RdfTriple]) -> None:
-    """Add the description of a thing to the root, with those of the blank nodes in it, nested."""
-    outer = etree.SubElement(root, _DESCRIPTION, nsmap=_missing(root.nsmap))
-    if not isinstance(subject, BNode):
-        outer.set(_ABOUT, str(subject))
-    of: dict[Node, list[RdfTriple]] = {}
-    for triple in triples:
+def _rule_xml(rule: Rule) -> str:
+    """The element of a rule. Its variables and built-ins are declared where it uses them, so that they go with it."""
+    declared = {triple[0]: _VARIABLE for triple in rule.triples if triple[2] == _VARIABLE}
+    builtins = {URIRef(atom.predicate): URIRef(SWRL + "Builtin") for atom in rule.body if atom.kind == "builtin"}
+    of: dict[Node, list[RdfTriple]] = {rule.node: []}
+    if not rule.enabled:
+        of[rule.node].append((rule.node, ENABLED, _truth(False)))
+    for triple in rule.triples:
         of.setdefault(triple[0], []).append(triple)
-    waiting = [(outer, subject)]  # a list nests as deep as it is long, which is too deep for a recursion
-    while waiting:
-        element, node = waiting.pop()
-        for _, predicate, value in of[node]:
-            child = _add_property(element, predicate, value)
-            if isinstance(value, BNode):
-                waiting.append((etree.SubElement(child, _DESCRIPTION), value))
-    # Each property has a line, and each item of a list: nested lists cost no indentation an item.
-    outer.text = "\n" + _INDENT * 2
-    for child in outer:
-        child.tail = "\n" + _INDENT * 2
-    outer[-1].tail = "\n" + _INDENT
-    for first in outer.iter(_clark(RDF_NS + "first")):
-        before = first.getprevious()
-        if before is not None:
-            before.tail = "\n" + _INDENT * 3
+    for name, kind in (*declared.items(), *builtins.items()):
+        of[name] = [(name, RDF.type, kind)]
+    order = [rule.node]
+    for node in order:  # a list nests as deep as it is long, which is too deep for a recursion
+        order += [value for _, predicate, value in of[node] if value in of and predicate != RDF.type]
+    texts: dict[Node, str] = {}
+    for node in reversed(order):
+        texts[node] = "".join(_property_xml(predicate, value, texts) for _, predicate, value in of[node])
+    inside = re.sub(r"(?=<(?:rdf:(?:first|rest)|swrl:(?:body|head)|rdfs:label)[ >])", "\n        ", texts[rule.node])
+    return f"    <rdf:Description {_DECLARED}>{inside}\n    </rdf:Description>\n"
 
 
-def _add_property(element: etree._Element, predicate: Node, value: Node) -> etree._Element:
-    child = etree.SubElement(element, _clark(str(predicate)), nsmap=_missing(element.nsmap))
-    if isinstance(value, URIRef):
-        child.set(_RESOURCE, str(value))
-    elif isinstance(value, Literal):
-        child.text = str(value)
-        if value.language:
-            child.set("{http://www.w3.org/XML/1998/namespace}lang", value.language)
-        elif value.datatype is not None:
-            child.set(_clark(RDF_NS + "datatype"), str(value.datatype))
-    return child
+def _property_xml(predicate: Node, value: Node, texts: dict[Node, str]) -> str:
+    """The element of a property; `texts` are the contents of the nodes that are written inside."""
+    text = str(predicate)
+    name = next(f"{prefix}:{text[len(iri) :]}" for prefix, iri in _PREFIXES.items() if text.startswith(iri))
+    if value in texts and not isinstance(value, BNode):
+        return f"<{name}><rdf:Description rdf:about={quoteattr(str(value))}>{texts[value]}</rdf:Description></{name}>"
+    if value in texts:
+        return f"<{name}><rdf:Description>{texts[value]}</rdf:Description></{name}>"
+    if not isinstance(value, Literal):
+        return f"<{name} rdf:resource={quoteattr(str(value))}/>"
+    kind = f' xml:lang="{value.language}"' if value.language else ""
+    kind = f" rdf:datatype={quoteattr(str(value.datatype))}" if value.datatype else kind
+    return f"<{name}{kind}>{escape(value)}</{name}>"
 
 
-def _inside(root: etree._Element) -> bytes:
-    """What is inside a root, an element a line; what the root declares, the file declares already."""
-    root.text = _INDENT
-    for child in root:
-        child.tail = "\n" + _INDENT
-    root[-1].tail = "\n"
-    text: bytes = etree.tostring(root)
-    return text[text.index(b">") + 1 : text.rindex(b"</")]
+def _truth(value: bool) -> Literal:
+    return Literal(str(value).lower(), datatype=URIRef(XSD + "boolean"))
 
 
-def _statement(rule: Rule) -> _Statement:
-    return rule.name, rule.enabled, (rule.body, rule.head)
-
-
-def _replace(file: OntologyFile, content: bytes, change: Callable[[list[_Statement]], list[_Statement]]) -> None:
+def _replace(file: OntologyFile, content: bytes, change: Callable[[list[Rule]], Sequence[Rule]]) -> None:
     """Replace the file, if its new content says what was intended; the old file is kept beside it."""
     try:
         result = read_ontology(file.path, content)
     except KnowledgeError as error:
         raise _cannot(file.path) from error
     before, after = rules_of(file), rules_of(result)
-    intended = change([_statement(rule) for rule in before])
-    if sorted(map(_statement, after), key=str) != sorted(intended, key=str):
-        raise _cannot(file.path)
-    if _others(result, after) != _others(file, before):
+    intended = map(_statement, change(list(before)))
+    if sorted(map(_statement, after), key=str) != sorted(intended, key=str) or _others(file) != _others(result):
         raise _cannot(file.path)
     path = file.path.resolve()
-    try:
-        _write(path.with_name(path.name + ".bak"), file.content, path)
-        _write(path, content, path)
-    except OSError as error:
-        raise InputError(f"cannot be written: {error.strerror}", file=file.path) from error
+    mode = stat.S_IMODE(path.stat().st_mode)
+    write_files(path.parent, {f"{path.name}.bak": file.content, path.name: content})
+    for each in (path, path.with_name(f"{path.name}.bak")):
+        each.chmod(mode)
 
 
-def _others(file: OntologyFile, rules: Sequence[Rule]) -> Counter[tuple[Node | None, ...]]:
-    """What a file says besides its rules; blank nodes have no names that could be compared."""
-    inside = {triple for rule in rules for triple in rule.triples}
-    return Counter(
-        tuple(None if isinstance(term, BNode) else term for term in triple)
-        for triple in file.graph
-        if triple not in inside and not (triple[1] == RDF.type and _is_declaration(str(triple[0]), str(triple[2])))
-    )
+def _statement(rule: Rule) -> tuple[object, ...]:
+    return rule.name, rule.enabled, rule.body, rule.head
 
 
-def _write(path: Path, content: bytes, like: Path) -> None:
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        shutil.copymode(like, name)
-        Path(name).replace(path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+def _others(file: OntologyFile) -> int:
+    """Number of statements besides rules and the declarations of variables and built-ins."""
+    inside = {triple for rule in rules_of(file) for triple in rule.triples}
+    others = (triple for triple in file.graph if triple not in inside)
+    return sum(triple[2] not in (_VARIABLE, URIRef(SWRL + "Builtin")) for triple in others)
 
 
 def _cannot(path: Path) -> KnowledgeError:

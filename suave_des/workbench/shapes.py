@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from importlib.metadata import version
 from pathlib import Path
 from typing import Final
 
-from rdflib import RDF, Graph, Literal, Namespace, URIRef
+from rdflib import RDF, Graph, Namespace, URIRef
 from rdflib.plugins.parsers.notation3 import BadSyntax
 from rdflib.term import Node
 
+from suave_des.caches import private_cache, read_checked, remove_oldest, with_checksum
 from suave_des.errors import InputError
 from suave_des.files import decode, read_bytes
-from suave_des.knowledge.checks.findings import Finding, Level, finding_about
-from suave_des.knowledge.ontology_file import OntologyFile, without_log
-from suave_des.knowledge.rdf import QA_OPERATOR, local_name
+from suave_des.findings import Finding, Level
+from suave_des.knowledge.ontology_file import OntologyFile, place_of
+from suave_des.knowledge.rdf import HAS_VALUE, local_name, without_log
+from suave_des.knowledge.state import measurement_name
 from suave_des.resources import shipped_folder
 
 _SH: Final = Namespace("http://www.w3.org/ns/shacl#")
@@ -25,38 +31,54 @@ _TURTLE: Final = "give SHACL shapes in Turtle"
 _SHAPES_LIMIT_BYTES: Final = 8 * 2**20
 
 
-def check_shapes(
-    sources: Sequence[OntologyFile], more: Sequence[Path], assumed: Mapping[str, str]
-) -> Iterator[Finding]:
-    """Check the model against SHACL shapes, the shipped ones and more.
+def check_shapes(sources: Sequence[OntologyFile], more: Sequence[Path] = ()) -> list[Finding]:
+    """Check the model against SHACL shapes, the shipped ones and more; the same files are checked once, then cached.
 
     Args:
         sources: the ontologies.
         more: files of shapes.
-        assumed: qa_comparison_operator by the IRI of a quality attribute type, besides what the ontologies say.
 
     Raises:
         InputError: a file of shapes cannot be read.
     """
+    files = (shipped_folder("ontology") / "tomasys-shapes.ttl", *more)
+    texts = [decode(path, read_bytes(path, _SHAPES_LIMIT_BYTES)) for path in files]
+    total = hashlib.sha256(f"{version('pyshacl')}{Path(__file__).read_bytes()!r}{texts}".encode())
+    for source in sources:
+        total.update(str(source.path).encode() + hashlib.sha256(source.content).digest())
+    folder = private_cache("findings")
+    path = None if folder is None else folder / total.hexdigest()
+    if path is not None and (content := read_checked(path)) is not None:
+        return [Finding(**each | {"level": Level(each["level"])}) for each in json.loads(content)]
+    shapes = Graph()
+    for file, text in zip(files, texts, strict=True):
+        shapes += _read_shapes(file, text)
+    found = list(_validate(sources, shapes, more))
+    if path is not None:
+        path.write_bytes(with_checksum(json.dumps([asdict(each) for each in found]).encode()))
+        remove_oldest(path.parent, "*")
+    return found
+
+
+def _validate(sources: Sequence[OntologyFile], shapes: Graph, files: Sequence[Path]) -> Iterator[Finding]:
     from pyshacl import validate
 
-    shapes = Graph()
-    for path in (shipped_folder("ontology") / "tomasys-shapes.ttl", *more):
-        shapes += _read_shapes(path)
     data = Graph()
     for source in sources:
         data += source.graph
-    for attribute, sign in assumed.items():
-        data.add((URIRef(attribute), URIRef(QA_OPERATOR), Literal(sign)))
     try:
         _, report, _ = validate(data, shacl_graph=shapes, do_owl_imports=False, meta_shacl=False, inplace=False)
+        if not isinstance(report, Graph):
+            raise ValueError(getattr(report, "message", report))
     except Exception as error:  # each kind of malformed shape raises another error
         reason = " ".join(str(error).split())
-        raise InputError(f"the shapes cannot be used: {reason}", file=", ".join(map(str, more)) or None) from error
-    assert isinstance(report, Graph)
+        raise InputError(f"the shapes cannot be used: {reason}", file=", ".join(map(str, files)) or None) from error
     for result in report.subjects(_SH.resultSeverity, None):
-        if not _is_placeholder(report.value(result, _SH.focusNode), data):
-            yield _shape_finding(report, result, sources)
+        # A query (SPARQL) is about the value that it gives, other constraints are about their focus.
+        is_query = report.value(result, _SH.sourceConstraintComponent) == _SH.SPARQLConstraintComponent
+        thing = (report.value(result, _SH.value) if is_query else None) or report.value(result, _SH.focusNode)
+        if is_query or not _is_placeholder(thing, data):
+            yield _finding(report, result, thing, sources)
 
 
 def _is_placeholder(node: Node | None, data: Graph) -> bool:
@@ -65,8 +87,7 @@ def _is_placeholder(node: Node | None, data: Graph) -> bool:
     return isinstance(node, URIRef) and not is_mentioned and (None, None, node) not in data
 
 
-def _read_shapes(path: Path) -> Graph:
-    text = decode(path, read_bytes(path, _SHAPES_LIMIT_BYTES))
+def _read_shapes(path: Path, text: str) -> Graph:
     if text.lstrip().startswith(("<?xml", "<rdf:RDF")):
         raise InputError("this is XML, not Turtle", file=path, remedy=_TURTLE)
     place = None
@@ -81,14 +102,15 @@ def _read_shapes(path: Path) -> Graph:
     raise InputError(f"is not Turtle: {reason}", file=path, place=place, remedy=_TURTLE)
 
 
-def _shape_finding(report: Graph, result: Node, sources: Sequence[OntologyFile]) -> Finding:
-    def value(name: str) -> str:
-        return str(report.value(result, _SH[name]) or "")
-
-    name, path = local_name(value("focusNode")), local_name(value("resultPath"))
-    level = _LEVELS.get(URIRef(value("resultSeverity")), Level.ERROR)
-    focus = report.value(result, _SH.focusNode)
+def _finding(report: Graph, result: Node, thing: Node | None, sources: Sequence[OntologyFile]) -> Finding:
+    name, path = local_name(str(thing)), report.value(result, _SH.resultPath)
+    level = _LEVELS.get(URIRef(str(report.value(result, _SH.resultSeverity))), Level.ERROR)
+    words = (name, local_name(str(path or "")), str(report.value(result, _SH.resultMessage) or ""))
+    message = ": ".join(filter(None, words))
+    has_value = any((thing, URIRef(HAS_VALUE), None) in source.graph for source in sources)
+    if path == URIRef(HAS_VALUE) and name.startswith(measurement_name("")) and not has_value:
+        level, message = Level.INFO, f"{name} has no hasValue: missions give it the measured one"
     described = [source for source in sources if source.line_of(name)]
-    mentioning = [source for source in sources if focus in source.graph.all_nodes()]
-    message = ": ".join(filter(None, (name, path, value("resultMessage"))))
-    return finding_about(name, described or mentioning or sources, level, message)
+    mentioning = [source for source in sources if thing in source.graph.all_nodes()]
+    file, line = place_of(name, described or mentioning or sources)
+    return Finding(level, message, str(file), line)

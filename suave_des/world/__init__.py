@@ -1,1 +1,1 @@
-"""World: pipeline geometry, what is in view of it, the area seen of the sea bed, signals over time."""
+"""World: pipeline geometry, what is in view of it, signals over time."""

@@ -1,4 +1,7 @@
-"""The pipeline, and the mock-up of its detection: which of its points a downward camera sees (facts: kas-lab/suave)."""
+"""The pipeline, and the mock-up of its detection: which of its points a downward camera sees.
+
+Source: the pipeline detection of kas-lab/suave, of 4 February 2023 and of 1.5.0; the paper, section on the mission.
+"""
 
 from functools import cache
 from itertools import pairwise
@@ -18,14 +21,6 @@ def sample_points(vertices_m: tuple[tuple[float, float, float], ...], points_per
     points = np.concatenate([a + share * (b - a) for a, b in pairwise(np.array(vertices_m))])
     points.flags.writeable = False
     return points
-
-
-def there_and_back(points: Array) -> Array:
-    """Make the path along all points, shape (n, at least 2), and back: x and y in m, shape (2 n, 2).
-
-    From its element i on it is the path to follow when point i is seen first: on to the far end, then back along all.
-    """
-    return np.concatenate((points[:, :2], points[::-1, :2]))
 
 
 @compiled

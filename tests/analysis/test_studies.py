@@ -14,6 +14,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "analysis"
 SCRIPTS = sorted(FOLDER.glob("*.py"))
+PARTS = sorted((FOLDER / "calibration").glob("*.py"))
 CASES = {
     "when_adapting_pays": [("seams2023", "period 80 s (paper)", 2.57, "exemplar's")],
     "rule_worth": ["S11", "QAWaterVisibility"],
@@ -40,6 +41,8 @@ def study(monkeypatch: pytest.MonkeyPatch) -> Iterator[object]:
     yield load
     for script in SCRIPTS:
         sys.modules.pop(script.stem, None)
+    for name in [name for name in sys.modules if name.partition(".")[0] == "calibration"]:
+        del sys.modules[name]
 
 
 def committed(name: str) -> pandas.DataFrame:
@@ -76,7 +79,7 @@ def test_the_committed_figure_and_conclusion_are_of_the_committed_table(study, n
 def test_judging_the_shipped_values_again_gives_what_is_committed_of_one_half(study):
     module = study("half_blocks")
     (case,) = module.read_cases(["planta_exp1_campaign"], (), module.MANAGERS)
-    problem = module.read_problem(module.find("planta_exp1", "scenarios/calibration"), [case], 48, 2)
+    problem = module.read_problem("planta_exp1", [case], 48, 2)
     found = module.judge(problem, case.only(module.HALVES[0]), [each.start for each in problem.parameters])
     before = pandas.read_csv(FOLDER / "split" / "half_blocks.csv").iloc[0]
     assert (before["values"], before["judged_on"]) == ("shipped", "1 3 5")
@@ -112,7 +115,7 @@ def public_modules() -> set[str]:
     return set(names) | {name.rpartition(".")[0] for name in names if not name.endswith(".*")}
 
 
-@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
+@pytest.mark.parametrize("script", [*SCRIPTS, *PARTS], ids=lambda script: script.stem)
 def test_a_study_imports_public_names_only(script):
     imported = {
         node.module

@@ -29,7 +29,7 @@ def test_a_campaign_that_is_stopped_again_and_again_has_the_same_bytes(tmp_path:
         process.send_signal(number)
         status, told = chaos.ended(process)
         assert status in (0, -number, 128 + number), told
-        assert "Traceback" not in told
+        assert "Traceback" not in told or "in _get_module_details" in told  # of Python itself, while it starts
         again = (
             ["--resume", "killed"]
             if (tmp_path / "killed" / "campaign.sqlite").is_file()

@@ -10,7 +10,8 @@ import pandas
 import pytest
 
 from suave_des.campaign.campaign import run_campaign
-from suave_des.report.result_files import read_missions
+from suave_des.records.runs import exemplar_names
+from suave_des.results.missions import read_missions
 
 FIRST_COLUMNS = [
     *("scenario", "manager", "run", "seed", "initial_x_m", "initial_y_m", "mission_duration_s", "pipeline_found"),
@@ -157,7 +158,7 @@ class TestSuaveFormat:
         scenario.write_text("base: seams2023.yaml\nmission: {time_limit_s: 150}\n")
         run_campaign(scenario, ["none", "random"], 4, 1, out=tmp_path / "out", suave_format=True)
         folder = tmp_path / "out" / "suave"
-        names = ["time_constrained_none.csv", "time_constrained_random.csv"]
+        names = ["none_time_constrained.csv", "random_time_constrained.csv"]
         assert sorted(path.name for path in folder.iterdir()) == names
         theirs = [row for name in names for row in rows_of(folder / name)]
         ours = rows_of(tmp_path / "out" / "runs.csv")
@@ -182,9 +183,25 @@ class TestSuaveFormat:
     def test_a_later_campaign_without_it_leaves_none_of_an_earlier_one(self, tmp_path: Path) -> None:
         run_campaign("release15", ["none"], 1, 1, out=tmp_path / "out", suave_format=True)
         run_campaign("release15", ["bt"], 1, 1, out=tmp_path / "out", suave_format=True, overwrite=True)
-        assert [path.name for path in (tmp_path / "out" / "suave").iterdir()] == ["suave_bt.csv"]
+        assert [path.name for path in (tmp_path / "out" / "suave").iterdir()] == ["bt_suave.csv"]
         run_campaign("release15", ["bt"], 1, 1, out=tmp_path / "out", overwrite=True)
         assert not (tmp_path / "out" / "suave").exists()
+
+    def test_the_extended_mission_is_named_as_the_exemplars_runner_names_it(self, tmp_path: Path) -> None:
+        managers = ["none", "bt", "bt_extended"]
+        run_campaign("extended", managers, 1, 1, out=tmp_path / "out", suave_format=True)
+        folder = tmp_path / "out" / "suave"
+        names = {path.name: rows_of(path)[0]["mission name"] for path in sorted(folder.iterdir())}
+        assert names == {
+            "bt_suave.csv": "suave bt",
+            "bt_suave_extended.csv": "suave_extended bt",
+            "none_suave_extended.csv": "suave_extended none",
+        }
+        assert sorted(read_missions([folder]).frame["manager"]) == sorted(managers)
+
+    def test_managers_that_differ_in_signs_that_no_file_name_has_get_files_of_their_own(self) -> None:
+        names = dict(exemplar_names(["a:B", "a/B", "a_B"], "1.5", has_battery=False))
+        assert names == {"a_B_suave": "suave a:B", "a_B_suave_2": "suave a/B", "a_B_suave_3": "suave a_B"}
 
     def test_its_files_are_compared_as_the_campaign_is_but_not_paired(self, tmp_path: Path) -> None:
         run_campaign("release15", ["none", "bt"], 4, 1, out=tmp_path / "out", suave_format=True)
@@ -197,7 +214,7 @@ class TestSuaveFormat:
 
     def test_revision_1_5(self, tmp_path: Path) -> None:
         run_campaign("release15", ["none"], 2, 1, out=tmp_path / "out", suave_format=True)
-        theirs = rows_of(tmp_path / "out" / "suave" / "suave_none.csv")
+        theirs = rows_of(tmp_path / "out" / "suave" / "none_suave.csv")
         assert list(theirs[0]) == [
             *("mission name", "datetime", "initial pos (x,y)", "mission duration (s)", "pipeline found"),
             *("time searching pipeline (s)", "distance inspected (m)", "mean reaction time (s)"),
@@ -211,7 +228,7 @@ class TestSuaveFormat:
         scenario = tmp_path / "short.yaml"
         scenario.write_text("base: release15.yaml\nmission: {time_limit_s: 20}\n")
         run_campaign(scenario, ["none"], 2, 1, out=tmp_path / "out", suave_format=True)
-        theirs = rows_of(tmp_path / "out" / "suave" / "suave_none.csv")
+        theirs = rows_of(tmp_path / "out" / "suave" / "none_suave.csv")
         ours = rows_of(tmp_path / "out" / "runs.csv")
         assert [(row["pipeline_found"], row["search_time_s"]) for row in ours] == [("False", "20.0")] * 2
         whole = [str(int(float(row["mission_duration_s"]))) for row in ours]

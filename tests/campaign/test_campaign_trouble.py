@@ -12,10 +12,9 @@ from typing import IO, Any
 
 import pytest
 
+from suave_des.campaign import workers
 from suave_des.campaign.campaign import CampaignInterrupted, resume_campaign, run_campaign
-from suave_des.campaign.executors import local
-from suave_des.campaign.executors.mission_runner import MissionRunner
-from suave_des.campaign.missions import WorkerError
+from suave_des.campaign.missions import MissionRunner, WorkerError
 from suave_des.errors import InputError
 from tests.helpers import AWKWARD
 
@@ -36,8 +35,8 @@ def test_a_manager_that_raises_costs_its_own_mission_only(workers: int, tmp_path
     assert 0 < len(failed) < RUNS
     assert failed == sorted(failed)
     for failure in result.failures:
-        line = f"manager {manager}, run {failure.run}, mission time 50.00 s: ValueError: I do not know what to do"
-        assert str(failure) == line
+        place = f"manager {manager}, run {failure.run}, mission time 50.00 s"
+        assert str(failure) == f"{place}: ValueError: I do not know what to do (awkward_managers.py, line 32)"
     rows = rows_of(tmp_path / "out")
     assert [int(row["run"]) for row in rows if row["manager"] == manager] == [
         run for run in range(1, RUNS + 1) if run not in failed
@@ -50,7 +49,7 @@ def test_a_manager_that_raises_costs_its_own_mission_only(workers: int, tmp_path
 
 def test_a_manager_that_calls_exit_is_a_manager_that_raises() -> None:
     result = run_campaign("seams2023", [f"{AWKWARD}:Quits", "none"], 1, 1)
-    assert [failure.cause for failure in result.failures] == ["SystemExit: no more"]
+    assert [failure.cause for failure in result.failures] == ["SystemExit: no more (awkward_managers.py, line 39)"]
     assert len(result.rows) == 1
 
 
@@ -125,14 +124,14 @@ def test_a_mission_that_takes_too_long_has_failed_and_the_others_go_on(workers: 
 
 
 def test_a_mission_that_cannot_be_interrupted_ends_with_its_worker(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(local, "_MARGIN_S", 2.0)
+    monkeypatch.setattr(workers, "_MARGIN_S", 2.0)
     result = run_campaign("seams2023", [f"{AWKWARD}:BlocksInSome"], 3, 1, 2, time_out_s=8.0)
     assert [(failure.run, failure.cause) for failure in result.failures] == [(2, "not done after 8 s (time-out)")]
     assert result.done == 2
 
 
 def test_it_does_so_too_when_no_other_mission_ends_after_it_began(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(local, "_MARGIN_S", 1.0)
+    monkeypatch.setattr(workers, "_MARGIN_S", 1.0)
     started_s = time.monotonic()
     result = run_campaign("seams2023", [f"{AWKWARD}:BlocksInSome"], 2, 201, 2, time_out_s=1.0)
     assert [failure.run for failure in result.failures] == [1, 2]
@@ -142,9 +141,9 @@ def test_it_does_so_too_when_no_other_mission_ends_after_it_began(monkeypatch: p
 def test_missions_run_in_as_many_processes_as_asked_for() -> None:
     manager = f"{AWKWARD}:TellsItsProcess"
     alone = run_campaign("seams2023", [manager], 2, 1)
-    assert {failure.cause for failure in alone.failures} == {f"RuntimeError: process {os.getpid()}"}
+    assert {failure.cause.partition(" (")[0] for failure in alone.failures} == {f"RuntimeError: process {os.getpid()}"}
     shared = run_campaign("seams2023", [manager], 19, 1, 2)
-    processes = {re.sub(r"\D", "", failure.cause) for failure in shared.failures}
+    processes = {re.sub(r"\D", "", failure.cause.partition(" (")[0]) for failure in shared.failures}
     assert str(os.getpid()) not in processes
     assert 1 <= len(processes) <= 2
 
@@ -153,15 +152,15 @@ class TestRefusedBeforeAnythingIsWritten:
     @pytest.mark.parametrize(
         ("change", "words"),
         [
-            ({"managers": []}, "no managers are given"),
+            ({"managers": []}, "managers: "),
             ({"managers": ["metacontrl"]}, "there is no manager 'metacontrl' (did you mean metacontrol?"),
             ({"managers": ["none", "none"]}, "'none' is given twice"),
             ({"managers": ["no_such_module:Manager"]}, "no_such_module"),
             ({"managers": [f"{AWKWARD}:NoSuchClass"]}, "NoSuchClass"),
-            ({"runs": 0}, "runs: 0 is out of range"),
-            ({"runs": -5}, "runs: -5"),
-            ({"time_out_s": 0.0}, "time-out: 0 is out of range"),
-            ({"time_out_s": float("nan")}, "time-out: nan is out of range"),
+            ({"runs": 0}, "runs: 0 "),
+            ({"runs": -5}, "runs: -5 "),
+            ({"time_out_s": 0.0}, "time_out_s: 0.0 "),
+            ({"time_out_s": float("nan")}, "time_out_s: .nan "),
             ({"workers": 0}, "workers: 0 is out of range"),
             ({"workers": 10_000}, "workers: 10000 is out of range"),
             ({"scenario": "no_such_scenario"}, "no_such_scenario"),

@@ -3,15 +3,17 @@
 import csv
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import stats
 
 from suave_des.campaign.campaign import resume_campaign, run_campaign
-from suave_des.campaign.ensemble import COLUMN, Ensemble, differences, read_ensemble
-from suave_des.campaign.missions import MissionKey
+from suave_des.campaign.variation import ENSEMBLE_COLUMN, Ensemble, differences, read_ensemble
 from suave_des.cli.main import main
 from suave_des.errors import InputError
+from suave_des.records.store import MissionKey
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
@@ -29,7 +31,7 @@ def two(tmp_path: Path) -> Path:
 
 def test_runs_have_the_members_in_turn_and_managers_have_the_same():
     frame = run_campaign("seams2023", ["none", "bt"], 3, ensemble="seams2023").frame()
-    assert frame[COLUMN].tolist() == [1, 2, 3, 1, 2, 3]
+    assert frame[ENSEMBLE_COLUMN].tolist() == [1, 2, 3, 1, 2, 3]
 
 
 def test_a_run_is_the_mission_of_the_scenario_with_its_members_values(two):
@@ -42,7 +44,7 @@ def test_a_run_is_the_mission_of_the_scenario_with_its_members_values(two):
 def test_members_run_through_again_at_each_point_of_a_sweep(two):
     sweep = {"visibility.period_s": [60, 80]}
     frame = run_campaign("seams2023", ["none"], 3, ensemble=two, sweep=sweep).frame()
-    assert frame[COLUMN].tolist() == [1, 2, 1, 1, 2, 1]
+    assert frame[ENSEMBLE_COLUMN].tolist() == [1, 2, 1, 1, 2, 1]
 
 
 def test_resuming_gives_the_same_bytes(two, tmp_path):
@@ -56,14 +58,14 @@ def test_resuming_gives_the_same_bytes(two, tmp_path):
 def test_a_campaign_is_not_resumed_with_another_ensemble(two, tmp_path):
     run_campaign("seams2023", ["none"], 1, out=tmp_path / "out", ensemble=two)
     two.write_text(TWO.replace("4.0", "4.1"), encoding="utf-8")
-    with pytest.raises(InputError, match=r"cannot be resumed: files_sha256\.two\.csv"):
+    with pytest.raises(InputError, match=rf"cannot be resumed: files_sha256\.{two}"):
         resume_campaign(tmp_path / "out", runs=2)
 
 
 def test_a_campaign_file_names_its_ensemble_relative_to_itself(two, tmp_path):
     (tmp_path / "mine.yaml").write_text("campaign: 1\nscenario: seams2023\nruns: 2\nensemble: two.csv\n")
     frame = run_campaign(tmp_path / "mine.yaml", ["none"]).frame()
-    assert frame[COLUMN].tolist() == [1, 2]
+    assert frame[ENSEMBLE_COLUMN].tolist() == [1, 2]
 
 
 def test_the_file_of_differences_has_a_row_for_each_pair_and_metric(two, tmp_path):
@@ -77,7 +79,7 @@ def test_the_file_of_differences_has_a_row_for_each_pair_and_metric(two, tmp_pat
 
 def test_a_campaign_without_an_ensemble_has_neither_column_nor_file(tmp_path):
     result = run_campaign("seams2023", ["none"], 1, out=tmp_path / "out")
-    assert COLUMN not in result.columns
+    assert ENSEMBLE_COLUMN not in result.columns
     assert not (tmp_path / "out" / "ensemble.csv").exists()
 
 
@@ -91,10 +93,10 @@ def test_a_campaign_without_an_ensemble_has_neither_column_nor_file(tmp_path):
         (f"{GAIN}\n0.6\nfast\n", "line 3: calibration.velocity_gain_per_s: expected a number, got 'fast'"),
         (f"{GAIN}\n0.6\nnan\n", "line 3: calibration.velocity_gain_per_s: expected a number, got 'nan'"),
         (f"{GAIN}\n0.6\n0.6,0.7\n", "line 3: has 2 values, but the header has 1"),
-        (f"{GAIN}\n0.6\n-4\n", "member 2: "),
+        (f"{GAIN}\n0.6\n-4\n", "member 2 does not fit scenario seams2023: at calibration.velocity_gain_per_s=-4.0: "),
         ("calibration.gain\n1\n2\n", "calibration.gain: "),
-        ("pipeline.vertices_m\n1\n2\n", "pipeline.vertices_m: expected a number in scenario seams2023"),
-        ("revision\n1\n2\n", "revision: expected a number"),
+        ("pipeline.vertices_m\n1\n2\n", "member 1 does not fit scenario seams2023: "),
+        ("revision\n1\n2\n", "member 1 does not fit scenario seams2023: "),
     ],
 )
 def test_an_ensemble_that_cannot_be_used_is_named_with_its_place(two, text, told):
@@ -130,23 +132,45 @@ def test_a_difference_is_paired_by_run_and_told_by_member():
     ensemble = Ensemble("two", ("x",), ((1.0,), (2.0,)))
     rows = rows_of({0: [10.0, 20.0, 12.0, 22.0], 1: [9.0, 25.0, 10.0, 27.0]})
     (found,) = differences(rows, ["none", "bt"], {"search_time_s": 0}, ensemble)
-    assert (found.first, found.second, found.n) == ("bt", "none", 4)
-    assert found.member_means == (-1.5, 5.0)
-    assert (found.mean, found.below, found.above) == (1.75, 1, 1)
+    assert (found["first"], found["second"], found["n"], found["members"]) == ("bt", "none", 4, 2)
+    assert (found["difference"], found["members_below_0"], found["members_above_0"]) == (1.75, 1, 1)
+
+
+def test_the_interval_of_a_difference_is_over_draws_not_over_the_runs_that_share_one():
+    ensemble = Ensemble("two", ("x",), ((1.0,), (2.0,)))
+    draws = np.random.default_rng(3).normal(5.0, 4.0, 6)
+    values = np.repeat(draws, 10) + np.random.default_rng(4).normal(0.0, 0.1, 60)
+    rows = rows_of({0: [0.0] * 60, 1: values.tolist()})
+    (of_draws,) = differences(rows, ["none", "bt"], {"search_time_s": 0}, ensemble, 10)
+    means = values.reshape(6, 10).mean(axis=1)
+    assert (of_draws["ci95_low"], of_draws["ci95_high"]) == pytest.approx(
+        stats.t.interval(0.95, 5, means.mean(), stats.sem(means))
+    )
+    (of_runs,) = differences(rows, ["none", "bt"], {"search_time_s": 0}, ensemble)
+    assert (of_runs["ci95_low"], of_runs["ci95_high"]) == pytest.approx(
+        stats.t.interval(0.95, 59, values.mean(), stats.sem(values))
+    )
+
+
+def test_a_member_without_a_difference_is_neither_above_nor_below():
+    ensemble = Ensemble("three", ("x",), ((1.0,), (2.0,), (3.0,)))
+    (found,) = differences(rows_of({0: [1.0] * 3, 1: [1.0, 0.0, 3.0]}), ["none", "bt"], {"x": 0}, ensemble)
+    assert (found["members_above_0"], found["members_below_0"]) == (1, 1)
 
 
 def test_a_run_that_one_manager_lacks_is_left_out():
     ensemble = Ensemble("two", ("x",), ((1.0,), (2.0,)))
     rows = [row for row in rows_of({0: [1.0, 2.0], 1: [1.0, 5.0]}) if row[0] != MissionKey(0, 0, 1)]
     (found,) = differences(rows, ["none", "bt"], {"search_time_s": 0}, ensemble)
-    assert (found.n, found.mean, found.interval, found.range) == (1, 3.0, None, None)
+    assert (found["n"], found["difference"]) == (1, 3.0)
+    assert [found[name] for name in ("ci95_low", "ci95_high", "range95_low", "range95_high")] == [None] * 4
 
 
 def test_the_range_over_members_is_that_of_their_means():
     ensemble = Ensemble("three", ("x",), ((1.0,), (2.0,), (3.0,)))
     rows = rows_of({0: [0.0] * 6, 1: [0.0, 10.0, 20.0, 2.0, 12.0, 22.0]})
     (found,) = differences(rows, ["none", "bt"], {"search_time_s": 0}, ensemble)
-    assert found.range == pytest.approx(
+    assert (found["range95_low"], found["range95_high"]) == pytest.approx(
         (11.0 - 4.302653 * 10.0 * (4 / 3) ** 0.5, 11.0 + 4.302653 * 10.0 * (4 / 3) ** 0.5), rel=1e-6
     )
 

@@ -37,6 +37,7 @@ def test_training_goes_on_from_a_file(learner: str, tmp_path: Path) -> None:
     train("seams2023", learner, 9, "first.json")
     more = train("seams2023", learner, 3, "second.json", start="first.json", seed=5)
     assert sum(missions for missions, _ in more.learned.values()) == 12
+    assert more.trainings == (("seams2023", 0, 9), ("seams2023", 5, 3))
 
 
 @pytest.mark.usefixtures("quick_workers")
@@ -49,10 +50,19 @@ def test_a_frozen_policy_gives_the_same_rows_for_any_number_of_workers(learner: 
     assert one.equals(two) and "remarks" not in one.attrs
 
 
-def test_a_campaign_on_missions_of_the_training_says_so(learner: str) -> None:
+@pytest.mark.parametrize(("runs", "seen"), [(4, 4), (12, 9)])
+@pytest.mark.parametrize("given", ["option", "sweep"])
+def test_a_campaign_on_missions_of_the_training_or_an_earlier_one_says_so(
+    learner: str, given: str, runs: int, seen: int
+) -> None:
     train("seams2023", learner, 9, "policy.json", seed=1)
-    with pytest.warns(UserWarning, match="runs 1 to 4 are missions that it was trained on"):
-        run_campaign("seams2023", [learner], 4, manager_options={learner: {"learned": "policy.json"}})
+    train("seams2023", learner, 2, "other.json", seed=8)
+    train("seams2023", learner, 3, "more.json", seed=5, start="policy.json")
+    files = {"option": {"manager_options": {learner: {"learned": "more.json"}}}}
+    files["sweep"] = {"sweep": {f"managers.{learner}.learned": ["other.json", "more.json"]}}
+    with pytest.warns(UserWarning, match=f"runs 1 to {seen} are missions that it was trained on"):
+        run_campaign("seams2023", [learner], runs, **files[given])
+    assert "remarks" not in run_campaign("seams2023", [learner], 1, seed=2, **files[given]).attrs
 
 
 @pytest.mark.parametrize("content", ["", "[]", "{}", '{"suave_des_learned": 2, "learned": {}}'])
@@ -114,39 +124,24 @@ def test_a_misspelt_measured_attribute_is_reported() -> None:
 @pytest.mark.parametrize("workers", [1, 2])
 @pytest.mark.usefixtures("quick_workers")
 def test_a_name_that_nothing_measures_is_reported_once(workers: int, tmp_path: Path) -> None:
-    with pytest.warns(UserWarning, match="depends_on has 'water_visiblity', which nothing measures"):
-        run_campaign("seams2023", [f"{AWKWARD}:WaitsInVain"], 6, workers=workers, out=tmp_path / "out")
+    with pytest.warns(UserWarning, match=r"measured\('visibility'\) is always None"):
+        run_campaign("seams2023", [f"{AWKWARD}:ReadsNothing"], 6, workers=workers, out=tmp_path / "out")
     (remark,) = json.loads((tmp_path / "out" / "manifest.json").read_text())["remarks"]
     assert remark.endswith("(did you mean 'water_visibility'? known: battery_level, water_visibility)")
 
 
 def test_a_name_that_nothing_measures_in_the_second_run_alone_is_reported_too() -> None:
-    manager = f"{AWKWARD}:WaitsInVainAtTimes"
+    manager = f"{AWKWARD}:ReadsNothingAtTimes"
     has_remark = {
         seed: [bool(run_mission("seams2023", manager, run, seed).remarks) for run in (1, 2)] for seed in range(9)
     }
     seed = next(seed for seed, runs in has_remark.items() if runs == [False, True])
-    with pytest.warns(UserWarning, match="depends_on has 'water_visiblity'"):
+    with pytest.warns(UserWarning, match=r"measured\('visibility'\)"):
         run_campaign("seams2023", [manager], 2, seed)
-
-
-def test_a_name_that_nothing_measures_is_reported_of_one_mission_too() -> None:
-    (remark,) = run_mission("seams2023", f"{AWKWARD}:WaitsInVain").remarks
-    assert "did you mean 'water_visibility'?" in remark
-    assert run_mission("seams2023", f"{AWKWARD}:SavesCharge").remarks == ()
 
 
 def test_a_manager_that_serves_scenarios_without_a_battery_too_is_not_reported() -> None:
     assert "remarks" not in run_campaign("seams2023", [f"{AWKWARD}:SavesCharge"], 2).attrs
-
-
-@pytest.mark.usefixtures("quick_workers")
-def test_the_same_error_in_the_first_missions_stops_the_campaign_with_one_message(tmp_path: Path) -> None:
-    manager = f"{AWKWARD}:RaisesAlways"
-    asked = ("--managers", manager, "--runs", "500", "--workers", "2", "--out", "out", "--quiet")
-    done = command_here("campaign", "seams2023", *asked, cwd=tmp_path)
-    assert done.returncode == 3 and done.stdout == ""
-    assert done.stderr.count("\n") == 1 and f"manager {manager} fails in each mission: " in done.stderr
 
 
 MISTAKES = """
@@ -202,6 +197,23 @@ class NoStart(Loops):
         super().__init__(system)
         self.starts_s = float("nan")
 
+class Early(Loops):
+    starts_s = -50.0
+
+class Never(Loops):
+    starts_s = float("inf")
+
+class NoPeriod(Loops):
+    def __init__(self, system):
+        super().__init__(system)
+        self.period_s = float("inf")
+
+class NoThreshold(ManagingSubsystem):
+    depends_on = {"water_visibility": (2.25, float("nan"))}
+
+class NothingMeasured(ManagingSubsystem):
+    depends_on = {"water_visiblity": (3.25,)}
+
 class NoKind(ManagingSubsystem):
     subscribes_to = ("visibility",)
 
@@ -227,7 +239,7 @@ class NeedsSetting(ManagingSubsystem):
     [
         ("NoSuper", 3, "NoSuper.__init__ does not begin with super().__init__(system)"),
         ("Signature", 2, "write def diagnostic(self, diagnostic)"),
-        ("Misspelt", 2, "did you mean task_requested(self, task)?"),
+        ("Misspelt", 2, "did you mean def task_requested(self, task)?"),
         ("NoMethod", 2, "adapt is not a method"),
         ("Loops", 3, "no mission time passed"),
         ("Waits", 2, "diagnostic yields, and nothing would run it"),
@@ -236,6 +248,11 @@ class NeedsSetting(ManagingSubsystem):
         ("Returns", 3, "adapt returned 'fd_spiral_low'; it may return None"),
         ("TextPeriod", 3, "period_s is '2'; it must be a number above 0"),
         ("NoStart", 3, "starts_s is nan"),
+        ("Early", 3, "starts_s is -50.0"),
+        ("Never", 3, "starts_s is inf"),
+        ("NoPeriod", 3, "period_s is inf"),
+        ("NoThreshold", 3, "depends_on is"),
+        ("NothingMeasured", 3, "'water_visiblity', which nothing measures (did you mean 'water_visibility'?"),
         ("NoKind", 2, "subscribes_to has 'visibility'"),
         ("OneKind", 2, "subscribes_to is 'Pose'"),
         ("NoKinds", 2, "subscribes_to is nothing"),

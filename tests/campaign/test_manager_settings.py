@@ -2,12 +2,16 @@
 
 import json
 import linecache
+import shutil
 import sys
 from pathlib import Path
 
 import pytest
 
 from suave_des import InputError, load_scenario, run_campaign, run_mission, with_values
+from suave_des.campaign.inputs import read_campaign
+from suave_des.campaign.spec import CampaignSpec, read_campaign_file
+from suave_des.resources import shipped_folder
 from tests.helpers.command import command_here
 
 RESUME = ("campaign", "--resume", "out", "--workers", "1")
@@ -26,6 +30,9 @@ class Settable(NoManager):
     @classmethod
     def input_files(cls, settings):
         return [settings["table"]] if "table" in settings else []
+
+class Other(Settable):
+    pass
 
 class Careless(NoManager):
     def mission_started(self):
@@ -130,12 +137,33 @@ class TestDeclaredFiles:
         with pytest.warns(UserWarning, match=r"secret\.txt' is not declared"):
             run_campaign("seams2023", [settable.replace("Settable", "Careless")], 1)
 
-    def test_a_change_is_noticed_when_the_campaign_is_resumed(self, folder: Path, settable: str) -> None:
-        (folder / "table.txt").write_text("fd_spiral_high")
-        run_campaign("seams2023", [settable], 1, out=folder / "out", manager_options={settable: {"table": "table.txt"}})
-        (folder / "table.txt").write_text("fd_spiral_low")
-        done = command_here(*RESUME, "--managers", settable, "--runs", "2", cwd=folder)
-        assert done.returncode == 2 and "files_sha256.table.txt was" in done.stderr
+    @pytest.mark.parametrize("changed", ["a/table.txt", "a/table.yaml"])
+    def test_a_change_of_one_is_noticed_when_the_campaign_is_resumed(
+        self, folder: Path, settable: str, changed: str
+    ) -> None:
+        """Also of a YAML file, and of one of two with the same name in different folders."""
+        managers, files = [settable, settable.replace("Settable", "Other")], [changed, changed.replace("a/", "b/")]
+        for name in files:
+            (folder / name).parent.mkdir()
+            (folder / name).write_text("fd_spiral_high")
+        options = {manager: {"table": name} for manager, name in zip(managers, files, strict=True)}
+        run_campaign("seams2023", managers, 1, out=folder / "out", manager_options=options)
+        (folder / changed).write_text("fd_spiral_low")
+        done = command_here(*RESUME, "--managers", ",".join(managers), "--runs", "2", cwd=folder)
+        assert done.returncode == 2 and f"files_sha256.{changed} was" in done.stderr
+
+    def test_a_change_of_the_program_of_one_of_two_is_noticed_when_the_campaign_is_resumed(self, folder: Path) -> None:
+        program = Path(__file__).parents[2] / "docs" / "examples" / "exec" / "manager.pl"
+        commands = []
+        for name in ("a/manager.pl", "b/manager.pl"):
+            (folder / name).parent.mkdir()
+            shutil.copy(program, folder / name)
+            commands.append(f"exec:perl {name}")
+        run_campaign("seams2023", commands, 1, out=folder / "out")
+        with (folder / "a/manager.pl").open("a") as file:
+            file.write("# changed")
+        done = command_here(*RESUME, "--managers", ",".join(commands), "--runs", "2", cwd=folder)
+        assert done.returncode == 2 and "files_sha256.a/manager.pl was" in done.stderr
 
 
 def test_a_check_that_raises_is_bad_input(folder: Path) -> None:
@@ -147,9 +175,16 @@ def test_a_check_that_raises_is_bad_input(folder: Path) -> None:
         run_campaign("seams2023", [name], runs=1)
 
 
+def as_received(out: Path) -> None:
+    """Put a copy into the place of a folder, as if it came from elsewhere."""
+    shutil.copytree(out, out.with_name("copy"))
+    shutil.rmtree(out)
+    out.with_name("copy").rename(out)
+
+
 class TestReceivedFolder:
     @pytest.fixture
-    def received(self, folder: Path, settable: str) -> Path:
+    def own(self, folder: Path, settable: str) -> Path:
         """A campaign whose module, which nothing has imported yet, notes that it is imported."""
         run_campaign("seams2023", ["none", settable], 1, out=folder / "out")
         name = settable.partition(":")[0]
@@ -158,6 +193,22 @@ class TestReceivedFolder:
         module = folder / f"{name}.py"
         module.write_text("import pathlib\npathlib.Path('imported').touch()\n" + SETTABLE)
         return folder
+
+    @pytest.fixture
+    def received(self, own: Path) -> Path:
+        as_received(own / "out")
+        return own
+
+    def test_a_folder_that_this_user_began_here_asks_for_nothing(self, own: Path) -> None:
+        done = command_here(*RESUME, cwd=own)
+        assert "give --managers" not in done.stderr and (own / "imported").exists()
+
+    def test_from_another_folder_it_is_asked_for_again(self, own: Path) -> None:
+        """There, another module of the same name might be found."""
+        (own / "below").mkdir()
+        done = command_here("campaign", "--resume", "../out", cwd=own / "below")
+        assert done.returncode == 2 and "give --managers" in done.stderr
+        assert not (own / "below" / "imported").exists()
 
     def test_its_managers_are_not_imported_unasked(self, received: Path, settable: str) -> None:
         done = command_here(*RESUME, cwd=received)
@@ -169,9 +220,76 @@ class TestReceivedFolder:
         options = ("--managers", settable) if how == "named" else ("--yes",)
         done = command_here(*RESUME, *options, cwd=received)
         assert (received / "imported").exists()
-        assert "manager_code_sha256" in done.stderr  # the code is another one than the campaign began with
+        assert (
+            f"files_sha256.{settable.partition(':')[0]}.py was" in done.stderr
+        )  # the code is another one than the campaign began with
 
     def test_a_manager_that_it_does_not_have_cannot_be_added_but_compared(self, received: Path) -> None:
         done = command_here(*RESUME, "--managers", "bt", cwd=received)
         assert done.returncode == 2 and "the campaign has no manager 'bt'" in done.stderr
         assert "with the same seed into another folder: suave-des compare out FOLDER pairs" in done.stderr
+
+    def test_managers_of_the_campaign_file_are_not_run_unasked_either(self, folder: Path) -> None:
+        """The campaign file decides what runs, whatever the folder's own store says."""
+        (folder / "mine.yaml").write_text("campaign: 1\nscenario: seams2023\nmanagers: [none]\nruns: 1\n")
+        assert command_here("campaign", "mine.yaml", "--out", "out", cwd=folder).returncode == 0
+        command = "exec:sh -c 'touch ran'"
+        (folder / "mine.yaml").write_text(f'campaign: 1\nscenario: seams2023\nmanagers: ["{command}"]\nruns: 1\n')
+        done = command_here(*RESUME, cwd=folder)
+        assert done.returncode == 2 and f"give --managers {command}" in done.stderr
+        assert not (folder / "ran").exists()
+
+
+FUNCTION = """
+f_lights:
+  ros__parameters:
+    type: system
+    parts: f_lights_node
+    modes: {fd_unground: {f_lights_node: inactive}, fd_dim: {f_lights_node: active.fd_dim}}
+f_lights_node:
+  ros__parameters: {type: node, modes: {fd_dim: {ros__parameters: {power_w: 15.0}}}}
+"""
+LIGHTS = "from suave_des.managed.node import CustomFunction\nclass Lights(CustomFunction):\n    pass\n"
+
+
+class TestReceivedFunction:
+    """A scenario names the class of a function of the user's."""
+
+    @pytest.fixture
+    def received(self, folder: Path) -> Path:
+        """A campaign whose module, which nothing has imported yet, notes that it is imported."""
+        modes = (shipped_folder("scenarios") / "suave_modes.yaml").read_text()
+        (folder / "modes.yaml").write_text(modes + FUNCTION)
+        module = folder / f"lights_{folder.name}.py"
+        module.write_text("import pathlib\npathlib.Path('imported').touch()\n" + LIGHTS)
+        text = "base: seams2023\nmodes_file: modes.yaml\nmission: {functions: {search_pipeline: [f_lights]}}\n"
+        text += f"default_modes: {{f_lights: fd_dim}}\nfunctions: {{f_lights: {{node: '{module.stem}:Lights'}}}}\n"
+        (folder / "mine.yaml").write_text(text)
+        made = command_here("campaign", "mine.yaml", "--managers", "none", "--runs", "1", "--out", "out", cwd=folder)
+        assert made.returncode == 0, made.stderr
+        as_received(folder / "out")
+        (folder / "imported").unlink()
+        return folder
+
+    @pytest.mark.parametrize("command", [RESUME, ("replay", "out")])
+    def test_it_is_not_imported_unasked(self, received: Path, command: tuple[str, ...]) -> None:
+        done = command_here(*command, cwd=received)
+        assert done.returncode == 2 and f"run the code of lights_{received.name}:Lights" in done.stderr
+        assert not (received / "imported").exists()
+        assert command_here(*command, "--yes", cwd=received).returncode == 0
+        assert (received / "imported").exists()
+
+    def test_a_report_imports_nothing(self, received: Path) -> None:
+        pytest.importorskip("plotly")
+        assert command_here("report", "out", cwd=received).returncode == 0
+        assert not (received / "imported").exists()
+
+    def test_a_class_that_a_sweep_names_is_not_imported_unasked_either(self, received: Path) -> None:
+        name = f"lights_{received.name}:Lights"
+        text = f'campaign: 1\nscenario: mine.yaml\nmanagers: [none]\nsweep: {{functions.f_lights.node: ["{name}"]}}\n'
+        (received / "swept.yaml").write_text(text)
+        (received / "mine.yaml").write_text((received / "mine.yaml").read_text().replace(name, "installed_package"))
+        file = read_campaign_file(received / "swept.yaml")
+        campaign = read_campaign(CampaignSpec.of(received / "swept.yaml"), file)
+        assert campaign.code() == (name,)
+        assert not (received / "imported").exists()

@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 from suave_des import run_campaign
-from suave_des.campaign.mistakes import SHOWN
+from suave_des.campaign.inputs import MISTAKES_SHOWN
 from suave_des.errors import MISTAKES_LOGGER
-from suave_des.knowledge.checks.static import StaticFindings, Subject, static_findings
+from suave_des.findings import Finding
+from suave_des.knowledge.checks import Subject, static_findings
 from suave_des.knowledge.ontology_file import OntologyFile
 from suave_des.resources import shipped_folder
 from tests.helpers.command import command_here, suave_des_command
@@ -21,8 +22,7 @@ STATUS = 'nothing in the simulation reports c_status "False" (did you mean "FALS
 
 @pytest.fixture(autouse=True)
 def told_nothing_yet(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("_reported", "_checked"):
-        monkeypatch.setattr(f"suave_des.campaign.mistakes.{name}", set())
+    monkeypatch.setattr("suave_des.campaign.inputs._told", set())
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def test_it_is_told_on_standard_error(tmp_path: Path, wrong_rule: str) -> None:
 def test_it_changes_no_result(tmp_path: Path, wrong_rule: str, monkeypatch: pytest.MonkeyPatch) -> None:
     campaign(tmp_path, "--rules", wrong_rule, managers="metacontrol")
     first = (tmp_path / "out" / "runs.csv").read_bytes()
-    monkeypatch.setattr("suave_des.campaign.mistakes.report_mistakes", lambda *_: None)
+    monkeypatch.setattr("suave_des.campaign.inputs.report_mistakes", lambda *_: None)
     (tmp_path / "out").rename(tmp_path / "before")
     campaign(tmp_path, "--rules", wrong_rule, managers="metacontrol")
     assert (tmp_path / "out" / "runs.csv").read_bytes() == first
@@ -85,7 +85,7 @@ def test_nothing_is_told_of_files_without_mistakes(tmp_path: Path, caplog: pytes
 
 @pytest.mark.parametrize("scenario", ["seams2023", "extended"])
 def test_shipped_files_are_not_even_checked(scenario: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("suave_des.campaign.mistakes.static_findings", lambda *_: pytest.fail("checked"))
+    monkeypatch.setattr("suave_des.knowledge.checks.static_findings", lambda *_: pytest.fail("checked"))
     campaign(tmp_path, scenario=scenario, managers="metacontrol")
 
 
@@ -102,11 +102,11 @@ def test_the_same_files_are_checked_once_and_changed_ones_again(
 ) -> None:
     checks: list[Subject] = []
 
-    def counted(subject: Subject, sources: Sequence[OntologyFile]) -> StaticFindings:
+    def counted(subject: Subject, sources: Sequence[OntologyFile]) -> list[Finding]:
         checks.append(subject)
         return static_findings(subject, sources)
 
-    monkeypatch.setattr("suave_des.campaign.mistakes.static_findings", counted)
+    monkeypatch.setattr("suave_des.knowledge.checks.static_findings", counted)
     for status, number in (("False", 1), ("False", 1), ("FALSE", 2), ("Flase", 3), ("False", 3)):
         (tmp_path / wrong_rule).write_text(f'Late: c_status(?c, "{status}") -> Role(?c)\n', encoding="utf-8")
         run_campaign("seams2023", "none", 1, rules=[tmp_path / wrong_rule])
@@ -115,11 +115,11 @@ def test_the_same_files_are_checked_once_and_changed_ones_again(
 
 
 def test_many_mistakes_are_counted(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    rules = "".join(f'L{number}: c_status(?c, "False") -> Role(?c)\n' for number in range(SHOWN + 4))
+    rules = "".join(f'L{number}: c_status(?c, "False") -> Role(?c)\n' for number in range(MISTAKES_SHOWN + 4))
     (tmp_path / "mine.swrl").write_text(rules, encoding="utf-8")
     campaign(tmp_path, "--rules", "mine.swrl")
     *findings, last = caplog.messages
-    assert len(findings) == SHOWN
+    assert len(findings) == MISTAKES_SHOWN
     assert last.startswith("note: 4 more; ")
 
 

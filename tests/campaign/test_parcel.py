@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-import pickle
+import shutil
 import sys
 import threading
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from suave_des.campaign.executors import dask_worker
-from suave_des.campaign.executors.dask_worker import Parcel, Unpacked, pack
-from suave_des.campaign.executors.mission_runner import MissionRunner
-from suave_des.campaign.missions import Finished, JobSpec, MissionFailure, MissionKey
-from suave_des.campaign.user_modules import user_modules
-from suave_des.campaign.variation import Variation
-from suave_des.errors import InputError, KnowledgeError
-from suave_des.scenario.loader import load_scenario
+from suave_des.campaign import cluster
+from suave_des.campaign.inputs import read_campaign, user_modules
+from suave_des.campaign.missions import Campaign, Finished, MissionRunner
+from suave_des.campaign.spec import CampaignSpec
+from suave_des.errors import InputError
+from suave_des.records.store import MissionFailure, MissionKey
+from suave_des.scenario.loader import LoadedScenario, load_scenario
 from tests.helpers import AWKWARD
 
 
-def job(*managers: str, time_out_s: float = 60.0) -> JobSpec:
-    return JobSpec(load_scenario("seams2023"), Variation(), managers, 1, time_out_s)
+def campaign(*managers: str, loaded: LoadedScenario | None = None, time_out_s: float = 60.0) -> Campaign:
+    return read_campaign(CampaignSpec.of("seams2023", managers=managers, time_out_s=time_out_s), None, loaded)
 
 
 @pytest.fixture(autouse=True)
@@ -32,9 +30,10 @@ def modules_as_before() -> Iterator[None]:
     """Unpacking in this process replaces modules by those unpacked, whose folder then goes."""
     before = dict(sys.modules)
     yield
-    for name, module in before.items():
-        if name.partition(".")[0] == "tests":
-            sys.modules[name] = module
+    for name in [name for name in sys.modules if name.partition(".")[0] == "tests"]:
+        del sys.modules[name]
+        if name in before:
+            sys.modules[name] = before[name]
 
 
 class TestOwnModules:
@@ -64,7 +63,7 @@ class TestOwnModules:
             path = folder / place
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text)
-        found = user_modules(["mine.manager:M", "none", "metacontrol"])
+        found = user_modules(["mine.manager:M", "none", "metacontrol"], [])
         assert found == {place: folder / place for place in files if place != "mine/not_imported.py"}
 
     def test_a_class_from_another_module_brings_both(self, folder: Path) -> None:
@@ -72,74 +71,68 @@ class TestOwnModules:
         (folder / "behind.py").write_text(
             "from suave_des.managing.simple import NoManager\nclass M(NoManager):\n    pass\n"
         )
-        assert set(user_modules(["facade:M"])) == {"facade.py", "behind.py"}
+        assert set(user_modules(["facade:M"], [])) == {"facade.py", "behind.py"}
 
-    def test_a_script_s_own_class_cannot_travel(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_of_a_script_what_it_imports(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Its own classes are sent by value."""
         from suave_des.managing.simple import NoManager
 
-        monkeypatch.setattr(sys.modules["__main__"], "Mine", NoManager, raising=False)
-        with pytest.raises(InputError, match="is defined in a script or a notebook, which workers do not have"):
-            user_modules(["__main__:Mine"])
-
-
-def test_files_that_managers_declare_travel_with_their_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "table.txt").write_text("fd_spiral_high")
-    monkeypatch.chdir(tmp_path)
-    settings = {f"{AWKWARD}:Declares": {"table": "table.txt"}}
-    loaded = load_scenario("seams2023", manager_options=settings)
-    declaring = replace(job(f"{AWKWARD}:Declares"), loaded=loaded)
-    unpacked = Unpacked(pickle.loads(pickle.dumps(pack(declaring))), tmp_path / "there")
-    (tmp_path / "table.txt").unlink()
-    path = unpacked.job.loaded.manager_file(f"{AWKWARD}:Declares", "table.txt")
-    assert path.is_relative_to(tmp_path / "there") and path.read_text() == "fd_spiral_high"
-
-
-def test_errors_name_the_user_s_files(tmp_path: Path) -> None:
-    files = [Path(name) for name in ("own/suave.owl", "tomasys.owl", "r.swrl")]
-    own = job("none")
-    own = replace(own, loaded=replace(own.loaded, ontologies=tuple(files[:2]), rules=tuple(files[2:])))
-    parcel = Parcel(own, {str(path): b"<" for path in files}, {}, {})
-    unpacked = Unpacked(parcel, tmp_path)
-    suave, tomasys = unpacked.job.loaded.ontologies
-    assert [path.name for path in (suave, tomasys, *unpacked.job.loaded.rules)] == [
-        "suave.owl",
-        "tomasys.owl",
-        "r.swrl",
-    ]
-    error = KnowledgeError(f"supplies it, and so does {tomasys}", file=suave, place="line 2", remedy="give one")
-    known = unpacked.error_with_known_names(error)
-    assert type(known) is KnowledgeError
-    assert str(known) == "own/suave.owl: line 2: supplies it, and so does tomasys.owl (give one)"
-    failure: Finished = (MissionKey(0, 0, 1), MissionFailure("none", 1, 3.0, f"{suave}: broken"))
-    assert unpacked.with_known_names(failure)[1] == MissionFailure("none", 1, 3.0, "own/suave.owl: broken")
+        (folder / "script.py").write_text("import habits\n")
+        (folder / "habits.py").write_text("PERIOD_S = 4.0\n")
+        mine = type("Mine", (NoManager,), {"__module__": "__main__"})
+        monkeypatch.setattr(sys.modules["__main__"], "Mine", mine, raising=False)
+        monkeypatch.setattr(sys.modules["__main__"], "__file__", str(folder / "script.py"), raising=False)
+        assert user_modules(["__main__:Mine"], []) == {
+            "__main__.py": folder / "script.py",
+            "habits.py": folder / "habits.py",
+        }
 
 
 class TestOnAWorker:
     @pytest.fixture(autouse=True)
     def worker(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         pytest.importorskip("distributed")
-        worker = SimpleNamespace(address="tcp://there:1", local_directory=str(tmp_path))
+        (tmp_path / "scratch").mkdir()
+        worker = SimpleNamespace(address="tcp://there:1", local_directory=str(tmp_path / "scratch"))
         monkeypatch.setattr("distributed.get_worker", lambda: worker)
         yield
-        dask_worker.forget("token")
-        assert list(tmp_path.iterdir()) == []  # nothing is left behind
+        cluster.forget("token")
+        assert list((tmp_path / "scratch").iterdir()) == []  # nothing is left behind
 
     @staticmethod
-    def run(parcel: Parcel, runs: range, **needs: str) -> list[Finished]:
-        chunk = pickle.dumps([(0, 0, run) for run in runs])
-        seconds, finished = pickle.loads(
-            dask_worker.run("token", {**dask_worker.needs(), **needs}, pickle.dumps(parcel), chunk)
-        )
+    def run(parcel: bytes, runs: range, **needs: str) -> list[Finished]:
+        chunk = tuple(MissionKey(0, 0, run) for run in runs)
+        seconds, finished = cluster.run("token", {**cluster.code_versions(), **needs}, parcel, chunk, 100.0)
         assert seconds > 0.0
-        return list(finished)
+        return finished
 
     def test_the_same_rows_as_in_this_process(self) -> None:
-        found = self.run(pack(job("random")), range(1, 6))
-        assert found == list(MissionRunner(job("random")).each([MissionKey(0, 0, run) for run in range(1, 6)]))
+        found = self.run(cluster.pack(campaign("random")), range(1, 6))
+        assert found == list(MissionRunner(campaign("random")).each([MissionKey(0, 0, run) for run in range(1, 6)]))
+
+    def test_files_that_managers_declare_travel_each_with_its_own_content(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Also where two managers have a file of the same name, from different folders."""
+        monkeypatch.chdir(tmp_path)
+        (tmp_path / "below").mkdir()
+        names = [f"{AWKWARD}:Declares", f"{AWKWARD}:DeclaresToo"]
+        text = f'base: seams2023\nmanagers: {{"{names[1]}": {{table: table.txt}}}}\n'
+        for path, content in (("table.txt", "high"), ("below/table.txt", "low"), ("below/mine.yaml", text)):
+            (tmp_path / path).write_text(content)
+        loaded = load_scenario("below/mine.yaml", manager_options={names[0]: {"table": "table.txt"}})
+        parcel = cluster.pack(campaign(*names, loaded=loaded))
+        shutil.rmtree(tmp_path / "below")
+        (tmp_path / "table.txt").unlink()
+        self.run(parcel, range(1, 2))
+        there = cluster._current["token"][0].campaign.loaded
+        files = [there.manager_file(name, "table.txt") for name in names]
+        assert [path.read_text() for path in files] == ["high", "low"]
+        assert all(path.is_relative_to(tmp_path / "scratch") and path.name == "table.txt" for path in files)
 
     def test_a_mission_that_takes_too_long_is_interrupted_in_a_thread_too(self) -> None:
         outcomes: list[list[Finished]] = []
-        parcel = pack(job(f"{AWKWARD}:HangsInSome", time_out_s=1.0))
+        parcel = cluster.pack(campaign(f"{AWKWARD}:HangsInSome", time_out_s=1.0))
         thread = threading.Thread(target=lambda: outcomes.append(self.run(parcel, range(1, 4))))
         thread.start()
         thread.join(60.0)
@@ -151,9 +144,4 @@ class TestOnAWorker:
 
     def test_a_machine_with_another_version_is_refused(self) -> None:
         with pytest.raises(InputError, match=r"numpy is [\d.]+ on worker tcp://there:1, and 1.0 here"):
-            self.run(pack(job("none")), range(1, 2), numpy="1.0")
-
-    def test_a_manager_with_other_code_is_refused(self) -> None:
-        parcel = replace(pack(job("none")), manager_code={"none": "0" * 64})
-        with pytest.raises(InputError, match="worker tcp://there:1: manager 'none' has different code there"):
-            self.run(parcel, range(1, 2))
+            self.run(cluster.pack(campaign("none")), range(1, 2), numpy="1.0")

@@ -12,12 +12,13 @@ import pytest
 from rich.console import Console
 
 from benchmarks import chaos
-from suave_des.campaign import display
+from suave_des.campaign import progress as display
 from suave_des.campaign.campaign import CampaignInterrupted, resume_campaign, run_campaign
-from suave_des.campaign.missions import COLUMNS, Finished, MissionFailure, MissionKey
 from suave_des.campaign.progress import GROUPS_SHOWN, OnProgress, Progress, ProgressTracker
-from suave_des.campaign.stopping import UntilCi
-from suave_des.estimates import estimate
+from suave_des.estimates import mean_of
+from suave_des.records.metrics import COLUMNS
+from suave_des.records.store import MissionFailure, MissionKey
+from suave_des.records.store import Outcome as Finished
 from tests.helpers import AWKWARD
 
 PLACE = COLUMNS.index("search_time_s")
@@ -31,30 +32,28 @@ def outcome(point: int, manager: int, run: int, value: float | None) -> Finished
 
 class TestProgressTracker:
     def test_knows_each_manager_s_mean(self) -> None:
-        tracker = ProgressTracker(1, ["none", "random"], 5, None)
+        tracker = ProgressTracker(1, ["none", "random"], 5)
         values = [100.0, 120.0, 170.0]
         tracker.add(outcome(0, 0, run, value) for run, value in enumerate(values, 1))
         tracker.add([outcome(0, 0, 4, None)])
         progress = tracker.progress()
         assert (progress.done, progress.failed, progress.total) == (4, 1, 10)
         none, rest = progress.groups()
-        low, high = estimate(values).mean_interval or (0.0, 0.0)
+        low, high = mean_of(values).interval or (0.0, 0.0)
         assert (none.manager, none.done, none.failed, none.runs) == ("none", 4, 1, 5)
         assert none.mean == pytest.approx(130.0)
         assert none.half_width == pytest.approx((high - low) / 2.0)
         assert (rest.manager, rest.done, rest.mean, rest.half_width) == ("random", 0, None, None)
 
-    def test_a_manager_that_is_stopped_has_fewer_missions_in_all(self) -> None:
-        tracker = ProgressTracker(1, ["none", "random"], 100, UntilCi("search_time_s", 5.0))
-        tracker.add(outcome(0, 0, run, 100.0 + run % 2) for run in range(1, 31))
-        progress = tracker.progress()
-        assert tracker.is_over((0, 0), 31)
-        assert not tracker.is_over((0, 1), 1)
-        assert (progress.done, progress.total) == (20, 120)
-        assert [key.run for key, _ in tracker.counted(outcome(0, 0, run, 1.0) for run in range(18, 24))] == [18, 19, 20]
+    def test_where_runs_share_draws_the_interval_is_of_the_draws(self) -> None:
+        tracker = ProgressTracker(1, ["none"], 4, runs_sharing_draw=2)
+        tracker.add(outcome(0, 0, run, value) for run, value in ((4, 4.0), (3, 4.0), (1, 1.0), (2, 1.0)))
+        (group,) = tracker.progress().groups()
+        assert group.mean == 2.5
+        assert group.half_width == pytest.approx(12.7062 * 1.5, rel=1e-5)  # Student's t of one degree, draws 1 and 4
 
     def test_of_many_points_it_tells_and_remembers_few(self) -> None:
-        tracker = ProgressTracker(1000, ["none"], 2, None)
+        tracker = ProgressTracker(1000, ["none"], 2)
         for point in range(500):
             tracker.add([outcome(point, 0, 1, 5.0), outcome(point, 0, 2, 6.0)])
         tracker.add([outcome(500, 0, 1, 7.0)])
@@ -63,9 +62,9 @@ class TestProgressTracker:
         assert (groups[-1].done, groups[-1].mean, tracker.progress().total) == (1, 7.0, 2000)
 
 
-def shown_on(console: Console, label: str = "seams2023", until: UntilCi | None = None, *, quiet: bool = False) -> None:
+def shown_on(console: Console, label: str = "seams2023", *, quiet: bool = False) -> None:
     """Show a campaign of two managers that goes on for a while."""
-    tracker = ProgressTracker(1, ["none", "a_module_with_a_long_name:AndAClass"], 40, until)
+    tracker = ProgressTracker(1, ["none", "a_module_with_a_long_name:AndAClass"], 40)
     with display.shown(label, console, quiet=quiet) as show:
         for run in range(1, 41):
             tracker.add([outcome(0, 0, run, None if run == 7 else 180.0 + run % 3)])
@@ -74,9 +73,9 @@ def shown_on(console: Console, label: str = "seams2023", until: UntilCi | None =
 
 
 class TestOnATerminal:
-    def last_screen(self, width: int, until: UntilCi | None = None) -> list[str]:
+    def last_screen(self, width: int) -> list[str]:
         text = io.StringIO()
-        shown_on(Console(file=text, force_terminal=True, width=width, color_system=None), until=until)
+        shown_on(Console(file=text, force_terminal=True, width=width, color_system=None))
         plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", text.getvalue()).replace("\r", "\n")
         lines = [line.rstrip() for line in plain.splitlines()]
         assert all(len(line) <= width for line in lines)
@@ -91,11 +90,6 @@ class TestOnATerminal:
         assert re.fullmatch(r"none +40 +1 +181\.00 ± 0\.27  done", none)
         assert re.fullmatch(r"a_module_with_a_long_name:AndAClass +0", other)
 
-    def test_it_says_which_manager_was_stopped(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(display, "_UPDATE_PERIOD_S", 0.0)
-        lines = self.last_screen(80, UntilCi("search_time_s", 5.0))
-        assert any(re.fullmatch(r"none +21 +1 +18\d\.\d\d ± 0\.\d\d  stopped", line) for line in lines)
-
     def test_it_is_gone_at_the_end(self) -> None:
         text = io.StringIO()
         shown_on(Console(file=text, force_terminal=True, width=80))
@@ -105,8 +99,9 @@ class TestOnATerminal:
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         seen: list[object] = []
-        monkeypatch.setattr(display._Display, "look", lambda self: seen.append(self.progress))
-        tracker = ProgressTracker(1, ["none"], 5000, None)
+        look = display._View.look
+        monkeypatch.setattr(display._View, "look", lambda self: (seen.append(self), look(self)))
+        tracker = ProgressTracker(1, ["none"], 5000)
         with display.shown("x", Console(file=io.StringIO(), force_terminal=True)) as show:
             assert show is not None
             monkeypatch.setattr(display.time, "monotonic", iter(range(10**6)).__next__)
@@ -193,7 +188,7 @@ class TestDuringACampaign:
         result = run_campaign("seams2023", managers, 12, 1, workers, tmp_path / "out", on_progress=seen.append)
         last = seen[-1]
         assert (last.done, last.failed, last.total) == (24, len(result.failures), 24)
-        for group, told in zip(last.groups(), result.summary_records(), strict=True):
+        for group, told in zip(last.groups(), result.summary, strict=True):
             assert (group.manager, group.done - group.failed) == (told["manager"], told["n"])
             assert group.mean == pytest.approx(told["search_time_s_mean"])
             width = told["search_time_s_ci95_high"] - told["search_time_s_ci95_low"]
@@ -214,5 +209,5 @@ class TestDuringACampaign:
             run_campaign(scenario, ["none"], 20, 1, out=tmp_path / "out", on_progress=stopping(8))
         seen: list[Progress] = []
         resume_campaign(tmp_path / "out", on_progress=seen.append)
-        assert [(one.before, one.done) for one in seen] == [(8, done) for done in range(9, 21)]
+        assert [one.done for one in seen] == [*range(9, 21)]
         assert seen[-1].groups()[0].done == 20

@@ -15,8 +15,8 @@ import pytest
 import suave_des
 from benchmarks import chaos
 from suave_des.campaign.campaign import CampaignInterrupted
-from suave_des.campaign.store import Store
 from suave_des.errors import InputError
+from suave_des.records.store import Store
 from tests.helpers import AWKWARD
 
 
@@ -92,7 +92,7 @@ class TestRunCampaign:
             )
         assert Path(told[0].filename).name == Path(__file__).name
         manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
-        for name in ("missions", "failures", "until_ci"):
+        for name in ("missions", "failures"):
             assert frame.attrs[name] == manifest[name]
         assert frame.attrs["missions"]["done"] == len(frame)
         with (tmp_path / "out" / "summary.csv").open(newline="") as file:
@@ -143,7 +143,7 @@ class TestRunCampaign:
     def test_progress_is_shown_when_asked_for(
         self, scenario: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("suave_des.campaign.display._FIRST_LINE_S", 0.0)
+        monkeypatch.setattr("suave_des.campaign.progress._FIRST_LINE_S", 0.0)
         suave_des.run_campaign(scenario, ["none"], 3)
         assert capsys.readouterr().err == ""
         suave_des.run_campaign(scenario, ["none"], 3, progress=True)
@@ -157,12 +157,6 @@ class TestStreamCampaign:
         assert [len(piece) for piece in pieces] == [4, 4, 2]
         pandas.testing.assert_frame_equal(pandas.concat(pieces, ignore_index=True), whole)
         assert all(piece.attrs == whole.attrs for piece in pieces)
-
-    def test_it_stops_managers_early_too(self, scenario: Path) -> None:
-        pieces = suave_des.stream_campaign(scenario, ["none"], 500, 1, until_ci="initial_y_m:0.003", chunk_rows=10)
-        rows = pandas.concat(pieces)
-        assert 20 <= len(rows) < 100
-        assert len(rows) == rows.attrs["until_ci"]["managers"][0]["last_run"]
 
     def test_memory_does_not_grow_with_the_campaign(self, scenario: Path) -> None:
         def peak(runs: int) -> int:

@@ -7,16 +7,20 @@ import os
 import random
 import shutil
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from suave_des.campaign import campaign
 from suave_des.campaign.campaign import resume_campaign, run_campaign
+from suave_des.campaign.inputs import read_campaign
+from suave_des.campaign.spec import CampaignSpec
 from suave_des.cli.main import main
 from suave_des.errors import InputError, SuaveDesError
 from suave_des.files import write_files
+from suave_des.records.store import _crc, _note
+from tests.helpers.command import ends_within
 
 
 @pytest.fixture(scope="module")
@@ -41,11 +45,21 @@ class TestLinks:
         yield path
         assert path.read_text() == "precious"
 
-    @pytest.mark.parametrize("name", [".campaign.lock", "campaign.sqlite-wal", "campaign.sqlite-journal"])
-    def test_where_the_campaign_is_resumed(self, received: Path, precious: Path, name: str) -> None:
-        (received / name).symlink_to(precious)
-        with pytest.raises(InputError, match="is a link, which is not followed"):
+    @pytest.mark.parametrize("name", ["campaign.sqlite-wal", "campaign.sqlite-journal"])
+    @pytest.mark.parametrize("link", ["symlink_to", "hardlink_to"])
+    def test_where_the_campaign_is_resumed(self, received: Path, precious: Path, name: str, link: str) -> None:
+        getattr(received / name, link)(precious)
+        with pytest.raises(InputError, match=r"is a (hard )?link") as raised:
             resume_campaign(received, runs=5)
+        assert raised.value.file == str(received / name)
+
+    def test_to_a_folder_of_other_files_in_place_of_the_exemplars(self, received: Path, precious: Path) -> None:
+        (precious.parent / "mine.csv").write_text("mine")
+        (received / "suave").symlink_to(precious.parent)
+        with pytest.raises(InputError, match="is a link") as raised:
+            resume_campaign(received, runs=5)
+        assert raised.value.file == str(received / "suave")
+        assert (precious.parent / "mine.csv").read_text() == "mine"
 
     def test_in_place_of_the_store(self, received: Path, precious: Path) -> None:
         (received / "campaign.sqlite").rename(received / "elsewhere.sqlite")
@@ -55,9 +69,9 @@ class TestLinks:
 
     def test_where_a_new_campaign_goes(self, precious: Path, tmp_path: Path) -> None:
         (tmp_path / "out").mkdir()
-        (tmp_path / "out" / ".campaign.lock").symlink_to(precious)
+        (tmp_path / "out" / "campaign.sqlite").symlink_to(precious)
         with pytest.raises(InputError, match="is a link"):
-            run_campaign("seams2023", ["none"], 1, out=tmp_path / "out")
+            run_campaign("seams2023", ["none"], 1, out=tmp_path / "out", overwrite=True)
 
     def test_in_place_of_a_file_that_is_being_written(self, precious: Path, tmp_path: Path) -> None:
         part = tmp_path / f".runs.csv.{os.getpid()}.part"
@@ -65,6 +79,39 @@ class TestLinks:
         write_files(tmp_path, {"runs.csv": "new"})
         assert (tmp_path / "runs.csv").read_text() == "new"
         assert not (tmp_path / "runs.csv").is_symlink()
+
+
+WRONG = (None, 0, -1, 1e400, 2**70, "", "x", "../x", [], [1], ["a", None], {}, {"a": 1}, [[[]]], True)
+"""Values that JSON has, in place of what is expected."""
+
+
+def forgeries(path: Path) -> Iterator[tuple[object, Callable[[sqlite3.Connection], object]]]:
+    """Edits of a store after which its checksums are right, each with a name."""
+    with sqlite3.connect(path) as db:
+        about = {name: json.loads(value) for name, value in db.execute("SELECT name, value FROM about")}
+        rows = [json.loads(content) for (content,) in db.execute("SELECT content FROM outcomes ORDER BY run")]
+
+    def noted(name: str, value: object) -> Callable[[sqlite3.Connection], object]:
+        return lambda db: db.execute("INSERT OR REPLACE INTO about VALUES (?, ?, ?)", _note(name, value))
+
+    def outcome(value: object, kind: int = 0, run: object = 1) -> Callable[[sqlite3.Connection], object]:
+        content = json.dumps(value)
+        crc = _crc(0, 0, run, kind, content)
+        statement = "INSERT OR REPLACE INTO outcomes VALUES (0, 0, ?, ?, ?, ?)"
+        return lambda db: db.execute(statement, (run, kind, content, crc))
+
+    for name in ("request", "deciding", "remarks"):
+        for value in WRONG:
+            yield (name, value), noted(name, value)
+    for name in ("request", "deciding"):
+        for key in about[name]:
+            for value in WRONG[:: 1 if name == "request" else 4]:
+                yield (name, key, value), noted(name, {**about[name], key: value})
+    for value in (*WRONG, *([*rows[0][:place], wrong, *rows[0][place + 1 :]] for place in (7, 8) for wrong in WRONG)):
+        for kind in (0, 1, 2, 7):
+            yield (kind, value), outcome(value, kind)
+    for run in (0, -5, 2**62, 9):
+        yield run, outcome(rows[0], run=run)
 
 
 class TestDamage:
@@ -116,6 +163,21 @@ class TestDamage:
                 pytest.skip(str(error))
         self.resumed(received)
 
+    @pytest.mark.parametrize("part", [0, *(pytest.param(part, marks=pytest.mark.slow) for part in range(1, 8))])
+    def test_of_what_has_the_right_checksum_is_no_traceback(self, received: Path, part: int) -> None:
+        """As somebody would forge it who knows the program."""
+        whole = (received / "campaign.sqlite").read_bytes()
+        for name, edit in list(forgeries(received / "campaign.sqlite"))[part::8]:
+            (received / "campaign.sqlite").write_bytes(whole)
+            with sqlite3.connect(received / "campaign.sqlite") as db:
+                edit(db)
+            db.close()
+            with ends_within(60):
+                try:
+                    resume_campaign(received, runs=4)
+                except SuaveDesError as error:
+                    assert len(str(error).splitlines()) == 1, name
+
     @pytest.mark.slow
     def test_of_bytes_is_no_traceback(self, received: Path) -> None:
         whole = (received / "campaign.sqlite").read_bytes()
@@ -140,7 +202,7 @@ class TestOverwrite:
             found.extend(path.name for path in received.iterdir())
             raise InputError("killed here")
 
-        monkeypatch.setattr(campaign, "plan", killed)
+        monkeypatch.setattr(campaign, "_work", killed)
         with pytest.raises(InputError, match="killed here"):
             run_campaign("release15", ["bt"], 2, 1, out=received, overwrite=True)
         assert not {"runs.csv", "summary.csv", "manifest.json"} & set(found)
@@ -163,12 +225,10 @@ class TestOverwrite:
 
 
 def test_the_time_out_follows_the_reasoner() -> None:
-    from suave_des.campaign.inputs import default_time_out_s, read_inputs
-    from suave_des.campaign.spec import CampaignSpec
-
     def default(**options: object) -> float:
-        return default_time_out_s(*read_inputs(CampaignSpec.of("seams2023", managers=["none"], **options), None)[:2])
+        return read_campaign(CampaignSpec.of("seams2023", managers=["none"], **options), None).spec.time_out_s
 
     assert default() == default(reasoner="pellet") == 120
     assert default(reasoner="owlready2") == 1800
+    assert default(reasoner="owlready2", time_out_s=5) == 5
     assert default(sweep={"knowledge.reasoner": ["pellet", "owlready2"]}) == 1800

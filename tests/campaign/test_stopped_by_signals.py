@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import _thread
 import csv
-import fcntl
 import os
 import signal
+import subprocess
+import sys
 import time
 from multiprocessing.context import SpawnProcess
 from multiprocessing.process import BaseProcess
@@ -14,10 +15,11 @@ from pathlib import Path
 
 import pytest
 
+import suave_des
 from benchmarks import chaos
 from suave_des.campaign.campaign import resume_campaign, run_campaign
-from suave_des.campaign.executors.local import LocalWorkers
-from suave_des.campaign.store import LOCK_FILE, NEW_STORE_FILE, STORE_FILE, Store, make_store
+from suave_des.campaign.workers import LocalWorkers
+from suave_des.records.store import STORE_FILE, Store
 
 STATUS = {signal.SIGINT: 130, signal.SIGTERM: 143}
 RUNS = 100_000
@@ -44,7 +46,7 @@ def wait_for(path: Path, size: int = 0) -> None:
 def test_what_is_done_is_kept(number: signal.Signals, workers: int, scenario: Path, tmp_path: Path) -> None:
     asked = [str(scenario), "--managers", "none", "--runs", str(RUNS), "--workers", str(workers), "--out", "out"]
     process = chaos.start(asked, tmp_path)
-    wait_for(tmp_path / "out" / f"{STORE_FILE}-wal", 50_000)
+    wait_for(tmp_path / "out" / f"{STORE_FILE}-wal", 100_000)
     children = chaos.workers_of(process)
     process.send_signal(number)
     status, err = chaos.ended(process)
@@ -62,14 +64,12 @@ def test_what_is_done_is_kept(number: signal.Signals, workers: int, scenario: Pa
 
 @pytest.mark.usefixtures("quick_campaigns")
 @pytest.mark.parametrize(
-    ("number", "moment"),
-    [(signal.SIGINT, "lock"), (signal.SIGTERM, "store"), (signal.SIGINT, "later"), (signal.SIGTERM, "later")],
+    ("number", "after_s"), [(signal.SIGINT, 0.0), (signal.SIGTERM, 0.0), (signal.SIGINT, 0.3), (signal.SIGTERM, 0.3)]
 )
-def test_no_empty_folder_is_left(number: signal.Signals, moment: str, scenario: Path, tmp_path: Path) -> None:
+def test_no_empty_folder_is_left(number: signal.Signals, after_s: float, scenario: Path, tmp_path: Path) -> None:
     process = chaos.start([str(scenario), "--managers", "none", "--runs", str(RUNS), "--out", "out"], tmp_path)
-    wait_for(tmp_path / "out" / (".campaign.lock" if moment == "lock" else STORE_FILE))
-    if moment == "later":
-        time.sleep(0.3)
+    wait_for(tmp_path / "out" / STORE_FILE)
+    time.sleep(after_s)
     process.send_signal(number)
     status, err = chaos.ended(process)
     assert status == STATUS[number], err
@@ -86,10 +86,31 @@ def test_workers_leave_ctrl_c_to_the_campaign(scenario: Path, tmp_path: Path) ->
     process = chaos.start(
         [str(scenario), "--managers", "none", "--runs", "500", "--workers", "2", "--out", "out"], tmp_path
     )
-    wait_for(tmp_path / "out" / f"{STORE_FILE}-wal", 50_000)
+    wait_for(tmp_path / "out" / f"{STORE_FILE}-wal", 100_000)
     for child in chaos.workers_of(process):
         os.kill(child, signal.SIGINT)
     assert chaos.ended(process) == (0, "")
+
+
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGINT, signal.SIGTERM])
+def test_a_signal_to_all_its_processes_is_told_once(number: signal.Signals, scenario: Path, tmp_path: Path) -> None:
+    """As a terminal sends it that is closed, or a scheduler of jobs."""
+    command = [sys.executable, "-m", "suave_des", "campaign", str(scenario), "--managers", "none", "--quiet"]
+    process = subprocess.Popen(
+        [*command, "--runs", str(RUNS), "--workers", "2", "--out", "out"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(Path(suave_des.__file__).parents[1])},
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),  # under nohup it is ignored
+    )
+    wait_for(tmp_path / "out" / f"{STORE_FILE}-wal", 100_000)
+    os.killpg(process.pid, number)
+    _, err = process.communicate(timeout=120)
+    assert process.returncode == 128 + number
+    assert err.startswith("suave-des: interrupted; ") and err.count("\n") == 1
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == FILES
 
 
 def test_workers_that_are_interrupted_while_they_start_end_with_the_pool(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -110,7 +131,7 @@ def test_workers_that_are_interrupted_while_they_start_end_with_the_pool(monkeyp
     assert [process.exitcode for process in started] == [-signal.SIGKILL] * len(started)
 
 
-def ctrl_c(*_: object) -> None:
+def ctrl_c(*_: object, **__: object) -> None:
     raise KeyboardInterrupt
 
 
@@ -118,11 +139,11 @@ class TestInterruptedAtAnAwkwardMoment:
     @pytest.mark.parametrize(
         "moment",
         [
-            "suave_des.campaign.store.FileLock.acquire",
-            "suave_des.campaign.campaign.make_store",
-            "suave_des.campaign.store.remove_store",
+            "suave_des.campaign.campaign.make_output_folder",
             "suave_des.campaign.campaign.Store.__init__",
-            "suave_des.campaign.executors.local.InProcess.outcomes",
+            "suave_des.campaign.campaign.Store._check",
+            "suave_des.campaign.campaign.Store.begin",
+            "suave_des.campaign.campaign.in_process",
         ],
     )
     def test_before_the_first_mission_nothing_is_left(
@@ -133,32 +154,13 @@ class TestInterruptedAtAnAwkwardMoment:
             run_campaign(scenario, ["none"], 2, 1, out=tmp_path / "out")
         assert not (tmp_path / "out").exists()
 
-    @pytest.mark.parametrize("call", ["os.open", "fcntl.flock", "os.fstat"])
-    def test_while_the_folder_is_locked_nothing_is_left(
-        self, call: str, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        module, name = (os, call[3:]) if call.startswith("os.") else (fcntl, call[6:])
-        real = getattr(module, name)
-
-        def done_and_interrupted(*arguments: object) -> object:
-            result = real(*arguments)
-            if (tmp_path / "out" / LOCK_FILE).exists():
-                monkeypatch.setattr(module, name, real)
-                raise KeyboardInterrupt
-            return result
-
-        monkeypatch.setattr(module, name, done_and_interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            run_campaign(scenario, ["none"], 2, 1, out=tmp_path / "out")
-        assert not (tmp_path / "out").exists()
-
     def test_before_an_earlier_campaign_is_replaced_its_missions_stay(
         self, scenario: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         out = tmp_path / "out"
         run_campaign(scenario, ["none"], 2, 1, out=out)
         before = {path.name: path.read_bytes() for path in out.iterdir()}
-        monkeypatch.setattr("suave_des.campaign.store.remove_store", ctrl_c)
+        monkeypatch.setattr("suave_des.records.store._note", ctrl_c)
         with pytest.raises(KeyboardInterrupt):
             run_campaign(scenario, ["none"], 3, 1, out=out, overwrite=True)
         monkeypatch.undo()
@@ -166,12 +168,11 @@ class TestInterruptedAtAnAwkwardMoment:
         assert {path.name: path.read_bytes() for path in out.iterdir() if path.suffix == ".csv"} == {
             name: content for name, content in before.items() if name.endswith(".csv")
         }
-        assert not (out / NEW_STORE_FILE).exists()
 
     def test_between_two_transactions_what_comes_next_is_kept(self, tmp_path: Path) -> None:
         path = tmp_path / STORE_FILE
-        make_store(path, {})
         store = Store(path)
+        store.begin({})
         store._db.execute("COMMIT")  # as commit() does, and is interrupted before it begins the next
         store.note("remarks", ["mine"])
         store.close()
@@ -184,7 +185,7 @@ class TestInterruptedAtAnAwkwardMoment:
     ) -> None:
         out = tmp_path / "out"
         with monkeypatch.context() as patch:
-            patch.setattr("suave_des.campaign.campaign.write_results", ctrl_c)
+            patch.setattr("suave_des.campaign.results.write_campaign", ctrl_c)
             with pytest.raises(KeyboardInterrupt, match=r"nothing is lost: suave-des campaign --resume .* writes"):
                 run_campaign(scenario, ["none"], 2, 1, out=out)
         assert resume_campaign(out).done == 2

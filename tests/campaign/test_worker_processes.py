@@ -58,17 +58,11 @@ def test_a_script_needs_no_guard_nor_loads_the_compiler(scenario: Path, tmp_path
     assert "numba" in sys.modules  # as the missions of this process need it
 
 
-def test_a_manager_that_the_script_defines_needs_one(scenario: Path, tmp_path: Path) -> None:
-    managers = ["__main__:Mine"]
-    done = run_script(MINE + GUARD + call(scenario, managers), tmp_path)
+@pytest.mark.parametrize("guard", ["", GUARD])
+def test_a_manager_that_the_script_defines_needs_no_guard_either(scenario: Path, tmp_path: Path, guard: str) -> None:
+    done = run_script(MINE + guard + call(scenario, ["__main__:Mine"]), tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == without_workers(scenario, ["random"]).replace(",random,", ",__main__:Mine,") + "\n"
-    without = run_script(MINE + call(scenario, managers), tmp_path)
-    assert without.returncode == 1
-    assert without.stderr.count("Traceback") == 1  # of the script itself: its workers say nothing
-    last = without.stderr.splitlines()[-1]
-    assert "the campaign would start again in each worker process; " in last
-    assert 'into a module of its own, or the campaign under `if __name__ == "__main__":`' in last
 
 
 def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:

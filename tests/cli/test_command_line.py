@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from suave_des.campaign.spec import RUNS_LIMIT_DEFAULT
 from suave_des.cli.main import main
 
 
@@ -121,7 +120,7 @@ class TestResume:
         [
             (("--resume", "out", "--seed", "0"), "--seed cannot be used with --resume"),
             (("seams2023", "--resume", "out"), "SCENARIO cannot be used with --resume"),
-            (("--resume", "nowhere"), "nowhere: there is no campaign to resume"),
+            (("--resume", "nowhere"), "nowhere: there is no campaign in it"),
             (("seams2023",), "--out DIR is missing"),
             (("--out", "out"), "SCENARIO is missing"),
         ],
@@ -131,46 +130,6 @@ class TestResume:
         assert (ended.status, ended.out) == (2, "")
         assert words in ended.err
         assert ended.err.count("\n") == 1
-
-
-class TestUntilCi:
-    def test_says_where_each_manager_was_stopped(self, command, tmp_path: Path) -> None:
-        arguments = ("--managers", "none,random", "--until-ci", "search_time_s:25", "--workers", "1", *OUT)
-        ended = command("campaign", "seams2023", *arguments)
-        assert (ended.status, ended.err) == (0, "")
-        told = re.search(
-            r"stopped with search_time_s ± less than 25: none after run 20, random after run (\d+)", ended.out
-        )
-        assert told
-        manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
-        assert [each["last_run"] for each in manifest["until_ci"]["managers"]] == [20, int(told[1])]
-        assert manifest["runs"] == RUNS_LIMIT_DEFAULT
-
-    def test_says_which_limit_was_not_reached_and_what_to_do(self, command) -> None:
-        arguments = ("--managers", "none", "--until-ci", "search_time_s:0.5", "--runs", "21", "--workers", "1", *OUT)
-        ended = command("campaign", "seams2023", *arguments)
-        assert ended.status == 0
-        assert re.search(
-            r"not reached: none: search_time_s ± \d+\.\d+ after all 21 runs, not less than 0.5\n", ended.out
-        )
-        assert "more runs: suave-des campaign --resume out --runs N\n" in ended.out
-
-    def test_may_stand_in_a_campaign_file(self, command, tmp_path: Path) -> None:
-        (tmp_path / "file.yaml").write_text(f"{FILE}until_ci: search_time_s:25\n")
-        assert "after run 20" in command("campaign", "file.yaml", "--workers", "1", *OUT).out
-        (tmp_path / "wrong.yaml").write_text(f"{FILE}until_ci: search_time:25\n")
-        ended = command("campaign", "wrong.yaml", "--out", "other")
-        assert ended.status == 2
-        assert ended.err.startswith("suave-des: wrong.yaml: line 4, until_ci: ")
-        assert "did you mean search_time_s?" in ended.err
-
-    def test_each_point_of_a_sweep_is_stopped_by_itself(self, command, tmp_path: Path) -> None:
-        text = f"{FILE}until_ci: search_time_s:25\nsweep: {{start.x_m: [-17, -10]}}\n"
-        (tmp_path / "file.yaml").write_text(text)
-        ended = command("campaign", "file.yaml", "--workers", "1", *OUT)
-        assert "none start.x_m=-17 after run 20, none start.x_m=-10 after run 20" in ended.out
-        told = json.loads((tmp_path / "out" / "manifest.json").read_text())["until_ci"]["managers"]
-        assert [each["start.x_m"] for each in told] == [-17, -10]
 
 
 class TestProgress:
@@ -187,7 +146,7 @@ class TestProgress:
     def test_is_on_stderr_unless_quiet(
         self, arguments: tuple[str, ...], quiet: tuple[str, ...], command, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("suave_des.campaign.display._FIRST_LINE_S", 0.0)
+        monkeypatch.setattr("suave_des.campaign.progress._FIRST_LINE_S", 0.0)
         ended = command(*arguments, "--runs", "2", "--workers", "1", *quiet)
         assert ended.status == 0
         assert ("missions" in ended.err) == (not quiet)
@@ -308,12 +267,12 @@ class TestBadInput:
             (["run", "seams2023", "--manager", "none", "--ontology", "no.owl", *OUT], "no.owl"),
             (["run", "seams2023", "--manager", "none", "--modes", "no.yaml", *OUT], "no.yaml"),
             (["campaign", "seams2023"], "--out"),
-            (["campaign", "seams2023", "--managers", "", *OUT], "no managers are given"),
+            (["campaign", "seams2023", "--managers", "", *OUT], "managers: "),
             (["campaign", "seams2023", "--managers", "none,nome", *OUT], "'nome' (did you mean none?"),
             (["campaign", "seams2023", "--managers", "none,none", *OUT], "twice"),
             (["campaign", "seams2023", "--workers", "0", *OUT], "workers: 0 is out of range"),
             (["campaign", "seams2023", "--workers", "10000", *OUT], "workers: 10000 is out of range"),
-            (["campaign", "seams2023", "--runs", "0", *OUT], "runs: 0 is out of range"),
+            (["campaign", "seams2023", "--runs", "0", *OUT], "runs: 0 "),
             (["campaign", "seams2023", "--runs", "many", *OUT], "--runs"),
             (["campaign", "seams2023", "--format", "excel", *OUT], "--format"),
             (["campaign", "seams2023", "--managers", "none", "--out", "no/where"], "no/where: there is no folder no"),

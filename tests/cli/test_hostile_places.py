@@ -15,7 +15,7 @@ from suave_des import caches
 from suave_des.cli.console import plain
 from suave_des.cli.main import main
 from suave_des.errors import InputError
-from suave_des.knowledge.pellet.limit import TimeLimit
+from suave_des.knowledge.pellet import TimeLimit
 
 COMMAND = [sys.executable, "-P", "-m", "suave_des"]
 CHECKOUT = Path(caches.__file__).parent.parent
@@ -197,7 +197,7 @@ def temporary(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def reasoned(temporary: Path) -> subprocess.CompletedProcess[str]:
     """A command that asks Pellet, where variables have options for every Java that it must not get."""
     options = {"JAVA_TOOL_OPTIONS": "-Xmx1k -XX:+NoSuchOption", "_JAVA_OPTIONS": "-XX:+NoSuchOption"}
-    arguments = ["kb", "infer", "--reasoner", "pellet", "--set", "water_visibility=1"]
+    arguments = ["kb", "infer", "--reasoner", "pellet", "--at", "water_visibility=1"]
     return run(*arguments, cwd=temporary, TMPDIR=str(temporary), **options)
 
 
@@ -241,7 +241,7 @@ class TestLimits:
         done = subprocess.run(
             [*COMMAND, *arguments],
             cwd=tmp_path,
-            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (16, 16)),
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (10, 10)),
             capture_output=True,
             text=True,
             timeout=120,

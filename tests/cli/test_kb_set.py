@@ -10,8 +10,8 @@ import pytest
 from suave_des.cli.main import main
 from suave_des.workbench import KnowledgeBase
 
-IMPROVES = "revision.metacontrol.search_improves_when_exceeded"
-STATE = ("--ground", "f_generate_search_path=fd_spiral_low", "--set", "water_visibility=4")
+IMPROVES = "revision.metacontrol.improve_when_exceeded"
+STATE = ("--at", "f_generate_search_path=fd_spiral_low", "--at", "water_visibility=4")
 
 
 @pytest.fixture

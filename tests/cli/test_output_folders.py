@@ -53,14 +53,6 @@ def test_results_of_another_kind_are_left_alone(command, first, second, found) -
     assert files() == before
 
 
-@pytest.mark.parametrize("command_line", [RUN, CAMPAIGN])
-def test_a_fit_is_left_alone(command, command_line) -> None:
-    Path("out").mkdir()
-    Path("out/calibration.json").write_text("{}")
-    status, error = command(*command_line, "--overwrite")
-    assert (status, "a fit's results in it (calibration.json)" in error) == (2, True)
-
-
 @pytest.mark.parametrize("first", [REPRODUCE, VALIDATE])
 def test_a_new_campaign_takes_away_the_tables_of_the_one_that_it_replaces(command, first) -> None:
     assert command(*first)[0] == 0
@@ -82,11 +74,10 @@ def test_every_file_that_a_command_writes_is_known(command) -> None:
 
 
 def test_the_known_files_are_those_of_the_modules_that_write_them() -> None:
-    from suave_des.calibration import report
-    from suave_des.campaign import knowledge_records, result_files, single, store
-    from suave_des.validation import files as validation
+    from suave_des.records import knowledge, mission_folder, store
+    from suave_des.results import validation
 
-    assert set(FAMILIES["fit"]) == set(report.FILES)
-    assert {store.STORE_FILE, *result_files.FILES, *validation.FILES} <= set(FAMILIES["campaign"])
-    mission = {single.MISSION_FILE, single.EVENTS_FILE, single.TRAJECTORY_FILE, knowledge_records.KNOWLEDGE_FILE}
+    assert {store.STORE_FILE, *store.FILES, *validation.FILES} <= set(FAMILIES["campaign"])
+    mission = {mission_folder.MISSION_FILE, mission_folder.EVENTS_FILE, mission_folder.TRAJECTORY_FILE}
+    mission |= {knowledge.KNOWLEDGE_FILE}
     assert set(FAMILIES["mission"]) == mission

@@ -10,14 +10,14 @@ from contextlib import suppress
 from pathlib import Path
 
 from suave_des.domain import Task
-from suave_des.managing.base import Dependencies, ManagedSystem, ManagingSubsystem
+from suave_des.managing.base import Dependencies, ManagingSubsystem, System
 from suave_des.managing.simple import NoManager
 
 
 class _InRun(NoManager):
     """Knows which run it is in, by the run's sea: tests give the start positions at which to misbehave."""
 
-    def __init__(self, system: ManagedSystem) -> None:
+    def __init__(self, system: System) -> None:
         super().__init__(system)
         self.draw = system.stream("awkward").random()
         self.period_s = 50.0
@@ -113,6 +113,10 @@ class Declares(NoManager):
         return [settings["table"]]
 
 
+class DeclaresToo(Declares):
+    """The same, of another name."""
+
+
 class Remembers(NoManager):
     """Searches higher the more missions its class has seen."""
 
@@ -147,21 +151,12 @@ class ReadsNothing(NoManager):
         self.system.measured("visibility")
 
 
-class WaitsInVain(NoManager):
-    """Depends on a measured value whose name it misspells."""
+class ReadsNothingAtTimes(ReadsNothing):
+    """Does so in runs that it draws."""
 
-    @property
-    def depends_on(self) -> Dependencies:
-        return {"water_visiblity": (3.25,)}
-
-
-class WaitsInVainAtTimes(NoManager):
-    """Misspells a measured value in runs that it draws."""
-
-    @property
-    def depends_on(self) -> Dependencies:
-        misspells = self.system.stream("misspells").random() < 0.5
-        return {"water_visiblity" if misspells else "water_visibility": (3.25,)}
+    def mission_started(self) -> None:
+        if self.system.stream("misspells").random() < 0.5:
+            super().mission_started()
 
 
 class SavesCharge(NoManager):

@@ -1,14 +1,15 @@
-"""What `kb check` finds in the shipped ontology with something added."""
+"""What is found in the shipped ontology with something added."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
-
-from suave_des.knowledge.checks.findings import Finding, Level
+from suave_des.findings import Finding, Level, ordered
+from suave_des.knowledge.checks import Subject, static_findings
+from suave_des.knowledge.ontology_file import collect
 from suave_des.resources import shipped_folder
-from suave_des.workbench.check import Subject, check
+from suave_des.workbench.check import check
+from suave_des.workbench.shapes import check_shapes
 
 SUAVE = "http://www.metacontrol.org/suave#"
 TOMASYS = "http://metacontrol.org/tomasys#"
@@ -16,18 +17,36 @@ OWL = "http://www.w3.org/2002/07/owl#"
 SWRL = "http://www.w3.org/2003/11/swrl#"
 
 
-def found(tmp_path: Path, rules: str = "", extra: str = "", states: int = 3, **options: object) -> tuple[Finding, ...]:
-    """What is found in the shipped suave.owl with a rule file; Pellet is asked about a few states only."""
+def subject(tmp_path: Path, rules: str = "", extra: str = "", **options: object) -> Subject:
+    """A copy of the shipped suave.owl with things added at its end, and a file of rules."""
     text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
     (tmp_path / "suave.owl").write_text(text.replace("</rdf:RDF>", extra + "</rdf:RDF>"), encoding="utf-8")
     (tmp_path / "mine.swrl").write_text(rules, encoding="utf-8")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("suave_des.workbench.check.MAX_STATES", states)
-        return check(Subject([tmp_path / "suave.owl"], [tmp_path / "mine.swrl"], **options))  # type: ignore[arg-type]
+    return Subject([tmp_path / "suave.owl"], [tmp_path / "mine.swrl"], **options)  # type: ignore[arg-type]
+
+
+def found_by_pellet(tmp_path: Path, rules: str = "", extra: str = "", **options: object) -> tuple[Finding, ...]:
+    """What `kb check` finds."""
+    return check(subject(tmp_path, rules, extra, **options))
+
+
+def found(tmp_path: Path, rules: str = "", extra: str = "", **options: object) -> tuple[Finding, ...]:
+    """What `kb check` finds without a reasoner."""
+    return findings_of(subject(tmp_path, rules, extra, **options))
+
+
+def findings_of(subject: Subject) -> tuple[Finding, ...]:
+    """What `kb check` finds without a reasoner."""
+    sources = collect(subject.given)
+    return ordered([*static_findings(subject, sources), *check_shapes(sources, subject.shapes)])
 
 
 def errors(findings: tuple[Finding, ...]) -> list[Finding]:
     return [one for one in findings if one.level is Level.ERROR]
+
+
+def warnings(findings: tuple[Finding, ...]) -> list[Finding]:
+    return [one for one in findings if one.level is Level.WARN]
 
 
 def only(findings: tuple[Finding, ...], words: str) -> Finding:
@@ -35,12 +54,15 @@ def only(findings: tuple[Finding, ...], words: str) -> Finding:
     return one
 
 
-def individual(name: str, kind: str, inside: str = "") -> str:
-    return (
-        f'<owl:NamedIndividual rdf:about="{SUAVE}{name}"><rdf:type rdf:resource="{TOMASYS}{kind}"/>{inside}'
-        "</owl:NamedIndividual>\n"
-    )
+def individual(name: str, kind: str = "", inside: str = "") -> str:
+    """An individual; without a kind, only declared."""
+    kind = f'<rdf:type rdf:resource="{TOMASYS}{kind}"/>' if kind else ""
+    return f'<owl:NamedIndividual rdf:about="{SUAVE}{name}">{kind}{inside}</owl:NamedIndividual>\n'
 
 
 def link(name: str, target: str) -> str:
     return f'<tomasys:{name} rdf:resource="{SUAVE}{target}"/>'
+
+
+def value(name: str, text: str, kind: str = "decimal") -> str:
+    return f'<tomasys:{name} rdf:datatype="http://www.w3.org/2001/XMLSchema#{kind}">{text}</tomasys:{name}>'

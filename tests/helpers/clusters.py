@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import suave_des
+from tests.helpers.java_archive import share_java_archive
 
 _TELLS_WHAT_IT_OPENS = """
 import os, sys
@@ -48,6 +49,7 @@ class Cluster:
         hooks = folder / "hooks"
         hooks.mkdir(parents=True)
         (hooks / "sitecustomize.py").write_text(_TELLS_WHAT_IT_OPENS)
+        share_java_archive(folder / ".cache" / "suave-des")
         own = {
             name: value
             for name, value in os.environ.items()
@@ -57,7 +59,6 @@ class Cluster:
             **own,
             "HOME": str(folder),
             "PYTHONPATH": os.pathsep.join([str(hooks), str(Path(suave_des.__file__).parents[1])]),
-            "SUAVE_DES_JAVA_ARCHIVE": os.environ.get("SUAVE_DES_JAVA_ARCHIVE", "off"),
             **_QUIET,
             "FORBIDDEN": str(forbidden),
             "OPENED": str(self._opened),

@@ -10,7 +10,7 @@ import re
 from pathlib import Path
 
 from rdflib import BNode, Graph, Literal, URIRef
-from rdflib.namespace import OWL, RDF, RDFS
+from rdflib.namespace import OWL, RDF, RDFS, XSD
 from rdflib.term import Node
 
 from suave_des.resources import shipped_folder
@@ -79,6 +79,24 @@ def write_exemplar_files(shipped: Path, folder: Path, *, oldest: bool = False) -
     for name, graph in files.items():
         graph.serialize(folder / f"{name}.owl", format="xml")
     return {name: folder / f"{name}.owl" for name in files}
+
+
+def write_files_of_2023(shipped: Path, folder: Path) -> dict[str, Path]:
+    """Write the three files in their oldest form, without the properties that TOMASys got later; returns them by stem.
+
+    Statuses are any text there, so that rules that ask for a status of false never match.
+    """
+    files = write_exemplar_files(shipped, folder, oldest=True)
+    for path in files.values():
+        graph = Graph().parse(path, format="xml")
+        for name in ("o_always_improve", "o_updatable", "qa_comparison_operator"):
+            for pattern in ((URIRef(TOMASYS + name), None, None), (None, URIRef(TOMASYS + name), None)):
+                graph.remove(pattern)
+        for name in ("b_status", "c_status", "fg_status", "o_status"):
+            if (URIRef(TOMASYS + name), RDF.type, None) in graph:
+                graph.set((URIRef(TOMASYS + name), RDFS.range, XSD.string))
+        graph.serialize(path, format="xml")
+    return files
 
 
 def write_as_owlready2_saves_it(path: Path, placeholder: str = "") -> Path:

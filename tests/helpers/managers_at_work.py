@@ -1,14 +1,17 @@
 """A managing subsystem by itself: the test calls its hooks and reads the modes that it asks for."""
 
-import random
 from collections import defaultdict
+from collections.abc import Mapping
+from types import SimpleNamespace
 
 import simpy
 
+from suave_des.clock import Process
 from suave_des.domain import Task
-from suave_des.managing.base import ManagedSystem, ManagingSubsystem
-from suave_des.monitor.diagnostics import Diagnostic, Kind
-from suave_des.monitor.measurements import Measured, Thresholds
+from suave_des.draws import Streams
+from suave_des.managing.base import ManagingSubsystem, System
+from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
+from suave_des.monitor.measurements import Measurements, Thresholds
 from suave_des.registry import manager_class
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import Scenario
@@ -33,10 +36,10 @@ class AskedModes:
         return mode in MODES.modes(function)
 
 
-class Published(Measured):
+class Published(Measurements):
     """Values of a quality attribute, all of them published by now."""
 
-    is_tabulated = False
+    are_known = False
 
     def __init__(self) -> None:
         self.times_s: list[float] = []
@@ -47,6 +50,27 @@ class Published(Measured):
 
     def next_crossing_s(self, t_s: float, thresholds: Thresholds) -> float:
         raise AssertionError("what will be published is not known")
+
+    def publish(self, env: simpy.Environment, bus: DiagnosticsBus) -> Process:
+        raise AssertionError("it is published already")
+
+
+def system_of(
+    env: simpy.Environment,
+    scenario: Scenario,
+    modes: object,
+    measurements: Mapping[str, Measurements],
+    coordinator: object,
+    *,
+    recorded: bool = False,
+    settings: Mapping[str, object] | None = None,
+    seed: int = 1,
+) -> System:
+    """What a manager sees, without a vehicle and a knowledge base."""
+    recorder = SimpleNamespace(enabled=recorded, log=lambda source, event, detail: None)
+    parts = {"_manager": "m", "_coordinator": coordinator, "_vehicle": None, "_draws": Streams(seed, 1)}
+    further = {"_recorder": recorder, "_files": {}, "_open_knowledge": lambda: None}
+    return System(env, modes, measurements, scenario, settings or {}, **parts, **further)
 
 
 class AtWork:
@@ -59,17 +83,9 @@ class AtWork:
         scenario: Scenario = SCENARIOS[revision].scenario
         if battery:
             scenario = scenario.model_copy(update={"battery": Battery()})
-        system = ManagedSystem(
-            env=simpy.Environment(),
-            scenario=scenario,
-            settings={},
-            modes=self.modes,
-            lasting_functions=() if self.per_task else (MOTION,),
-            stream=lambda stream: random.Random(f"{seed}/{stream}"),
-            log=lambda event, detail: None,
-            knowledge=lambda: None,
-            measurements=self.measurements,
-        )
+        self.mission_wide = () if self.per_task else (MOTION,)
+        self.coordinator = SimpleNamespace(functions=self.mission_wide)
+        system = system_of(simpy.Environment(), scenario, self.modes, self.measurements, self.coordinator, seed=seed)
         self.manager: ManagingSubsystem = manager_class(name)(system)
 
     def task(self, name: str) -> Task:
@@ -78,10 +94,12 @@ class AtWork:
 
     def request(self, name: str) -> list[tuple[str, str]]:
         """What is asked for at a task's request."""
+        self.coordinator.functions = (*self.mission_wide, *self.task(name).functions)
         return self._during(lambda: self.manager.task_requested(self.task(name)))
 
     def cancel(self, name: str) -> list[tuple[str, str]]:
         """What is asked for at a task's cancellation."""
+        self.coordinator.functions = self.mission_wide
         return self._during(lambda: self.manager.task_cancelled(self.task(name)))
 
     def adapt(self) -> list[tuple[str, str]]:

@@ -6,7 +6,7 @@ from weakref import WeakSet
 
 from suave_des.domain import Task
 from suave_des.knowledge.state import Plan
-from suave_des.managing.base import ManagedSystem, ManagingSubsystem
+from suave_des.managing.base import ManagingSubsystem, System
 from suave_des.managing.metacontrol import Metacontrol
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, Kind
 from suave_des.monitor.measurements import region_of
@@ -15,7 +15,7 @@ from suave_des.monitor.measurements import region_of
 class Deliberate(ManagingSubsystem):
     """Searches high from the first tick on; each adaptation takes as long as its settings say."""
 
-    def __init__(self, system: ManagedSystem) -> None:
+    def __init__(self, system: System) -> None:
         super().__init__(system)
         self.period_s = 2.0
         self.starts_s = 1.0
@@ -68,7 +68,7 @@ class Counted(ManagingSubsystem):
 
     existing: ClassVar[WeakSet] = WeakSet()
 
-    def __init__(self, system: ManagedSystem) -> None:
+    def __init__(self, system: System) -> None:
         super().__init__(system)
         self.existing.add(self)
 
@@ -78,13 +78,13 @@ class Lingering(Counted):
 
     latest: ClassVar[Counted | None] = None
 
-    def __init__(self, system: ManagedSystem) -> None:
+    def __init__(self, system: System) -> None:
         super().__init__(system)
         Lingering.latest = self
 
 
 class FailsAtLaunch(ManagingSubsystem):
-    def __init__(self, system: ManagedSystem) -> None:
+    def __init__(self, system: System) -> None:
         raise RuntimeError("at launch")
 
 
@@ -105,7 +105,7 @@ class FailsOnDiagnostic(ManagingSubsystem):
 
 
 class FailsInAdapt(ManagingSubsystem):
-    def __init__(self, system: ManagedSystem) -> None:
+    def __init__(self, system: System) -> None:
         super().__init__(system)
         self.period_s = self.starts_s = 12.0
 
@@ -134,7 +134,7 @@ class FailsInItsOwnProcess(ManagingSubsystem):
 
 
 class NeverAdvances(ManagingSubsystem):
-    def __init__(self, system: ManagedSystem) -> None:
+    def __init__(self, system: System) -> None:
         super().__init__(system)
         self.period_s = 0.0
 
@@ -143,9 +143,9 @@ class EventTriggered(ManagingSubsystem):
     """Depends on how the visibility compares with 2 and 3 m, and notes the times of its calls."""
 
     subscribes_to: ClassVar = (Kind.COMPONENT_STATUS,)
-    depends_on: ClassVar = {"water_visibility": (2.0, 3.0), "salinity": (0.5,)}
+    depends_on: ClassVar = {"water_visibility": (2.0, 3.0), "battery_level": (0.5,)}
 
-    def __init__(self, system: ManagedSystem) -> None:
+    def __init__(self, system: System) -> None:
         super().__init__(system)
         self.period_s = float(system.settings.get("period_s", 2.0))
         self.starts_s = float(system.settings.get("starts_s", 1.0))
@@ -213,7 +213,7 @@ class TakesTime(EventTriggered):
 
     depends_on: ClassVar = {"water_visibility": (2.0, 3.0)}
 
-    def __init__(self, system: ManagedSystem) -> None:
+    def __init__(self, system: System) -> None:
         super().__init__(system)
         self.takes_s = float(system.settings.get("takes_s", 0.5))
         self.handled: object = None
@@ -240,7 +240,7 @@ class SearchesAsHighAsItCanSee(ManagingSubsystem):
     subscribes_to: ClassVar = (Kind.COMPONENT_STATUS,)
     depends_on: ClassVar = {"water_visibility": (2.25, 3.25)}
 
-    def __init__(self, system: ManagedSystem) -> None:
+    def __init__(self, system: System) -> None:
         super().__init__(system)
         self.period_s = float(system.settings.get("period_s", 2.0))
         self.starts_s = float(system.settings.get("starts_s", 1.0))
@@ -300,7 +300,7 @@ class ChangesModesInHooks(SearchesAsHighAsItCanSee):
 
 
 class AsksForTheRecord(ManagingSubsystem):
-    def __init__(self, system: ManagedSystem) -> None:
+    def __init__(self, system: System) -> None:
         super().__init__(system)
         RECORDED.append(system.recorded)
 
@@ -321,7 +321,7 @@ class Hasty(Metacontrol):
 
     depends_on = Metacontrol.depends_on
 
-    def __init__(self, system: ManagedSystem) -> None:
+    def __init__(self, system: System) -> None:
         super().__init__(system)
         self.period_s = 0.4
 
@@ -350,7 +350,7 @@ class PlansLow(Metacontrol):
 class CountsIdleCycles(Metacontrol):
     """Requests a mode in the 25th cycle that changes nothing, and so does not say what it depends on."""
 
-    def __init__(self, system: ManagedSystem) -> None:
+    def __init__(self, system: System) -> None:
         super().__init__(system)
         self._idle = 0
 

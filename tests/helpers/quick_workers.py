@@ -62,9 +62,9 @@ def _warm_process() -> None:
 @pytest.fixture
 def quick_workers(_warm_process: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Have campaigns of this process fork their workers."""
-    from suave_des.campaign.executors import local
+    from suave_des.campaign import workers
 
-    monkeypatch.setattr(local, "SpawnProcess", _Forked)
+    monkeypatch.setattr(workers, "SpawnProcess", _Forked)
 
 
 class ForkedCampaign:

@@ -12,9 +12,8 @@ from typing import Any
 
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.scenario.loader import load_scenario
-from suave_des.workbench.fact_reader import FactReader
-from suave_des.workbench.reasons.why_not import RuleQuestions, open_without_unusable
-from suave_des.workbench.state_input import ManagingSettings, StateBuilder
+from suave_des.workbench.states import ManagingSettings, StateBuilder
+from suave_des.workbench.why_not import RuleQuestions
 from tests.helpers.owl_text import SUAVE, TOMASYS, XSD
 
 SEARCH, MOTION = "f_generate_search_path", "f_maintain_motion"
@@ -231,12 +230,9 @@ def prepared(name: str, ontology: Path, folder: Path) -> Asked:
     rules = folder / "mine.swrl"
     rules.write_text((text or "") + "\n", encoding="utf-8")
     loaded = load_scenario("seams2023", ontologies=[ontology], rules=[rules])
-    base, unusable = open_without_unusable(loaded)
-    reader = FactReader(base)
-    reader.declare(facts)
-    base = base.with_facts(map(reader.triple, facts))
-    builder = StateBuilder(base, ManagingSettings.of(loaded.scenario))
+    questions = RuleQuestions.open(loaded, facts)
+    builder = StateBuilder(questions.base, ManagingSettings.of(loaded.scenario))
     for kind, content in parts.items():
         for thing, value in content.items():
             builder.add(kind, thing, value)
-    return Asked(RuleQuestions(base, tuple(unusable)), (names or ["r"])[0], builder.state(), answer)
+    return Asked(questions, (names or ["r"])[0], builder.state(), answer)

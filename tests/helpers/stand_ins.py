@@ -7,11 +7,11 @@ from functools import cache
 import simpy
 
 from suave_des.compiling import Array
+from suave_des.managed.node import SetPointSender
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.modes import Mode
 from suave_des.scenario.revision import Revision
-from suave_des.vehicle.guidance import SetPointSender
-from suave_des.vehicle.vehicle import ArrivalCheck
+from suave_des.vehicle.vehicle import ArrivalCheck, ControlListener
 
 Place = tuple[float, float, float]
 START = (-17.0, 2.0, -18.5)
@@ -24,9 +24,10 @@ class PlacedVehicle:
     """
 
     def __init__(self, place: Place = START, *, obeys: bool = False, rise_m: float = 0.0) -> None:
-        self.control_listeners: list[Callable[[int], None]] = []
+        self.control_listeners: list[ControlListener] = []
         self._place = place
         self.obeys = obeys
+        self.sends: ArrivalCheck | None = None  # whose way-point is being sent
         self.rise_m = rise_m
         self.commands: list[tuple[float, Place]] = []
 
@@ -39,7 +40,7 @@ class PlacedVehicle:
         """Put it elsewhere: like a change of control, this invalidates what was looked ahead."""
         self._place = place
         for listener in self.control_listeners:
-            listener(0)
+            listener(0, self.sends)
 
     def position(self, t_s: float) -> Place:
         return self.place
@@ -58,7 +59,9 @@ class PlacedVehicle:
         """Look at the first way-point only: where a later set-point takes the vehicle cannot be known beforehand."""
         if send:
             x_m, y_m, z_m = sent_as_m
+            self.sends = check
             self.command(t_s, waypoints.item(0, 0) + x_m, waypoints.item(0, 1) + y_m, z_m)
+            self.sends = None
         half_widths_m = (check.half_width_m, check.half_width_m, check.half_height_m)
         for tick in range(first, last + 1):
             errors_m = [abs(a - b) for a, b in zip(self.position(check.time_s(tick)), waypoints[0, :3], strict=True)]
@@ -102,7 +105,7 @@ def revision(name: str) -> Revision:
 
 def sender(env: simpy.Environment, vehicle: PlacedVehicle) -> SetPointSender:
     """A connection to the autopilot without losses and frame errors."""
-    return SetPointSender(vehicle, lambda: env.now, stream=random.Random(0))
+    return SetPointSender(vehicle, env, stream=random.Random(0))
 
 
 def spiral_at(altitude_m: float) -> Mode:

@@ -4,10 +4,7 @@ import gc
 
 import scipy.special  # noqa: F401
 
-import suave_des.cli.main
-import suave_des.cli.summary  # noqa: F401
-from suave_des.campaign import campaign, display  # noqa: F401
-from suave_des.campaign.executors import mission_runner  # noqa: F401
+from suave_des.campaign import campaign, missions, progress  # noqa: F401
 from suave_des.scenario.loader import load_scenario
 from suave_des.simulation.simulator import Simulator
 

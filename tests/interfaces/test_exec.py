@@ -1,8 +1,8 @@
 """Managers that are programs of their own, in whatever language."""
 
-import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -127,6 +127,10 @@ def test_it_is_told_what_happens() -> None:
         ("print('{\"protocol\": 2}', flush=True)", "does not speak version 1"),
         ('print(\'{"period_s": "often"}\', flush=True)', "to mission_started"),
         ('print(\'{"subscribes_to": ["poses"]}\', flush=True)', "did you mean 'pose'"),
+        ('print(\'{"period_s": 2, "starts_s": -50}\', flush=True)', "starts_s is -50.0"),
+        ('print(\'{"period_s": 2, "starts_s": Infinity}\', flush=True)', "starts_s is inf"),
+        ('print(\'{"depends_on": {"water_visibility": [NaN]}}\', flush=True)', "depends_on is"),
+        ('print(\'{"depends_on": {"visibility": [2.0]}}\', flush=True)', "'visibility', which nothing measures"),
         ('print(\'{"modes": {"f_generate_search_path": "fd_spiral_hihg"}}\', flush=True)', "'fd_spiral_high'"),
         ("print('{\"modes\": [1]}', flush=True)", "modes is an object"),
     ],
@@ -145,18 +149,45 @@ def test_after_a_failure_the_next_mission_begins_with_a_new_program() -> None:
     assert frame["run"].tolist() == [2, 3]
 
 
-@pytest.mark.usefixtures("quick_workers")
-def test_programs_end_with_the_campaign() -> None:
-    note = "open('pid', 'w').write(str(os.getpid()))\n"
-    run_campaign("seams2023", [program(note + EVERY_PERIOD)], runs=2, workers=2)
-    pid = int(Path("pid").read_text())
+WITH_A_CHILD = """
+if number == 0:
+    import subprocess
+    child = subprocess.Popen(["sleep", "600"])
+    with open("pids", "a") as pids:
+        pids.write(f"{os.getpid()} {child.pid}\\n")
+"""
+
+
+def assert_all_ended() -> None:
+    pids = Path("pids").read_text().split()
     for _ in range(100):
-        try:
-            os.kill(pid, 0)
-        except ProcessLookupError:
+        if not any(Path("/proc", pid).exists() for pid in pids):
             return
         time.sleep(0.1)
-    raise AssertionError("the program still runs")
+    raise AssertionError("a program, or its child, still runs")
+
+
+@pytest.mark.usefixtures("quick_workers")
+def test_programs_and_their_children_end_with_the_campaign() -> None:
+    run_campaign("seams2023", [program(WITH_A_CHILD + EVERY_PERIOD)], runs=2, workers=2)
+    assert_all_ended()
+
+
+def test_the_children_of_a_program_that_fails_end_with_its_mission() -> None:
+    failure(program(WITH_A_CHILD + "sys.exit(1)\n"))
+    assert_all_ended()
+
+
+@pytest.mark.parametrize(("workers", "number"), [(1, signal.SIGINT), (2, signal.SIGINT), (1, signal.SIGKILL)])
+def test_programs_and_their_children_end_when_the_campaign_is_stopped(workers: int, number: int) -> None:
+    manager = program(WITH_A_CHILD + "time.sleep(600)\n")
+    options = ("--manager-option", "time_out_s=600", "--workers", str(workers), "--runs", "9", "--out", "out")
+    command = (sys.executable, "-m", "suave_des", "campaign", "seams2023", "--managers", manager, *options)
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        while not Path("pids").exists() or len(Path("pids").read_text().splitlines()) < workers:
+            time.sleep(0.1)
+        process.send_signal(number)
+    assert_all_ended()
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,9 @@
-"""The Gymnasium environment and its vector form."""
+"""The Gymnasium environment."""
 
 import subprocess
 import sys
 import warnings
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import suave_des  # noqa: F401
-from suave_des import InputError, load_scenario
+from suave_des import InputError, load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
 
 NAME = "suave_des/PipelineInspection-v0"
@@ -37,6 +38,13 @@ def test_it_passes_gymnasiums_own_checker_without_a_warning(scenario: str) -> No
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(environment)
+
+
+def test_the_snippet_of_the_guide_works_when_it_is_copied_alone() -> None:
+    page = Path(__file__).parents[2] / "docs" / "guides" / "other-programs.md"
+    snippet = page.read_text().partition("## Gymnasium")[2].partition("```python\n")[2].partition("```")[0]
+    done = subprocess.run([sys.executable, "-c", snippet], capture_output=True, text=True)
+    assert done.returncode == 0 and done.stdout.splitlines()[-1] == "47.4 87.0", done.stderr
 
 
 @pytest.mark.parametrize("imports", ["import suave_des, gymnasium", "import gymnasium, suave_des"])
@@ -71,6 +79,16 @@ def test_an_observation_has_what_monitors_measured(simulator: Simulator) -> None
     assert first["water_visibility"] == -1.0 and first["time_share"] == 0.0
     high = [dict(zip(names, each.tolist(), strict=True))["f_generate_search_path"] for each in seen[1:20]]
     assert set(high) == {2.0}
+
+
+def test_an_action_that_stays_the_same_is_requested_again_for_the_next_task(simulator: Simulator) -> None:
+    made = Simulator(load_scenario("release15"))  # there maintain_motion ends and begins with each task
+    environment = gymnasium.make(NAME, scenario=made)
+    names = environment.unwrapped.observation_names
+    seen, _, info = play(environment, [2, 1], seed=1)
+    inspecting = [named for each in seen if (named := dict(zip(names, each.tolist(), strict=True)))["inspects"]]
+    assert info["metrics"].pipeline_found
+    assert {named["f_maintain_motion"] for named in inspecting[1:]} == {1.0}
 
 
 def test_modes_make_a_difference(simulator: Simulator) -> None:
@@ -122,45 +140,60 @@ def test_a_step_before_reset_is_refused(simulator: Simulator) -> None:
         gymnasium.make(NAME, scenario=simulator).unwrapped.step([0, 0])
 
 
-class TestVector:
-    def test_its_missions_are_those_of_single_environments(self, simulator: Simulator) -> None:
-        vector = gymnasium.make_vec(NAME, num_envs=3, scenario=simulator)
-        single = [gymnasium.make(NAME, scenario=simulator) for _ in range(3)]
-        observations, _ = vector.reset(seed=5)
+def test_many_missions_side_by_side_are_those_of_single_environments(simulator: Simulator) -> None:
+    vector = gymnasium.make_vec(NAME, num_envs=3, scenario=simulator, period_s=10.0)
+    single = [gymnasium.make(NAME, scenario=simulator, period_s=10.0) for _ in range(3)]
+    observations, _ = vector.reset(seed=5)
+    for n, one in enumerate(single):
+        assert (one.reset(seed=5 + n)[0] == observations[n]).all()
+    actions = np.random.default_rng(3).integers(0, [3, 2], (25, 3, 2))
+    for step in actions:
+        observations, rewards, *_ = vector.step(step)
         for n, one in enumerate(single):
-            assert (one.reset(seed=5 + n)[0] == observations[n]).all()
-        actions = np.random.default_rng(3).integers(0, [3, 2], (60, 3, 2))
-        for step in actions:
-            observations, rewards, *_ = vector.step(step)
-            for n, one in enumerate(single):
-                observation, reward, *_ = one.step(step[n])
-                assert (observation == observations[n]).all() and reward == rewards[n]
+            observation, reward, *_ = one.step(step[n])
+            assert (observation == observations[n]).all() and reward == rewards[n]
 
-    def test_a_mission_that_is_over_is_followed_by_another(self, simulator: Simulator) -> None:
-        vector = gymnasium.make_vec(NAME, num_envs=2, scenario=simulator, period_s=100.0)
-        vector.reset(seed=1)
-        actions = np.zeros((2, 2), np.int64)
-        overs = []
-        for _ in range(10):
-            observations, _, over, _, infos = vector.step(actions)
-            overs.append(over.all())
-            if over.all():
-                assert {each.run for each in infos["metrics"]} == {1}
-            elif overs[-2:-1] == [True]:
-                assert (observations[:, 9] == 0.0).all()
-        assert overs.count(True) == 2
 
-    def test_the_same_seed_gives_the_same_missions(self, simulator: Simulator) -> None:
-        def total() -> float:
-            vector = gymnasium.make_vec(NAME, num_envs=2, scenario=simulator, period_s=50.0)
-            vector.reset(seed=9)
-            return sum(vector.step(np.ones((2, 2), np.int64))[1].sum() for _ in range(30))
+def test_observations_are_within_the_bounds_of_the_scenario(simulator: Simulator) -> None:
+    environment = gymnasium.make(NAME, scenario=simulator)
+    names = environment.unwrapped.observation_names
+    space = environment.observation_space
+    bounds = dict(zip(names, zip(space.low, space.high, strict=True), strict=True))
+    assert bounds["water_visibility"] == (-1.0, 3.75) and bounds["c_thruster_1"] == (0.0, 1.0)
+    assert bounds["distance_inspected_m"][1] < 250.0 and bounds["time_share"][1] < 1.01
+    seen, _, _ = play(environment, [1, 0], seed=2)
+    assert all(environment.observation_space.contains(each) for each in seen)
 
-        assert total() == total()
 
-    @pytest.mark.parametrize("actions", [np.zeros((2, 3), int), np.zeros((2, 2)), np.zeros(2, int)])
-    def test_actions_of_another_shape_are_refused(self, simulator: Simulator, actions: np.ndarray) -> None:
-        vector = gymnasium.make_vec(NAME, num_envs=2, scenario=simulator)
-        vector.reset(seed=1)
-        with pytest.raises(InputError, match="actions"):
-            vector.step(actions)
+@pytest.mark.parametrize(
+    ("signal", "low", "high"),
+    [
+        ({"kind": "constant", "value": 8.0}, -1.0, 8.0),
+        ({"kind": "step", "time_s": 5.0, "before": -4.0, "after": 2.0}, -4.0, 2.0),
+        ({"kind": "constant", "value": 2.0, "noise": {"distribution": "normal", "mean": 0.0, "std": 0.5}}, -1.0, 5.0),
+        ({"kind": "constant", "value": {"distribution": "uniform", "minimum": 1.0, "maximum": 6.0}}, -1.0, 6.0),
+        ({"kind": "constant", "value": 0.0, "noise": {"distribution": "exponential", "mean": 0.1}}, -1.0, 3.6),
+    ],
+)
+def test_bounds_follow_from_what_the_scenario_says_of_a_signal(signal: dict, low: float, high: float) -> None:
+    made = Simulator(with_values(load_scenario("seams2023"), {"signals.water_visibility": signal}))
+    space = gymnasium.make(NAME, scenario=made).observation_space
+    assert (space.low[0], space.high[0]) == pytest.approx((low, high))
+
+
+def test_it_draws_the_way_so_far(simulator: Simulator) -> None:
+    environment = gymnasium.make(NAME, scenario=simulator, render_mode="rgb_array").unwrapped
+    environment.reset(seed=1)
+    before = environment.render()
+    for _ in range(20):
+        environment.step([1, 0])
+    after = environment.render()
+    assert before.shape == after.shape == (400, 600, 3) and before.dtype == np.uint8
+    assert (before != after).any()
+
+
+def test_without_a_render_mode_it_says_how_to_draw(simulator: Simulator) -> None:
+    environment = gymnasium.make(NAME, scenario=simulator).unwrapped
+    environment.reset(seed=1)
+    with pytest.raises(InputError, match="rgb_array"):
+        environment.render()

@@ -2,6 +2,7 @@
 
 import json
 import socket
+import struct
 import threading
 import time
 from collections.abc import Iterator
@@ -34,12 +35,20 @@ def port(simulator: Simulator) -> Iterator[int]:
         server.shutdown()
 
 
-def request(port: int, method: str, path: str, body: object = None) -> tuple[int, bytes]:
+def request(port: int, method: str, path: str, body: object = None, **headers: str) -> tuple[int, bytes]:
+    """Send a request; further headers, in which an underscore stands for a dash, replace those that it has."""
     connection = HTTPConnection("127.0.0.1", port, timeout=10.0)
     content = None if body is None else body if isinstance(body, bytes) else json.dumps(body).encode()
-    connection.request(method, path, content)
+    given = {name.replace("_", "-"): value for name, value in headers.items()}
+    connection.request(method, path, content, {"Content-Type": "application/json", **given})
     answer = connection.getresponse()
     return answer.status, answer.read()
+
+
+def validate_schema(data: dict, schema: dict) -> None:
+    """Check as UPISAS does: what its Strategy sends and gets has exactly the keys of the schema."""
+    jsonschema.validate(data, schema)
+    assert data.keys() == schema["properties"].keys()
 
 
 class Strategy:
@@ -50,9 +59,9 @@ class Strategy:
         schemas = {name: self.get(f"{name}_schema") for name in ("monitor", "execute", "adaptation_options")}
         for schema in schemas.values():
             jsonschema.Draft202012Validator.check_schema(schema)
-        self.valid = {name: jsonschema.Draft202012Validator(schema) for name, schema in schemas.items()}
+        self.schemas = schemas
         self.options = self.get("adaptation_options")
-        self.valid["adaptation_options"].validate(self.options)
+        validate_schema(self.options, schemas["adaptation_options"])
 
     def get(self, path: str) -> dict:
         status, body = request(self.port, "GET", f"/{path}")
@@ -62,12 +71,12 @@ class Strategy:
 
     def monitor(self) -> dict:
         found = self.get("monitor")
-        self.valid["monitor"].validate(found)
+        validate_schema(found, self.schemas["monitor"])
         assert not any(isinstance(value, dict | list) for value in found.values())
         return found
 
     def execute(self, adaptation: dict) -> None:
-        self.valid["execute"].validate(adaptation)
+        validate_schema(adaptation, self.schemas["execute"])
         status, body = request(self.port, "PUT", "/execute", adaptation)
         assert status == 200
         self.seen += body
@@ -77,7 +86,7 @@ def whole_mission(port: int, seed: int) -> tuple[bytes, dict]:
     request(port, "POST", "/start", {"seed": seed})
     strategy = Strategy(port)
     while not (found := strategy.monitor())["is_over"]:
-        adaptation: dict[str, object] = {"advance_s": 4.0}
+        adaptation = {**dict.fromkeys(strategy.schemas["execute"]["properties"]), "advance_s": 4.0}
         if found["task"] == "search_pipeline":
             low, medium, high = strategy.options[SEARCH]
             visibility_m = found["water_visibility"] or 0.0
@@ -122,7 +131,8 @@ def test_time_may_pass_by_a_factor_of_real_time(simulator: Simulator) -> None:
         ("PUT", "/execute", b"[" * 50_000, 400, "not JSON"),
         ("PUT", "/execute", [1], 400, "expected an object"),
         ("PUT", "/execute", {SEARCH: "fd_spiral_hihg"}, 400, "did you mean 'fd_spiral_high'"),
-        ("PUT", "/execute", {"f_search": "x"}, 400, "there is no function"),
+        ("PUT", "/execute", {"f_search": "x"}, 400, "unknown key 'f_search'"),
+        ("PUT", "/execute", {"f_search": None}, 400, "unknown key 'f_search'"),
         ("PUT", "/execute", {SEARCH: ["x"]}, 400, "no mode"),
         ("PUT", "/execute", {"advance_s": -1}, 400, "is not a time in seconds"),
         ("PUT", "/execute", {"advance_s": "soon"}, 400, "is not a time in seconds"),
@@ -142,10 +152,72 @@ def test_what_it_cannot_use_is_refused_and_changes_nothing(
     assert request(port, "GET", "/monitor") == before
 
 
-def test_a_body_without_a_length_is_refused(port: int) -> None:
+def test_null_leaves_a_mode_as_it_is(port: int) -> None:
+    before = json.loads(request(port, "GET", "/monitor")[1])
+    keys = json.loads(request(port, "GET", "/execute_schema")[1])["properties"]
+    status, body = request(port, "PUT", "/execute", dict.fromkeys(keys))
+    assert status == 200 and json.loads(body) == {"time_s": before["time_s"], "is_over": False}
+    assert json.loads(request(port, "GET", "/monitor")[1]) == before
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({"Host": "rebound.example:3000"}, 421),
+        ({"Host": "rebound.example"}, 421),
+        ({"Host": "[::1"}, 421),
+        ({"Host": ""}, 421),
+        ({"Origin": "http://evil.example"}, 403),
+        ({"Origin": "http://localhost:1"}, 403),
+        ({"Origin": "null"}, 403),
+        ({"Content_Type": "text/plain"}, 415),
+        ({"Content_Type": "application/x-www-form-urlencoded"}, 415),
+    ],
+)
+def test_a_web_page_of_somebody_else_may_neither_read_nor_steer(port: int, headers: dict, status: int) -> None:
+    before = request(port, "GET", "/monitor")
+    for method, path, body in (("PUT", "/execute", {SEARCH: "fd_spiral_high"}), ("POST", "/start", {"seed": 7})):
+        found, answer = request(port, method, path, body, **headers)
+        assert found == status and "error" in json.loads(answer)
+    if status != 415:  # a GET has no body
+        assert request(port, "GET", "/monitor", **headers)[0] == status
+    assert request(port, "GET", "/monitor") == before
+
+
+@pytest.mark.parametrize("host", ["localhost", "localhost:3000", "127.0.0.1:80", "[::1]:3000"])
+def test_it_may_be_called_by_the_names_of_this_machine(port: int, host: str) -> None:
+    own = {"Host": host, "Origin": f"http://{host}", "Content_Type": "application/json; charset=utf-8"}
+    assert request(port, "POST", "/advance", {"advance_s": 1}, **own)[0] == 200
+
+
+def raw(port: int, head: str) -> bytes:
     with socket.create_connection(("127.0.0.1", port), timeout=10.0) as stream:
-        stream.sendall(b"PUT /execute HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\n")
-        assert b" 400 " in stream.recv(1000)
+        stream.sendall(head.encode() + b"\r\nContent-Type: application/json\r\n\r\n")
+        return stream.recv(1000)
+
+
+@pytest.mark.parametrize(
+    ("head", "status"),
+    [
+        ("Transfer-Encoding: chunked", b" 400 "),
+        ("Content-Length: -1", b" 400 "),
+        ("Content-Length: " + "0" * 20 + "99999999999", b" 413 "),
+        ("Content-Length: " + "9" * 5000, b" 413 "),
+    ],
+)
+def test_a_body_without_a_sensible_length_is_refused(port: int, head: str, status: bytes) -> None:
+    assert status in raw(port, f"PUT /execute HTTP/1.1\r\nHost: localhost\r\n{head}")
+
+
+def test_clients_that_leave_in_the_middle_are_not_reported(port: int, capfd: pytest.CaptureFixture[str]) -> None:
+    for _ in range(50):
+        stream = socket.create_connection(("127.0.0.1", port), timeout=10.0)
+        stream.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # leave with a reset
+        stream.sendall(b"PUT /execute HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9")
+        stream.close()
+    assert request(port, "GET", "/monitor")[0] == 200
+    time.sleep(0.2)
+    assert capfd.readouterr().err == ""
 
 
 def test_several_clients_at_once_get_whole_answers(port: int) -> None:

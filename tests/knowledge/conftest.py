@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.reasoners import Reasoner, make_reasoner
+from suave_des.knowledge.reasoner import Reasoner
 from suave_des.resources import shipped_folder
 from tests.helpers.owl_text import MakeOntology
 
@@ -35,7 +35,7 @@ def kb() -> Ontology:
 
 @pytest.fixture(scope="session")
 def pellet(kb: Ontology) -> Reasoner:
-    return make_reasoner("pellet", kb)
+    return Reasoner(kb, "pellet")
 
 
 @pytest.fixture

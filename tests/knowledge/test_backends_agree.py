@@ -10,9 +10,9 @@ import pytest
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet.limit import TimeLimit
+from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.planning import plan
-from suave_des.knowledge.reasoners import Reasoner, make_reasoner
+from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import Fact, Inference, KnowledgeState, ObjectiveState
 from tests.helpers.generated_ontologies import write_ontology
 from tests.helpers.knowledge_states import FOLLOW, MOTION, SEARCH, searching
@@ -51,7 +51,7 @@ def random_state(draw: random.Random) -> KnowledgeState:
 
 def outcome(reasoner: Reasoner, state: KnowledgeState) -> Inference | str:
     try:
-        return reasoner.infer(state)
+        return reasoner.analyze(state)
     except KnowledgeError as error:
         return str(error)
 
@@ -64,7 +64,7 @@ def test_both_backends_infer_the_same_on_random_states(kb: Ontology, pellet: Rea
     states += [searching("fd_spiral_high", 1.0, status="UNGROUNDED"), KnowledgeState()]
     assert len(set(states)) >= count
     found = [outcome(pellet, state) for state in states]
-    stock = make_reasoner("owlready2", kb, TimeLimit(180.0))
+    stock = Reasoner(kb, "owlready2", TimeLimit(180.0))
     with ThreadPoolExecutor(max_workers=2) as pool:  # each call waits for a Java process of its own
         reference = list(pool.map(lambda state: outcome(stock, state), states))
     assert found == reference
@@ -79,8 +79,8 @@ def test_both_backends_infer_the_same_on_random_states(kb: Ontology, pellet: Rea
 def test_an_inference_does_not_depend_on_those_before_it(kb: Ontology) -> None:
     draw = random.Random(7)
     states = [random_state(draw) for _ in range(40)]
-    forth = make_reasoner("pellet", kb)
-    back = make_reasoner("pellet", kb)
+    forth = Reasoner(kb, "pellet")
+    back = Reasoner(kb, "pellet")
     one = [outcome(forth, state) for state in states]
     other = [outcome(back, state) for state in reversed(states)]
     assert one == other[::-1]
@@ -94,7 +94,7 @@ def everything(backend: str, number: int, folder: Path) -> frozenset[Fact] | str
     owl, rules = write_ontology(number, folder)
     base = Ontology.load([owl], rules=[rules])
     try:
-        return make_reasoner(backend, base, TimeLimit(180.0), base.content.all_terms()).infer(KnowledgeState()).facts
+        return Reasoner(base, backend, TimeLimit(180.0), base.content.all_terms()).analyze(KnowledgeState()).facts
     except KnowledgeError as error:
         assert "contradiction" in str(error)
         return "contradiction"

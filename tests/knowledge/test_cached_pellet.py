@@ -1,12 +1,10 @@
-"""CachedPellet answers are Pellet's answers: on several ontologies, around every threshold, and from a file."""
+"""The cached reasoner's answers are Pellet's: on several ontologies, around every threshold, and from a file."""
 
 from __future__ import annotations
 
 import random
-from concurrent.futures import ProcessPoolExecutor
 from decimal import Decimal
 from functools import lru_cache
-from multiprocessing import get_context
 from pathlib import Path
 from tempfile import mkdtemp
 
@@ -15,11 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.errors import KnowledgeError
+from suave_des.knowledge import reasoner as module
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet import cached
-from suave_des.knowledge.pellet.cached import CachedPellet, InferenceCache, cache_digest
-from suave_des.knowledge.reasoners import Reasoner, make_reasoner
-from suave_des.knowledge.regions import Regions, regions_of
+from suave_des.knowledge.reasoner import Reasoner, Regions, cache_digest, regions_of
 from suave_des.knowledge.state import Inference, KnowledgeState, ObjectiveState, exact
 from suave_des.resources import shipped_folder
 from tests.helpers.knowledge_states import MOTION, SEARCH, searching
@@ -66,19 +62,19 @@ ONTOLOGIES = {
 
 
 @lru_cache
-def loaded(name: str) -> tuple[Ontology, Reasoner, CachedPellet]:
+def loaded(name: str) -> tuple[Ontology, Reasoner, Reasoner]:
     extra, rules = ONTOLOGIES[name]
     folder = Path(mkdtemp())
     text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
     (folder / "suave.owl").write_text(text.replace("</rdf:RDF>", extra + "</rdf:RDF>"), encoding="utf-8")
     (folder / "mine.swrl").write_text(rules, encoding="utf-8")
     kb = Ontology.load([folder / "suave.owl"], rules=[folder / "mine.swrl"])
-    return kb, make_reasoner("pellet", kb), CachedPellet(kb, folder)
+    return kb, Reasoner(kb, "pellet"), Reasoner(kb, folder=folder)
 
 
 def outcome(reasoner: Reasoner, state: KnowledgeState) -> Inference | str:
     try:
-        return reasoner.infer(state)
+        return reasoner.analyze(state)
     except KnowledgeError as error:
         return str(error)
 
@@ -132,7 +128,7 @@ def test_cached_pellet_and_pellet_agree_around_thresholds(name: str, data: st.Da
     state = data.draw(states(kb))
     assert outcome(cached, state) == outcome(pellet, state)
     twin = moved(random.Random(seed), kb, state)
-    if cached.regions.is_sound:
+    if cached.regions is not None and cached.regions.is_sound:
         assert cached.regions.key(twin) == cached.regions.key(state)
     found, wanted = outcome(cached, twin), outcome(pellet, twin)
     assert found == wanted
@@ -147,7 +143,7 @@ def test_cached_pellet_and_pellet_agree_around_thresholds(name: str, data: st.Da
 def test_stock_owlready2_agrees(name: str, visibility: str, battery: str) -> None:
     kb, pellet, cached = loaded(name)
     draw = random.Random(name)
-    stock = make_reasoner("owlready2", kb)
+    stock = Reasoner(kb, "owlready2")
     state = searching(draw.choice(kb.designs(SEARCH)), visibility)
     state = KnowledgeState.of(
         state.objectives,
@@ -215,26 +211,26 @@ STATES = [searching(f"fd_spiral_{name}", value) for name in ("low", "high") for 
 
 @pytest.fixture
 def filled(kb: Ontology, tmp_path: Path) -> Path:
-    cached = CachedPellet(kb, tmp_path)
+    cached = Reasoner(kb, folder=tmp_path)
     for state in STATES:
-        cached.infer(state)
+        cached.analyze(state)
     (file,) = (tmp_path / "inferences").iterdir()
     return file
 
 
 def test_a_filled_memory_asks_nobody(kb: Ontology, pellet: Reasoner, filled: Path, no_pellet: None) -> None:
-    cached = CachedPellet(kb, filled.parent.parent)
+    cached = Reasoner(kb, folder=filled.parent.parent)
     for state in [*STATES, searching("fd_spiral_high", "2.1234")]:
-        assert cached.infer(state) == pellet.infer(state)
+        assert cached.analyze(state) == pellet.analyze(state)
     with pytest.raises(AssertionError, match="asked"):
-        cached.infer(searching("fd_spiral_medium", "1.0"))
+        cached.analyze(searching("fd_spiral_medium", "1.0"))
 
 
 def test_the_cache_depends_on_the_code_of_every_package_for_knowledge(
     kb: Ontology, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = cache_digest(kb)
-    monkeypatch.setattr(cached, "_code", cached._code.__wrapped__)
+    monkeypatch.setattr(module, "_code", module._code.__wrapped__)
     assert cache_digest(kb) == before
     read = Path.read_bytes
     for changed in ("ontology.py", "pellet/in_process.py", "rules/parser.py"):
@@ -242,75 +238,21 @@ def test_the_cache_depends_on_the_code_of_every_package_for_knowledge(
         assert cache_digest(kb) != before
 
 
-def test_another_knowledge_base_does_not_use_it(filled: Path, tmp_path: Path, kb: Ontology) -> None:
-    other = Ontology.load(disabled_rules=["S1b"])
-    assert cache_digest(other) != cache_digest(kb)
-    assert InferenceCache(cache_digest(other), filled.parent.parent).load() == {}
-
-
-def test_damaged_entries_are_left_out_and_the_file_is_mended(kb: Ontology, filled: Path) -> None:
-    disk = InferenceCache(cache_digest(kb), filled.parent.parent)
-    whole = disk.load()
-    assert len(whole) == len(STATES)
-    lines = filled.read_bytes().split(b"\n")
-    entry = next(number for number, line in enumerate(lines) if b"IN_ERROR_NFR" in line)
-    lines[entry] = lines[entry].replace(b"IN_ERROR_NFR", b"IN_ERROR_FR_")
-    filled.write_bytes(b"\n".join(lines) + b"\xff\x00 trash [\n" + lines[-2][:40])
-    mended = disk.load()
-    assert len(mended) == len(whole) - 1
-    assert mended.items() <= whole.items()
-    content = filled.read_bytes()
-    assert disk.load() == mended
-    assert filled.read_bytes() == content
-    assert b"trash" not in content
-
-
-@pytest.mark.parametrize(
-    "content", [b"", b"\x80\x04pickled", b"suave-des inferences 1 other\n" + b"x" * 24 + b" [[],[]]\n"]
-)
-def test_a_foreign_file_is_rebuilt(kb: Ontology, filled: Path, content: bytes) -> None:
-    filled.write_bytes(content)
-    cached = CachedPellet(kb, filled.parent.parent)
-    cached.infer(STATES[0])
-    assert len(InferenceCache(cache_digest(kb), filled.parent.parent).load()) == 1
-
-
-def test_random_bytes_never_break_the_memory(kb: Ontology, filled: Path) -> None:
-    whole = InferenceCache(cache_digest(kb), filled.parent.parent).load()
-    original = filled.read_bytes()
-    draw = random.Random(5)
-    for _ in range(300):
-        content = bytearray(original)
-        for _ in range(draw.randint(1, 20)):
-            content[draw.randrange(len(content))] = draw.randrange(256)
-        filled.write_bytes(bytes(content[: draw.randrange(len(content))]))
-        assert InferenceCache(cache_digest(kb), filled.parent.parent).load().items() <= whole.items()
+def test_another_knowledge_base_does_not_use_it(kb: Ontology) -> None:
+    assert cache_digest(Ontology.load(disabled_rules=["S1b"])) != cache_digest(kb)
 
 
 def test_a_folder_that_cannot_be_written_is_no_obstacle(kb: Ontology, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("not a folder", encoding="utf-8")
-    cached = CachedPellet(kb, tmp_path / "file")
-    assert cached.infer(STATES[0]).grounding_status(SEARCH) == "IN_ERROR_NFR"
-
-
-def _add_many(folder: str, digest: str, number: int) -> None:
-    disk = InferenceCache(digest, Path(folder))
-    for count in range(200):
-        state = KnowledgeState.of(components={f"c_{number}": str(count)})
-        disk.add((state.objectives, state.groundings, state.components, ()), frozenset())
-
-
-def test_several_processes_share_a_file(tmp_path: Path) -> None:
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        list(pool.map(_add_many, [str(tmp_path)] * 2, ["d" * 64] * 2, range(2)))
-    assert len(InferenceCache("d" * 64, tmp_path).load()) == 400
+    cached = Reasoner(kb, folder=tmp_path / "file")
+    assert cached.analyze(STATES[0]).grounding_status(SEARCH) == "IN_ERROR_NFR"
 
 
 def test_a_contradiction_is_told_for_each_state_with_its_own_values(kb: Ontology, tmp_path: Path) -> None:
-    cached = CachedPellet(kb, tmp_path)
+    cached = Reasoner(kb, folder=tmp_path)
     for _ in range(2):
         with pytest.raises(KnowledgeError, match="o_status"):
-            cached.infer(searching("fd_spiral_high", "1.0", status="UNGROUNDED"))
+            cached.analyze(searching("fd_spiral_high", "1.0", status="UNGROUNDED"))
     assert not (tmp_path / "inferences").exists()
 
 
@@ -318,11 +260,11 @@ def test_a_contradiction_is_told_for_each_state_with_its_own_values(kb: Ontology
 def test_a_value_on_a_threshold_is_not_one_beside_it(order: tuple[int, int, int], tmp_path: Path) -> None:
     # fd_spiral_high expects 3.25 m; the rule QAWaterVisibility says less than that is an error, so 3.25 itself is none.
     kb = Ontology.load()
-    cached = CachedPellet(kb, tmp_path)
+    cached = Reasoner(kb, folder=tmp_path)
     cases = [("3.2499", "IN_ERROR_NFR"), ("3.25", None), ("3.2501", None)]
     for place in order:
         value, status = cases[place]
-        inference = cached.infer(searching("fd_spiral_high", value))
+        inference = cached.analyze(searching("fd_spiral_high", value))
         assert inference.grounding_status(SEARCH) == status, value
 
 
@@ -332,10 +274,10 @@ def test_a_rule_for_a_threshold_alone_holds_on_it_alone(order: tuple[int, int, i
         "Level: isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ equal(?v, 3.25) -> Binding(?q)\n"
     )
     kb = Ontology.load(rules=[tmp_path / "equal.swrl"])
-    cached = CachedPellet(kb, tmp_path)
+    cached = Reasoner(kb, folder=tmp_path)
     for place in order:
         value = ("3.2499", "3.25", "3.2501")[place]
-        facts = cached.infer(searching("fd_spiral_high", value)).facts
+        facts = cached.analyze(searching("fd_spiral_high", value)).facts
         assert ("Binding(obs_water_visibility)" in map(str, facts)) == (value == "3.25"), value
 
 

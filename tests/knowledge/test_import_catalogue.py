@@ -10,7 +10,7 @@ import pytest
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.planning import plan
-from suave_des.knowledge.reasoners import Reasoner, make_reasoner
+from suave_des.knowledge.reasoner import Reasoner
 from tests.helpers.exemplar_files import MROS_IMPORT, write_exemplar_files
 from tests.helpers.knowledge_states import MOTION, SEARCH, searching
 from tests.helpers.owl_text import MakeOntology
@@ -28,7 +28,7 @@ STORY = [
 
 
 def decisions(base: Ontology, reasoner: Reasoner) -> list[dict[str, str | None]]:
-    plans = [plan(base, reasoner.infer(state)) for state in STORY]
+    plans = [plan(base, reasoner.analyze(state)) for state in STORY]
     return [{d.function: d.design for d in one.decisions} for one in plans]
 
 
@@ -40,7 +40,7 @@ def test_the_exemplars_three_files_decide_as_the_shipped_two(
     base = Ontology.load(list(files.values()))
     assert set(base.files) == set(files.values())
     assert len(base.rules) == len(kb.rules)
-    found = decisions(base, make_reasoner("pellet", base))
+    found = decisions(base, Reasoner(base, "pellet"))
     assert found == decisions(kb, pellet)
     assert found[4] == {MOTION: "fd_recover_thrusters"}
     assert found[6] == {MOTION: "fd_all_thrusters", SEARCH: "fd_spiral_low"}
@@ -165,4 +165,4 @@ def test_an_ontology_of_ones_own_may_add_to_the_shipped_ones(tmp_path: Path, shi
     base = Ontology.load([path])
     assert "fd_zigzag" in base.designs(SEARCH)
     assert set(base.files) == {path, shipped / "suave.owl", shipped / "tomasys.owl"}
-    assert make_reasoner("pellet", base).infer(searching("fd_zigzag")).facts == frozenset()
+    assert Reasoner(base, "pellet").analyze(searching("fd_zigzag")).facts == frozenset()

@@ -62,8 +62,8 @@ def test_importing_the_room_starts_and_loads_nothing() -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
     code = (
-        "import jpype, suave_des.knowledge.reasoners\n"
-        "from suave_des.knowledge.pellet import cached, in_process, stock\n"
+        "import jpype, suave_des.knowledge.reasoner\n"
+        "from suave_des.knowledge.pellet import in_process, stock\n"
         "print(jpype.isJVMStarted())"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -10,21 +10,22 @@ import pytest
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.planning import plan, triggers_adaptation
-from suave_des.knowledge.reasoners import Reasoner, make_reasoner
+from suave_des.knowledge.rdf import QA_OPERATOR, Lit
+from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import Decision, KnowledgeState, ObjectiveState
 from tests.helpers.knowledge_states import MOTION, SEARCH, searching
 from tests.helpers.owl_text import MakeOntology, individual
 
 
 def decide(kb: Ontology, reasoner: Reasoner, state: KnowledgeState, **options: bool) -> dict[str, Decision]:
-    decisions = plan(kb, reasoner.infer(state), **options).decisions
+    decisions = plan(kb, reasoner.analyze(state), **options).decisions
     assert [d.function for d in decisions] == sorted(d.function for d in decisions)
     return {decision.function: decision for decision in decisions}
 
 
 def decide_with(file: Path, state: KnowledgeState) -> Decision:
     base = Ontology.load([file])
-    return decide(base, make_reasoner("pellet", base), state)[SEARCH]
+    return decide(base, Reasoner(base, "pellet"), state)[SEARCH]
 
 
 @pytest.mark.parametrize(
@@ -164,6 +165,38 @@ def test_a_value_that_the_objective_requires_is_compared_with_the_expected_one(s
     assert [r.reason for r in decision.rejected] == ["energy 0.90 expected > 0.60 required"]
 
 
+def test_a_value_is_bad_if_any_operator_of_its_attribute_says_so(suave_copy: MakeOntology) -> None:
+    """The schema allows one operator; without that, expected and measured values are compared by each."""
+    designs = {"fd_spiral_low": "0.5", "fd_spiral_medium": "0.6", "fd_spiral_high": "0.7"}
+    added = individual("current", "QualityAttributeType", ("qa_comparison_operator", "<")) + "".join(
+        individual(f"qa_{name}", "QAvalue", ("isQAtype", ":current"), ("hasValue", value))
+        + individual(name, "FunctionDesign", ("hasQAestimation", f":qa_{name}"))
+        for name, value in designs.items()
+    )
+    required = individual("nfr", "QAvalue", ("isQAtype", ":current"), ("hasValue", "0.6"))
+    required += individual("o_generate_search_path", "Objective", ("hasNFR", ":nfr"))
+
+    def decided(text: str, state: KnowledgeState) -> Decision:
+        base = Ontology.load([suave_copy(text)])
+        facts = [each for each in base.content.triples if not (each[0] == QA_OPERATOR and "Functional" in str(each[2]))]
+        current = next(each for each in facts if each[1] == QA_OPERATOR and each[0].endswith("#current"))
+        base = base.with_triples([*facts, (*current[:2], Lit(">", current[2].datatype))])
+        return decide(base, Reasoner(base, "pellet"), state)[SEARCH]
+
+    decision = decided(added + required, searching(None, None, status="UNGROUNDED"))
+    assert decision.design == "fd_spiral_medium"
+    assert {(r.design, r.reason) for r in decision.rejected} == {
+        ("fd_spiral_low", "current 0.50 expected < 0.60 required"),
+        ("fd_spiral_high", "current 0.70 expected > 0.60 required"),
+    }
+    measured = decided(added, KnowledgeState.of([ObjectiveState(SEARCH, "UNGROUNDED")], measurements={"current": 0.6}))
+    assert measured.design == "fd_spiral_medium"
+    assert {r.reason for r in measured.rejected} == {
+        "current 0.60 measured > 0.50 expected",
+        "current 0.60 measured < 0.70 expected",
+    }
+
+
 def test_a_required_performance_counts_designs_that_tell_none_as_bad(suave_copy: MakeOntology) -> None:
     path = suave_copy(
         individual("nfr", "QAvalue", ("isQAtype", ":mros:performance"), ("hasValue", "0.5"))
@@ -198,7 +231,7 @@ def test_the_operator_of_the_attribute_decides_what_is_bad(
         + individual("fd_spiral_high", "FunctionDesign", ("hasQAestimation", ":qa_current"))
     )
     base = Ontology.load([path])
-    reasoner = make_reasoner("pellet", base)
+    reasoner = Reasoner(base, "pellet")
 
     def chosen(current: float) -> str | None:
         state = KnowledgeState.of([ObjectiveState(SEARCH, "UNGROUNDED")], measurements={"current": current})
@@ -221,19 +254,19 @@ def test_overridden_values_decide_and_show_in_the_hash(kb: Ontology) -> None:
     base = Ontology.load(values=values)
     assert base.expected("fd_spiral_high")["water_visibility"] == 2
     state = searching(None, 2.0, status="UNGROUNDED")
-    assert decide(base, make_reasoner("pellet", base), state)[SEARCH].design == "fd_spiral_high"
+    assert decide(base, Reasoner(base, "pellet"), state)[SEARCH].design == "fd_spiral_high"
     assert base.content_hash != kb.content_hash
 
 
 def test_a_state_with_an_unknown_design_or_function_is_refused(pellet: Reasoner) -> None:
     with pytest.raises(KnowledgeError, match="no function design fd_spiral_hgih"):
-        pellet.infer(searching("fd_spiral_hgih"))
+        pellet.analyze(searching("fd_spiral_hgih"))
     with pytest.raises(KnowledgeError, match="no function f_dance"):
-        pellet.infer(KnowledgeState.of([ObjectiveState("f_dance")]))
+        pellet.analyze(KnowledgeState.of([ObjectiveState("f_dance")]))
 
 
 def test_what_monitors_report_beyond_the_model_has_no_effect(pellet: Reasoner) -> None:
     state = KnowledgeState.of(
         [ObjectiveState(SEARCH)], components={"c_sonar": "FALSE"}, measurements={"salinity": 35.0}
     )
-    assert pellet.infer(state).facts == frozenset()
+    assert pellet.analyze(state).facts == frozenset()

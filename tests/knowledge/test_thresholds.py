@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from suave_des.knowledge.checks.findings import Finding, Level
-from suave_des.knowledge.checks.static import static_findings
+from suave_des.findings import Finding, Level
+from suave_des.knowledge.checks import static_findings
 from suave_des.knowledge.ontology_file import collect
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.scenario_knowledge import measured_ranges, subject_of
@@ -22,7 +22,7 @@ def warned(tmp_path: Path, comparison: str, values: dict[str, object] | None = N
     subject = subject_of(load_scenario("seams2023", rules=[rules]))
     if values:
         subject = subject_of(with_values(load_scenario("seams2023", rules=[rules]), values))
-    found = static_findings(subject, collect(subject.given)).findings
+    found = static_findings(subject, collect(subject.given))
     return [each for each in found if each.level is not Level.INFO]
 
 

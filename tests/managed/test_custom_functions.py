@@ -7,9 +7,10 @@ import pytest
 
 from suave_des import registry
 from suave_des.errors import InputError, MissionError
-from suave_des.managed.custom import CustomFunction
+from suave_des.managed.node import CustomFunction
 from suave_des.metrics.result import Event, MissionResult
 from suave_des.scenario.loader import load_scenario
+from suave_des.simulation.mission import Mission
 from suave_des.simulation.simulator import Simulator
 
 MODES = """
@@ -125,7 +126,7 @@ def test_a_function_is_active_while_the_task_lasts_that_needs_it(fly) -> None:
 
 
 def test_a_function_that_is_needed_all_the_time_belongs_to_no_task(fly) -> None:
-    assert of_lights(fly(NAMED.replace("search_pipeline", "lasting"))) == []  # none sets modes of tasks only
+    assert of_lights(fly(NAMED.replace("search_pipeline", "mission_wide"))) == []  # none sets modes of tasks only
 
 
 def test_the_mission_itself_stays_the_same(fly) -> None:
@@ -147,8 +148,8 @@ def test_a_package_registers_a_function_under_its_name(fly, monkeypatch: pytest.
     ("text", "problem", "remedy"),
     [
         (NEEDED, "function f_lights has no node", "name its class: functions: {f_lights: {node: module:Class}}"),
-        (NEEDED.replace("[f_lights]", "[f_light]"), "no function f_light, which the mission", "did you mean"),
-        (NAMED.replace("Lights'", "Lamps'"), "no subclass of CustomFunction named 'Lamps'", "suave_des.managed.custom"),
+        (NEEDED.replace("[f_lights]", "[f_light]"), "there is no function 'f_light'", "did you mean"),
+        (NAMED.replace("Lights'", "Lamps'"), "no subclass of CustomFunction named 'Lamps'", "suave_des.CustomFunction"),
         (
             NAMED.replace("tests.managed.test_custom_functions:Lights", "lights"),
             "no package registers 'lights'",
@@ -185,7 +186,7 @@ def test_what_a_function_raises_fails_its_mission_and_names_the_function(fly, no
 @pytest.mark.parametrize(
     ("body", "words"),
     [
-        ("def activate(self): pass", "has no hook, but activate .did you mean activated.self."),
+        ("def activate(self): pass", "activate is not a hook, .*did you mean def activated.self."),
         ("def activated(self): pass\n    def configured(self, mode): pass", "configured is not a hook"),
         ("def activated(self): yield self.env.timeout(1.0)", "activated yields, .*self.env.process"),
         ("async def activated(self): pass", "activated is async"),
@@ -195,7 +196,7 @@ def test_what_a_function_raises_fails_its_mission_and_names_the_function(fly, no
 )
 def test_a_wrong_hook_is_bad_input(fly, tmp_path: Path, body: str, words: str) -> None:
     module = f"lights_{tmp_path.name}"
-    text = f"from suave_des.managed.custom import CustomFunction\n\n\nclass Lights(CustomFunction):\n    {body}\n"
+    text = f"from suave_des.managed.node import CustomFunction\n\n\nclass Lights(CustomFunction):\n    {body}\n"
     (tmp_path / f"{module}.py").write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=words):
         fly(NAMED.replace("tests.managed.test_custom_functions", module))
@@ -216,8 +217,9 @@ def test_a_function_that_cannot_be_used_fails_its_mission_and_is_named(fly, name
 
 def test_a_mode_of_a_function_without_node_is_neither_offered_nor_set(fly) -> None:
     fly("base: seams2023.yaml\nmodes_file: modes.yaml\n")
-    started = Simulator(load_scenario("mine.yaml")).start("none", 1, 1, record=True)
-    modes = started.modes
-    assert modes.available_modes("f_lights") == ()
-    assert modes.change_mode("f_lights", "fd_dim") is False
-    assert any("name its class under functions:" in event.detail for event in started.result().events)
+    mission = Mission("mine.yaml", "none", record=True)
+    assert mission.mode_manager.available_modes("f_lights") == ()
+    assert mission.mode_manager.change_mode("f_lights", "fd_dim") is False
+    result = mission.result()
+    assert any((event.event, event.detail) == ("refused", "f_lights -> fd_dim") for event in result.events)
+    assert any("name its class under functions:" in reason for reason in result.refused)

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from suave_des.managed.detection import PipelineDetector
 from suave_des.scenario.physical import Pipeline
-from suave_des.vehicle.autopilot import Autopilot
-from suave_des.vehicle.frames import Pose
+from suave_des.vehicle.model import Autopilot, Pose
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
 from suave_des.world.pipeline import first_point_in_view, sample_points
 from tests.helpers.stand_ins import silent
@@ -68,6 +67,15 @@ def first_sight(sight: Sight) -> tuple[float, int]:
 def test_detection_is_the_first_row_of_the_way_with_a_point_in_view() -> None:
     sight = Sight(TO_THE_PIPELINE)
     assert sight.run() == first_sight(sight)
+
+
+def test_no_row_is_looked_at_that_a_change_of_control_may_still_replace() -> None:
+    sight = Sight([])
+    checked = sight.vehicle.computed_row
+    sight.env.run(until=(checked + 0.49) * STEP_S)  # a command now would act from that row on
+    assert sight.vehicle.computed_row == checked
+    sight.env.run(until=(checked + 0.7) * STEP_S)
+    assert sight.vehicle.computed_row > checked
 
 
 def test_detection_is_recorded_at_its_own_time() -> None:

@@ -1,6 +1,8 @@
 """Follow pipeline: points, polls, and the distance it publishes."""
 
 import math
+from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,9 +10,8 @@ import simpy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from suave_des.managed.follow import NO_PATH, FollowPipeline, InspectionPath
-from suave_des.vehicle.autopilot import Autopilot
-from suave_des.vehicle.frames import Pose
+from suave_des.managed.follow import FollowPipeline, InspectionPath
+from suave_des.vehicle.model import Autopilot, Pose
 from suave_des.vehicle.vehicle import Vehicle, row_at
 from tests.helpers.stand_ins import ACTIVE, INACTIVE, MovingVehicle, PlacedVehicle, revision, sender
 from tests.helpers.vehicles import BLUEROV2
@@ -21,8 +22,11 @@ SPEED = 0.25
 
 
 def follow_of(env: simpy.Environment, name: str, vehicle: PlacedVehicle, path=LINE) -> FollowPipeline:
-    way = NO_PATH if path is None else InspectionPath.along(np.array(path), 1.25)
-    return FollowPipeline(env, sender(env, vehicle), revision(name).follow, lambda: way)
+    """A follow function whose path is a line; without one, the pipeline is not detected."""
+    points = np.insert(np.array(path or LINE), 2, -18.75, axis=1)
+    lengths_m = (0.0, *(math.dist(a, b) for a, b in pairwise(points.tolist())))
+    detector = SimpleNamespace(first_point=None if path is None else 0)
+    return FollowPipeline(env, sender(env, vehicle), revision(name).follow, InspectionPath(points, lengths_m), detector)
 
 
 def along_the_line() -> MovingVehicle:
@@ -33,6 +37,12 @@ def along_the_line() -> MovingVehicle:
 @pytest.fixture
 def env() -> simpy.Environment:
     return simpy.Environment()
+
+
+def test_path_goes_on_from_the_point_seen_and_back_along_all_points() -> None:
+    path = InspectionPath.there_and_back(np.array(LINE), 1.25).from_point(40)
+    assert path.points_m[:, :2].tolist() == [list(point) for point in (*LINE[40:], *reversed(LINE))]
+    assert set(path.points_m[:, 2]) == {-18.75} and path.lengths_m[1:6] == (0.5, 0.5, 0.5, 0.5, 0.0)
 
 
 @BOTH

@@ -1,5 +1,7 @@
 """Maintain motion: recovery of the thrusters."""
 
+from types import SimpleNamespace
+
 import pytest
 import simpy
 
@@ -23,9 +25,13 @@ class Motion:
             self.env,
             bus,
             revision(name).recovery,
-            lambda t_s, thruster, health: self.restored.append((t_s, thruster)),
+            SimpleNamespace(recover=self.recover),
             lambda: 10.0,
         )
+
+    def recover(self, thruster: int) -> bool:
+        self.restored.append((self.env.now, thruster))
+        return True
 
 
 @BOTH

@@ -11,7 +11,7 @@ import simpy
 
 from suave_des.metrics.reactions import ReactionMeter
 from suave_des.monitor.diagnostics import Diagnostic, Kind
-from suave_des.monitor.measurements import Measurements
+from suave_des.monitor.measurements import SignalMeasurements, Timing
 from suave_des.scenario.models import ReactionMetric
 from tests.helpers.stand_ins import ACTIVE, INACTIVE, spiral_at
 
@@ -66,9 +66,10 @@ class Timeline:
         return [pytest.approx(reaction, abs=1e-9) for reaction in self.meter.reactions_s()]
 
 
-def _measurements(key: str, rows: list[tuple[float, float]], phase_s: float) -> Measurements:
-    times_s, values = tuple(t_s for t_s, _ in rows), tuple(value for _, value in rows)
-    return Measurements(key, times_s, values, phase_s, 1.0, (np.array(times_s), np.array(values)))
+def _measurements(key: str, rows: list[tuple[float, float]], phase_s: float) -> SignalMeasurements:
+    times_s, values = [t_s for t_s, _ in rows], [value for _, value in rows]
+    arrays = np.array(times_s), np.array(values)
+    return SignalMeasurements(key, lambda t_s: 0.0, Timing(1.0, phase_s), times_s, values, arrays)
 
 
 def test_without_reactions_there_is_no_mean() -> None:
@@ -108,6 +109,10 @@ def test_once_maintain_motion_is_inactive_a_failure_is_an_event_again() -> None:
     assert timeline.reactions == [4.0]
 
 
+def test_an_answer_at_the_time_of_the_failure_is_a_reaction_of_no_time() -> None:
+    assert Timeline().thruster(35.0, "FALSE").mode(35.0, MOTION).reactions == [0.0]
+
+
 def test_a_failure_never_answered_does_not_count() -> None:
     assert Timeline().thruster(35.0, "FALSE").mode(40.0, MOTION, active=False).reactions == []
 
@@ -121,6 +126,10 @@ def test_a_recovery_asks_for_no_reaction() -> None:
 
 def test_the_first_message_is_a_mismatch_already() -> None:
     assert Timeline().visibility(0.2, 3.75).altitude(0.7, 3.0).reactions == [0.5]
+
+
+def test_an_altitude_set_at_the_time_of_the_message_was_no_mismatch() -> None:
+    assert Timeline().visibility(0.2, 3.75).altitude(0.2, 3.0).reactions == []
 
 
 def test_unless_two_metres_fit() -> None:

@@ -2,7 +2,7 @@
 
 import simpy
 
-from suave_des.managed.recharge import GenerateRechargePath
+from suave_des.managed.destinations import GenerateRechargePath
 from tests.helpers.stand_ins import ACTIVE, INACTIVE, PlacedVehicle, sender
 
 

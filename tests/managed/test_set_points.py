@@ -3,15 +3,16 @@
 import random
 
 import pytest
+import simpy
 
-from suave_des.vehicle.guidance import SetPointSender
+from suave_des.managed.node import SetPointSender
 from tests.helpers.stand_ins import Place, PlacedVehicle
 
 
 def sent(count: int, loss_probability: float, frame_error_m: Place = (0.0, 0.0, 0.0)) -> list[Place]:
     """What arrives of so many set-points."""
     vehicle = PlacedVehicle()
-    sender = SetPointSender(vehicle, lambda: 0.0, frame_error_m, loss_probability, random.Random(1))
+    sender = SetPointSender(vehicle, simpy.Environment(), frame_error_m, loss_probability, random.Random(1))
     for n in range(count):
         sender.send(float(n), 0.0, -18.0)
     return vehicle.commanded

@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.managed.search import GenerateSearchPath
-from suave_des.vehicle.autopilot import Autopilot
-from suave_des.vehicle.frames import Pose
+from suave_des.vehicle.model import Autopilot, Pose
 from suave_des.vehicle.vehicle import Vehicle, row_at
 from tests.helpers.stand_ins import INACTIVE, START, PlacedVehicle, revision, sender, spiral_at
 from tests.helpers.vehicles import BLUEROV2, VIEW_TANGENT

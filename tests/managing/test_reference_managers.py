@@ -4,6 +4,7 @@ import pytest
 
 from suave_des import InputError, load_scenario, run_campaign, run_mission
 from suave_des.registry import is_built_in, manager_class
+from tests.helpers.managers_at_work import AtWork
 
 SEARCH = "f_generate_search_path"
 
@@ -48,6 +49,14 @@ def test_threshold_adapts_at_metacontrols_times(scenario: str) -> None:
     )
     reasoning_s = load_scenario(scenario).scenario.latencies.inference_s
     assert metacontrol_s - threshold_s == pytest.approx(reasoning_s)
+
+
+@pytest.mark.parametrize(("visibility_m", "mode"), [(3.25, "fd_spiral_high"), (3.2499, "fd_spiral_medium")])
+def test_a_threshold_itself_is_enough(visibility_m: float, mode: str) -> None:
+    at_work = AtWork("threshold")
+    at_work.request("search_pipeline")
+    at_work.measured("water_visibility", visibility_m)
+    assert (SEARCH, mode) in at_work.adapt()
 
 
 def test_oracle_changes_modes_at_the_moment_of_the_true_crossing() -> None:

@@ -66,8 +66,18 @@ def test_a_module_that_ends_the_program_on_import_is_bad_input(tmp_path: Path, m
 def test_a_module_that_fails_on_import_is_bad_input(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "broken_manager_module.py").write_text("def broken(:\n")
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(InputError, match="SyntaxError"):
+    with pytest.raises(InputError, match="invalid syntax") as caught:
         manager_class("broken_manager_module:Mine")
+    assert Path(str(caught.value.file)).name == "broken_manager_module.py" and caught.value.place == "line 1"
+    assert caught.value.remedy is None  # it is no question of where it is
+
+
+def test_what_a_module_raises_on_import_is_shown_with_its_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "raising_manager_module.py").write_text("import math\n\nmath.sqrt(-1.0)\n")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match="ValueError") as caught:
+        manager_class("raising_manager_module:Mine")
+    assert Path(str(caught.value.file)).name == "raising_manager_module.py" and caught.value.place == "line 3"
 
 
 def test_a_module_that_another_thread_still_imports_is_waited_for(
@@ -115,15 +125,15 @@ def derived(method: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, base: 
 @pytest.mark.parametrize(
     ("method", "words"),
     [
-        ("def adpat(self): pass", "adpat is not a hook, and nothing calls it .did you mean adapt.self.?"),
+        ("def adpat(self): pass", "adpat is not a hook, and nothing calls it .did you mean def adapt.self.?"),
         (
             "def task_request(self, task): pass",
-            "task_request is not a hook, .* .did you mean task_requested.self, task.",
+            "task_request is not a hook, .* .did you mean def task_requested.self, task.",
         ),
-        ("def diagnostics(self, diagnostic): pass", "did you mean diagnostic.self, diagnostic."),
+        ("def diagnostics(self, diagnostic): pass", "did you mean def diagnostic.self, diagnostic."),
         (
             "from suave_des.monitor.diagnostics import Kind\n\n    def diagnostics(self, diagnostic): pass",
-            "did you mean diagnostic.self, diagnostic.",
+            "did you mean def diagnostic.self, diagnostic.",
         ),
     ],
 )

@@ -6,15 +6,14 @@ import pytest
 from typer.testing import CliRunner
 
 from suave_des.cli.main import app
-from suave_des.managing import behaviours
-from suave_des.managing.behaviours import Condition, Fallback, Parallel, Sequence, SetMode
+from suave_des.managing.bt import Behaviour
 from suave_des.metrics.result import MissionResult
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
 
 py_trees = pytest.importorskip("py_trees")
 
-from suave_des.managing.trees import PyTreesManager  # noqa: E402
+from suave_des.interfaces.trees import PyTreesManager  # noqa: E402
 
 SEARCH, FOLLOW = "f_generate_search_path", "f_follow_pipeline"
 
@@ -48,10 +47,10 @@ def flown(manager: str, **values: object) -> MissionResult:
     return Simulator(loaded).run(manager, run=1, seed=1, record=True)
 
 
-def ticked(*outcomes: bool) -> tuple[list[str], list[Condition]]:
+def ticked(*outcomes: bool) -> tuple[list[str], list[Behaviour]]:
     seen: list[str] = []
     conditions = [
-        Condition(str(place), holds=lambda place=place, outcome=outcome: seen.append(str(place)) or outcome)
+        Behaviour("", str(place), act=lambda place=place, outcome=outcome: seen.append(str(place)) or outcome)
         for place, outcome in enumerate(outcomes)
     ]
     return seen, conditions
@@ -60,27 +59,27 @@ def ticked(*outcomes: bool) -> tuple[list[str], list[Condition]]:
 @pytest.mark.parametrize(
     ("kind", "outcomes", "visited", "succeeds"),
     [
-        (Sequence, (True, True), "01", True),
-        (Sequence, (False, True), "0", False),
-        (Fallback, (False, True, True), "01", True),
-        (Fallback, (False, False), "01", False),
-        (Parallel, (False, True), "01", False),
-        (Parallel, (True, True), "01", True),
+        ("->", (True, True), "01", True),
+        ("->", (False, True), "0", False),
+        ("?", (False, True, True), "01", True),
+        ("?", (False, False), "01", False),
+        ("=>", (False, True), "01", False),
+        ("=>", (True, True), "01", True),
     ],
 )
 def test_parts_tick_their_children_as_far_as_they_must(kind, outcomes, visited: str, succeeds: bool) -> None:
     seen, conditions = ticked(*outcomes)
-    assert behaviours.tick(kind("part", tuple(conditions))) is succeeds
+    assert Behaviour(kind, "part", tuple(conditions)).tick() is succeeds
     assert "".join(seen) == visited
 
 
 def test_a_drawing_has_a_line_for_each_part() -> None:
-    mode = SetMode("f = fd_a", request=lambda: None)
-    tree = Fallback("root", (Sequence("first", (Condition("clear", holds=lambda: True), mode)), Condition("else")))
+    clear, mode = Behaviour("", "clear", act=lambda: True), Behaviour("!", "f = fd_a", act=lambda: True)
+    tree = Behaviour("?", "root", (Behaviour("->", "first", (clear, mode)), Behaviour("", "else")))
     expected = ["? root", "├─ -> first", "│  ├─ clear", "│  └─ ! f = fd_a", "└─ else"]
-    assert behaviours.drawing(tree).splitlines() == expected
-    behaviours.tick(tree)
-    assert behaviours.last_tick(tree) == "f = fd_a (clear)"
+    assert list(tree.drawing()) == expected
+    tree.tick()
+    assert list(tree.requests()) == ["f = fd_a (clear)"]
 
 
 @pytest.mark.parametrize(("manager", "scenario"), [("bt", "release15"), ("bt_extended", "extended")])

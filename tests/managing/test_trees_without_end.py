@@ -12,7 +12,7 @@ pytest.importorskip("py_trees")
 TREES = """
 import py_trees
 from py_trees.common import Status
-from suave_des.managing.trees import PyTreesManager
+from suave_des.interfaces.trees import PyTreesManager
 
 class TicksForever(py_trees.behaviour.Behaviour):
     def tick(self):

@@ -9,15 +9,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.errors import InputError
+from suave_des.metrics.coverage import covered_area_m2
 from suave_des.metrics.further import FurtherMetrics, measured_at_rows
+from suave_des.monitor.thrusters import Thrusters
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import FURTHER_METRICS, Requirement
 from suave_des.scenario.modes import Mode
+from suave_des.scenario.physical import ThrusterEvent
+from suave_des.scenario.revision import ThrusterFailureRevision
 from suave_des.simulation.simulator import Simulator
-from suave_des.vehicle.autopilot import Autopilot
-from suave_des.vehicle.frames import Pose
+from suave_des.vehicle.model import Autopilot, Pose
 from suave_des.vehicle.vehicle import Vehicle, row_at
-from suave_des.world.coverage import covered_area_m2
+from tests.helpers.stand_ins import silent
 from tests.helpers.vehicles import BLUEROV2
 
 TANGENT = math.tan(math.radians(30.0))
@@ -30,18 +33,18 @@ class Watched:
         self.env = simpy.Environment()
         scenario = load_scenario("extended").scenario
         scenario = scenario.model_copy(update={"metrics": FURTHER_METRICS, "requirements": {}, "battery": None})
-        self.vehicle = Vehicle(BLUEROV2, Autopilot(), Pose(0.0, 0.0, -18.0, 0.0, 0.0, 0.0), 60.0)
-        self.noted = FurtherMetrics(self.env, scenario, self.vehicle, {}, None)
+        vehicle = Vehicle(BLUEROV2, Autopilot(), Pose(0.0, 0.0, -18.0, 0.0, 0.0, 0.0), 60.0)
+        self.thrusters = Thrusters(self.env, vehicle, ThrusterFailureRevision(), None, silent)
+        self.noted = FurtherMetrics(self.env, scenario, self.thrusters, {})
 
     def at(self, t_s: float) -> FurtherMetrics:
         if t_s > self.env.now:
             self.env.run(until=t_s)
         return self.noted
 
-    def lose(self, t_s: float, thruster: int, health: float) -> None:
-        noted = self.at(t_s)
-        self.vehicle.set_thruster_health(t_s, thruster, health)
-        noted.thrusters_changed()
+    def thruster(self, t_s: float, event: str) -> None:
+        self.at(t_s)
+        self.thrusters.apply(ThrusterEvent(thruster=2, event=event, time_s=t_s))
 
 
 @pytest.mark.parametrize(
@@ -78,8 +81,8 @@ def test_configurations_are_counted_once_each_and_not_when_passed_through() -> N
 
 def test_operational_thrusters_are_a_mean_over_time() -> None:
     watched = Watched()
-    watched.lose(10.0, 2, 0.0)
-    watched.lose(30.0, 2, 1.0)
+    watched.thruster(10.0, "failure")
+    watched.thruster(30.0, "recovery")
     assert watched.at(40.0).value("operational_thrusters") == pytest.approx((10 * 6 + 20 * 5 + 10 * 6) / 40)
 
 
@@ -159,6 +162,13 @@ def test_a_requirement_on_a_measured_value_is_a_mean_over_time(mission) -> None:
     assert mission(text).further["requirement_see"] == pytest.approx((100 * 1.0 + 200 * 0.5) / 300, abs=0.01)
 
 
+def test_time_before_the_first_measurement_does_not_count(mission) -> None:
+    signal = "{kind: constant, value: 3.0, publishing_period_s: 50}"
+    required = "{attribute: water_visibility, relation: at_least, value: 2.0}"
+    text = f"base: release15.yaml\nsignals: {{water_visibility: {signal}}}\nrequirements: {{see: {required}}}\n"
+    assert mission(text).further["requirement_see"] == pytest.approx(1.0)
+
+
 def test_reasoning_takes_the_scenarios_time_in_each_cycle_that_adapts(mission) -> None:
     text = "base: release15.yaml\nlatencies: {inference_s: 0.5}\nmetrics: [reasoning_time_s]\n"
     assert mission(text, "metacontrol").further["reasoning_time_s"] % 0.5 == 0.0
@@ -186,7 +196,10 @@ def test_all_of_them_leave_the_mission_as_it_is(mission) -> None:
             "requirements: {a: {attribute: water_current, relation: at_most, value: 1}}",
             "nothing measures water_current",
         ),
-        ("requirements: {a: {metric: adaptations, relation: at_most, value: 1, tolerance: -1}}", "-1 is out of range"),
+        (
+            "requirements: {a: {metric: adaptations, relation: at_most, value: 1, tolerance: -1}}",
+            "-1 should be greater than or equal to 0",
+        ),
     ],
 )
 def test_what_cannot_be_evaluated_is_refused(mission, line: str, problem: str) -> None:

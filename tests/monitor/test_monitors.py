@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.monitor.diagnostics import Diagnostic, DiagnosticsBus, Kind
-from suave_des.monitor.measurements import BatteryLevel, Measurements, MonitorTiming, measure, region_of
-from suave_des.monitor.monitors import ScheduledEvent, battery_monitor, signal_monitor, thruster_monitor
+from suave_des.monitor.measurements import BatteryMeasurements, SignalMeasurements, Timing, region_of
+from suave_des.monitor.thrusters import thruster_monitor
+from suave_des.scenario.physical import ThrusterEvent
 from suave_des.world.signals import constant, sinusoid, step
 
 VISIBILITY = sinusoid(80.0, 1.25, 3.75)
@@ -39,30 +41,31 @@ def subscriber() -> Subscriber:
 
 
 def test_messages_lie_on_the_monitors_grid() -> None:
-    measured = measure("v", lambda t: t, 3.0, MonitorTiming(0.8, 0.3))
+    measured = SignalMeasurements.of("v", lambda t: t, 3.0, Timing(0.8, 0.3))
     assert measured.times_s == pytest.approx((0.3, 1.1, 1.9, 2.7))
 
 
 def test_only_changed_values_are_published() -> None:
-    measured = measure("v", VISIBILITY, 3.0, MonitorTiming(0.2, 0.1, 1.0))
+    measured = SignalMeasurements.of("v", VISIBILITY, 3.0, Timing(0.2, 0.1), 1.0)
     assert measured.times_s == pytest.approx((0.1, 1.1, 2.1))
 
 
 def test_a_message_has_the_value_of_its_whole_second() -> None:
-    measured = measure("v", VISIBILITY, 30.0, MonitorTiming(1.0, 0.7, 1.0))
-    assert measured.values == tuple(sinusoid(80.0, 1.25, 3.75)(float(t)) for t in range(30))
+    measured = SignalMeasurements.of("v", VISIBILITY, 30.0, Timing(1.0, 0.7), 1.0)
+    assert measured.values == [sinusoid(80.0, 1.25, 3.75)(float(t)) for t in range(30)]
 
 
 def test_rounding_errors_of_a_timer_do_not_shift_a_step() -> None:
     assert 0.1 + 3 * 0.3 < 1.0  # by a rounding error
-    measured = measure("v", lambda t_s: t_s, 1.9, MonitorTiming(0.3, 0.1, 1.0))
-    assert (measured.times_s, measured.values) == ((0.1, pytest.approx(1.0)), (0.0, 1.0))
+    measured = SignalMeasurements.of("v", lambda t_s: t_s, 1.9, Timing(0.3, 0.1), 1.0)
+    assert (measured.times_s, measured.values) == ([0.1, pytest.approx(1.0)], [0.0, 1.0])
 
 
-def measurements(values: tuple[float, ...]) -> Measurements:
+def measurements(values: tuple[float, ...]) -> SignalMeasurements:
     """Values at 1, 2, 3, ... s."""
-    times_s = tuple(float(n) for n in range(1, len(values) + 1))
-    return Measurements("v", times_s, values, 1.0, 1.0, (np.array(times_s), np.array(values)))
+    times_s = [float(n) for n in range(1, len(values) + 1)]
+    arrays = np.array(times_s), np.array(values)
+    return SignalMeasurements("v", constant(0.0), Timing(1.0, 1.0), times_s, list(values), arrays)
 
 
 @pytest.mark.parametrize(
@@ -112,37 +115,37 @@ def test_crossings_are_those_found_by_going_through_all_values(
     regions = [region_of(value, thresholds) for value in values]
     pairs = enumerate(itertools.pairwise([-1, *regions]), start=1)
     crossings = [(float(n), region) for n, (before, region) in pairs if region != before]
-    assert list(zip(*measured.crossings(thresholds), strict=True)) == crossings
+    assert measured.crossings_s(thresholds) == [t_s for t_s, _ in crossings]
     passed = int(min(t_s, len(values)))
     assert measured.region(t_s, thresholds) == (regions[passed - 1] if passed else -1)
     assert measured.next_crossing_s(t_s, thresholds) == next((s for s, _ in crossings if s > t_s), math.inf)
 
 
 def test_a_constant_is_published_once() -> None:
-    measured = measure("v", constant(2.0), 100.0, MonitorTiming(0.2, 0.05))
-    assert (measured.times_s, measured.values) == ((0.05,), (2.0,))
+    measured = SignalMeasurements.of("v", constant(2.0), 100.0, Timing(0.2, 0.05))
+    assert (measured.times_s, measured.values) == ([0.05], [2.0])
 
 
 def test_a_step_is_published_at_the_first_message_after_it() -> None:
-    measured = measure("v", step(10.05, 3.0, 1.0), 20.0, MonitorTiming(0.2, 0.0))
+    measured = SignalMeasurements.of("v", step(10.05, 3.0, 1.0), 20.0, Timing(0.2, 0.0))
     assert measured.times_s == pytest.approx((0.0, 10.2))
 
 
 def test_noise_makes_every_measurement_another_one() -> None:
     errors = itertools.count(1)
-    measured = measure("v", constant(2.0), 1.0, MonitorTiming(0.25, 0.0, 1.0), noise=lambda: next(errors))
-    assert measured.values == (3.0, 4.0, 5.0, 6.0, 7.0)
+    measured = SignalMeasurements.of("v", constant(2.0), 1.0, Timing(0.25, 0.0), 1.0, noise=lambda: next(errors))
+    assert measured.values == [3.0, 4.0, 5.0, 6.0, 7.0]
 
 
 @pytest.mark.parametrize(("t_s", "expected_s"), [(0.0, 0.3), (0.3, 0.3), (0.31, 1.3), (7.0, 7.3)])
 def test_next_message_comes_changed_or_not(t_s: float, expected_s: float) -> None:
-    measured = measure("v", constant(2.0), 10.0, MonitorTiming(1.0, 0.3))
+    measured = SignalMeasurements.of("v", constant(2.0), 10.0, Timing(1.0, 0.3))
     assert measured.next_message_s(t_s) == pytest.approx(expected_s)
 
 
 def test_signal_monitor_publishes_measurements_at_their_times(subscriber: Subscriber) -> None:
-    measured = measure("current", step(1.0, 0.1, 0.4), 5.0, MonitorTiming(0.5, 0.2))
-    subscriber.env.process(signal_monitor(subscriber.env, subscriber.bus, measured))
+    measured = SignalMeasurements.of("current", step(1.0, 0.1, 0.4), 5.0, Timing(0.5, 0.2))
+    subscriber.env.process(measured.publish(subscriber.env, subscriber.bus))
     subscriber.env.run()
     assert subscriber.received == [
         Diagnostic(0.2, Kind.QA_STATUS, "current", 0.1),
@@ -153,21 +156,18 @@ def test_signal_monitor_publishes_measurements_at_their_times(subscriber: Subscr
 # Thrusters
 
 
+def event(thruster: int, happens: str, time_s: float) -> tuple[ThrusterEvent, float]:
+    return ThrusterEvent(thruster=thruster, event=happens, time_s=0.0), time_s
+
+
 def publish_events(
-    subscriber: Subscriber, *faults: ScheduledEvent, after_previous: bool, phase_s: float = 0.25
+    subscriber: Subscriber, *schedule: tuple[ThrusterEvent, float], after_previous: bool, phase_s: float = 0.25
 ) -> list:
     """Run a schedule to its end; the events, with the times at which they happened."""
-    happened: list[tuple[float, ScheduledEvent]] = []
-    subscriber.env.process(
-        thruster_monitor(
-            subscriber.env,
-            subscriber.bus.publish,
-            faults,
-            lambda t_s, event: happened.append((t_s, event)),
-            MonitorTiming(1.0, phase_s),
-            after_previous=after_previous,
-        )
-    )
+    happened: list[tuple[float, ThrusterEvent]] = []
+    thrusters = SimpleNamespace(env=subscriber.env, apply=lambda event: happened.append((subscriber.env.now, event)))
+    timing = Timing(1.0, phase_s)
+    subscriber.env.process(thruster_monitor(thrusters, subscriber.bus, schedule, timing, after_previous))
     subscriber.env.run()
     return happened
 
@@ -177,20 +177,20 @@ BOTH = pytest.mark.parametrize("after_previous", [True, False], ids=["2023", "1.
 
 @BOTH
 def test_failure_is_seen_at_the_first_look_after_its_time(subscriber: Subscriber, after_previous: bool) -> None:
-    publish_events(subscriber, ScheduledEvent(1, True, 35.0), after_previous=after_previous)
+    publish_events(subscriber, event(1, "failure", 35.0), after_previous=after_previous)
     assert subscriber.received == [Diagnostic(35.25, Kind.COMPONENT_STATUS, "c_thruster_1", "FALSE")]
 
 
 @BOTH
 def test_failure_and_recovery_happen_when_they_are_published(subscriber: Subscriber, after_previous: bool) -> None:
-    failure, recovery = ScheduledEvent(3, True, 5.0), ScheduledEvent(3, False, 60.0)
+    failure, recovery = event(3, "failure", 5.0), event(3, "recovery", 60.0)
     happened = publish_events(subscriber, failure, recovery, after_previous=after_previous)
-    assert happened == [(subscriber.received[0].time_s, failure), (subscriber.received[1].time_s, recovery)]
+    assert happened == [(subscriber.received[0].time_s, failure[0]), (subscriber.received[1].time_s, recovery[0])]
 
 
 @BOTH
 def test_recovery_is_published_as_recovered(subscriber: Subscriber, after_previous: bool) -> None:
-    publish_events(subscriber, ScheduledEvent(6, False, 2.0), after_previous=after_previous)
+    publish_events(subscriber, event(6, "recovery", 2.0), after_previous=after_previous)
     assert subscriber.values() == [(2.25, "c_thruster_6", "RECOVERED")]
 
 
@@ -200,20 +200,18 @@ def test_recovery_is_published_as_recovered(subscriber: Subscriber, after_previo
 def test_what_the_time_of_a_second_event_counts_from(
     subscriber: Subscriber, after_previous: bool, times_s: list[float]
 ) -> None:
-    publish_events(
-        subscriber, ScheduledEvent(1, True, 10.0), ScheduledEvent(2, True, 30.0), after_previous=after_previous
-    )
+    publish_events(subscriber, event(1, "failure", 10.0), event(2, "failure", 30.0), after_previous=after_previous)
     assert [each.time_s for each in subscriber.received] == times_s
 
 
 def test_in_2023_time_counts_from_when_the_event_before_happened(subscriber: Subscriber) -> None:
     # Due at 10 s, it happened at 10.25 s: 30.1 s later is past the look at 40.25 s.
-    publish_events(subscriber, ScheduledEvent(1, True, 10.0), ScheduledEvent(2, True, 30.1), after_previous=True)
+    publish_events(subscriber, event(1, "failure", 10.0), event(2, "failure", 30.1), after_previous=True)
     assert subscriber.received[1].time_s == 41.25
 
 
 def test_several_due_come_one_a_second_in_list_order(subscriber: Subscriber) -> None:
-    events = [ScheduledEvent(thruster, True, 5.0) for thruster in (4, 2, 6)]
+    events = [event(thruster, "failure", 5.0) for thruster in (4, 2, 6)]
     publish_events(subscriber, *events, after_previous=False)
     assert subscriber.values() == [
         (5.25, "c_thruster_4", "FALSE"),
@@ -223,30 +221,30 @@ def test_several_due_come_one_a_second_in_list_order(subscriber: Subscriber) -> 
 
 
 def test_an_earlier_event_waits_for_the_one_before_it_in_the_list(subscriber: Subscriber) -> None:
-    publish_events(subscriber, ScheduledEvent(1, True, 20.0), ScheduledEvent(2, True, 5.0), after_previous=False)
+    publish_events(subscriber, event(1, "failure", 20.0), event(2, "failure", 5.0), after_previous=False)
     assert subscriber.values() == [(20.25, "c_thruster_1", "FALSE"), (21.25, "c_thruster_2", "FALSE")]
 
 
 @BOTH
 def test_a_time_before_the_start_fires_at_the_first_look(subscriber: Subscriber, after_previous: bool) -> None:
-    publish_events(subscriber, ScheduledEvent(1, True, -50.0), after_previous=after_previous, phase_s=0.6)
+    publish_events(subscriber, event(1, "failure", -50.0), after_previous=after_previous, phase_s=0.6)
     assert subscriber.values() == [(0.6, "c_thruster_1", "FALSE")]
 
 
 def test_a_negative_time_after_another_event_fires_at_the_next_look(subscriber: Subscriber) -> None:
-    publish_events(subscriber, ScheduledEvent(1, True, 10.0), ScheduledEvent(2, True, -5.0), after_previous=True)
+    publish_events(subscriber, event(1, "failure", 10.0), event(2, "failure", -5.0), after_previous=True)
     assert [each.time_s for each in subscriber.received] == [10.25, 11.25]
 
 
 # Battery
 
 
-def battery(docked: set[float]) -> BatteryLevel:
-    return BatteryLevel(lambda t_s: t_s in docked, 200.0, MonitorTiming(1.0, 0.5))
+def battery(docked: set[float]) -> BatteryMeasurements:
+    return BatteryMeasurements(lambda t_s: t_s in docked, 200.0, Timing(1.0, 0.5))
 
 
 def battery_levels(subscriber: Subscriber, until_s: float, docked: set[float]) -> list[tuple[float, float]]:
-    subscriber.env.process(battery_monitor(subscriber.env, subscriber.bus, battery(docked)))
+    subscriber.env.process(battery(docked).publish(subscriber.env, subscriber.bus))
     subscriber.env.run(until=until_s)
     return [(each.time_s, each.value) for each in subscriber.received]
 
@@ -263,6 +261,14 @@ def test_an_empty_battery_stays_empty(subscriber: Subscriber) -> None:
 def test_battery_is_full_at_once_at_the_station(subscriber: Subscriber) -> None:
     levels = dict(battery_levels(subscriber, 200.0, docked={160.5}))
     assert (levels[159.5], levels[160.5], levels[161.5]) == pytest.approx((0.2025, 1.0, 0.995))
+
+
+def test_a_stay_at_the_station_is_one_recharge() -> None:
+    level = battery({160.5, 161.5, 162.5, 170.5})
+    level.count_until(165.0)
+    assert level.recharges == 1
+    level.count_until(200.0)
+    assert level.recharges == 2
 
 
 def test_a_level_looked_up_is_the_one_published_last(subscriber: Subscriber) -> None:

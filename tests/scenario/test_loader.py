@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 
 from suave_des.resources import find, shipped_folder
 from suave_des.scenario.loader import load_scenario
-from suave_des.scenario.physical import ThrusterEvent
+from suave_des.scenario.physical import ConstantSignal, SinusoidSignal, TableSignal, ThrusterEvent
 from suave_des.scenario.quantities import Normal, Uniform
-from suave_des.scenario.signal_kinds import ConstantSignal, SinusoidSignal, TableSignal
 
 HEAD = "base: seams2023.yaml\n"
 SHIPPED = ("seams2023", "planta_exp1", "release15", "extended", "paper_table_values")

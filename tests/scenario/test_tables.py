@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.errors import InputError
-from suave_des.scenario.signal_kinds import read_table
+from suave_des.scenario.physical import read_table
 
 
 def test_a_table_gives_times_and_values(write):
@@ -28,16 +28,16 @@ def test_columns_may_be_in_any_order_and_excel_may_have_written_it(write):
         ("t_s;value\n0;3.5\n", "line 1", "the columns are 't_s;value'"),
         ("t_s,value,note\n0,1,a\n", "line 1", "the columns are 't_s,value,note'"),
         ("t_s,value\n", "line 1", "has no row under its header"),
-        ("t_s,value\n0,1\n60\n", "line 3", "has 1 value"),
-        ("t_s,value\n0,1\n60,1,2\n", "line 3", "has 3 values"),
-        ("t_s,value\n0,1\nsoon,2\n", "line 3", "expected a number as t_s, got 'soon'"),
-        ("t_s,value\n0,murky\n", "line 2", "expected a number as value, got 'murky'"),
-        ("t_s,value\n0,nan\n", "line 2", "value 'nan' is not finite"),
-        ("t_s,value\ninf,1\n", "line 2", "t_s 'inf' is not finite"),
+        ("t_s,value\n0,1\n60\n", "line 3", "'60' is not two numbers"),
+        ("t_s,value\n0,1\n60,1,2\n", "line 3", "'60,1,2' is not two numbers"),
+        ("t_s,value\n0,1\nsoon,2\n", "line 3", "'soon,2' is not two numbers"),
+        ("t_s,value\n0,murky\n", "line 2", "'0,murky' is not two numbers"),
+        ("t_s,value\n0,nan\n", "line 2", "value nan is out of range"),
+        ("t_s,value\ninf,1\n", "line 2", "t_s inf is out of range"),
         ("t_s,value\n0,1\n60,2\n60,3\n", "line 4", "t_s 60 does not come after 60"),
         ("t_s,value\n0,1\n60,2\n30,3\n", "line 4", "t_s 30 does not come after 60"),
-        ("t_s,value\n0,1e300\n", "line 2", "value '1e300' is out of range"),
-        ("t_s,value\n1e10,1\n", "line 2", "t_s '1e10' is out of range"),
+        ("t_s,value\n0,1e300\n", "line 2", "value 1e+300 is out of range"),
+        ("t_s,value\n1e10,1\n", "line 2", "t_s 1e+10 is out of range"),
         (b"t_s,value\n0,\xff\n", "line 2", "is not UTF-8 text"),
         ('t_s,value\n0,"1\n', "line 2", "is not valid CSV"),
     ],

@@ -2,8 +2,6 @@
 
 import json
 import string
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.errors import InputError
-from suave_des.scenario.yamlfile import NODE_LIMIT, SIZE_LIMIT_BYTES, read_yaml
+from suave_des.scenario.yamlfile import SIZE_LIMIT_BYTES, read_yaml
 
 
 def refused(path: Path | str) -> str:
@@ -20,7 +18,6 @@ def refused(path: Path | str) -> str:
     message = str(caught.value)
     assert message.startswith(str(path))
     assert "\n" not in message
-    assert caught.value.remedy
     return message
 
 
@@ -81,23 +78,20 @@ def test_a_folder_is_refused(tmp_path):
     ("content", "place", "problem"),
     [
         (b"a: 1\nb: \xff\n", "line 2", "is not UTF-8 text"),
-        (b"a: 1\nb: \x00\n", "line 2", r"the character '\x00', which is not allowed"),
-        ("", "line 1", "is empty"),
+        (b"a: 1\nb: \x00\n", "line 2", r"holds '\x00', which YAML does not allow"),
         ("# only a comment\n", "line 1", "is empty"),
         ("\n- a\n- b\n", "line 2", "not a mapping at its top level"),
         ("just text\n", "line 1", "not a mapping at its top level"),
         ("a: 1\nb: c: d\n", "line 2", "is not valid YAML: mapping values are not allowed here"),
-        ("a:\n\tb: 1\n", "line 2", "(indent with spaces, not tabs)"),
+        ("a:\n\tb: 1\n", "line 2", "indent with spaces, not tabs"),
         ("a: [1, 2\nb: 3\n", "line 2", "is not valid YAML"),
-        ("a: 1\n---\nb: 2\n", "line 2", "a second document begins here"),
+        ("a: 1\n---\nb: 2\n", "line 2", "found another document"),
         ("a: *nobody\n", "line 1", "undefined alias"),
         ("a: 1\nb: 2\na: 3\n", "line 3, a", "'a' appears twice, first in line 1"),
         ("a:\n  b: {c: 1, c: 2}\n", "line 2, a.b.c", "'c' appears twice"),
         ("a: 1\n'a': 2\n", "line 2, a", "appears twice"),
-        ("a: &x [1, *x]\n", "line 1, a[1]", "an alias stands for something that holds it"),
-        ("a: &x {b: {c: *x}}\n", "line 1, a.b.c", "an alias stands for something that holds it"),
-        ("[a, b]: 1\n", "line 1", "a key must be text"),
-        ("a: &x {b: 1}\nc: {<<: *x}\n", "line 2, c", "the merge key << is not supported"),
+        ("[a, b]: 1\n", "line 1", "a key must be short text"),
+        ('"a\\nb": 1\n', "line 1", "a key must be short text"),
         ("a: !!float abc\n", "line 1, a", "expected !!float, got 'abc'"),
     ],
 )
@@ -123,29 +117,20 @@ def test_what_is_no_plain_mapping_is_refused_with_its_line(write, content, place
 def test_a_tag_that_would_build_an_object_is_refused_and_builds_nothing(write, value):
     message = refused(write("a.yaml", f"x: 1\na: {value}\n"))
     assert message.startswith("a.yaml: line 2, a: the tag '!")
-    assert "use plain text, numbers, lists and mappings" in message
     assert not Path("made").exists()
 
 
-@pytest.mark.parametrize("levels", [9, 60])
-def test_a_bomb_of_aliases_is_refused_before_it_is_written_out(write, levels):
+def test_a_bomb_of_aliases_is_refused_before_it_is_written_out(write):
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x]"]
-    lines += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]" for n in range(1, levels)]
-    path = write("a.yaml", "\n".join(lines))
-    # In a process of its own: one that wrote out all 9**levels values would not end.
-    program = "import sys; from suave_des.scenario.yamlfile import read_yaml; read_yaml(sys.argv[1])"
-    ended = subprocess.run([sys.executable, "-c", program, path], capture_output=True, text=True, timeout=120)
-    assert f"expands to more than {NODE_LIMIT:,} values" in ended.stderr
+    lines += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]" for n in range(1, 60)]
+    assert "expands to more than 100,000 values" in refused(write("a.yaml", "\n".join(lines)))
 
 
-def test_a_chain_of_aliases_nested_too_deep_is_refused(write):
-    lines = ["a0: &a0 [x]"] + [f"a{n}: &a{n} [*a{n - 1}]" for n in range(1, 300)]
-    assert "is nested more than 100 deep" in refused(write("a.yaml", "\n".join(lines)))
-
-
-@pytest.mark.parametrize("opening", ["[", "{a: "])
-def test_deep_brackets_are_refused(write, opening):
-    assert "is nested more than 100 deep" in refused(write("a.yaml", "a: " + opening * 20_000))
+@pytest.mark.parametrize(
+    "content", ["a: " + "[" * 20_000, "a: " + "{a: " * 20_000, "a: &x [1, *x]\n", "a: &x {b: {c: *x}}\n"]
+)
+def test_what_is_nested_without_end_is_refused(write, content):
+    assert "is nested too deep" in refused(write("a.yaml", content))
 
 
 def test_a_large_file_is_refused(write):
@@ -179,6 +164,5 @@ def test_any_bytes_are_read_or_refused_in_one_line(tmp_path_factory, content):
         document = read_yaml(path)
     except InputError as error:
         assert "\n" not in str(error)
-        assert error.remedy
     else:
         assert all(isinstance(key, str) for key in document.data)

@@ -1,4 +1,4 @@
-"""Missions that look ahead and leave calls out are those in which everything is polled: see `tests.helpers.polling`."""
+"""Missions that look ahead and leave calls out are the plain ones: see `tests.helpers.polling`."""
 
 from functools import cache
 
@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from suave_des.scenario.loader import load_scenario, with_values
 from suave_des.simulation.simulator import Simulator
 from tests.helpers.designs import each_pair
-from tests.helpers.polling import polled, unrecorded
+from tests.helpers.polling import effects, polled
 
 MANAGERS = ("none", "random", "bt", "bt_extended", "metacontrol")
 LOADED = {name: load_scenario(name) for name in ("seams2023", "planta_exp1", "release15")}
@@ -72,9 +72,9 @@ def assert_same(simulator: Simulator, manager: str, run: int) -> None:
     assert recorded.metrics == plain.metrics
     assert recorded.trajectory == plain.trajectory
     assert recorded.knowledge == plain.knowledge
-    effects = [(event.t_s, event.detail) for event in plain.events if event.event == "mode_set"]
-    for _ in range(2 if manager == "metacontrol" else 1):  # at first its memo may be empty
-        assert unrecorded(simulator, manager, run) == (plain.metrics, effects)
+    modes = [(event.t_s, event.detail) for event in plain.events if event.event == "mode_set"]
+    for _ in range(2 if manager == "metacontrol" else 1):  # at first its cache may be empty
+        assert effects(simulator, manager, run, record=False) == (plain.metrics, modes)
 
 
 @pytest.mark.parametrize(("name", "condition", "manager"), each_pair(sorted(LOADED), CONDITIONS, MANAGERS))

@@ -93,6 +93,16 @@ def test_a_thruster_can_fail_for_good_after_it_was_recovered_once(fly) -> None:
     assert reports.count("c_thruster_1 RECOVERED") == 1
 
 
+def test_whether_a_thruster_can_be_recovered_is_up_to_its_last_failure(fly) -> None:
+    events = (
+        "[{thruster: 1, event: failure, time_s: 35, recoverable: false}, {thruster: 1, event: recovery, time_s: 60},"
+        " {thruster: 1, event: failure, time_s: 100}]"
+    )
+    reports = details(fly(f"base: release15.yaml\nthruster_events: {events}\n", "bt"), "component_status")
+    assert reports.count("c_thruster_1 FALSE") == 2
+    assert reports.count("c_thruster_1 RECOVERED") == 2  # by the scenario, and by maintain_motion
+
+
 def test_in_an_outage_the_last_measurement_stays(fly) -> None:
     signal = "{outages_s: [[50, 120]]}"
     points = fly(f"base: release15.yaml\nsignals: {{water_visibility: {signal}}}\n").trajectory
@@ -140,16 +150,16 @@ def test_losing_messages_leaves_campaigns_the_same_for_every_reader(fly) -> None
 @pytest.mark.parametrize(
     ("line", "problem"),
     [
-        ("leak: {time_s: 100}", "defines no function f_surface"),
+        ("leak: {time_s: 100}", "no function 'f_surface'"),
         ("leak: {time_s: -1}", "-1 is out of range"),
         ("metrics: [surfacing_time_s]", "surfacing_time_s needs a leak"),
-        ("current: {wave: {period_s: 0}}", "0 is out of range"),
+        ("current: {wave: {period_s: 0}}", "0 should be"),
         ("current: {wave: {amplitude_m_per_s: 50}}", "50 is out of range"),
-        ("signals: {water_visibility: {dropout_probability: 2}}", "2 is out of range"),
+        ("signals: {water_visibility: {dropout_probability: 2}}", "2 should be"),
         ("signals: {water_visibility: {outages_s: [[20, 10]]}}", "the outage [20, 10] ends before it begins"),
-        ("signals: {water_visibility: {outages_s: [20, 10]}}", "expected a list, got 20"),
+        ("signals: {water_visibility: {outages_s: [20, 10]}}", "20 should be a list"),
         ("thruster_monitor: {dropout: 1}", "unknown key"),
-        ("thruster_events: [{thruster: 1, event: failure, time_s: 1, recoverable: 3}]", "expected true or false"),
+        ("thruster_events: [{thruster: 1, event: failure, time_s: 1, recoverable: 3}]", "3 should be a boolean"),
     ],
 )
 def test_what_cannot_be_is_refused(fly, line: str, problem: str) -> None:

@@ -1,8 +1,7 @@
 """Event-triggered managers are called when something has changed; their missions are those of time-triggered ones."""
 
-import random
-from contextlib import nullcontext
 from dataclasses import replace
+from types import SimpleNamespace
 from unittest import mock
 
 import numpy as np
@@ -13,18 +12,18 @@ from hypothesis import strategies as st
 
 from suave_des.clock import Alarm
 from suave_des.errors import MissionError
-from suave_des.managing.base import ManagedSystem
 from suave_des.managing.metacontrol import Metacontrol
 from suave_des.monitor.diagnostics import FAILED, Diagnostic, DiagnosticsBus, Kind
-from suave_des.monitor.measurements import Measurements
+from suave_des.monitor.measurements import SignalMeasurements, Timing
 from suave_des.registry import manager_class
 from suave_des.scenario.loader import LoadedScenario, load_scenario, with_values
-from suave_des.scenario.signal_kinds import ConstantSignal
+from suave_des.scenario.physical import ConstantSignal
 from suave_des.simulation.host import ManagerHost
 from suave_des.simulation.simulator import Simulator
 from tests.helpers import OUTSIDE, outside_managers
 from tests.helpers.designs import each_pair
-from tests.helpers.polling import polled, unrecorded
+from tests.helpers.managers_at_work import system_of
+from tests.helpers.polling import effects
 
 NO_FAULTS = {"thruster_events": [], "mission.time_limit_s": 60.0}
 LOADED = {name: load_scenario(name) for name in ("seams2023", "release15")}
@@ -195,12 +194,9 @@ def assert_same_missions(simulator: Simulator, manager: str, runs: range) -> Non
     """Metrics and effects are the same whether the manager is event-triggered or called at each of its times."""
     has_cache = not manager.startswith(OUTSIDE) or issubclass(manager_class(manager), Metacontrol)
     for run in runs:
-        found = []
-        for called_at_each_time in (True, False, *([False] if has_cache else [])):  # at first the cache is empty
-            with polled("calls", "monitors") if called_at_each_time else nullcontext():
-                found.append(unrecorded(simulator, manager, run))
-        assert all(each == found[0] for each in found)
-        assert simulator.run(manager, run, 1, record=True).metrics == found[0][0]
+        at_each_time = effects(simulator, manager, run, record=True)
+        for _ in range(2 if has_cache else 1):  # at first the cache is empty
+            assert effects(simulator, manager, run, record=False) == at_each_time
 
 
 SLOW = {"managers.metacontrol.reasoning_period_s": 7.3, "latencies.inference_s": 5.0}
@@ -230,21 +226,21 @@ def test_metacontrol_skips_no_cycle_while_it_may_have_missed_a_value() -> None:
         **steps(1.5, 1.6, 40.0),
         **NO_FAULTS,
         "revision.coordinator.maintain_motion_per_task": True,
-        "revision.metacontrol.objectives_at_launch": False,
+        "revision.metacontrol.objectives_at_launch": [],
     }
     simulator = simulator_of(values)
-    _, effects = unrecorded(simulator, "metacontrol", 1)
-    assert [t_s > 40.0 for t_s, effect in effects if effect.endswith("fd_spiral_low")] == [True]
+    _, found = effects(simulator, "metacontrol", 1, record=False)
+    assert [t_s > 40.0 for t_s, effect in found if effect.endswith("fd_spiral_low")] == [True]
     assert_same_missions(simulator, "metacontrol", range(1, 3))
 
 
 def test_what_a_derived_class_plans_is_its_own() -> None:
     simulator = simulator_of(NO_FAULTS)
-    before = unrecorded(simulator, "metacontrol", 1)
-    _, effects = unrecorded(simulator, f"{OUTSIDE}:PlansLow", 1)
-    searches = [effect for _, effect in effects if "= fd_spiral" in effect]
+    before = effects(simulator, "metacontrol", 1, record=False)
+    _, found = effects(simulator, f"{OUTSIDE}:PlansLow", 1, record=False)
+    searches = [effect for _, effect in found if "= fd_spiral" in effect]
     assert searches == ["f_generate_search_path = fd_spiral_low"] != [effect for _, effect in before[1]]
-    assert unrecorded(simulator, "metacontrol", 1) == before
+    assert effects(simulator, "metacontrol", 1, record=False) == before
 
 
 NOISE = {"signals.water_visibility.noise": {"distribution": "normal", "mean": 0.0, "std": 0.3}}
@@ -293,24 +289,22 @@ def test_calls_that_are_not_skipped_come_at_the_very_same_times(
     levels = [2.5, *([3.5, 2.5] * 2)[: len(changes)]]
     times_s = (0.0, *(period_s * time for time in changes))
     arrays = (np.array(times_s), np.array(levels))
-    measured = Measurements("water_visibility", times_s, tuple(levels), 0.0, period_s, arrays)
+    timing = Timing(period_s, 0.0)
+    measured = SignalMeasurements("water_visibility", float, timing, list(times_s), levels, arrays)
     found, requested = [], []
-    for skips_idle_calls in (False, True):
+    for recorded in (True, False):
         env, bus = simpy.Environment(), DiagnosticsBus()
         modes = mock.Mock(requests=0)
-        system = ManagedSystem(
+        system = system_of(
             env,
             LOADED["seams2023"].scenario,
-            {"period_s": period_s, "starts_s": start * period_s, "takes_s": takes * period_s},
-            modes=modes,
-            lasting_functions=(),
-            stream=random.Random,
-            log=lambda event, detail: None,
-            knowledge=lambda: None,
-            measurements={measured.key: measured},
+            modes,
+            {measured.key: measured},
+            SimpleNamespace(functions=()),
+            recorded=recorded,
+            settings={"period_s": period_s, "starts_s": start * period_s, "takes_s": takes * period_s},
         )
-        name = f"{OUTSIDE}:{manager}"
-        ManagerHost(name, manager_class(name), 1, system, bus, skips_idle_calls=skips_idle_calls)
+        ManagerHost(manager_class(f"{OUTSIDE}:{manager}"), system, bus, lambda error: error, {}, False)
         for time in reports:
             Alarm(env, lambda publish=bus.publish: publish(FAILURE)).set(time * period_s)
         env.run(until=12.0 * period_s)

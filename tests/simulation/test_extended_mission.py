@@ -6,7 +6,7 @@ from itertools import pairwise
 import pytest
 
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.reasoners import make_reasoner
+from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.metrics.result import MissionResult
 from suave_des.resources import find
@@ -130,7 +130,7 @@ def test_stock_pellet_infers_the_same_of_the_extended_ontology(level: float, des
         groundings={"generate_recharge_path": design},
         measurements={"battery_level": level},
     )
-    ours, stock = (make_reasoner(name, base).infer(state) for name in ("pellet", "owlready2"))
+    ours, stock = (Reasoner(base, name).analyze(state) for name in ("pellet", "owlready2"))
     assert ours == stock
     in_error = design == "fd_no_recharge" and level < 0.25
     assert (ours.grounding_status("generate_recharge_path") == "IN_ERROR_NFR") is in_error

@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from suave_des.managed.follow import InspectionPath
 from suave_des.managing.bt import BehaviourTree
 from suave_des.metrics.result import MissionResult, TrajectoryPoint
-from suave_des.world.pipeline import there_and_back
+from suave_des.simulation.mission import Mission
 
 NO_ERRORS = {"calibration": {"altitude_error_m": 0.0, "reasoning_slowdown": 0.0}}
 MANAGERS = ("none", "random", "bt", "bt_extended")
@@ -127,7 +128,7 @@ def test_distance_of_an_undisturbed_inspection_is_the_way_along_some_of_the_path
     metrics = simulator(scenario, **NO_ERRORS).run(manager, 1, 1).metrics
     points = simulator(scenario).points
     first = int(np.argmin(np.abs(points[:, 0] - metrics.detection_x_m)))
-    path = there_and_back(points)[first:].tolist()
+    path = InspectionPath.there_and_back(points, 1.25).points_m[first:, :2].tolist()
     ways_m = np.cumsum([math.dist(here, there) for here, there in pairwise(path)])
     assert np.min(np.abs(ways_m - metrics.distance_inspected_m)) < 1e-9
 
@@ -215,6 +216,18 @@ def test_a_failure_too_early_to_take_effect_is_published_all_the_same(simulator)
     assert without_effect.trajectory[-1].x_m == whole.trajectory[-1].x_m != failed.trajectory[-1].x_m
 
 
+def test_a_failure_takes_effect_from_the_very_time_on(simulator) -> None:
+    def without_effect(effective_from_s: float) -> list:
+        failures = {"effective_from_s": effective_from_s, "loss_probability": 0.0}
+        made = simulator(mission={"time_limit_s": 80.0}, revision={"thruster_failures": failures})
+        mission = made.run("none", 1, 1, record=True)
+        return events(mission, "failure_without_effect")
+
+    (failed_s,) = without_effect(100.0)
+    assert without_effect(failed_s) == []
+    assert without_effect(math.nextafter(failed_s, math.inf)) == [failed_s]
+
+
 def test_only_a_missions_first_failure_may_have_no_effect(simulator) -> None:
     failures = {"effective_from_s": 0.0, "loss_probability": 0.25}
     failing = [{"thruster": n, "event": "failure", "time_s": 1.0} for n in (3, 1)]
@@ -284,7 +297,7 @@ def test_the_reasoner_slows_the_world_down_in_proportion_to_its_share_of_the_tim
     def flown(kind: type[BehaviourTree], **calibration: float) -> list[TrajectoryPoint]:
         latencies = {"inference_s": inference_s}  # in metacontrol's period of 2 s
         made = simulator(calibration={"altitude_error_m": 0.0, **calibration}, latencies=latencies)
-        return made.start("bt", 1, 1, record=True, manager_type=kind).result().trajectory
+        return Mission(made, kind, record=True).result().trajectory
 
     slower = flown(ReasoningTree, reasoning_slowdown=0.4)
     assert slower == flown(BehaviourTree, real_time_factor_loss=0.4 * share)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.clock import Alarm, tick_at_or_after, until
-from suave_des.streams import Streams
+from suave_des.draws import Streams
 
 names = st.text(min_size=1, max_size=20)
 

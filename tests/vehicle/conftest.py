@@ -2,8 +2,7 @@ from collections.abc import Callable
 
 import pytest
 
-from suave_des.vehicle.autopilot import Autopilot
-from suave_des.vehicle.frames import Pose
+from suave_des.vehicle.model import Autopilot, Pose
 from suave_des.vehicle.vehicle import Vehicle
 from tests.helpers.vehicles import BLUEROV2
 

@@ -6,11 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from suave_des.vehicle import kernel
-from suave_des.vehicle.model import allocation_matrix, autopilot_allocation
 from suave_des.vehicle.vehicle import STEP_S, Vehicle
 from tests.helpers.vehicles import BLUEROV2
 
-B = allocation_matrix(BLUEROV2)
+B = BLUEROV2.wrenches
 S = np.sqrt(0.5)
 SURGE, SWAY, HEAVE, ROLL, PITCH, YAW = range(6)
 
@@ -37,7 +36,7 @@ demands = st.tuples(*[st.floats(-20.0, 20.0)] * 6)
 @given(demands)
 def test_healthy_thrusters_give_any_demand_but_pitch(demand: tuple[float, ...]) -> None:
     demanded = np.array(demand)
-    given_wrench = B @ (autopilot_allocation(BLUEROV2) @ demanded)
+    given_wrench = B @ (BLUEROV2.allocation @ demanded)
     demanded[PITCH] = 0.0
     assert given_wrench == pytest.approx(demanded, abs=1e-9)
 
@@ -70,7 +69,7 @@ def test_autopilot_commands_a_lost_thruster_as_if_it_worked(make_vehicle, lost: 
     for vehicle in (healthy, failed):
         vehicle.command(0.0, 0.3, -0.2, -17.8)
     net_buoyancy = np.array([0, 0, BLUEROV2.buoyancy_n - BLUEROV2.weight_n, 0, 0, 0])
-    commanded = autopilot_allocation(BLUEROV2) @ (first_wrench(healthy) - net_buoyancy)
+    commanded = BLUEROV2.allocation @ (first_wrench(healthy) - net_buoyancy)
     commanded[lost - 1] = 0.0
     assert first_wrench(failed) == pytest.approx(B @ commanded + net_buoyancy, abs=1e-9)
 

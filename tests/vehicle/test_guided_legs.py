@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from suave_des.vehicle import kernel
-from suave_des.vehicle.autopilot import Autopilot
-from suave_des.vehicle.frames import Pose
+from suave_des.vehicle.model import Autopilot, Pose
 from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at
-from tests.helpers.vehicles import BLUEROV2
+from tests.helpers.vehicles import BLUEROV2, nu
 
 START = Pose(0.0, 0.0, -18.0, 0.0, 0.0, 0.0)
 STIFF = Autopilot(
@@ -49,7 +48,7 @@ def test_an_interrupted_leg_starts_anew_from_the_stopping_point() -> None:
     vehicle = Vehicle(BLUEROV2, Autopilot(), START, 30.0)
     vehicle.command(0.0, 3.0, 0.0, -18.0)
     x_m, y_m, z_m = vehicle.position(2.0)
-    u_m_per_s = vehicle.nu(2.0)[0]
+    u_m_per_s = nu(vehicle, 2.0)[0]
     vehicle.command(2.0, 3.0, 1.0, -18.0)
     assert leg_start(vehicle, 2.1) == pytest.approx((x_m + u_m_per_s, y_m, z_m), abs=1e-3)  # the position gain is 1 / s
 

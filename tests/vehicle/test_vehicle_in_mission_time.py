@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from suave_des.vehicle.frames import euler_angles, quaternion
+from suave_des.vehicle.model import euler_angles, quaternion
 from suave_des.vehicle.vehicle import STEP_S, Vehicle, row_at
 
 DURATION_S = 40.0
@@ -42,13 +42,13 @@ def test_reading_at_any_times_changes_no_bit(make_vehicle, plan: list, readings:
 @given(st.lists(commands | faults, max_size=5), st.integers(0, 800))
 def test_looking_ahead_does_not_bind_the_future(make_vehicle, plan: list, ahead: int) -> None:
     foresighted = make_vehicle(duration_s=DURATION_S)
-    foresighted.control_listeners.append(lambda row: foresighted.look_ahead(min(row + ahead, foresighted.last_row)))
+    foresighted.control_listeners.append(lambda row, _: foresighted.look_ahead(min(row + ahead, foresighted.last_row)))
     assert np.array_equal(carry_out(make_vehicle(duration_s=DURATION_S), plan, []), carry_out(foresighted, plan, []))
 
 
 def test_a_thruster_that_is_as_it_was_is_no_change_of_control(make_vehicle) -> None:
     vehicle, rows = make_vehicle(), []
-    vehicle.control_listeners.append(rows.append)
+    vehicle.control_listeners.append(lambda row, _: rows.append(row))
     vehicle.set_thruster_health(1.0, 2, 1.0)
     vehicle.set_thruster_health(2.0, 2, 0.0)
     vehicle.set_thruster_health(3.0, 2, 0.0)
@@ -57,7 +57,7 @@ def test_a_thruster_that_is_as_it_was_is_no_change_of_control(make_vehicle) -> N
 
 def test_listeners_get_the_row_of_a_change_of_control(make_vehicle) -> None:
     vehicle, rows = make_vehicle(), []
-    vehicle.control_listeners.append(rows.append)
+    vehicle.control_listeners.append(lambda row, _: rows.append(row))
     vehicle.command(3.0, 1.0, 0.0, -18.0)
     vehicle.set_thruster_health(4.5, 2, 0.0)
     assert rows == [row_at(3.0), row_at(4.5)]

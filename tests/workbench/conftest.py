@@ -11,12 +11,12 @@ from tests.helpers.knowledge_states import FEWER_NUMBERS
 
 
 @pytest.fixture(scope="session")
-def bench():
+def knowledge():
     return KnowledgeBase.load()
 
 
 @pytest.fixture(scope="session")
-def small_bench():
+def small():
     """The shipped knowledge base with fewer ranges of measured values, for what goes through all of them."""
     return KnowledgeBase.load(values=FEWER_NUMBERS)
 

@@ -4,15 +4,15 @@ from pathlib import Path
 
 import pytest
 
-from suave_des.campaign.knowledge_records import KNOWLEDGE_FILE, knowledge_text
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.metrics.result import KnowledgeRecord
+from suave_des.records.knowledge import KNOWLEDGE_FILE, knowledge_text
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario
 
 SEARCH = "f_generate_search_path"
 RULE = 'near: FunctionGrounding(?fg) -> fg_status(?fg, "IN_ERROR_NFR")'
-STATE = ("--set", "water_visibility=1.8", "--ground", f"{SEARCH}=fd_spiral_low")
+STATE = ("--at", "water_visibility=1.8", "--at", f"{SEARCH}=fd_spiral_low")
 ASKING = {
     "rules": (),
     "check": (),
@@ -51,7 +51,7 @@ UNREADABLE = {
     "nested entities": (nested(12), "the entities in this file expand to far more than its size"),
     "external entity": (
         document("&x;", '<!DOCTYPE rdf [<!ENTITY x SYSTEM "file:///etc/passwd">]>'),
-        "entity x is external",
+        "refers to another file",
     ),
 }
 
@@ -103,8 +103,8 @@ def test_an_ontology_of_something_else_is_told_apart_from_a_broken_one(folder, c
     assert (status, error) == (1, "")
     assert "there is no function f_follow_pipeline" in text
     for name, said in {
-        "infer": "there is no quality attribute 'water_visibility'",
-        "explain": "there is no quality attribute 'water_visibility'",
+        "infer": "there is no quality attribute, component or function 'water_visibility'",
+        "explain": "there is no quality attribute, component or function 'water_visibility'",
         "policy": "no function has a function design",
         "try": "FunctionGrounding is not defined",
     }.items():
@@ -134,7 +134,7 @@ def test_names_that_are_not_ascii_are_names(folder, command):
     rule = 'größer: typeFD(?größe, fd_spirale_größte) -> fg_status(?größe, "IN_ERROR_FR")'
     assert command("add-rule", "suave.owl", rule)[0] == 0
     assert rule in command("rules", "--ontology", "suave.owl")[1]
-    state = ("--ground", f"{SEARCH}=fd_spirale_größte")
+    state = ("--at", f"{SEARCH}=fd_spirale_größte")
     status, text, _ = command("explain", "fg_status(fg_spirale_größte, IN_ERROR_FR)", "--ontology", "suave.owl", *state)
     assert status == 0
     assert "by rule größer with ?größe = fg_spirale_größte" in text

@@ -12,9 +12,9 @@ import pytest
 
 import suave_des
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.knowledge.pellet import limit
-from suave_des.knowledge.pellet.limit import TimeLimit, times_abandoned
-from suave_des.knowledge.reasoners import make_reasoner
+from suave_des.knowledge import pellet as limit
+from suave_des.knowledge.pellet import TimeLimit, times_abandoned
+from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import ObjectiveState
 from suave_des.workbench import KnowledgeBase
 
@@ -29,16 +29,16 @@ def _python(*arguments):
     return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
 
 
-def test_infers_the_error_and_plans_the_lower_spiral(bench):
-    conclusion = bench.infer(bench.state(**HIGH))
-    assert "fg_status(fg_spiral_high, IN_ERROR_NFR)" in set(map(str, conclusion.inference.facts))
-    assert [(each.function, each.design) for each in conclusion.plan.decisions] == [
+def test_infers_the_error_and_plans_the_lower_spiral(knowledge):
+    reasoning = knowledge.infer(knowledge.state(**HIGH))
+    assert "fg_status(fg_spiral_high, IN_ERROR_NFR)" in set(map(str, reasoning.inference.facts))
+    assert [(each.function, each.design) for each in reasoning.plan.decisions] == [
         ("f_generate_search_path", "fd_spiral_low")
     ]
 
 
-def test_without_objectives_the_search_task_s_are_asked_for(bench):
-    assert bench.state().objectives == (
+def test_without_objectives_the_search_task_s_are_asked_for(knowledge):
+    assert knowledge.state().objectives == (
         ObjectiveState("f_generate_search_path", "UNGROUNDED"),
         ObjectiveState("f_maintain_motion", "UNGROUNDED"),
     )
@@ -51,7 +51,7 @@ def test_the_revision_decides_whether_the_search_always_improves():
     assert decision[0].design == "fd_spiral_high"
 
 
-def test_a_file_and_words_make_one_state_and_words_win(bench, tmp_path):
+def test_a_file_and_words_make_one_state_and_words_win(knowledge, tmp_path):
     file = tmp_path / "state.yaml"
     file.write_text(
         "objectives: [f_generate_search_path]\n"
@@ -59,8 +59,8 @@ def test_a_file_and_words_make_one_state_and_words_win(bench, tmp_path):
         "components: {c_thruster_1: FALSE}\n"  # YAML's own false
         "measurements: {water_visibility: 1.8}\n"
     )
-    assert bench.state(file).components == (("c_thruster_1", "FALSE"),)
-    state = bench.state(file, measurements={"water_visibility": 3.0}, components={"c_thruster_1": "RECOVERED"})
+    assert knowledge.state(file).components == (("c_thruster_1", "FALSE"),)
+    state = knowledge.state(file, measurements={"water_visibility": 3.0}, components={"c_thruster_1": "RECOVERED"})
     assert str(state.measured("water_visibility")[0]) == "3"
     assert state.components == (("c_thruster_1", "RECOVERED"),)
 
@@ -76,31 +76,31 @@ def test_a_file_and_words_make_one_state_and_words_win(bench, tmp_path):
             "no rule mentions the c_status 'recoverd' (did you mean 'REC",
         ),
         ("component: {}\n", "did you mean 'components'"),
-        ("components: 3\n", "is not a mapping"),
+        ("components: 3\n", "line 1, components: "),
         ("", "is empty"),
     ],
 )
-def test_a_wrong_file_is_told_with_its_place(bench, tmp_path, text, said):
+def test_a_wrong_file_is_told_with_its_place(knowledge, tmp_path, text, said):
     file = tmp_path / "state.yaml"
     file.write_text(text)
     with pytest.raises(InputError) as error:
-        bench.state(file)
+        knowledge.state(file)
     assert said in str(error.value)
     assert str(file) in str(error.value)
 
 
-def test_the_command_prints_what_the_library_gives(bench, command):
-    words = ("--ground", "f_generate_search_path=fd_spiral_high", "--set", "water_visibility=1.8")
+def test_the_command_prints_what_the_library_gives(knowledge, command):
+    words = ("--at", "f_generate_search_path=fd_spiral_high", "--at", "water_visibility=1.8")
     status, text, _ = command("infer", *words)
     assert status == 0
     assert "  fg_status(fg_spiral_high, IN_ERROR_NFR)\n" in text
     assert "    not fd_spiral_medium: water_visibility 1.80 measured < 2.25 expected\n" in text
     status, printed, _ = command("infer", *words, "--format", "json")
-    assert json.loads(printed)["inferred"] == sorted(map(str, bench.infer(bench.state(**HIGH)).inference.facts))
+    assert json.loads(printed)["inferred"] == sorted(map(str, knowledge.infer(knowledge.state(**HIGH)).inference.facts))
 
 
 def test_a_rule_switched_off_infers_nothing(command):
-    words = ("--ground", "f_generate_search_path=fd_spiral_high", "--set", "water_visibility=1.8")
+    words = ("--at", "f_generate_search_path=fd_spiral_high", "--at", "water_visibility=1.8")
     _, text, _ = command("infer", *words, "--disable-rule", "QAWaterVisibility")
     assert "inferred\n  nothing\nplan\n  nothing to adapt\n" in text
 
@@ -108,13 +108,14 @@ def test_a_rule_switched_off_infers_nothing(command):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--set", "water_visibility"), "--set: 'water_visibility' has no value"),
-        (("--component", "c_thruster_7=FALSE"), "--component: there is no component 'c_thruster_7' (did you mean"),
-        (("--component", "c_thruster_1=false"), "no rule mentions the c_status 'false' (did you mean 'FALSE'?"),
-        (("--objective", "f_maintain_motion=ungrounded"), "--objective: no rule mentions the o_status 'ungrounded'"),
+        (("--at", "water_visibility"), "--at: 'water_visibility' has no value"),
+        (("--at", "c_thruster_7=FALSE"), "--at: there is no quality attribute, component or function 'c_thruster_7'"),
+        (("--at", "c_thruster_1=false"), "no rule mentions the c_status 'false' (did you mean 'FALSE'?"),
+        (("--at", "f_maintain_motion=ungrounded"), "--at: f_maintain_motion has no function design 'ungrounded'"),
+        (("--at", "nowhere@3"), "--at: nowhere has no recorded states"),
         (("--disable-rule", "QAWaterVisibilty"), "did you mean QAWaterVisibility?"),
         (("--reasoner", "hermit"), "there is no reasoner 'hermit'"),
-        (("--state", "nowhere.yaml"), "nowhere.yaml: no such file"),
+        (("--at", "nowhere.yaml"), "nowhere.yaml: no such file"),
     ],
 )
 def test_what_cannot_be_used_ends_in_one_line(command, words, said):
@@ -124,44 +125,46 @@ def test_what_cannot_be_used_ends_in_one_line(command, words, said):
     assert error.count("\n") == 1
 
 
-def test_statuses_of_ones_own_are_taken(bench):
-    state = bench.state(
+def test_statuses_of_ones_own_are_taken(knowledge):
+    state = knowledge.state(
         components={"c_thruster_1": "HOT"}, objectives={"f_maintain_motion": "UPDATABLE", "f_follow_pipeline": "DONE"}
     )
     assert state.components == (("c_thruster_1", "HOT"),)
     assert [each.status for each in state.objectives] == ["DONE", "UPDATABLE"]
 
 
-def test_an_objective_without_a_status_of_ones_own_has_the_one_that_follows(bench):
+def test_an_objective_without_a_status_of_ones_own_has_the_one_that_follows(knowledge):
     for groundings in ({}, {"f_maintain_motion": "fd_all_thrusters"}):
-        named = bench.state(objectives=["f_maintain_motion"], groundings=groundings)
-        assert bench.state(objectives={"f_maintain_motion": None}, groundings=groundings) == named
+        named = knowledge.state(objectives=["f_maintain_motion"], groundings=groundings)
+        assert knowledge.state(objectives={"f_maintain_motion": None}, groundings=groundings) == named
 
 
-def test_one_file_or_name_may_stand_alone(bench, tmp_path):
+def test_one_file_or_name_may_stand_alone(knowledge, tmp_path):
     (tmp_path / "mine.swrl").write_text("mine: Objective(?o) -> o_updatable(?o, true)\n")
     alone = KnowledgeBase.load("suave.owl", rules=tmp_path / "mine.swrl", disabled_rules="compError")
     assert {rule.name: rule.enabled for rule in alone.base.rules if rule.name in ("mine", "compError")} == {
         "mine": True,
         "compError": False,
     }
-    assert [each.function for each in bench.state(objectives="f_maintain_motion").objectives] == ["f_maintain_motion"]
+    assert [each.function for each in knowledge.state(objectives="f_maintain_motion").objectives] == [
+        "f_maintain_motion"
+    ]
 
 
 class TestTimeLimit:
-    def test_names_the_state_that_takes_too_long_and_refuses_more(self, bench, monkeypatch):
-        monkeypatch.setattr("suave_des.knowledge.pellet.limit._abandoned", [])
+    def test_names_the_state_that_takes_too_long_and_refuses_more(self, knowledge, monkeypatch):
+        monkeypatch.setattr("suave_des.knowledge.pellet._abandoned", [])
         released = threading.Event()
         monkeypatch.setattr(
             "suave_des.knowledge.pellet.in_process.InProcessPellet.infer", lambda *_: released.wait(60.0)
         )
         limit = TimeLimit()
-        reasoner = make_reasoner("pellet", bench.base, limit)
+        reasoner = Reasoner(knowledge.base, "pellet", limit)
         limit.seconds = 0.2
         with pytest.raises(KnowledgeError, match=r"fd_spiral_high, water_visibility = 1.8: not done after 0.2 s"):
-            reasoner.infer(bench.state(**HIGH))
+            reasoner.analyze(knowledge.state(**HIGH))
         with pytest.raises(KnowledgeError, match="still reasoning"):
-            reasoner.infer(bench.state())
+            reasoner.analyze(knowledge.state())
         released.set()
 
     @pytest.mark.parametrize("reasoner", ["cached", "owlready2"])
@@ -170,7 +173,8 @@ class TestTimeLimit:
         rules.write_text(EXPLOSION)
         program = f"""
 import sys
-from suave_des.knowledge.pellet import limit, stock
+from suave_des.knowledge import pellet as limit
+from suave_des.knowledge.pellet import stock
 limit.TimeLimit.__init__.__defaults__ = (1.0, None)
 if {reasoner == "owlready2"}:  # its own limit, without the check by the Pellet in this process
     from suave_des.knowledge.pellet import in_process
@@ -198,8 +202,8 @@ main(["run", "seams2023", "--reasoner", {reasoner!r}, "--rules", {str(rules)!r}]
         def interrupted(*_):
             raise KeyboardInterrupt
 
-        monkeypatch.setattr("suave_des.knowledge.pellet.limit._abandoned", [])
-        monkeypatch.setattr("suave_des.knowledge.pellet.limit.Future.result", interrupted)
+        monkeypatch.setattr("suave_des.knowledge.pellet._abandoned", [])
+        monkeypatch.setattr("suave_des.knowledge.pellet.Future.result", interrupted)
         with pytest.raises(KeyboardInterrupt):
             TimeLimit().run(lambda: None, "reasoning")
         assert times_abandoned() == 1
@@ -216,14 +220,14 @@ main(["run", "seams2023", "--reasoner", {reasoner!r}, "--rules", {str(rules)!r}]
 import sys
 from suave_des.errors import KnowledgeError
 from suave_des.workbench import KnowledgeBase
-from suave_des.knowledge.pellet import limit
-from suave_des.knowledge.pellet.limit import TimeLimit, times_abandoned
-bench = KnowledgeBase.load(reasoner="pellet")  # Java starts in another thread than this one
-state = bench.state(groundings={HIGH["groundings"]!r}, measurements={HIGH["measurements"]!r})
-assert bench.infer(state).plan.decisions
+from suave_des.knowledge import pellet as limit
+from suave_des.knowledge.pellet import TimeLimit, times_abandoned
+knowledge = KnowledgeBase.load(reasoner="pellet")  # Java starts in another thread than this one
+state = knowledge.state(groundings={HIGH["groundings"]!r}, measurements={HIGH["measurements"]!r})
+assert knowledge.infer(state).plan.decisions
 def for_ever():
     while True:
-        bench.explain(state)
+        knowledge.explain(state)
 try:
     {given_up_on} and TimeLimit(0.5).run(for_ever, "explaining")
 except KnowledgeError:
@@ -236,7 +240,7 @@ sys.exit(5)
     def test_a_reasoner_that_starts_while_the_process_ends_does_nothing(self, monkeypatch):
         # Its thread is listed from before it runs: abandoned work may be starting another reasoner.
         starting, done = limit._ReasonerThread(), []
-        monkeypatch.setattr("suave_des.knowledge.pellet.limit.threading.enumerate", lambda: [starting])
+        monkeypatch.setattr("suave_des.knowledge.pellet.threading.enumerate", lambda: [starting])
         limit._end_all()
         starting.jobs.put((Future(), lambda: done.append("reasoned")))
         starting.start()
@@ -248,9 +252,9 @@ sys.exit(5)
         program = """
 import atexit, sys, threading
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge.pellet import jvm
-from suave_des.knowledge.pellet.limit import TimeLimit
-thread = jvm.java_class("java.lang.Thread")
+from suave_des.knowledge.pellet import java
+from suave_des.knowledge.pellet import TimeLimit
+thread = java.java_class("java.lang.Thread")
 atexit.register(lambda: print([each.name for each in threading.enumerate() if each.name == "reasoner"]))
 inner = TimeLimit()  # as a reasoner has its own limit
 def for_ever():

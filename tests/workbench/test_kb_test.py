@@ -1,14 +1,15 @@
 """kb test: tests of rules pass and fail as they should, say why, and refuse what makes no sense."""
 
 import textwrap
+from functools import partial
 from xml.etree import ElementTree
 
 import pytest
 
 from suave_des.errors import InputError
-from suave_des.workbench.ranges import measurements_in, parse_region, ranges_between
-from suave_des.workbench.testing.reading import TestFile, shipped_tests
-from suave_des.workbench.testing.run import Runner
+from suave_des.workbench.rule_tests import TestFile, run_test, shipped_tests
+from suave_des.workbench.space import measurements_in, parse_region, ranges_between
+from tests.helpers.owl_text import individual, iri
 
 SPARE = """\
 spare: hasQAvalue(?fg, ?q) ^ isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ lessThan(?v, 3.5)
@@ -17,18 +18,18 @@ spare: hasQAvalue(?fg, ?q) ^ isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^
 
 
 @pytest.fixture(scope="module")
-def runner(bench):
-    return Runner.of(bench)
+def run(knowledge):
+    return partial(run_test, knowledge)
 
 
 @pytest.fixture
-def suite(tmp_path, bench):
+def suite(tmp_path, knowledge):
     """Reads tests from YAML that is given as text."""
 
     def read(text):
         path = tmp_path / "mine.yaml"
         path.write_text("tests:\n" + textwrap.dedent(text), encoding="utf-8")
-        return TestFile.read(path).tests(bench)
+        return list(TestFile.read(path).tests(knowledge))
 
     return read
 
@@ -40,29 +41,29 @@ def test_the_shipped_rules_pass_the_shipped_tests(command):
     assert len(shipped_tests()) == 2
 
 
-def test_a_fact_that_does_not_follow_is_a_failure_that_names_rule_and_values(suite, runner):
+def test_a_fact_that_does_not_follow_is_a_failure_that_names_rule_and_values(suite, run):
     (test,) = suite("""
         - name: too clear
           given: {groundings: {f_generate_search_path: fd_spiral_high}, measurements: {water_visibility: 3.4}}
           follows: ["fg_status(fg_spiral_high, IN_ERROR_NFR)"]
         """)
-    (failure,) = runner.run(test).failures
+    (failure,) = run(test).failures
     assert failure.what == "fg_status(fg_spiral_high, IN_ERROR_NFR) does not follow"
     assert "QAWaterVisibility: lessThan(?measured, ?expected) does not hold: found 3.4" in failure.because[0]
 
 
-def test_a_fact_that_must_not_follow_is_a_failure_with_its_derivation(suite, runner):
+def test_a_fact_that_must_not_follow_is_a_failure_with_its_derivation(suite, run):
     (test,) = suite("""
         - name: never
           given: {components: {c_thruster_1: FALSE}}
           follows_not: ["fd_realisability(fd_all_thrusters, false)"]
         """)
-    (failure,) = runner.run(test).failures
+    (failure,) = run(test).failures
     assert failure.what == "fd_realisability(fd_all_thrusters, false) follows"
     assert "by rule compError" in failure.because[0]
 
 
-def test_a_region_stands_for_all_kinds_of_values_in_it(suite, runner):
+def test_a_region_stands_for_all_kinds_of_values_in_it(suite, run):
     (test,) = suite("""
         - name: partly in error
           given: {groundings: {f_generate_search_path: fd_spiral_medium}, measurements: {water_visibility: ">= 1.25"}}
@@ -76,11 +77,11 @@ def test_a_region_stands_for_all_kinds_of_values_in_it(suite, runner):
         "3.25",
         "3.75",
     ]
-    (failure,) = runner.run(test).failures
+    (failure,) = run(test).failures
     assert failure.situation.ranges == "water_visibility 2.25"
 
 
-def test_a_decision_may_be_a_design_or_that_the_present_one_stays(suite, runner):
+def test_a_decision_may_be_a_design_or_that_the_present_one_stays(suite, run):
     tests = suite("""
         - name: both ways to say it
           given: {groundings: {f_generate_search_path: fd_spiral_high}, measurements: {water_visibility: 4}}
@@ -92,10 +93,10 @@ def test_a_decision_may_be_a_design_or_that_the_present_one_stays(suite, runner)
           given: {groundings: {f_generate_search_path: fd_spiral_high}, measurements: {water_visibility: 2}}
           decides: {f_generate_search_path: stays}
         """)
-    assert [runner.run(test).passed for test in tests] == [True, True, False]
+    assert [run(test).passed for test in tests] == [True, True, False]
 
 
-def test_what_a_rule_changes_is_tested_with_and_without_it(suite, runner):
+def test_what_a_rule_changes_is_tested_with_and_without_it(suite, run):
     tests = suite("""
         - name: right
           given: {groundings: {f_generate_search_path: fd_spiral_high}, measurements: {water_visibility: 2}}
@@ -106,10 +107,10 @@ def test_what_a_rule_changes_is_tested_with_and_without_it(suite, runner):
           without: compError
           changes: {f_generate_search_path: stays -> fd_spiral_low}
         """)
-    assert [runner.run(test).passed for test in tests] == [True, False]
+    assert [run(test).passed for test in tests] == [True, False]
 
 
-def test_facts_may_introduce_individuals_and_contradict_the_state(suite, runner):
+def test_facts_may_introduce_individuals_and_contradict_the_state(suite, run):
     tests = suite("""
         - name: a binding
           given: {facts: [Binding(b1), "binding_component(b1, c_thruster_1)", "c_status(c_thruster_1, false)"]}
@@ -127,7 +128,7 @@ def test_facts_may_introduce_individuals_and_contradict_the_state(suite, runner)
             facts: ["fg_status(fg_spiral_high, IN_ERROR_FR)"]
           follows: ["fg_status(fg_spiral_high, IN_ERROR_FR)"]
         """)
-    assert [runner.run(test).passed for test in tests] == [True, True, False]
+    assert [run(test).passed for test in tests] == [True, True, False]
 
 
 def test_rules_of_the_file_are_tested_and_results_are_written_as_junit_xml(tmp_path, command):
@@ -154,43 +155,67 @@ def test_rules_of_the_file_are_tested_and_results_are_written_as_junit_xml(tmp_p
     assert [case.get("name") for case in root.iter("testcase")] == ["not high below 3.5 m", "wrong <&>"]
 
 
+def test_a_test_whose_state_cannot_be_decided_fails_and_the_others_run(edited, command, tmp_path):
+    """Planning compares required values with an operator, which this quality attribute does not have."""
+    required = f'<rdf:Description rdf:about="{iri("o_maintain_motion")}"><tomasys:hasNFR rdf:resource="{iri("nfr")}"/>'
+    depth = individual("depth", "QualityAttributeType")
+    nfr = individual("nfr", "QAvalue", ("isQAtype", ":depth"), ("hasValue", "1.0"))
+    ontology = edited(f"{depth}{nfr}{required}</rdf:Description>")
+    tests = tmp_path / "mine.yaml"
+    tests.write_text(
+        "tests:\n"
+        "- {name: undecided, given: {objectives: [f_maintain_motion]}, decides: {f_maintain_motion: none left}}\n"
+        "- {name: decided, given: {objectives: [f_follow_pipeline]}, follows: [Objective(o_follow_pipeline)]}\n",
+        encoding="utf-8",
+    )
+    status, out, _ = command("test", tests, "--ontology", ontology)
+    assert status == 1
+    assert "1 failed, 1 passed" in out
+    assert f"FAILED {tests}:2: undecided: the state cannot be decided: " in out and "qa_comparison_operator" in out
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (
-            "- name: x\n  folows: []",
-            "line 3, tests[0].folows: 'folows' is not a known key here (did you mean 'follows'?",
-        ),
-        ("- name: x", "this test expects nothing"),
-        ("- name: x\n  follows: [fg_status(fg_spiral_high, IN)]", "needs quotes, because of its comma"),
-        ('- name: x\n  follows: ["fg_stats(fg_spiral_high, IN)"]', "no property 'fg_stats' (did you mean fg_status?)"),
-        ('- name: x\n  follows: ["fg_status(fg_spiral_hig, IN)"]', "did you mean fg_spiral_high? or introduce it"),
-        ('- name: x\n  follows: ["fg_status(?fg, IN)"]', "has a variable"),
-        (
-            '- name: x\n  follows_not: ["fg_status(fg_spiral_low, IN_EROR_NFR)"]',
-            "'IN_EROR_NFR' is not among the values of fg_status (did you mean IN_ERROR_NFR?)",
-        ),
-        ('- name: x\n  follows_not: ["fd_realisability(fd_spiral_low, False)"]', "whose range is boolean"),
-        ("- name: x\n  decides: {f_generate_search_path: fd_spiral_hihg}", "did you mean 'fd_spiral_high'?"),
-        ("- name: x\n  decides: {f_search: stays}", "there is no function 'f_search'"),
-        ("- name: x\n  contradiction: 1", "1 is neither true nor false"),
-        (
-            "- name: x\n  without: nothing\n  changes: {f_generate_search_path: stays -> stays}",
-            "no enabled rule 'nothing'",
-        ),
+        ("- name: x\n  folows: []", "line 3, tests[0].folows: unknown key 'folows' (did you mean 'follows'?"),
+        ("- name: x", "line 2, tests[0]: this test expects nothing"),
         ("- name: x\n  without: S1a\n  decides: {f_generate_search_path: stays}", "must be given together"),
-        (
-            '- name: x\n  given: {measurements: {water_visibility: "1 << 2"}}\n  contradiction: true',
-            "'1 << 2' is not a region",
-        ),
-        ("- name: x\n  given: {mission: nowhere, at_s: 3}\n  contradiction: true", "nowhere has no recorded states"),
+        ("- name: x\n  contradiction: maybe", "line 3, tests[0].contradiction: "),
     ],
 )
-def test_what_makes_no_sense_is_refused_with_line_key_and_remedy(suite, text, said):
+def test_a_file_that_is_not_as_it_must_be_is_refused_with_line_key_and_remedy(suite, text, said):
     with pytest.raises(InputError) as error:
         suite(text + "\n")
     assert said in str(error.value)
     assert "mine.yaml: line" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("follows: [fg_status(fg_spiral_high, IN)]", "needs quotes, because of its comma"),
+        ('follows: ["fg_stats(fg_spiral_high, IN)"]', "no property 'fg_stats' (did you mean fg_status?)"),
+        ('follows: ["fg_status(fg_spiral_hig, IN)"]', "did you mean fg_spiral_high? or introduce it"),
+        ('follows: ["fg_status(?fg, IN)"]', "has a variable"),
+        (
+            'follows_not: ["fg_status(fg_spiral_low, IN_EROR_NFR)"]',
+            "'IN_EROR_NFR' is not among the values of fg_status (did you mean IN_ERROR_NFR?)",
+        ),
+        ('follows_not: ["fd_realisability(fd_spiral_low, False)"]', "whose range is boolean"),
+        ("decides: {f_generate_search_path: fd_spiral_hihg}", "did you mean 'fd_spiral_high'?"),
+        ("decides: {f_search: stays}", "there is no function 'f_search'"),
+        ("without: nothing\n  changes: {f_generate_search_path: stays -> stays}", "no enabled rule 'nothing'"),
+        ('given: {measurements: {water_visibility: "1 << 2"}}\n  contradiction: true', "'1 << 2' is not a region"),
+        ("given: {mission: nowhere, at_s: 3}\n  contradiction: true", "nowhere has no recorded states"),
+        ("given: {mission: nowhere}\n  contradiction: true", "mission and at_s must be given together"),
+    ],
+)
+def test_what_a_knowledge_base_does_not_have_fails_the_test_with_a_remedy(suite, run, text, said):
+    """So the others run: the same tests may be tried on other files."""
+    wrong, right = suite(f"- name: x\n  {text}\n- name: y\n  decides: {{f_generate_search_path: fd_spiral_high}}\n")
+    (failure,) = run(wrong).failures
+    assert said in failure.what
+    assert run(right).passed
 
 
 @pytest.mark.parametrize("region", [*map(str, ranges_between([1, 2])[1:]), "1 <= . <= 2", "not measured"])
@@ -204,6 +229,6 @@ def test_a_region_without_numbers_is_refused():
         parse_region("2 <= . < 1")
 
 
-def test_ends_of_a_region_divide_the_kinds_of_values(bench):
-    found = [words for _, words in measurements_in(bench.base, {"water_visibility": parse_region("3 < . < 3.5")})]
+def test_ends_of_a_region_divide_the_kinds_of_values(knowledge):
+    found = [words for _, words in measurements_in(knowledge.base, {"water_visibility": parse_region("3 < . < 3.5")})]
     assert found == [f"water_visibility {each}" for each in ("3 < . < 3.25", "3.25", "3.25 < . < 3.5")]

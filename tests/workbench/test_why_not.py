@@ -1,4 +1,4 @@
-"""kb why-not: why a rule does not fire, in one line (benchmarks/why_not.py times the answers)."""
+"""kb why-not: why a rule does not fire, in one line."""
 
 import itertools
 
@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.errors import InputError
-from suave_des.knowledge.reasoners import make_reasoner
+from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.scenario.loader import load_scenario
-from suave_des.workbench.prover import Prover, Situation
-from suave_des.workbench.reasons.why_not import RuleQuestions, open_without_unusable
+from suave_des.workbench.situations import Probes, Situation
+from suave_des.workbench.why_not import RuleQuestions, open_without_unusable
 from tests.helpers.number_ontology import NS, NUMBERS, numbers_ontology
 from tests.helpers.rule_questions import CASES, prepared
 
@@ -19,8 +19,8 @@ SEARCH = "f_generate_search_path"
 
 
 @pytest.fixture(scope="module")
-def prover(bench):
-    return Prover.of(bench, bodies=[rule.body for rule in bench.base.rules])
+def probes(knowledge):
+    return Probes(knowledge.base, knowledge.limit, [rule.body for rule in knowledge.base.rules])
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -31,14 +31,21 @@ def test_recurring_questions_are_answered_in_one_line(name, edited, tmp_path):
     assert asked.answer in found
 
 
-def test_a_rule_that_is_not_there_is_refused_with_the_nearest_name(bench):
+def test_a_rule_that_is_not_there_is_refused_with_the_nearest_name(knowledge):
     with pytest.raises(InputError, match="did you mean 'compError'"):
-        RuleQuestions(bench.base).why_not("compEror", bench.state())
+        RuleQuestions(knowledge.base).why_not("compEror", knowledge.state())
+
+
+def test_a_right_status_is_not_taken_for_a_misspelt_one(knowledge):
+    state = knowledge.state(groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 2})
+    for name in ("S1a", "S1c"):
+        found = str(RuleQuestions(knowledge.base).why_not(name, state))
+        assert 'found fg_status "IN_ERROR_NFR" of fg_spiral_high' in found and "did you mean" not in found
 
 
 def test_numbers_match_where_they_do_in_pellet(tmp_path):
     base = numbers_ontology(tmp_path)
-    found = make_reasoner("pellet", base, terms=base.content.all_terms()).infer(KnowledgeState()).facts
+    found = Reasoner(base, "pellet", terms=base.content.all_terms()).analyze(KnowledgeState()).facts
     questions, rules = RuleQuestions(base), {rule.name: rule for rule in base.rules}
     answers = {
         (thing, name)
@@ -48,7 +55,7 @@ def test_numbers_match_where_they_do_in_pellet(tmp_path):
     assert answers == {(fact.subject, fact.value) for fact in found if fact.property == "is" and fact.value != "sum"}
 
 
-def test_a_rule_of_an_ontology_that_pellet_would_drop_spoils_no_other_answer(bench, edited):
+def test_a_rule_of_an_ontology_that_pellet_would_drop_spoils_no_other_answer(knowledge, edited):
     from tests.helpers.owl_text import rule
 
     broken = rule(
@@ -56,8 +63,8 @@ def test_a_rule_of_an_ontology_that_pellet_would_drop_spoils_no_other_answer(ben
     )
     base, _ = open_without_unusable(load_scenario("seams2023", ontologies=[edited(broken)]))
     questions = RuleQuestions(base)
-    assert "there is no builtin lessThn in Pellet" in str(questions.why_not("broken", bench.state()))
-    assert "it fires" in str(questions.why_not("compRecov", bench.state(components={"c_thruster_2": "RECOVERED"})))
+    assert "there is no builtin lessThn in Pellet" in str(questions.why_not("broken", knowledge.state()))
+    assert "it fires" in str(questions.why_not("compRecov", knowledge.state(components={"c_thruster_2": "RECOVERED"})))
 
 
 def test_the_command_takes_states_by_name_by_file_and_from_a_mission(command, tmp_path):
@@ -77,25 +84,25 @@ def test_the_command_takes_states_by_name_by_file_and_from_a_mission(command, tm
     statuses=st.lists(st.sampled_from(["FALSE", "RECOVERED"]), max_size=2),
     visibility=st.sampled_from(["1", "1.25", "2.25", "3.2", "4"]),
 )
-def test_a_rule_fires_where_pellet_says_so(bench, prover, design, statuses, visibility):
-    state = bench.state(
+def test_a_rule_fires_where_pellet_says_so(knowledge, probes, design, statuses, visibility):
+    state = knowledge.state(
         groundings={SEARCH: design},
         components={f"c_thruster_{n}": status for n, status in enumerate(statuses, start=1)},
         measurements={"water_visibility": visibility},
     )
-    holding = prover.holding(Situation(state))
-    questions = RuleQuestions(bench.base)
-    answers = {rule.name: questions.of(rule, state).fires for rule in bench.base.rules}
-    assert answers == {rule.name: number in holding for number, rule in enumerate(bench.base.rules)}
+    holding = probes.holding(Situation(state))
+    questions = RuleQuestions(knowledge.base)
+    answers = {rule.name: questions.of(rule, state).fires for rule in knowledge.base.rules}
+    assert answers == {rule.name: number in holding for number, rule in enumerate(knowledge.base.rules)}
 
 
-def test_a_measured_attribute_that_no_design_estimates_is_told_as_kb_check_tells_it(bench, tmp_path):
+def test_a_measured_attribute_that_no_design_estimates_is_told_as_kb_check_tells_it(knowledge, tmp_path):
     rules = tmp_path / "mine.swrl"
     rules.write_text(
         "low: hasQAvalue(?g, ?q) ^ isQAtype(?q, battery_level) ^ hasValue(?q, ?v) ^ lessThan(?v, 0.3) -> Role(?g)"
     )
     base, _ = open_without_unusable(load_scenario("seams2023", rules=[rules]))
-    found = str(RuleQuestions(base).why_not("low", bench.state(measurements={"battery_level": 0.1})))
+    found = str(RuleQuestions(base).why_not("low", knowledge.state(measurements={"battery_level": 0.1})))
     assert (
         "no function design has an estimate of battery_level, so no grounding has a value of it; add a hasQA" in found
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from suave_des.scenario.physical import Pipeline
-from suave_des.world.pipeline import first_detection, first_point_in_view, sample_points, there_and_back
+from suave_des.world.pipeline import first_detection, first_point_in_view, sample_points
 
 POINTS = sample_points(Pipeline().vertices_m)
 HALF_WIDTH_AT_1_M = math.tan(math.radians(30.0))
@@ -40,11 +40,6 @@ def test_spacing_within_a_piece(piece: int, spacing_m: float) -> None:
 def test_points_cannot_be_changed_by_one_of_their_users() -> None:
     with pytest.raises(ValueError, match="read-only"):
         POINTS[0, 0] = 0.0
-
-
-def test_path_goes_on_from_the_point_seen_and_back_along_all_points() -> None:
-    there = [[x, y] for x, y, _ in POINTS.tolist()]
-    assert there_and_back(POINTS)[7:].tolist() == there[7:] + there[::-1]
 
 
 @pytest.mark.parametrize(

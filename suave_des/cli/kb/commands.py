@@ -10,7 +10,7 @@ from typing import ClassVar
 import typer
 
 from suave_des.cli.kb import ask, diff, rules, tests
-from suave_des.cli.options import CommandsUnderHeadings, Headings, add_commands
+from suave_des.cli.options import CommandsUnderHeadings, Headings
 
 
 class _Commands(CommandsUnderHeadings):
@@ -31,7 +31,6 @@ app = typer.Typer(
     rich_markup_mode=None,
     help="Inspect the knowledge base, edit its rules, and show what they do.",
 )
-add_commands(app, _Commands.headings)
 
 
 @app.callback(invoke_without_command=True)

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.table import Table
 
-from suave_des.cli.console import counted, errors, output, plain_table, print_trimmed, progress
-from suave_des.cli.kb.options import AsFormat, Format, MaxFailed, ReasonerOptions, print_json
-from suave_des.cli.options import Quiet, Seed, Workers, grouped_options
+from suave_des.cli.console import counted, errors, progress
+from suave_des.cli.kb.options import AsFormat, Format, MaxFailed, ReasonerOptions, announce, emit, shown
+from suave_des.cli.options import Modes, Quiet, Seed, Workers
 from suave_des.estimates import interval_text
+from suave_des.records.metrics import Metric, metric_of
+from suave_des.tables import Table
 
 if TYPE_CHECKING:
-    from suave_des.workbench.difference import MissionDifference, PolicyDifference
+    from suave_des.workbench.difference import MissionDifference, PairedDifference, PolicyDifference
 
 _MOST_RUNS = 10
 """Numbers of missions that are listed; all of them are in the JSON form."""
@@ -30,15 +32,15 @@ class MissionOptions:
         int | None,
         typer.Option("--missions", min=1, metavar="N", help="Run N missions with each, and compare them in pairs."),
     ] = None
+    modes: Modes = None
     seed: Seed = 1
     workers: Workers = 1
     quiet: Quiet = False
 
 
-@grouped_options
 def diff(
-    knowledge: ReasonerOptions,
-    options: MissionOptions,
+    options: ReasonerOptions,
+    mission_options: MissionOptions,
     one: Annotated[
         Path,
         typer.Argument(metavar="A", help="An ontology, or a .swrl file of rules to add to the ontologies."),
@@ -54,56 +56,79 @@ def diff(
     """
     from suave_des.workbench.difference import compare_axioms
 
-    benches = knowledge.with_file(one).bench(), knowledge.with_file(other).bench()
-    axioms = compare_axioms(benches[0].base, benches[1].base)
+    both = [options.with_file(file) for file in (one, other)]
+    before, after = (each.knowledge() for each in both)
+    axioms = compare_axioms(before.base, after.base)
     with counted("states", errors()) as on_count:
-        difference = benches[0].diff(benches[1], max_failed, on_count)
-    missions = None if options.missions is None else _missions(knowledge, (one, other), options)
-    if form is Format.JSON:
-        print_json({"axioms": axioms, **_decisions(difference), "missions": missions})
-        return
-    print(*axioms.lines(), *difference.lines(), sep="\n")
-    if missions is not None:
+        difference = before.diff(after, max_failed, on_count, partial(announce, before, 2))
+    missions = None if mission_options.missions is None else _missions(both, mission_options)
+    content = {"axioms": axioms, **_decisions(difference), "missions": missions}
+
+    def lines() -> Iterator[str]:
+        if axioms.removed or axioms.added:
+            yield f"axioms and rules: {len(axioms.removed)} removed, {len(axioms.added)} added"
+            yield from (f"  - {text}" for text in axioms.removed)
+            yield from (f"  + {text}" for text in axioms.added)
+        yield from difference.lines()
+
+    emit(content, form, lines)
+    if missions is not None and form is Format.TEXT:
         print()
-        print_trimmed(output(), _table(difference, missions))
-        print(*_mission_lines(missions), sep="\n")
+        print(shown(_table(difference, missions)))
+        print(*_mission_lines(both, mission_options, missions), sep="\n")
 
 
-def _missions(knowledge: ReasonerOptions, files: tuple[Path, Path], options: MissionOptions) -> MissionDifference:
-    from suave_des.workbench.difference import MissionsToCompare, compare_missions
+def _missions(both: list[ReasonerOptions], options: MissionOptions) -> MissionDifference:
+    from suave_des.workbench.difference import compare_missions
 
     assert options.missions is not None
-    which = MissionsToCompare(knowledge.scenario, options.missions, options.seed, options.workers)
-    one, other = (knowledge.with_file(file).replacements for file in files)
+    replaced = [each.replacements | {"modes_file": options.modes} for each in both]
     with progress("missions with A, then with B", quiet=options.quiet) as on_progress:
-        return compare_missions(which, one, other, on_progress)
+        return compare_missions(
+            both[0].scenario,
+            options.missions,
+            *replaced,
+            seed=options.seed,
+            workers=options.workers,
+            on_progress=on_progress,
+        )
 
 
 def _table(difference: PolicyDifference, missions: MissionDifference) -> Table:
     """Decisions and missions in one table."""
-    from suave_des.workbench.difference import METRICS
-
-    headings = ("", "A", "B", "B - A", "95% interval", "different")
-    table = plain_table(headings, right=headings[1:])
-    states = f"{difference.states} of {difference.compared} states"
-    table.add_row("decisions", "", "", "", "", states)
-    table.add_row("missions", "", "", "", "", f"{len(missions.changed)} of {missions.missions}")
+    rows = [
+        ("decisions", "", "", "", "", f"{difference.states} of {difference.compared} states"),
+        ("missions", "", "", "", "", f"{len(missions.changed)} of {missions.missions}"),
+    ]
     for each in missions.metrics:
-        interval = interval_text(each.interval, "+.2f")
-        values = f"{each.one:.2f}", f"{each.other:.2f}", f"{each.difference:+.2f}"
-        table.add_row(METRICS[each.metric], *values, interval, f"{each.changed} of {missions.missions}")
-    return table
+        found, changed = each.difference, f"{each.changed} of {missions.missions}"
+        values = f"{each.one:.2f}", f"{each.other:.2f}", f"{found.value:+.2f}", interval_text(found.interval, "+.2f")
+        rows.append((_metric(each).brief, *values, changed))
+    return Table(("", "A", "B", "B - A", "95% interval", "different"), rows)
 
 
-def _mission_lines(missions: MissionDifference) -> Iterator[str]:
+def _metric(each: PairedDifference) -> Metric:
+    return metric_of(each.metric) or Metric(each.metric, each.metric.replace("_", " "))
+
+
+def _mission_lines(both: list[ReasonerOptions], options: MissionOptions, missions: MissionDifference) -> Iterator[str]:
+    from suave_des.knowledge.pellet import TimeLimit
+    from suave_des.workbench.difference import METRICS, firing_states
+
     if not missions.changed:
-        yield "no mission differs"
+        replaced = [each.replacements | {"modes_file": options.modes} for each in both]
+        limit = TimeLimit(both[0].time_limit, "--time-limit")
+        firing, states = firing_states(both[0].scenario, missions.missions, *replaced, seed=options.seed, limit=limit)
+        yield f"no mission differs; rules that only A or B has fire in {firing} of their {states} states"
         return
     numbers = ", ".join(map(str, missions.changed[:_MOST_RUNS]))
     more = len(missions.changed) - _MOST_RUNS
     yield f"runs that differ: {numbers}" + (f" and {more} more" if more > 0 else "")
     yield "largest changes"
-    yield from missions.lines()
+    for each in missions.metrics:
+        metric = _metric(each)
+        for run, before, after in each.extremes if each.metric in METRICS else ():
+            yield f"  run {run}: {metric.title} {before:.1f} {metric.unit} -> {after:.1f} {metric.unit}"
 
 
 def _decisions(difference: PolicyDifference) -> dict[str, Any]:
@@ -111,19 +136,15 @@ def _decisions(difference: PolicyDifference) -> dict[str, Any]:
         "compared": difference.compared,
         "states": difference.states,
         "other_statuses_only": difference.states_reported,
-        "only_a": difference.only_one,
-        "only_b": difference.only_other,
         "computing_rules": difference.computing,
         "cells": [
             {
-                "regions": pair.one.ranges,
-                "state": pair.one.state,
-                "states": pair.one.reports.combinations,
-                "a": {name: pair.one.outcome(name) for name in pair.one.asked},
-                "b": {name: pair.other.outcome(name) for name in pair.one.asked},
-                "marks_a": pair.one.marks,
-                "marks_b": pair.other.marks,
+                "regions": dict(zip(difference.ranges, each.situation.ranges, strict=True)),
+                "state": each.situation.state,
+                "states": each.situation.reports.combinations,
+                "a": {name: each.one.choice(name) for name in each.situation.asked},
+                "b": {name: each.other.choice(name) for name in each.situation.asked},
             }
-            for pair in difference.differing
+            for each in difference.differing
         ],
     }

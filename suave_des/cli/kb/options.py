@@ -1,10 +1,11 @@
-"""Share options among the `kb` commands, and print states and results as JSON or as text."""
+"""Share options among the `kb` commands, and print results as text or JSON."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Iterator, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterable, Mapping
 from decimal import Decimal
 from enum import StrEnum
 from pathlib import Path
@@ -12,14 +13,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from suave_des.cli.options import KnowledgeFiles, Reasoner, key_and_value
+from suave_des.cli.console import errors, output
+from suave_des.cli.options import KnowledgeFiles, Reasoner
 from suave_des.resources import DEFAULT_SCENARIO
+from suave_des.tables import Table
 
 if TYPE_CHECKING:
     from suave_des.knowledge.state import KnowledgeState
     from suave_des.scenario.loader import LoadedScenario
     from suave_des.workbench import KnowledgeBase
-    from suave_des.workbench.state_input import StateBuilder
+
+
+#: Seconds for an inference by a reasoner that is slower than the Pellet in this process (which takes 2 to 7 ms).
+_SECONDS_EACH = {"owlready2": 1.0}
+#: Work that takes longer than so many seconds is announced.
+_LONG_S = 5.0
 
 
 class Format(StrEnum):
@@ -40,13 +48,9 @@ MaxFailed = Annotated[
         "--max-failed", min=0, metavar="N", help="Include states with up to N components failed or recovered."
     ),
 ]
-ScenarioOption = Annotated[
-    str,
-    typer.Option(
-        "--scenario",
-        metavar="SCENARIO",
-        help="Scenario that provides ontologies, values, measured attributes and revision.",
-    ),
+OtherScenario = Annotated[
+    str | None,
+    typer.Option("--scenario", metavar="SCENARIO", help="Scenario to use instead of the one that the files name."),
 ]
 
 
@@ -54,7 +58,14 @@ ScenarioOption = Annotated[
 class KnowledgeOptions(KnowledgeFiles):
     """Options that name a scenario, ontologies and rules."""
 
-    scenario: ScenarioOption = DEFAULT_SCENARIO
+    scenario: Annotated[
+        str,
+        typer.Option(
+            "--scenario",
+            metavar="SCENARIO",
+            help="Scenario that provides ontologies, values, measured attributes and revision.",
+        ),
+    ] = DEFAULT_SCENARIO
 
     def loaded(self) -> LoadedScenario:
         """Load the scenario, with the ontologies, rules and values that are given."""
@@ -70,7 +81,7 @@ class ReasonerOptions(KnowledgeOptions):
     reasoner: Reasoner = None
     time_limit: TimeLimitS = 60.0
 
-    def bench(self) -> KnowledgeBase:
+    def knowledge(self) -> KnowledgeBase:
         """Load the knowledge base and start the reasoner."""
         from suave_des.workbench import KnowledgeBase
 
@@ -91,107 +102,66 @@ class ReasonerOptions(KnowledgeOptions):
         return dataclasses.replace(self, ontology=[*(self.ontology or ()), file])
 
 
-@dataclasses.dataclass(frozen=True)
-class MeasuredValueOptions(KnowledgeFiles):
-    """Options of which one is for values of the scenario and for measured values of a state."""
-
-    set: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="NAME=VALUE",
-            help="Measured value of a quality attribute; if NAME has a dot, scenario value. Repeat it for several.",
-        ),
-    ] = None
-
-    @property
-    def measured(self) -> list[str]:
-        """The words that give measured values."""
-        return [word for word in self.set or () if "." not in word.partition("=")[0]]
-
-    @property
-    def values(self) -> dict[str, Any]:
-        """New values of the scenario, by key path."""
-        return dict(key_and_value(word, "--set") for word in self.set or () if word not in self.measured)
+At = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--at",
+        metavar="WHAT",
+        help="Part of the state: NAME=VALUE of a quality attribute, a component or a function; a FUNCTION that has an "
+        "objective; a YAML file; or FOLDER@SECONDS of a recorded mission. Repeat it for several.",
+    ),
+]
 
 
-@dataclasses.dataclass(frozen=True)
-class KnowledgeAndStateOptions(MeasuredValueOptions, KnowledgeOptions):
-    """Options that name a scenario, ontologies and rules, and measured values of a state."""
+def state_at(at: Iterable[str] | None, knowledge: KnowledgeBase) -> KnowledgeState:
+    """Build the state that the words of --at describe; later ones replace earlier ones."""
+    from suave_des.workbench.states import StateBuilder
+
+    builder = StateBuilder(knowledge.base, knowledge.settings)
+    builder.add_words(at or ())
+    return builder.state()
 
 
-@dataclasses.dataclass(frozen=True)
-class ReasonerAndStateOptions(MeasuredValueOptions, ReasonerOptions):
-    """Options that name ontologies, rules and a reasoner to ask about a state, and its measured values."""
+def announce(knowledge: KnowledgeBase, times: int, kinds: int, different: int) -> None:
+    """Say on standard error, before states are inferred, how long that will take, unless it is short.
+
+    Args:
+        knowledge: the knowledge base.
+        times: how many knowledge bases infer as many states.
+        kinds: number of kinds of states.
+        different: how many of them have to be inferred.
+    """
+    duration_s = times * different * _SECONDS_EACH.get(knowledge.reasoner, 0.007)
+    if duration_s >= _LONG_S:
+        each = f"{different} of {kinds} kinds of states have to be inferred"
+        errors().print(
+            f"suave-des: {each}{', twice' * (times == 2)}: about {duration_s:.0f} s, less if they are cached"
+        )
 
 
-@dataclasses.dataclass(frozen=True)
-class ReplayOptions(KnowledgeFiles):
-    """Options that replace or add to the knowledge base of recorded missions."""
-
-    scenario: Annotated[
-        str | None,
-        typer.Option("--scenario", metavar="SCENARIO", help="Scenario to use instead of the recorded one."),
-    ] = None
-    reasoner: Reasoner = None
-    time_limit: TimeLimitS = 60.0
+def shown(table: Table) -> str:
+    """Write a table, under its title, no wider than a terminal if there is one."""
+    console = output()
+    width = console.width if console.is_terminal or "COLUMNS" in os.environ else None
+    return f"{table.title}\n{table.text(width)}\n" if table.title else table.text(width)
 
 
-@dataclasses.dataclass(frozen=True)
-class StateOptions:
-    """Options that describe a state, besides its measured values: see `MeasuredValueOptions`."""
+def emit(content: object, form: Format, lines: Callable[[], Iterable[str]]) -> None:
+    """Print a result: its content as JSON, or its lines.
 
-    state: Annotated[
-        Path | None,
-        typer.Option("--state", metavar="FILE", help="YAML: objectives, groundings, components, measurements."),
-    ] = None
-    component: Annotated[
-        list[str] | None, typer.Option("--component", metavar="NAME=STATUS", help="Reported c_status of a component.")
-    ] = None
-    ground: Annotated[
-        list[str] | None, typer.Option("--ground", metavar="FUNCTION=DESIGN", help="Function design in use.")
-    ] = None
-    objective: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--objective",
-            metavar="FUNCTION[=STATUS]",
-            help="Objective of the mission; by default those of the groundings, or else those of the search task.",
-        ),
-    ] = None
-
-    @property
-    def is_given(self) -> bool:
-        """Whether any of the options is given."""
-        return any((self.state, self.component, self.ground, self.objective))
-
-    def build(self, bench: KnowledgeBase, measured: Sequence[str]) -> KnowledgeState:
-        """Build the state; measured values, as NAME=VALUE, and the other options replace what the file says."""
-        from suave_des.workbench.state_input import StateBuilder
-
-        builder = StateBuilder(bench.base, bench.settings)
-        self.add_to(builder, measured)
-        return builder.state()
-
-    def add_to(self, builder: StateBuilder, measured: Sequence[str]) -> None:
-        """Add all parts to a state."""
-        if self.state is not None:
-            builder.add_file(self.state)
-        builder.add_words("measurements", "--set", measured)
-        builder.add_words("components", "--component", self.component or ())
-        builder.add_words("groundings", "--ground", self.ground or ())
-        builder.add_words("objectives", "--objective", self.objective or ())
-
-
-def print_json(content: object) -> None:
-    """Print JSON that people read too: dataclasses as objects, states as in state files, facts and numbers as text."""
-    print(json.dumps(_plain(content), indent=2, ensure_ascii=False))
+    In JSON dataclasses are objects, states are as in state files, facts and exact numbers are text.
+    """
+    if form is Format.JSON:
+        print(json.dumps(_plain(content), indent=2, ensure_ascii=False))
+    else:
+        for line in lines():
+            print(line)
 
 
 def _plain(value: Any) -> Any:
     from suave_des.knowledge.state import Fact, KnowledgeState
-    from suave_des.workbench.ranges import ValueRange
-    from suave_des.workbench.state_input import state_dict
+    from suave_des.workbench.space import ValueRange
+    from suave_des.workbench.states import state_dict
 
     if isinstance(value, KnowledgeState):
         return state_dict(value)
@@ -199,20 +169,9 @@ def _plain(value: Any) -> Any:
         return str(value)
     if dataclasses.is_dataclass(value):
         value = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
+    elif hasattr(value, "_asdict"):
+        value = value._asdict()
     if isinstance(value, Mapping):
         bindings = {name: str(each) for name, each in value.get("bindings", ())}
         return {key: bindings if key == "bindings" else _plain(each) for key, each in value.items()}
     return [_plain(each) for each in value] if isinstance(value, list | tuple) else value
-
-
-def state_lines(state: KnowledgeState) -> Iterator[str]:
-    """A state, one line for each part."""
-    for objective in state.objectives:
-        status = f"  {objective.status}" if objective.status else ""
-        yield f"objective   {objective.function}{status}"
-    for function, design in state.groundings:
-        yield f"grounding   {function} = {design}"
-    for component, status in state.components:
-        yield f"component   {component} = {status}"
-    for name, value in state.measurements:
-        yield f"measured    {name} = {value}"

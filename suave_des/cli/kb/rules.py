@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from suave_des.cli.kb.options import AsFormat, Format, KnowledgeOptions, ReplayOptions, TimeLimitS, print_json
-from suave_des.cli.options import Modes, grouped_options
+from suave_des.cli.kb.options import AsFormat, Format, KnowledgeOptions, OtherScenario, TimeLimitS, emit
+from suave_des.cli.options import KnowledgeFiles, Modes, Reasoner
 from suave_des.errors import number_of
-from suave_des.resources import shipped_folder
 
 if TYPE_CHECKING:
+    from suave_des.findings import Finding
     from suave_des.knowledge.ontology import Ontology
+    from suave_des.workbench.replay import MissionReplay
 
 FOUND = 1
 """Exit status of `check` when there are findings that --fail-on names."""
@@ -38,9 +40,8 @@ class FailOn(StrEnum):
     WARN = "warn"
 
 
-@grouped_options
 def check(
-    sources: KnowledgeOptions,
+    options: KnowledgeOptions,
     modes: Modes = None,
     shapes: Annotated[
         list[Path] | None,
@@ -50,51 +51,46 @@ def check(
         FailOn.ERROR
     ),
     time_limit: TimeLimitS = 60.0,
-    verbose: Annotated[bool, typer.Option("--verbose", help="Show all notes on the shipped ontologies, too.")] = False,
     form: Annotated[FindingsFormat, typer.Option("--format", help="Output format.")] = FindingsFormat.TEXT,
 ) -> None:
     """Check ontologies and rules: names, arguments, variables, model, shapes, contradictions.
 
     Exit status: 0 no findings at the level of --fail-on or above; 1 such findings; 2 something cannot be read.
     """
-    from suave_des.knowledge.checks.findings import Level, folded, has_level, summary
+    from suave_des.findings import Level, has_level, summary
     from suave_des.scenario.loader import load_scenario
     from suave_des.scenario_knowledge import subject_of
     from suave_des.workbench.check import check as run_checks
 
-    loaded = load_scenario(sources.scenario, **(sources.replacements | {"modes_file": modes}))
+    loaded = load_scenario(options.scenario, **(options.replacements | {"modes_file": modes}))
     findings = run_checks(replace(subject_of(loaded), shapes=shapes or (), time_limit_s=time_limit))
-    shown = findings if verbose else folded(findings, shipped_folder("ontology"))
-    if form is FindingsFormat.JSON:
-        print_json(findings)
-    elif form is FindingsFormat.MARKDOWN:
-        print("| level | where | what | remedy |\n| --- | --- | --- | --- |")
-        for finding in shown:
-            cells = (finding.level, finding.where, finding.message, finding.remedy or "")
-            print(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
-        print(f"\n{summary(findings)}")
+    if form is FindingsFormat.MARKDOWN:
+        print(*_markdown(findings), "", summary(findings), sep="\n")
     else:
-        print(*shown, summary(findings), sep="\n")
+        emit(findings, Format(form), lambda: (*map(str, findings), summary(findings)))
     if has_level(findings, Level(fail_on.upper())):
         raise typer.Exit(FOUND)
 
 
-@grouped_options
-def rules(sources: KnowledgeOptions, form: AsFormat = Format.TEXT) -> None:
+def _markdown(findings: Sequence[Finding]) -> Iterator[str]:
+    yield "| level | where | what | remedy |\n| --- | --- | --- | --- |"
+    for finding in findings:
+        cells = (finding.level, finding.where, finding.message, finding.remedy or "")
+        yield f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
+
+
+def rules(options: KnowledgeOptions, form: AsFormat = Format.TEXT) -> None:
     """List all rules as text, in the format that --rules reads."""
     from suave_des.scenario_knowledge import open_base
 
-    base = open_base(sources.loaded())
-    if form is Format.JSON:
-        print_json([{"name": r.name, "enabled": r.enabled, "file": r.file, "text": r.text} for r in base.rules])
-    else:
-        print(rules_text(base), end="")
+    base = open_base(options.loaded())
+    content = [{"name": r.name, "enabled": r.enabled, "file": r.file, "text": r.text} for r in base.rules]
+    emit(content, form, lambda: rules_text(base).splitlines())
 
 
 def rules_text(base: Ontology) -> str:
     """Write all rules of a knowledge base as one text, file by file."""
-    from suave_des.knowledge.rules.syntax import EXPRESSION
-    from suave_des.knowledge.rules.writer import naming, write_rule
+    from suave_des.knowledge.rules import EXPRESSION, naming, write_rule
 
     named = naming(lambda iri: not base.vocabulary.means_itself(iri))
     blocks = []
@@ -112,13 +108,14 @@ def rules_text(base: Ontology) -> str:
 
 def add_rule(
     file: OwlFile,
-    rule: Annotated[str, typer.Argument(metavar="RULE", help='The rule: "name: body -> head".')],
+    rule: Annotated[str, typer.Argument(metavar="RULE", help='The rule, "name: body -> head", or a .swrl file.')],
 ) -> None:
-    """Add a rule to an OWL file, and leave everything else in it as it is."""
-    from suave_des.workbench.rule_editor import add_rule as add
+    """Add a rule, or the rules of a file, to an OWL file, and leave everything else in it as it is."""
+    from suave_des.workbench.rule_editor import add_rules
 
-    added = add(file, rule)
-    print(f"rule {added.name} is in {file} now; {file}.bak is the previous version")
+    names = [added.name for added in add_rules(file, rule)]
+    are = f"rule {names[0]} is" if len(names) == 1 else f"rules {', '.join(names)} are"
+    print(f"{are} in {file} now; {file}.bak is the previous version")
 
 
 def remove_rule(file: OwlFile, name: RuleName) -> None:
@@ -149,9 +146,17 @@ def _switch(file: Path, name: str, *, enabled: bool) -> None:
         print(f"rule {name} is {word} in {file} already")
 
 
-@grouped_options
+@dataclass(frozen=True)
+class ReplayOptions(KnowledgeFiles):
+    """Options that replace or add to the knowledge base of recorded missions."""
+
+    scenario: OtherScenario = None
+    reasoner: Reasoner = None
+    time_limit: TimeLimitS = 60.0
+
+
 def try_(
-    knowledge: ReplayOptions,
+    options: ReplayOptions,
     on: Annotated[
         Path,
         typer.Option(
@@ -160,7 +165,9 @@ def try_(
             help="Output folder of run, or of a campaign that recorded its knowledge, or a folder of such folders.",
         ),
     ],
-    rule: Annotated[str | None, typer.Argument(metavar="RULE", help='Rule to try: "name: body -> head".')] = None,
+    rule: Annotated[
+        str | None, typer.Argument(metavar="RULE", help='Rule to try, "name: body -> head", or a .swrl file.')
+    ] = None,
     disable: Annotated[
         str | None, typer.Option("--disable", metavar="NAME", help="Evaluate without this rule.")
     ] = None,
@@ -171,33 +178,33 @@ def try_(
     No mission is run again: the reasoner evaluates each recorded state with and without the rule. Only a new run shows
     the consequences of a different decision.
     """
-    from suave_des.workbench.replay import RuleChange
-    from suave_des.workbench.replay import try_rule as replayed
+    from suave_des.workbench.replay import RuleChange, try_rules
 
     change = RuleChange(
         rule,
         disable,
-        knowledge.ontology or (),
-        knowledge.scenario,
-        knowledge.rules or (),
-        knowledge.disable_rule or (),
-        knowledge.reasoner,
-        knowledge.time_limit,
-        knowledge.values,
+        options.ontology or (),
+        options.scenario,
+        options.rules or (),
+        options.disable_rule or (),
+        options.reasoner,
+        options.time_limit,
+        options.values,
     )
-    missions = list(replayed(on, change))
-    if form is Format.JSON:
-        print_json(missions)
-        return
+    missions = list(try_rules(on, change))
+    emit(missions, form, lambda: _replay_lines(missions))
+
+
+def _replay_lines(missions: Sequence[MissionReplay]) -> Iterator[str]:
     for mission in missions:
         if mission.cycles or len(missions) == 1:
-            print(*mission.lines(), sep="\n")
+            yield from mission.lines()
     if len(missions) > 1:
         cycles = [mission.cycles for mission in missions]
         firing = sum(any(each.firings for each in one) for one in cycles)
         changed = [sum(len(each.decisions) for each in one) for one in cycles]
         contradictions = sum(any(each.contradiction for each in one) for one in cycles)
-        print(
+        yield (
             f"{len(missions)} missions: fires in {firing}, different decisions in {sum(map(bool, changed))} "
             f"({number_of(sum(changed), 'decision')}), contradictions in {contradictions}"
         )

@@ -3,50 +3,95 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 from rich.console import Console
 from rich.progress import Progress
 from rich.text import Text
 
-from suave_des.cli.console import output, plain_table, print_table
-from suave_des.cli.kb.options import MaxFailed, TimeLimitS
-from suave_des.cli.options import KnowledgeFiles, grouped_options
-from suave_des.errors import InputError, did_you_mean, number_of, shown
+from suave_des.cli.console import output
+from suave_des.cli.kb.options import MaxFailed, OtherScenario, TimeLimitS, shown
+from suave_des.cli.options import KnowledgeFiles
+from suave_des.errors import InputError, did_you_mean, number_of
+from suave_des.errors import shown as quoted
 from suave_des.files import check_output_file, write_files
 from suave_des.resources import shipped_folder
+from suave_des.tables import Table
 
 if TYPE_CHECKING:
-    from suave_des.knowledge.ontology import Ontology
+    from suave_des.knowledge.state import KnowledgeState
     from suave_des.workbench import KnowledgeBase
-    from suave_des.workbench.testing.coverage import Coverage, RuleCoverage
-    from suave_des.workbench.testing.mutants import Mutant
-    from suave_des.workbench.testing.mutation import MutationReport
-    from suave_des.workbench.testing.reading import RuleTest, TestedKnowledge, TestFile
-    from suave_des.workbench.testing.run import TestResult
+    from suave_des.workbench.coverage import Coverage
+    from suave_des.workbench.mutation import MutantResult
+    from suave_des.workbench.rule_tests import RuleTest, Tested, TestResult
 
 FAILED = 1
 """Exit status when a test fails."""
 _WIDTH = 80
+_LINES_SHOWN = 8
+"""Goals that no state reaches, on a terminal."""
 
 
 @dataclass(frozen=True)
 class TestOptions(KnowledgeFiles):
     """Options that replace or add to what the files of tests say of their knowledge base."""
 
-    scenario: Annotated[
-        str | None, typer.Option("--scenario", metavar="SCENARIO", help="Scenario to use instead of the tests' own.")
+    scenario: OtherScenario = None
+    time_limit: TimeLimitS = 60.0
+
+    def apply(self, about: Tested) -> Tested:
+        """Replace and add to what a file says."""
+        return {
+            "scenario": self.scenario or about["scenario"],
+            "ontologies": self.ontology or about["ontologies"],
+            "rules": [*about["rules"], *(self.rules or ())],
+            "disabled_rules": [*about["disabled_rules"], *(self.disable_rule or ())],
+        }
+
+    def load(self, about: Tested) -> KnowledgeBase:
+        """Load a knowledge base."""
+        from suave_des.workbench import KnowledgeBase
+
+        return KnowledgeBase.load(**about, values=self.values, time_limit_s=self.time_limit)
+
+
+@dataclass(frozen=True)
+class MutationOptions:
+    """Options of mutation testing."""
+
+    mutate: Annotated[
+        bool,
+        typer.Option(
+            "--mutate", help="Mutation testing: seed small faults in rules and data; report those that no test detects."
+        ),
+    ] = False
+    mutants: Annotated[
+        int | None, typer.Option("--mutants", min=1, metavar="N", help="Maximum number of mutants; by default all.")
     ] = None
+    only: Annotated[
+        list[str] | None,
+        typer.Option("--only", metavar="NAME", help="Only mutants of this rule or individual; repeat it for several."),
+    ] = None
+    max_failed: MaxFailed = 1
 
 
-@grouped_options
+class Suite(NamedTuple):
+    """A knowledge base with all tests about it."""
+
+    about: Tested
+    knowledge: KnowledgeBase
+    tests: list[RuleTest]
+
+
 def test(
-    knowledge: TestOptions,
+    options: TestOptions,
+    mutation: MutationOptions,
     files: Annotated[
         list[Path] | None, typer.Argument(metavar="FILE", help="Tests in YAML; by default those of the shipped rules.")
     ] = None,
@@ -59,19 +104,6 @@ def test(
     coverage: Annotated[
         bool, typer.Option("--coverage", help="Show which rules, atoms and comparisons the tests cover.")
     ] = False,
-    mutate: Annotated[
-        bool,
-        typer.Option(
-            "--mutate", help="Mutation testing: seed small faults in rules and data; report those that no test detects."
-        ),
-    ] = False,
-    mutants: Annotated[
-        int | None, typer.Option("--mutants", min=1, metavar="N", help="Maximum number of mutants; by default all.")
-    ] = None,
-    only: Annotated[
-        list[str] | None,
-        typer.Option("--only", metavar="NAME", help="Only mutants of this rule or individual; repeat it for several."),
-    ] = None,
     from_mission: Annotated[
         Path | None,
         typer.Option("--from-mission", metavar="DIR", help="Write the decisions of a recorded mission as tests."),
@@ -80,8 +112,6 @@ def test(
         Path | None,
         typer.Option("--write", metavar="FILE", help="File to which --from-mission and --coverage write tests."),
     ] = None,
-    max_failed: MaxFailed = 1,
-    time_limit: TimeLimitS = 60.0,
 ) -> None:
     """Test rules: what must follow in a state, what must not, and what is decided.
 
@@ -89,45 +119,45 @@ def test(
     """
     for file in filter(None, (junit_xml, write)):
         check_output_file(file, overwrite=file == junit_xml)
-    if knowledge.set and (from_mission is not None or write is not None):
+    if options.set and (from_mission is not None or write is not None):
         remedy = "write a scenario with `base` and these values, and name it with --scenario"
         raise InputError("tests that are written name a scenario, not values of it", place="--set", remedy=remedy)
     if from_mission is not None:
-        _write_mission(from_mission, write, knowledge, time_limit)
+        _write_mission(from_mission, write, options)
         return
     if write is not None and not coverage:
         raise InputError("nothing to write", place="--write", remedy="with --from-mission DIR, or --coverage")
     began = time.perf_counter()
-    suites = _suites(knowledge, files or (), time_limit)
+    suites = _suites(options, files or ())
     console = output()
     results = _run(console, suites, select)
     _print_failures(console, results)
     if junit_xml is not None:
-        from suave_des.workbench.testing.run import junit_xml as written
+        from suave_des.workbench.rule_tests import junit_xml as written
 
         write_files(junit_xml.parent, {junit_xml.name: written(results)})
     _print_summary(console, results, time.perf_counter() - began)
     if coverage:
-        _cover(console, suites, max_failed, write)
-    if mutate or mutants is not None:
-        if not all(result.passed for result in results):
-            console.print("no mutation testing while a test fails: every mutant would count as killed")
+        _cover(suites, mutation.max_failed, write)
+    all_passed = all(result.passed for result in results)
+    if mutation.mutate or mutation.mutants is not None:
+        if all_passed:
+            _mutate(console, suites, mutation)
         else:
-            _mutate(console, suites, only or (), mutants, max_failed)
-    if not all(result.passed for result in results):
+            console.print("no mutation testing while a test fails: every mutant would count as killed")
+    if not all_passed:
         raise typer.Exit(FAILED)
 
 
-def _write_mission(folder: Path, file: Path | None, knowledge: TestOptions, time_limit_s: float) -> None:
+def _write_mission(folder: Path, file: Path | None, options: TestOptions) -> None:
     """Write a recorded mission's decisions as tests, or print them."""
-    from suave_des.workbench.prover import Prover
-    from suave_des.workbench.testing.writing import mission_knowledge, mission_states, tests_text
+    from suave_des.workbench.rule_tests import mission_knowledge, mission_states, tests_text
 
-    about = mission_knowledge(folder).with_replacements(knowledge.scenario, knowledge.replacements)
-    bench = about.load(time_limit_s)
-    states = list(mission_states(folder, bench))
+    about = options.apply(mission_knowledge(folder))
+    knowledge = options.load(about)
+    states = list(mission_states(folder, knowledge))
     comment = f"Decisions of the mission recorded in {folder}, one for each kind of state in it."
-    text = tests_text(about, Prover.of(bench), states, comment)
+    text = tests_text(about, knowledge, states, comment)
     if file is None:
         print(text, end="")
         return
@@ -135,112 +165,58 @@ def _write_mission(folder: Path, file: Path | None, knowledge: TestOptions, time
     print(f"{len(states)} tests are in {file}: suave-des kb test {file}")
 
 
-def _cover(console: Console, suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
-    """Show what the tests of each knowledge base cover, and write tests of what they do not."""
-    from suave_des.workbench.prover import Prover
-    from suave_des.workbench.testing.coverage import measure_coverage
-    from suave_des.workbench.testing.writing import tests_text
-
-    benches = _together(suites)
-    if file is not None and len(benches) > 1:
-        remedy = "give files of tests of one knowledge base"
-        raise InputError("the tests are about several knowledge bases", place="--write", remedy=remedy)
-    for suite, tests in benches:
-        situations = [situation for test in tests for situation in test.situations]
-        found = measure_coverage(suite.bench, situations, max_failed)
-        print_coverage(console, found)
-        if file is not None:
-            states = [(str(goals[0]), state) for state, goals in found.proposed]
-            text = tests_text(suite.about, Prover.of(suite.bench), states, "States that other tests do not cover.")
-            if states:
-                write_files(file.parent, {file.name: text})
-            print(
-                f"{len(states)} tests are in {file}; read them before you keep them" if states else "nothing to write"
-            )
-
-
-def _mutants(base: Ontology, only: Sequence[str], most: int | None) -> tuple[Mutant, ...]:
-    """The mutants of a knowledge base that are wanted: of some rules or individuals, all if there are none."""
-    from suave_des.workbench.testing.mutants import mutants_of, sample
-
-    found = mutants_of(base)
-    names = list(dict.fromkeys(mutant.name for mutant in found))
-    for name in only:
-        if name not in names:
-            raise InputError(f"there is no mutant of {shown(name)}", place="--only", remedy=did_you_mean(name, names))
-    return sample([mutant for mutant in found if not only or mutant.name in only], most)
-
-
-def _mutate(console: Console, suites: Sequence[Suite], only: Sequence[str], most: int | None, max_failed: int) -> None:
-    """Show which mutants of each knowledge base the tests kill."""
-    from suave_des.workbench.testing.mutation import mutate
-
-    for suite, tests in _together(suites):
-        chosen = _mutants(suite.bench.base, only, most)
-        with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
-            task = progress.add_task("mutants", total=len(chosen))
-            report = mutate(suite.bench, tests, chosen, max_failed, partial(progress.advance, task))
-        print_mutation(console, report)
-
-
-@dataclass(frozen=True)
-class Suite:
-    """A file of tests with its knowledge base."""
-
-    file: TestFile
-    about: TestedKnowledge
-    bench: KnowledgeBase
-    tests: tuple[RuleTest, ...]
-
-
-def _suites(knowledge: TestOptions, files: Sequence[Path], time_limit_s: float) -> list[Suite]:
+def _suites(options: TestOptions, files: Sequence[Path]) -> list[Suite]:
     """Read all files before anything runs, so that a mistake in the last one comes first."""
-    from suave_des.workbench.testing.reading import TestFile, shipped_tests
+    from suave_des.workbench.rule_tests import TestFile, shipped_tests
 
-    benches: dict[TestedKnowledge, KnowledgeBase] = {}
-    suites = []
+    suites: dict[str, Suite] = {}
     for file in [TestFile.read(path) for path in files or shipped_tests()]:
-        about = file.knowledge.with_replacements(knowledge.scenario, knowledge.replacements)
-        if about not in benches:
-            benches[about] = about.load(time_limit_s, knowledge.values)
-        suites.append(Suite(file, about, benches[about], file.tests(benches[about])))
-    return suites
+        about = options.apply(file.about)
+        if str(about) not in suites:
+            suites[str(about)] = Suite(about, options.load(about), [])
+        suites[str(about)].tests.extend(file.tests(suites[str(about)].knowledge))
+    return list(suites.values())
 
 
-def _together(suites: Iterable[Suite]) -> list[tuple[Suite, list[RuleTest]]]:
-    """Each knowledge base once: the first file that is about it, and the tests of all such files."""
-    found: dict[int, tuple[Suite, list[RuleTest]]] = {}
-    for suite in suites:
-        found.setdefault(id(suite.bench), (suite, []))[1].extend(suite.tests)
-    return list(found.values())
-
-
-def _run(console: Console, suites: Iterable[Suite], select: str | None) -> list[TestResult]:
-    from suave_des.workbench.testing.run import Runner
+def _run(console: Console, suites: Sequence[Suite], select: str | None) -> list[TestResult]:
+    """Run tests, with a line of dots for each file, as pytest prints it."""
+    from suave_des.workbench.rule_tests import run_test
 
     chosen = [
-        (suite, [test for test in suite.tests if select is None or select.lower() in test.name.lower()])
+        (suite.knowledge, test)
         for suite in suites
+        for test in suite.tests
+        if select is None or select.lower() in test.name.lower()
     ]
-    total = sum(len(tests) for _, tests in chosen)
-    if total == 0:
-        raise InputError(f"no test name contains {shown(select)}", place="-k", remedy="see the names in the files")
+    if not chosen:
+        raise InputError(f"no test name contains {quoted(select)}", place="-k", remedy="see the names in the files")
+    width = min(console.width, _WIDTH)
     results: list[TestResult] = []
-    runners: dict[int, Runner] = {}
-    for suite, tests in chosen:
-        if not tests:
-            continue
-        runner = runners.setdefault(id(suite.bench), Runner.of(suite.bench))
-        line = _Dots(console, _place(suite.file.document.path))
-        for test in tests:
-            results.append(runner.run(test))
-            line.add(results[-1].passed, len(results) / total)
-        line.end(len(results) / total)
+    column, file = 0, None
+    for knowledge, test in chosen:
+        if test.file != file or column >= width - 8:
+            if results:
+                _end_line(console, column, len(results) / len(chosen))
+            column = 0
+            if test.file != file:
+                file, name = test.file, _place(test.file)
+                console.print(f"{name} ", end="")
+                column = len(name) + 1
+        results.append(run_test(knowledge, test))
+        passed = results[-1].passed
+        console.print(Text("." if passed else "F", "green" if passed else "red"), end="")
+        column += 1
+    _end_line(console, column, 1.0)
     return results
 
 
+def _end_line(console: Console, column: int, share: float) -> None:
+    """Print how much is done at the end of a line."""
+    console.print(Text(f"[{share:4.0%}]".rjust(max(7, min(console.width, _WIDTH) - column)), "cyan"))
+
+
 def _place(file: Path, line: int | None = None) -> str:
-    from suave_des.knowledge.checks.findings import relative_path
+    from suave_des.findings import relative_path
 
     shipped = shipped_folder("ontology")
     if file.is_relative_to(shipped):
@@ -248,30 +224,7 @@ def _place(file: Path, line: int | None = None) -> str:
     return relative_path(file) + (f":{line}" if line is not None else "")
 
 
-class _Dots:
-    """A line of dots, as pytest prints it; a new one where the terminal ends."""
-
-    def __init__(self, console: Console, name: str) -> None:
-        self.console, self.width = console, min(console.width, _WIDTH)
-        console.print(f"{name} ", end="")
-        self.at = len(name) + 1
-
-    def add(self, passed: bool, share: float) -> None:
-        """Print one test's letter."""
-        if self.at >= self.width - 8:
-            self.end(share)
-        self.console.print(Text("." if passed else "F", "green" if passed else "red"), end="")
-        self.at += 1
-
-    def end(self, share: float) -> None:
-        """Print how much is done, and end the line."""
-        self.console.print(Text(f"[{share:4.0%}]".rjust(max(7, self.width - self.at)), "cyan"))
-        self.at = 0
-
-
 def _print_failures(console: Console, results: Sequence[TestResult]) -> None:
-    from suave_des.workbench.testing.run import failure_lines
-
     failed = [result for result in results if not result.passed]
     if not failed:
         return
@@ -281,9 +234,10 @@ def _print_failures(console: Console, results: Sequence[TestResult]) -> None:
         console.print(Text(f" {result.test.name} ".center(width, "_"), "bold red"))
         console.print(_place(result.test.file, result.test.line))
         for failure in result.failures:
-            first, *more = failure_lines(failure)
+            first, *more = failure.lines()
             console.print(Text(first, "red"))
-            console.print("\n".join(more))
+            if more:
+                console.print("\n".join(more))
     console.print(" short summary ".center(width, "="))
     for result in failed:
         place = _place(result.test.file, result.test.line)
@@ -296,44 +250,56 @@ def _print_summary(console: Console, results: Sequence[TestResult], duration_s: 
     states = sum(len(result.test.situations) for result in results)
     counts = [f"{failed} failed"] * bool(failed) + [f"{passed} passed"] * bool(passed)
     line = f" {', '.join(counts)}, {number_of(states, 'state')}, in {duration_s:.2f} s "
-    width = min(console.width, _WIDTH)
-    console.print(Text(line.center(width, "="), "bold red" if failed else "bold green"))
+    console.print(Text(line.center(min(console.width, _WIDTH), "="), "bold red" if failed else "bold green"))
 
 
-_LINES_SHOWN = 8
-"""Lines of a list on a terminal; all of it is in the JSON form."""
+def _cover(suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
+    """Show what the tests of each knowledge base cover, and write tests of what they do not."""
+    from suave_des.workbench.coverage import measure_coverage
+    from suave_des.workbench.rule_tests import tests_text
+
+    if file is not None and len(suites) > 1:
+        remedy = "give files of tests of one knowledge base"
+        raise InputError("the tests are about several knowledge bases", place="--write", remedy=remedy)
+    for about, knowledge, tests in suites:
+        situations = [situation for test in tests for situation in test.situations]
+        found = measure_coverage(knowledge, situations, max_failed)
+        print("", shown(_coverage_table(found)).rstrip("\n"), *_coverage_lines(found, max_failed), sep="\n")
+        if file is not None and found.proposed:
+            states: list[tuple[str, KnowledgeState]] = [(str(goals[0]), state) for state, goals in found.proposed]
+            text = tests_text(about, knowledge, states, "States that other tests do not cover.")
+            write_files(file.parent, {file.name: text})
+            print(f"{len(states)} tests are in {file}; read them before you keep them")
+        elif file is not None:
+            print("nothing to write")
 
 
-def print_coverage(console: Console, coverage: Coverage) -> None:
-    """Print a table of the rules, what is missing, and the states that would cover it."""
-    table = plain_table(
-        ("rule", "fired", "not fired", "covered", "missing", "no state"), right=("fired", "not fired", "covered")
-    )
+def _coverage_table(coverage: Coverage) -> Table:
+    rows = []
     for each in coverage.rules:
-        reachable = len(each.covered) + len(each.missing)
-        cells = (len(each.missing) or "", len(each.unreachable) or "")
-        table.add_row(
-            each.rule, str(each.fired), str(each.not_fired), f"{len(each.covered)}/{reachable}", *map(str, cells)
-        )
-    console.print()
-    share = coverage.covered / coverage.reachable if coverage.reachable else 1.0
-    title = f"coverage: {coverage.covered} of {coverage.reachable}, {share:.0%}"
-    print_table(console, title, table)
-    for line in _coverage_lines(coverage):
-        console.print(line)
+        share = f"{len(each.covered)}/{len(each.covered) + len(each.missing)}"
+        counts = (each.fired, each.not_fired, share)
+        rows.append((each.rule, *map(str, (*counts, len(each.missing) or "", len(each.unreachable) or ""))))
+    covered = sum(len(each.covered) for each in coverage.rules)
+    reachable = covered + sum(len(each.missing) for each in coverage.rules)
+    title = f"coverage: {covered} of {reachable}, {covered / reachable if reachable else 1.0:.0%}"
+    return Table(("rule", "fired", "not fired", "covered", "missing", "no state"), rows, title, "lrrrll")
 
 
-def _coverage_lines(coverage: Coverage) -> Iterator[str]:
-    missing = [goal for each in coverage.rules for goal in each.missing]
+def _coverage_lines(coverage: Coverage, max_failed: int) -> Iterator[str]:
+    missing, unreachable = (
+        [goal for each in coverage.rules for goal in getattr(each, kind)] for kind in ("missing", "unreachable")
+    )
     if missing:
         yield "not covered"
         yield from (f"  {goal}" for goal in missing)
-    unreachable = [each for each in coverage.rules if each.unreachable]
     if unreachable:
-        components = number_of(coverage.max_failed, "component")
+        components = number_of(max_failed, "component")
         words = f"of {coverage.states} kinds of states of this model, with at most {components} reporting"
         yield f"not reached in any state ({words}), but facts in a test may reach it"
-        yield from (f"  {line}" for line in _unreachable(unreachable))
+        yield from (f"  {goal}" for goal in unreachable[:_LINES_SHOWN])
+        if len(unreachable) > _LINES_SHOWN:
+            yield f"  and {len(unreachable) - _LINES_SHOWN} more"
     if coverage.proposed:
         count = len(coverage.proposed)
         yield f"a smallest set of states that would cover the rest: {count} (write them as tests with --write FILE)"
@@ -342,34 +308,47 @@ def _coverage_lines(coverage: Coverage) -> Iterator[str]:
             yield f"    {goals[0]}" + (f" and {len(goals) - 1} more" if len(goals) > 1 else "")
 
 
-def print_mutation(console: Console, report: MutationReport) -> None:
-    """Print a table of the operators, and each survivor with a state that tells it apart."""
-    from suave_des.workbench.testing.mutation import EQUIVALENT, KILLED, SURVIVED
+def _mutate(console: Console, suites: Sequence[Suite], options: MutationOptions) -> None:
+    """Show which mutants of each knowledge base the tests kill."""
+    from suave_des.workbench.mutation import mutants_of, mutate, sample
 
-    results = (KILLED, SURVIVED, EQUIVALENT)
-    table = plain_table(("operator", *results), right=results)
-    for operator in dict.fromkeys(verdict.mutant.operator for verdict in report.verdicts):
-        own = [verdict.result for verdict in report.verdicts if verdict.mutant.operator == operator]
-        table.add_row(operator, *(str(own.count(result)) for result in results))
-    killed, survived, equivalent = (len(report.of(result)) for result in results)
-    console.print()
-    title = f"mutation: {killed} of {killed + survived} mutants killed, {report.score:.0%}; {equivalent} equivalent"
-    print_table(console, title, table)
+    for suite in suites:
+        found = mutants_of(suite.knowledge.base)
+        names, only = list(dict.fromkeys(mutant.name for mutant in found)), options.only or ()
+        for name in only:
+            if name not in names:
+                remedy = did_you_mean(name, names)
+                raise InputError(f"there is no mutant of {quoted(name)}", place="--only", remedy=remedy)
+        chosen = sample([mutant for mutant in found if not only or mutant.name in only], options.mutants)
+        with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+            task = progress.add_task("mutants", total=len(chosen))
+            advance = partial(progress.advance, task)
+            began = time.perf_counter()
+            results, states = mutate(suite.knowledge, suite.tests, chosen, options.max_failed, advance)
+            duration_s = time.perf_counter() - began
+        print(*_mutation_lines(results, states, options.max_failed), sep="\n")
+        each_ms = 1000 * duration_s / max(1, len(results))
+        print(f"{number_of(len(results), 'mutant')} in {duration_s:.1f} s, {each_ms:.0f} ms each")
+
+
+def _mutation_lines(results: Sequence[MutantResult], states: int, max_failed: int) -> Iterator[str]:
+    """A table of the operators, and each survivor with a state that tells it apart."""
+    from suave_des.workbench.mutation import EQUIVALENT, KILLED, SURVIVED
+
+    kinds = (KILLED, SURVIVED, EQUIVALENT)
+    by_operator: dict[str, Counter[str]] = {}
+    for each in results:
+        by_operator.setdefault(each.mutant.operator, Counter())[each.result] += 1
+    killed, survived, equivalent = (sum(counts[kind] for counts in by_operator.values()) for kind in kinds)
+    share = killed / (killed + survived) if killed + survived else 1.0
+    title = f"mutation: {killed} of {killed + survived} mutants killed, {share:.0%}; {equivalent} equivalent"
+    rows = [(operator, *(str(counts[kind]) for kind in kinds)) for operator, counts in by_operator.items()]
+    yield "\n" + shown(Table(("operator", *kinds), rows, title)).rstrip("\n")
     if survived:
-        console.print("survivors, which no test notices")
-    for verdict in report.of(SURVIVED):
-        console.print(f"  {verdict.mutant}\n    {verdict.reason}\n    at {verdict.state}")
-    count = len(report.verdicts)
-    each_ms = 1000 * report.duration_s / count if count else 0.0
-    console.print(f"{number_of(count, 'mutant')} in {report.duration_s:.1f} s, {each_ms:.0f} ms each")
-    if report.states:
-        components = number_of(report.max_failed, "component")
-        words = f"equivalent: {report.states} kinds of states, with at most {components} reporting"
-        console.print(f"{words}, or the schema says so")
-
-
-def _unreachable(rules: list[RuleCoverage]) -> Iterator[str]:
-    goals = [goal for each in rules for goal in each.unreachable]
-    yield from map(str, goals[:_LINES_SHOWN])
-    if len(goals) > _LINES_SHOWN:
-        yield f"and {len(goals) - _LINES_SHOWN} more"
+        yield "survivors, which no test notices"
+    for each in results:
+        if each.result == SURVIVED:
+            yield f"  {each.mutant}\n    {each.reason}\n    at {each.state}"
+    if states:
+        components = number_of(max_failed, "component")
+        yield f"equivalent: {states} kinds of states, with at most {components} reporting"

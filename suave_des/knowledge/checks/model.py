@@ -1,23 +1,34 @@
-"""Check the model in the ontologies: names, functions, designs, modes, and rules that can never fire."""
+"""Checks of the model in the ontologies, of what missions have to do with it, and of what rules can fire in it.
+
+Which rules cannot fire is an upper bound of what can hold in any state, found without a reasoner.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Collection, Iterator
+from itertools import chain
 from typing import Final
 
 from suave_des.domain import DEFAULT_MODE, UNGROUND_MODE
-from suave_des.errors import nearest
-from suave_des.knowledge.checks.findings import Finding, Level, finding_about
+from suave_des.errors import KnowledgeError, nearest
+from suave_des.findings import Level
+from suave_des.knowledge.checks.registry import Found, Material, Scope, check
 from suave_des.knowledge.content import Content
-from suave_des.knowledge.model import Model, expectations
-from suave_des.knowledge.ontology_file import OntologyFile
+from suave_des.knowledge.model import OPERATORS, Model, assumption
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.ontology_file import is_metamodel
 from suave_des.knowledge.rdf import (
+    C_STATUS,
     HAS_QA_VALUE,
+    HAS_VALUE,
     IS_QA_TYPE,
     LANGUAGE_NAMESPACES,
+    O_STATUS,
     OWL,
     PERFORMANCE,
+    QA_OPERATOR,
     RDF_TYPE,
     RDFS,
     TOMASYS,
@@ -27,207 +38,202 @@ from suave_des.knowledge.rdf import (
     local_name,
     memberships,
     namespace,
+    reached,
 )
-from suave_des.knowledge.rules.names import Vocabulary
-from suave_des.knowledge.rules.syntax import EXPRESSION, Atom, Named, Rule
+from suave_des.knowledge.rules import EXPRESSION, Atom, Named, Rule, Term, write_atom
 
-_PROPERTIES: Final = ("object property", "data property", "annotation property")
-_ANY: Final = "any value"
-#: Axioms by which individuals are different: declared so, or members of disjoint classes or properties.
-_MAKE_DIFFERENT: Final = re.compile(OWL + "(different|AllDifferent|AllDisjoint|disjoint|propertyDisjoint|complement)")
-_ANY_TEXT: Final = "any text"
-_SUBCLASS: Final = RDFS + "subClassOf"
 _ABOUT_CLASSES: Final = frozenset(
-    (_SUBCLASS, RDFS + "domain", RDFS + "range", OWL + "equivalentClass", OWL + "disjointWith")
+    (RDFS + "subClassOf", RDFS + "domain", RDFS + "range", OWL + "equivalentClass", OWL + "disjointWith")
 )
-_SPREADS: Final = (RDFS + "subPropertyOf", OWL + "inverseOf", OWL + "equivalentProperty")
+_PROPERTIES: Final = ("object property", "data property", "annotation property")
 
 
-def undefined_names(
-    content: Content, model: Model | None, vocabulary: Vocabulary, sources: Sequence[OntologyFile]
-) -> Iterator[Finding]:
+@check(Level.ERROR, Scope.MODEL)
+def undefined_names(material: Material) -> Iterator[Found]:
     """Find the classes, properties and individuals that are used and defined nowhere: most are misspelt.
 
-    Names of other vocabularies than those of the ontologies may be defined elsewhere, and are a warning.
+    Only those of the ontologies' own namespaces: names of other vocabularies may be defined elsewhere.
     """
-    described = {subject for subject, _, _ in content.triples}
-    if model is not None:
-        described |= {individual.iri for individual in model.individuals()}
+    kinds, triples = material.vocabulary.kinds, material.content.triples
+    described = {subject for subject, _, _ in triples} | {each.iri for each in material.model.individuals()}
     namespaces = {namespace(iri) for iri in described}
-
-    def undefined(subject: str, what: str, name: str, *kinds: str) -> Finding:
-        bare = local_name(name)
-        known = [iri for iri in described if vocabulary.kinds.get(iri, frozenset()) & {*kinds}]
-        same = sorted(iri for iri in known if local_name(iri) == bare)
-        remedy = f"did you mean {' or '.join(same)}?" if same else nearest(bare, set(map(local_name, known)))
-        level = Level.ERROR if namespace(name) in namespaces else Level.WARN
-        message = f"{local_name(subject)}: {what} is not defined"
-        return finding_about(local_name(subject), sources, level, message, remedy)
-
-    for subject, predicate, value in content.triples:
-        own_value = isinstance(value, str) and not value.startswith(LANGUAGE_NAMESPACES)
-        if predicate == RDF_TYPE:
-            if own_value and "class" not in vocabulary.kinds.get(str(value), ()):
-                yield undefined(subject, f"class {local_name(str(value))}", str(value), "class")
-        elif predicate in _ABOUT_CLASSES:
-            if own_value and "class" not in vocabulary.kinds.get(str(value), ()):
-                what = f"{local_name(predicate)} {local_name(str(value))}"
-                if predicate != RDFS + "range" or "datatype" not in vocabulary.kinds.get(str(value), ()):
-                    yield undefined(subject, what, str(value), "class")
-        elif not predicate.startswith(LANGUAGE_NAMESPACES):
+    assumed = {(material.model.attributes[name], QA_OPERATOR) for name in material.assumed}
+    for subject, predicate, value in triples:
+        used: tuple[str, str, Collection[str]] | None = None  # words, what is used, what it should be
+        is_term = isinstance(value, str) and not value.startswith(LANGUAGE_NAMESPACES)
+        if predicate == RDF_TYPE or predicate in _ABOUT_CLASSES:
+            wanted = ("class", "datatype") if predicate == RDFS + "range" else ("class",)
+            if is_term and kinds.get(str(value), frozenset()).isdisjoint(wanted):
+                used = "class" if predicate == RDF_TYPE else local_name(predicate), str(value), ("class",)
+        elif not predicate.startswith(LANGUAGE_NAMESPACES) and (subject, predicate) not in assumed:
             if predicate not in described:
-                yield undefined(subject, f"property {local_name(predicate)}", predicate, *_PROPERTIES)
-            elif own_value and value not in described and "object property" in vocabulary.kinds.get(predicate, ()):
-                what = f"{local_name(predicate)} {local_name(str(value))}"
-                yield undefined(subject, what, str(value), "individual")
+                used = "property", predicate, _PROPERTIES
+            elif is_term and value not in described and "object property" in kinds.get(predicate, ()):
+                used = local_name(predicate), str(value), ("individual",)
+        if used is not None and namespace(used[1]) in namespaces:
+            words, name, meant = used
+            known = [iri for iri in described if kinds.get(iri, frozenset()) & {*meant}]
+            same = sorted(iri for iri in known if local_name(iri) == local_name(name))
+            remedy = f"did you mean {' or '.join(same)}?" if same else nearest(local_name(name), map(local_name, known))
+            problem = f"{local_name(subject)}: {words} {local_name(name)} is not defined"
+            yield local_name(subject), None, problem, remedy
 
 
-def check_designs(
-    content: Content,
-    model: Model,
-    sources: Sequence[OntologyFile],
-    modes: Mapping[str, Collection[str]] | None,
-    required: Collection[str],
-    effects: Mapping[str, Mapping[str, object]],
-) -> Iterator[Finding]:
-    """Check that functions have designs, and designs have modes.
+def _designs(material: Material, function: str) -> set[str]:
+    """Names of the designs that solve a function."""
+    model, iri = material.model, material.model.functions.get(function)
+    solving = {s for s, p, o in material.content.triples if local_name(p) == "solvesF" and o == iri}
+    return {name for name, design in model.designs.items() if design in solving}
+
+
+@check(Level.ERROR, Scope.MISSIONS)
+def missing_functions(material: Material) -> Iterator[Found]:
+    """Find the functions that the mission needs and that are not there, or have no design."""
+    for name in sorted(material.subject.needed):
+        if name not in material.model.functions:
+            yield name, None, f"there is no function {name}, which the mission needs", None
+        elif not _designs(material, name):
+            yield name, None, *_no_design(name)
+
+
+@check(Level.WARN, Scope.MODEL)
+def functions_without_design(material: Material) -> Iterator[Found]:
+    """Find the other functions that have no design."""
+    for name in sorted(material.model.functions.keys() - {*material.subject.needed}):
+        if not _designs(material, name):
+            yield name, None, *_no_design(name)
+
+
+def _no_design(function: str) -> tuple[str, str]:
+    return f"function {function} has no function design", f"add an individual of FunctionDesign with solvesF {function}"
+
+
+def _designs_and_modes(material: Material) -> Iterator[tuple[str, set[str], set[str]]]:
+    """(function, its designs, its modes that a design could have the name of) of the model, if modes are checked."""
+    for function in sorted(material.model.functions if material.subject.modes is not None else ()):
+        modes = {*(material.subject.modes or {}).get(function, ())} - {UNGROUND_MODE, DEFAULT_MODE}
+        yield function, _designs(material, function), modes
+
+
+@check(Level.ERROR, Scope.MISSIONS)
+def designs_without_mode(material: Material) -> Iterator[Found]:
+    """Find the function designs that no mode has the name of."""
+    otherwise = "add a mode of this name to the System Modes file, or remove the design"
+    for function, designs, modes in _designs_and_modes(material):
+        for design in sorted(designs - modes):
+            problem = f"function design {design} has no mode of the same name for {function}"
+            yield design, None, problem, nearest(design, modes - designs) or otherwise
+
+
+@check(Level.INFO, Scope.MISSIONS)
+def modes_without_design(material: Material) -> Iterator[Found]:
+    """Note the modes that metacontrol never chooses, such as those of behaviour trees."""
+    for function, designs, modes in _designs_and_modes(material):
+        if spare := sorted(modes - designs):
+            problem = (
+                f"modes of {function} without function design, which metacontrol never chooses: {', '.join(spare)}"
+            )
+            yield function, None, problem, None
+
+
+@check(Level.WARN, Scope.MISSIONS)
+def attributes_that_do_not_fit(material: Material) -> Iterator[Found]:
+    """Find quality attributes that missions measure and ontologies lack, or compare with nothing."""
+    model, measured = material.model, material.subject.measured
+    for name in sorted({*(measured or ())} - model.attributes.keys()):
+        problem = f"missions measure {name}, but no ontology has a quality attribute type of this name"
+        yield name, None, problem, nearest(name, model.attributes)
+    for name in () if rules_of_2023(material.content) else without_operator(material.content, model, measured or ()):
+        designs = ", ".join(sorted(design for design, names in model.estimated.items() if name in names))
+        problem = f"{name} has no qa_comparison_operator, so what is measured never rules out a design: {designs}"
+        yield name, None, problem, f"give it one of {' '.join(OPERATORS)}, usually <"
+    valued = {subject for subject, predicate, _ in material.content.triples if predicate == HAS_VALUE}
+    for name, each in model.measurements.items():
+        if measured is not None and each.iri in valued and name not in measured:
+            problem = f"hasValue of {local_name(each.iri)} is not used: {name} has the value that missions measure"
+            yield local_name(each.iri), None, problem, "measure it in the scenario"
+
+
+def without_operator(content: Content, model: Model, measured: Collection[str]) -> list[str]:
+    """Return the quality attributes that missions measure and designs expect, and that cannot be compared."""
+    compared = {subject for subject, predicate, _ in content.triples if predicate == QA_OPERATOR}
+    expected = frozenset().union(*model.estimated.values()) - {local_name(PERFORMANCE)}
+    return sorted(name for name in expected.intersection(measured) if model.attributes[name] not in compared)
+
+
+@check(Level.INFO, Scope.MISSIONS)
+def unknown_to_missions(material: Material) -> Iterator[Found]:
+    """Note the components that nothing reports, the attributes that nothing measures, and what is assumed."""
+    content, subject = material.content, material.subject
+    asserted = {each for each, predicate, _ in content.triples if predicate == C_STATUS}
+    if subject.reported is not None and C_STATUS not in content.head_properties():
+        for name, iri in sorted(material.model.components.items()):
+            if name not in subject.reported and iri not in asserted:
+                problem = (
+                    f"nothing in the simulation reports the status of component {name}, so missions never have one"
+                )
+                yield name, None, problem, f"reported are {', '.join(subject.reported)}"
+    expected = frozenset().union(*material.model.estimated.values()) - {local_name(PERFORMANCE)}
+    for name in sorted(expected.difference(subject.measured if subject.measured is not None else expected)):
+        yield name, None, f"missions do not measure {name}, so what designs expect of it is compared with nothing", None
+    for name, sign in material.assumed.items():
+        yield name, None, assumption(name, sign), None
+
+
+def rules_of_2023(content: Content) -> list[tuple[Rule, Atom]]:
+    """Find the enabled rules that conclude the status UPDATABLE, as the exemplar's ontologies of 2023 do."""
+    return [
+        (rule, atom)
+        for rule in content.enabled_rules
+        for atom in rule.head
+        if atom.predicate == O_STATUS and isinstance(atom.arguments[-1], Lit) and atom.arguments[-1].text == "UPDATABLE"
+    ]
+
+
+def check_revision(base: Material | Ontology, measured: Collection[str], revision: str) -> None:
+    """Check that ontologies of the exemplar's revision 2023 are used with that revision.
+
+    With a later one no design is ever ruled out, as its code assumes no operator, so that objectives stay in error;
+    the first thruster that recovers then contradicts that.
 
     Args:
-        content: the ontologies.
-        model: the functions and designs in them.
-        sources: the files that they come from.
-        modes: names of the modes by function; None: modes are not checked.
-        required: functions that the mission cannot do without.
-        effects: what modes do, by function and mode.
+        base: the ontologies with the operators that the revision assumes, and rules.
+        measured: the quality attributes that the scenario measures.
+        revision: the scenario's, for the message.
+
+    Raises:
+        KnowledgeError: with the file and line of the rule.
     """
-    designs: dict[str, set[str]] = {name: set() for name in model.functions}
-    functions = {iri: name for name, iri in model.functions.items()}
-    names = {iri: name for name, iri in model.designs.items()}
-    for design, predicate, function in content.triples:
-        if predicate == TOMASYS + "solvesF" and design in names and function in functions:
-            designs[functions[str(function)]].add(names[design])
-    for name in sorted({*model.functions, *required}):
-        level = Level.ERROR if name in required else Level.WARN
-        if name not in model.functions:
-            message = f"there is no function {name}, which the mission needs"
-            yield finding_about(name, sources, Level.ERROR, message)
-        elif not designs[name]:
-            remedy = f"add an individual of FunctionDesign with solvesF {name}"
-            yield finding_about(name, sources, level, f"function {name} has no function design", remedy)
-        if modes is not None:
-            named, solving = set(modes.get(name, ())), designs.get(name, set())
-            spare = named - solving - {UNGROUND_MODE, DEFAULT_MODE}
-            for design in sorted(solving - named):
-                remedy = nearest(design, spare) or (
-                    "add a mode of this name to the System Modes file, or remove the design"
-                )
-                message = f"function design {design} has no mode of the same name for {name}"
-                yield finding_about(design, sources, level, message, remedy)
-            for mode in sorted(spare):
-                message = f"mode {mode} of {name} has no function design, so it is never chosen"
-                does = effects.get(name, {})
-                # Nothing is lost if another mode does the same, as with those that only behaviour trees set.
-                same = [
-                    each for each in sorted(solving | {UNGROUND_MODE}) if mode in does and does.get(each) == does[mode]
-                ]
-                use = f"mode {same[0]} does the same" if same else None
-                yield finding_about(name, sources, Level.INFO if same else Level.WARN, message, use)
+    missing = without_operator(base.content, base.model, measured)
+    for rule, atom in rules_of_2023(base.content) if missing else ():
+        source = next((each for each in base.sources if each.path == rule.file), None)
+        line = None if source is None else source.line_of_rule(rule.name)
+        raise KnowledgeError(
+            f"these are ontologies of revision 2023, and the scenario's revision is {revision}: rule {rule.name} "
+            f"concludes {write_atom(atom)}, and {missing[0]} has no qa_comparison_operator",
+            file=rule.file,
+            place=rule.place or (f"line {line}" if line else None),
+            remedy=f'write revision: "2023" in the scenario, or use ontologies of revision {revision}',
+        )
 
 
-def designs_without_performance(content: Content, model: Model, sources: Sequence[OntologyFile]) -> Iterator[Finding]:
-    """Find the function designs without an expected performance."""
-    expected = expectations(content, model)
-    for name in sorted(model.designs):
-        if local_name(PERFORMANCE) not in expected.get(name, {}):
-            remedy = "add a hasQAestimation of type performance"
-            message = f"function design {name} has no performance, so 0.001 is assumed"
-            yield finding_about(name, sources, Level.WARN, message, remedy)
-
-
-def unused_individuals(content: Content, model: Model, sources: Sequence[OntologyFile]) -> Iterator[Finding]:
-    """Find the individuals that no fact and no rule mentions, and that mean nothing by themselves."""
-    mentioned = {value for _, predicate, value in content.triples if predicate != RDF_TYPE and isinstance(value, str)}
-    mentioned |= {
-        term.iri for rule in content.rules for atom in rule.atoms for term in atom.arguments if isinstance(term, Named)
-    }
-    holders = {subject for subject, name, _ in content.triples if not name.startswith(LANGUAGE_NAMESPACES)}
-    mentioned |= holders & {*model.components.values()}
-    mentioned |= {*model.designs.values(), *(individual.iri for individual in model.individuals())}
-    individuals = {individual for individual, _ in memberships(content.triples)}
-    for name in sorted(local_name(iri) for iri in individuals - mentioned if not iri.startswith(TOMASYS)):
-        yield finding_about(name, sources, Level.INFO, f"nothing refers to {name}")
-
-
-class _Possible:
-    """The classes that can have members, and the values that properties can have: an upper bound for any state."""
-
-    def __init__(self, content: Content, model: Model) -> None:
-        self.structure = "".join(content.structure)
-        self.classes = {OWL + "Thing", *(TOMASYS + name for name in ("Objective", "FunctionGrounding"))}
-        self.classes |= {name for _, name in memberships(content.triples)}
-        self.values: dict[str, set[object]] = {}
-        self.axioms = [triple for triple in content.triples if triple[1].startswith(LANGUAGE_NAMESPACES)]
-        for _, predicate, value in content.triples:
-            if not predicate.startswith(LANGUAGE_NAMESPACES):
-                self.values.setdefault(predicate, set()).add(canonical(value))
-        for name in ("typeF", "typeFD", "solvesO", "o_always_improve"):
-            self.values[TOMASYS + name] = {_ANY}
-        for name in ("o_status", "c_status"):
-            self.values.setdefault(TOMASYS + name, set()).add(_ANY_TEXT)
-        if model.attributes:
-            self.classes.add(TOMASYS + "QAvalue")
-            self.values.update({TOMASYS + name: {_ANY} for name in ("isQAtype", "hasValue")})
-        if any(model.estimated.values()):
-            self.values[HAS_QA_VALUE] = {_ANY}
-        self.spread()
-
-    def spread(self) -> None:
-        """Follow subclasses, domains and ranges, and properties that hold because others do."""
-        while True:
-            before = len(self.classes), len(self.values), sum(map(len, self.values.values()))
-            for subject, predicate, value in self.axioms:
-                if not isinstance(value, str):
-                    continue
-                if predicate in (_SUBCLASS, OWL + "equivalentClass"):
-                    if subject in self.classes:
-                        self.classes.add(value)
-                    if predicate != _SUBCLASS and value in self.classes:
-                        self.classes.add(subject)
-                elif predicate in (RDFS + "domain", RDFS + "range") and subject in self.values:
-                    self.classes.add(value)
-                elif predicate in _SPREADS:
-                    for one, other in ((subject, value), (value, subject)):
-                        if one in self.values:
-                            self.values.setdefault(other, set()).add(_ANY)
-            if before == (len(self.classes), len(self.values), sum(map(len, self.values.values()))):
-                return
-
-    def allows(self, atom: Atom) -> bool:
-        """Whether an atom of a body can hold."""
-        if atom.kind == "class":
-            return atom.predicate in self.classes or atom.predicate == EXPRESSION or self._is_defined(atom.predicate)
-        if atom.kind not in ("object", "data") or len(atom.arguments) != 2:
-            return True
-        values = self.values.get(atom.predicate)
-        if values is None:
-            return self._is_defined(atom.predicate)
-        wanted = atom.arguments[1]
-        if _ANY in values or not isinstance(wanted, Lit):
-            return True
-        return canonical(wanted) in values or (_ANY_TEXT in values and wanted.datatype == XSD + "string")
-
-    def _is_defined(self, iri: str) -> bool:
-        """Whether a class expression or a property chain mentions it; these are not followed here."""
-        return f"<{iri}>" in self.structure
-
-    def conclude(self, atom: Atom) -> None:
-        """Add what an atom of a head asserts."""
-        if atom.kind == "class":
-            self.classes.add(atom.predicate)
-        elif atom.kind in ("object", "data") and len(atom.arguments) == 2:
-            value = atom.arguments[1]
-            known = self.values.setdefault(atom.predicate, set())
-            known.add(canonical(value) if isinstance(value, Lit) else _ANY)
+#: Axioms by which the members of a class, or the values of a property, are those of another, or members of a class.
+_LEADS: Final = tuple(RDFS + name for name in ("subClassOf", "subPropertyOf", "domain", "range"))
+_BOTH_WAYS: Final = tuple(OWL + name for name in ("equivalentClass", "equivalentProperty", "inverseOf"))
+#: What states assert, whatever the ontologies say.
+_IN_STATES: Final = tuple(
+    TOMASYS + name for name in ("Objective", "FunctionGrounding", "typeF", "typeFD", "solvesO", "o_always_improve")
+)
+#: Axioms by which individuals are different: declared so, or members of disjoint classes or properties.
+_MAKE_DIFFERENT: Final = re.compile(OWL + "(different|AllDifferent|AllDisjoint|disjoint|propertyDisjoint|complement)")
+#: Classes of which nothing is a member of two, unless an ontology or a rule says so.
+_KINDS: Final = frozenset(
+    TOMASYS + name
+    for name in (
+        *("Component", "Function", "FunctionDesign", "FunctionGrounding"),
+        *("Objective", "QAvalue", "QualityAttributeType"),
+    )
+)
 
 
 def dead_rules(content: Content, model: Model) -> list[tuple[Rule, Atom]]:
@@ -237,53 +243,72 @@ def dead_rules(content: Content, model: Model) -> list[tuple[Rule, Atom]]:
     property is considered separately, and individuals are not distinguished. So every rule that is returned is dead,
     but not every dead rule is returned.
     """
-    possible = _Possible(content, model)
+    steps = [(one, str(other)) for one, name, other in content.triples if name in (*_LEADS, *_BOTH_WAYS)]
+    steps += [
+        (str(other), one) for one, name, other in content.triples if name in (*_BOTH_WAYS, RDFS + "subPropertyOf")
+    ]
+    structure = "".join(content.structure)
+    held = {
+        OWL + "Thing",
+        EXPRESSION,
+        C_STATUS,
+        O_STATUS,
+        *_IN_STATES,
+        *(name for _, name in memberships(content.triples)),
+    }
+    held |= {TOMASYS + "QAvalue", IS_QA_TYPE, HAS_VALUE} if model.attributes else set()
+    held |= {HAS_QA_VALUE} if any(model.estimated.values()) else set()
+    loose = {*_IN_STATES, IS_QA_TYPE, HAS_VALUE}  # properties that can have any value
+    values: dict[str, set[object]] = defaultdict(set)
+    for _, predicate, value in content.triples:
+        if not predicate.startswith(LANGUAGE_NAMESPACES):
+            values[predicate].add(canonical(value))
+
+    def allows(atom: Atom) -> bool:
+        if atom.kind not in ("class", "object", "data") or not atom.arguments:
+            return True
+        if atom.predicate not in possible:  # class expressions and property chains are not followed
+            return f"<{atom.predicate}>" in structure
+        wanted = atom.arguments[-1]
+        if not isinstance(wanted, Lit) or atom.predicate in loose | implied:
+            return True
+        is_text = atom.predicate in (C_STATUS, O_STATUS) and wanted.datatype == XSD + "string"
+        return is_text or canonical(wanted) in values[atom.predicate]
+
     waiting = list(content.enabled_rules)
-    while True:
-        firing = [rule for rule in waiting if all(map(possible.allows, rule.body))]
-        if not firing:
-            break
-        for rule in firing:
-            for atom in rule.head:
-                possible.conclude(atom)
-        possible.spread()
+    possible = reached(held | values.keys(), steps)
+    implied = {other for one, other in steps if one in possible}
+    while firing := [rule for rule in waiting if all(map(allows, rule.body))]:
+        for atom in chain.from_iterable(rule.head for rule in firing):
+            held.add(atom.predicate)
+            if atom.arguments and isinstance(concluded := atom.arguments[-1], Lit):
+                values[atom.predicate].add(canonical(concluded))
+            else:
+                loose.add(atom.predicate)
+        possible = reached(held | values.keys(), steps)
+        implied = {other for one, other in steps if one in possible}
         waiting = [rule for rule in waiting if rule not in firing]
-    return [(rule, next(atom for atom in rule.body if not possible.allows(atom))) for rule in waiting]
+    return [(rule, next(atom for atom in rule.body if not allows(atom))) for rule in waiting]
 
 
-def undeclared_differences(content: Content) -> list[tuple[Rule, Atom]]:
-    """Find the enabled rules that ask for different individuals (differentFrom), where nothing makes any different.
-
-    Values of functional properties can, so such a rule is suspicious, not dead.
-    """
-    terms = (*(predicate for _, predicate, _ in content.triples), *content.structure)
-    if any(map(_MAKE_DIFFERENT.search, terms)):
-        return []
-    rules = content.enabled_rules
-    if any(atom.kind == "different" for rule in rules for atom in rule.head):
-        return []
-    return [(rule, atom) for rule in rules for atom in rule.body if atom.kind == "different"]
-
-
-def no_estimate(attribute: str) -> tuple[str, str]:
-    """Say why no grounding has a value of an attribute, and what would give it one."""
-    problem = f"no function design has an estimate of {attribute}, so no grounding has a value of it"
-    return problem, f"add a hasQAestimation of type {attribute} to a design"
-
-
-def no_value(attribute: str, model: Model) -> tuple[str, str]:
-    """Say why no grounding has a value of an attribute, as no_estimate does, or because missions do not measure it."""
-    if not any(attribute in names for names in model.estimated.values()):
-        return no_estimate(attribute)
-    return f"missions do not measure {attribute}, so no grounding has a value of it", ""
+def rules_for_other_models(material: Material) -> list[Rule]:
+    """Find the rules of TOMASys and mros that need what this model does not have; they have rules for any."""
+    found = []
+    for rule, _ in dead_rules(material.content, material.model):
+        source = material.source(rule)
+        is_known = all(atom.kind == "builtin" or material.vocabulary.kinds.get(atom.predicate) for atom in rule.atoms)
+        if is_known and source is not None and is_metamodel(source):
+            found.append(rule)
+    return found
 
 
 def unmeasured_rules(
     content: Content, model: Model, measured: Collection[str] | None = None
-) -> list[tuple[Rule, Atom, str]]:
-    """Find the enabled rules that need a grounding's value (hasQAvalue) of an attribute of which no grounding has one.
+) -> list[tuple[Rule, Atom, str, str | None]]:
+    """Find the enabled rules that need a value of a quality attribute of which nothing has one.
 
-    A grounding has the measured values of those attributes that its function design has an estimate of.
+    A grounding has the measured values (hasQAvalue) of those attributes that its function design has an estimate of.
+    Other values are in the ontologies, or measured.
 
     Args:
         content: the ontologies and rules.
@@ -291,45 +316,81 @@ def unmeasured_rules(
         measured: quality attributes that missions measure; None: any.
 
     Returns:
-        each rule with the atom that names the attribute, and the attribute's name.
-    """
-    has_value, is_type = HAS_QA_VALUE, IS_QA_TYPE
-    estimated = frozenset().union(*model.estimated.values())
-    never = {
-        iri: name
-        for name, iri in model.attributes.items()
-        if name not in estimated or (measured is not None and name not in measured)
-    }
-    if content.head_properties() & {has_value, is_type} or any(triple[1] == has_value for triple in content.triples):
-        return []  # groundings have values from elsewhere, too
-    found = []
-    for rule in content.enabled_rules:
-        held = {atom.arguments[-1] for atom in rule.body if atom.predicate == has_value}
-        for atom in rule.body:
-            if atom.predicate == is_type and len(atom.arguments) == 2 and atom.arguments[0] in held:
-                term = atom.arguments[1]
-                if isinstance(term, Named) and term.iri in never:
-                    found.append((rule, atom, never[term.iri]))
-    return found
-
-
-def rules_without_values(content: Content, measured: Collection[str]) -> list[tuple[Rule, Atom, str]]:
-    """Find the enabled rules that need a value of an attribute of which neither ontologies nor missions have one.
-
-    Args:
-        content: the ontologies and rules.
-        measured: quality attributes that missions measure.
-
-    Returns:
-        each rule with the atom that names the attribute, and the attribute's name.
+        each rule with the atom that names the attribute, what is wrong, and what would be right.
     """
     if IS_QA_TYPE in content.head_properties():
         return []
-    valued = {str(value) for _, predicate, value in content.triples if predicate == IS_QA_TYPE}
-    return [
-        (rule, atom, local_name(term.iri))
-        for rule in content.enabled_rules
-        for atom in rule.body
-        if atom.predicate == IS_QA_TYPE and isinstance(term := atom.arguments[-1], Named)
-        if term.iri not in valued and local_name(term.iri) not in measured
-    ]
+    elsewhere = HAS_QA_VALUE in content.head_properties() or any(p == HAS_QA_VALUE for _, p, _ in content.triples)
+    estimated = frozenset().union(*model.estimated.values())
+    valued = {local_name(str(value)) for _, predicate, value in content.triples if predicate == IS_QA_TYPE}
+    found = []
+    for rule in content.enabled_rules:
+        held = {atom.arguments[-1] for atom in rule.body if atom.predicate == HAS_QA_VALUE}
+        for atom in rule.body:
+            if atom.predicate != IS_QA_TYPE or len(atom.arguments) != 2 or not isinstance(atom.arguments[1], Named):
+                continue
+            name = local_name(atom.arguments[1].iri)
+            is_measured = measured is None or name in measured
+            problem: tuple[str, str | None] | None = None
+            if atom.arguments[0] not in held:
+                if not is_measured and name not in valued:
+                    problem = f"missions do not measure {name}, and no ontology has a value of it", None
+            elif name in model.attributes and not elsewhere:
+                if name not in estimated:
+                    reason = f"no function design has an estimate of {name}, so no grounding has a value of it"
+                    problem = reason, f"add a hasQAestimation of type {name} to a design"
+                elif not is_measured:
+                    problem = f"missions do not measure {name}, so no grounding has a value of it", None
+            if problem is not None:
+                found.append((rule, atom, *problem))
+    return found
+
+
+def undeclared_differences(content: Content) -> Iterator[tuple[Rule, Atom]]:
+    """Find the enabled rules that ask for different individuals (differentFrom), where nothing makes any different.
+
+    Values of functional properties can, so such a rule is suspicious, not dead.
+    """
+    rules = content.enabled_rules
+    terms = (*(predicate for _, predicate, _ in content.triples), *content.structure)
+    if any(map(_MAKE_DIFFERENT.search, terms)) or any(atom.kind == "different" for rule in rules for atom in rule.head):
+        return iter(())
+    return ((rule, atom) for rule in rules for atom in rule.body if atom.kind == "different")
+
+
+class Kinds:
+    """What properties are declared for (rdfs:domain, rdfs:range): the kinds of things in TOMASys.
+
+    A reasoner contradicts no other use: it concludes that the thing is both, and a rule that needs both never fires.
+    Where an ontology or a rule makes something a thing of two kinds, none excludes another.
+    """
+
+    def __init__(self, content: Content, model: Model) -> None:
+        steps = [(s, str(o)) for s, p, o in content.triples if p in (RDFS + "subClassOf", OWL + "equivalentClass")]
+        self.of: dict[str, set[str]] = defaultdict(set)
+        for thing, name in (*memberships(content.triples), *steps):
+            self.of[thing] |= reached({name}, steps) & _KINDS
+        groups = (("Objective", model.objectives), ("FunctionGrounding", model.groundings))
+        for kind, individuals in (*groups, ("QAvalue", model.measurements)):
+            for each in individuals.values():
+                self.of[each.iri].add(TOMASYS + kind)
+        heads = content.head_classes()
+        self._is_mixed = any(len(kinds) > 1 for kinds in self.of.values()) or not _KINDS.isdisjoint(heads)
+        #: Kind by the property and the argument's number.
+        self.wanted: dict[tuple[str, int], str] = {}
+        for subject, predicate, value in content.triples:
+            if predicate in (RDFS + "domain", RDFS + "range") and value in _KINDS:
+                self.wanted[subject, int(predicate == RDFS + "range")] = str(value)
+
+    def uses(self, rule: Rule) -> Iterator[tuple[Atom, Term, str]]:
+        """(atom, argument, kind) wherever a rule needs a thing of a kind; classes in heads are concluded."""
+        if self._is_mixed:
+            return
+        for atom in rule.body:
+            if atom.kind == "class" and atom.predicate in _KINDS and len(atom.arguments) == 1:
+                yield atom, atom.arguments[0], atom.predicate
+        for atom in rule.atoms:
+            for number, term in enumerate(atom.arguments if atom.kind in ("object", "data") else ()):
+                kind = self.wanted.get((atom.predicate, number))
+                if kind is not None and not isinstance(term, Lit):
+                    yield atom, term, kind

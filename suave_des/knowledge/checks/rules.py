@@ -1,149 +1,380 @@
-"""Check the rules of a knowledge base together: where they come from, and what they can match."""
+"""Checks of the rules: well-formed ones, too, that cannot mean what their author wanted."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+import operator
+from collections import Counter, defaultdict
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
-from itertools import chain
+from itertools import chain, pairwise
 from pathlib import Path
+from typing import Final
 
-from suave_des.knowledge.checks.findings import Finding, Level, finding_from, relative_path
-from suave_des.knowledge.checks.kinds import Kinds, mixed_terms
-from suave_des.knowledge.checks.missions import did_you_mean_text, unreported_statuses
+from suave_des.errors import nearest, similar
+from suave_des.findings import Finding, Level
 from suave_des.knowledge.checks.model import (
+    Kinds,
     dead_rules,
-    no_value,
-    rules_without_values,
+    rules_for_other_models,
+    rules_of_2023,
     undeclared_differences,
     unmeasured_rules,
 )
-from suave_des.knowledge.checks.slips import slips
-from suave_des.knowledge.checks.thresholds import decided_comparisons
-from suave_des.knowledge.content import Content
-from suave_des.knowledge.model import Model
+from suave_des.knowledge.checks.registry import Found, Material, Scope, Subject, check, run_checks
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.ontology_file import OntologyFile
-from suave_des.knowledge.rules.checks import check_rule
-from suave_des.knowledge.rules.files import RulesFile
-from suave_des.knowledge.rules.names import Vocabulary
-from suave_des.knowledge.rules.syntax import Place, Rule
-from suave_des.knowledge.rules.writer import write_atom
+from suave_des.knowledge.ontology_file import is_metamodel
+from suave_des.knowledge.rdf import (
+    C_STATUS,
+    HAS_QA_VALUE,
+    HAS_VALUE,
+    IS_QA_TYPE,
+    NUMERIC,
+    TOMASYS,
+    XSD,
+    Lit,
+    canonical,
+    local_name,
+    number_in,
+)
+from suave_des.knowledge.rules import (
+    COMPARISON_OF,
+    COMPARISONS,
+    Atom,
+    Named,
+    Place,
+    Rule,
+    Term,
+    Variable,
+    literal_text,
+    mirrored,
+    write_atom,
+)
+from suave_des.knowledge.rules.checks import fatal_problems
+from suave_des.knowledge.rules.files import WITHOUT_NAME
+
+_FD_REALISABILITY: Final = TOMASYS + "fd_realisability"
+_COMPARE: Final[Mapping[str, Callable[[float, float], bool]]] = {
+    "=": operator.eq,
+    "!=": operator.ne,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+}
 
 
-def rules_from_text(file: RulesFile, vocabulary: Vocabulary, findings: list[Finding]) -> list[Rule]:
-    """The rules of a file whose names are all known; the others, and syntax errors, become findings."""
-    findings += map(finding_from, file.parsed.errors)
-    rules = []
-    for name, rule in file.looked_up(vocabulary):
-        if isinstance(rule, Rule):
-            rules.append(rule)
-        else:
-            findings.append(replace(finding_from(rule), rule=name))
-    return rules
+@check(Level.ERROR, Scope.RULES)
+def mistakes_that_pellet_ignores(material: Material) -> Iterator[Found]:
+    """Find what Pellet would drop or ignore without a word."""
+    skipped = set(map(id, rules_for_other_models(material)))
+    for rule in material.rules:
+        for each in fatal_problems(rule, material.vocabulary) if id(rule) not in skipped else ():
+            place = Place(each.line or 1, each.column) if each.column else None
+            yield rule, place, each.message, each.remedy
 
 
-def rule_problems(content: Content, vocabulary: Vocabulary, sources: Mapping[Path, OntologyFile]) -> Iterator[Finding]:
-    """Find what is wrong with each rule by itself, and rules that share a name."""
-    names = Counter(rule.name for rule in content.rules)
-    for rule in content.rules:
-        if names[rule.name] > 1:
-            yield _about(rule, sources, Level.WARN, f"{names[rule.name]} rules have this name", "rename one")
-        for problem in check_rule(rule, vocabulary):
-            if rule.enabled:
-                level, message = Level.ERROR if problem.is_fatal else Level.WARN, problem.message
-            else:
-                level, message = Level.INFO, f"switched off; {problem.message}"
-            yield _about(rule, sources, level, message, problem.remedy, problem.place)
+@check(Level.WARN, Scope.RULES)
+def shared_names(material: Material) -> Iterator[Found]:
+    """Find rules of one name, other than those of TOMASys and mros."""
+    names = Counter(rule.name for rule in material.content.rules)
+    sources = {rule.file: material.source(rule) for rule in material.content.rules}
+    others = {path for path, source in sources.items() if source is not None and is_metamodel(source)}
+    own = {rule.name for rule in material.content.rules if rule.file not in others}
+    for rule in material.content.rules:
+        if names[rule.name] > 1 and rule.name in own and not rule.name.endswith(WITHOUT_NAME):
+            yield rule, None, f"{names[rule.name]} rules have this name", "rename one"
 
 
-def replacing_rules(rules: Sequence[Rule], groups: Sequence[Sequence[Rule]]) -> Iterator[Finding]:
-    """Find the rules as text that replace a different rule of the same name."""
-    before = {rule.name: rule for rule in rules}
-    for group in groups:
-        for rule in group:
-            old = before.get(rule.name)
-            if old is not None and (old.text, old.enabled) != (rule.text, rule.enabled):
-                message = f"replaces the rule of this name in {relative_path(old.file)}"
-                yield _about(rule, {}, Level.WARN, message, "give it a different name, unless this is intended")
-        before |= {rule.name: rule for rule in group}
+@check(Level.INFO, Scope.RULES)
+def for_other_models(material: Material) -> Iterator[Found]:
+    """Note the rules of TOMASys and mros that need what this model does not have, a file in one line."""
+    by_file: dict[Path, list[str]] = defaultdict(list)
+    for rule in rules_for_other_models(material):
+        by_file[rule.file].append(rule.name)
+    for file, names in by_file.items():
+        yield file, None, f"rules for other models, which never fire in this one: {', '.join(names)}", None
 
 
-def rules_that_cannot_fire(
-    content: Content,
-    model: Model,
-    given: Collection[Path],
-    sources: Mapping[Path, OntologyFile],
-    measured: Collection[str] | None,
-) -> Iterator[Finding]:
-    """Find the rules that cannot, or hardly can, do what they should.
+@check(Level.WARN, Scope.RULES)
+def never_fires(material: Material) -> Iterator[Found]:
+    """Find rules with an atom that can hold in no state, or that need a value that nothing has."""
+    content, model = material.content, material.model
+    skipped = set(map(id, rules_for_other_models(material)))
+    found = [(rule, atom, f"{write_atom(atom)} holds in no state", None) for rule, atom in dead_rules(content, model)]
+    for rule, atom, problem, remedy in (*found, *unmeasured_rules(content, model, material.subject.measured)):
+        if id(rule) not in skipped:
+            skipped.add(id(rule))
+            yield rule, atom.place(), f"can never fire: {problem}", remedy
 
-    These are notes for imported ontologies, which have rules for many models.
 
-    Args:
-        content: the ontologies and rules.
-        model: what is in them.
-        given: files of the user's.
-        sources: the ontologies by their paths.
-        measured: quality attributes that missions measure; None: any.
+@check(Level.WARN, Scope.RULES)
+def equal_individuals(material: Material) -> Iterator[Found]:
+    """Find rules that ask for different individuals, where nothing makes any different."""
+    remedy = "add owl:AllDifferent to the ontology (Protégé: Different Individuals)"
+    for rule, atom in undeclared_differences(material.content):
+        problem = f"{write_atom(atom)} needs individuals that are declared different; different names are not enough"
+        yield rule, atom.place(), problem, remedy
+
+
+@check(Level.WARN, Scope.RULES)
+def things_of_two_kinds(material: Material) -> Iterator[Found]:
+    """Find variables and individuals that a rule would have to be of two kinds at once."""
+    kinds = Kinds(material.content, material.model)
+    for rule in material.rules:
+        known: dict[Term, tuple[str, str]] = {}
+        reported: set[Term] = set()
+        for atom, term, kind in kinds.uses(rule):
+            name = local_name(atom.predicate)
+            if isinstance(term, Named) and term not in known and (own := kinds.of.get(term.iri)):
+                known[term] = min(own), ""
+            before, by = known.setdefault(term, (kind, "" if atom.kind == "class" else name))
+            if kind != before and term not in reported:
+                reported.add(term)
+                thing = f"?{term.name}" if isinstance(term, Variable) else local_name(getattr(term, "iri", ""))
+                first = with_article(before) + (f" in {by}" if by else "")
+                yield rule, atom.place(), f"{thing} is {first}, but {with_article(kind)} in {name}", _use(atom, kinds)
+
+
+def _use(atom: Atom, kinds: Kinds) -> str | None:
+    """What a property is for."""
+    subject, value = (kinds.wanted.get((atom.predicate, number)) for number in (0, 1))
+    name = local_name(atom.predicate)
+    if subject is None:
+        return None
+    if value is None:
+        return f"{name} is a property of {with_article(subject)}"
+    return f"{name} leads from {with_article(subject)} to {with_article(value)}"
+
+
+def with_article(iri: str) -> str:
+    """Write the name of a class with its article."""
+    name = local_name(iri)
+    return f"{'an' if name[0] in 'AEIO' else 'a'} {name}"
+
+
+@check(Level.WARN, Scope.RULES)
+def misspelt_variables(material: Material) -> Iterator[Found]:
+    """Find variables that occur once, and whose name is nearly that of another."""
+    for rule in material.rules:
+        places: dict[str, list[Place | None]] = defaultdict(list)
+        values: dict[str, set[bool]] = defaultdict(set)
+        for atom in rule.atoms:
+            for number, term in enumerate(atom.arguments):
+                if isinstance(term, Variable):
+                    values[term.name].add(atom.takes_value(number))
+                    places[term.name].append(atom.place(number))
+        names = list(places)
+        for name in (each for each in names if len(places[each]) == 1):
+            near = [other for other in names if values[other] & values[name] and are_near(name, other)]
+            before = names[: names.index(name)]
+            meant = [other for other in near if len(places[other]) > 1] or [other for other in near if other in before]
+            if meant:
+                problem = f"?{name} occurs only here, and is another variable than ?{meant[0]}"
+                yield rule, places[name][0], problem, f"did you mean ?{meant[0]}?"
+
+
+def are_near(one: str, other: str) -> bool:
+    """Whether one name is probably a misspelling of the other: in its capitals, or in a letter inside it.
+
+    Names that differ in a digit, in their first letter or in a letter or two at their end are often meant:
+    ?speed1 and ?speed2, ?xpos and ?ypos, ?design and ?design_b.
     """
-
-    def level_in(rule: Rule) -> Level:
-        return Level.WARN if rule.file.resolve() in given else Level.INFO
-
-    dead = [(rule, atom, f"{write_atom(atom)} holds in no state", "") for rule, atom in dead_rules(content, model)]
-    known = {id(rule) for rule, *_ in dead}
-    for rule, atom, attribute in unmeasured_rules(content, model, measured):
-        if id(rule) not in known:
-            dead.append((rule, atom, *no_value(attribute, model)))
-    known = {id(rule) for rule, *_ in dead}
-    for rule, atom, attribute in rules_without_values(content, measured) if measured is not None else ():
-        if id(rule) not in known:
-            dead.append((rule, atom, f"missions do not measure {attribute}, and no ontology has a value of it", ""))
-    kinds = Kinds(content, model)
-    found = [(rule, atom, f"can never fire: {message}", remedy) for rule, atom, message, remedy in dead]
-    found += mixed_terms(content, kinds)
-    for rule, atom in undeclared_differences(content):
-        message = f"{write_atom(atom)} needs individuals that are declared different; different names are not enough"
-        found.append((rule, atom, message, "add owl:AllDifferent to the ontology (Protégé: Different Individuals)"))
-    for rule, atom, message, remedy in found:
-        yield _about(rule, sources, level_in(rule), message, remedy or None, atom.place())
-    for slip in slips(content, kinds):
-        yield _about(slip.rule, sources, level_in(slip.rule), slip.message, slip.remedy, slip.place)
+    if one.casefold() == other.casefold():
+        return one != other
+    short, long = sorted((one, other), key=len)
+    start = _same_letters(short, long)
+    end = _same_letters(short[start:][::-1], long[start:][::-1])
+    a, b = short[start : len(short) - end], long[start : len(long) - end]
+    if not start or not (a + b).islower() or not (a + b).isalpha():
+        return False
+    if sorted(a) == sorted(b):  # letters are exchanged
+        return len(a) == 2
+    is_inside = end > 0 or (not a and b == long[start - 1])
+    return len(a) <= 1 and len(b) == 1 and is_inside and len(short) >= (4 if a else 3)
 
 
-def misspelt_statuses(
-    content: Content,
-    reported: Mapping[str, Collection[str]],
-    given: Collection[Path],
-    sources: Mapping[Path, OntologyFile],
-) -> Iterator[Finding]:
-    """Find the rules that ask for a component's status that nothing reports: a warning where it is misspelt."""
-    known = sorted({*chain.from_iterable(reported.values())})
-    for rule, atom, status in unreported_statuses(content, known):
-        if rule.file.resolve() in given:
-            meant = did_you_mean_text(status, known)
-            level, remedy = Level.WARN, f'did you mean "{meant}"?'
-            if meant is None:
-                texts = ", ".join(f'"{each}"' for each in known)
-                level, remedy = Level.INFO, f"reported are {texts}; a function of your own can report others"
-            message = f'nothing in the simulation reports c_status "{status}"'
-            yield _about(rule, sources, level, message, remedy, atom.place(1))
+def _same_letters(one: str, other: str) -> int:
+    """Count the letters with which both begin."""
+    pairs = zip(one, other, strict=False)
+    return next((place for place, (a, b) in enumerate(pairs) if a != b), min(len(one), len(other)))
 
 
-def comparisons_out_of_range(
-    content: Content,
-    ranges: Mapping[str, tuple[float, float]],
-    given: Collection[Path],
-    sources: Mapping[Path, OntologyFile],
-) -> Iterator[Finding]:
-    """Find the rules of the user's that compare a measured value with a number beyond all that missions measure."""
-    for rule, atom, attribute, outcome in decided_comparisons(content, ranges):
-        if rule.file.resolve() in given:
-            low, high = ranges[attribute]
-            reached = f"{attribute} is between {low:g} and {high:g}"
-            message = f"{write_atom(atom)} {outcome} holds in this scenario: {reached}"
-            yield _about(rule, sources, Level.WARN, message, "check the number and its unit", atom.place())
+@check(Level.WARN, Scope.RULES)
+def two_values(material: Material) -> Iterator[Found]:
+    """Find what a rule asks, or concludes, to have two values of a property that has one."""
+    for rule in material.rules:
+        values: dict[tuple[str, Term], Term] = {}
+        for atom in rule.body:
+            if atom.predicate in material.functional and len(atom.arguments) == 2:
+                subject, value = atom.arguments
+                before = values.setdefault((atom.predicate, subject), value)
+                if not isinstance(before, Variable) and not isinstance(value, Variable) and not _same(before, value):
+                    name = local_name(atom.predicate)
+                    problem = f"{write_atom(atom)}: nothing has two values of {name}, so the rule never fires"
+                    yield rule, atom.place(), problem, "write a rule for each value"
+        equated = {term for atom in rule.body if COMPARISONS.get(atom.predicate) == "=" for term in atom.arguments}
+        for atom in rule.head:
+            asked = values.get((atom.predicate, atom.arguments[0])) if len(atom.arguments) == 2 else None
+            if asked is None or asked in equated or atom.kind != "data" or _same(asked, atom.arguments[1]):
+                continue
+            problem = f"{write_atom(atom)} contradicts {local_name(atom.predicate)} in the body, which holds as well"
+            yield rule, atom.place(), problem, "rules add facts, and change none"
+
+
+def _same(one: Term, other: Term) -> bool:
+    return one == other or (isinstance(one, Lit) and isinstance(other, Lit) and canonical(one) == canonical(other))
+
+
+@check(Level.WARN, Scope.RULES)
+def compared_with_itself(material: Material) -> Iterator[Found]:
+    """Find comparisons of a value with itself, by one variable or by two."""
+    for rule in material.rules:
+        holders: dict[Term, tuple[str, Term]] = {}
+        for atom in rule.body:
+            if atom.predicate in material.functional and atom.kind == "data":
+                holders.setdefault(atom.arguments[-1], (atom.predicate, atom.arguments[0]))
+        for atom in rule.body:
+            sign = COMPARISONS.get(atom.predicate)
+            terms = [term for term in atom.arguments if isinstance(term, Variable)]
+            if sign is None or len(terms) != 2:
+                continue
+            one, other = terms
+            holds = "always" if sign in ("=", "<=", ">=") else "never"
+            if one == other:
+                yield rule, atom.place(), f"{write_atom(atom)} compares ?{one.name} with itself: it {holds} holds", None
+            elif one in holders and holders[one] == holders.get(other):
+                name = local_name(holders[one][0])
+                problem = f"?{one.name} and ?{other.name} are the same {name}: {write_atom(atom)} {holds} holds"
+                yield rule, atom.place(), problem, "they need two different individuals"
+
+
+@check(Level.WARN, Scope.RULES)
+def no_effect(material: Material) -> Iterator[Found]:
+    """Find rules that conclude that a design is realisable, which no decision asks."""
+    is_asked = any(atom.predicate == _FD_REALISABILITY for rule in material.rules for atom in rule.body)
+    for rule in material.rules:
+        for atom in rule.head:
+            term = atom.arguments[-1] if atom.predicate == _FD_REALISABILITY and not is_asked else None
+            if isinstance(term, Lit) and term.text in ("true", "1"):
+                problem = "fd_realisability true has no effect: a design counts as realisable unless it is false"
+                yield rule, atom.place(), problem, "write the opposite condition, and conclude false"
+
+
+@check(Level.WARN, Scope.RULES)
+def comparisons_that_decide_nothing(material: Material) -> Iterator[Found]:
+    """Find comparisons that no value satisfies, alone or together, and those with a text that none is."""
+    vocabulary = material.vocabulary
+    for rule in material.rules:
+        holders = dict(rule.read_values())
+        asked: dict[str, list[tuple[str, float, str]]] = defaultdict(list)  # sign, number, how it is written
+        for atom, name, sign, value in _comparisons(rule):
+            holder = holders.get(name, "")
+            values = vocabulary.enumerations.get(holder)
+            if values is not None and sign in ("=", "!=") and value.text not in values:
+                holds, where = "never" if sign == "=" else "always", local_name(holder)
+                problem = f"{literal_text(value)} is not among the values of {where}: the comparison {holds} holds"
+                remedy = nearest(value.text, values) or f"one of {', '.join(sorted(values))}"
+                yield rule, atom.place(), problem, remedy
+            ranges = vocabulary.ranges.get(holder, frozenset())
+            if sign != "!=" and ranges and ranges <= NUMERIC and value.datatype not in NUMERIC:
+                compares = f"{local_name(COMPARISON_OF[sign])} compares ?{name}, a number"
+                problem = f"{compares}, with the text {literal_text(value)}: it never holds"
+                yield rule, atom.place(), problem, f"write {value.text} without quotes"
+            elif (number := number_in(value)) is not None:
+                asked[name].append((sign, float(number), f"{sign} {value.text}"))
+                if not _is_possible(asked[name]):
+                    problem = f"no value of ?{name} is {' and '.join(words for *_, words in asked[name])}"
+                    yield rule, atom.place(), f"{problem}: the rule never fires", "reverse one of the comparisons"
+                    asked[name].clear()
+
+
+def _comparisons(rule: Rule) -> Iterator[tuple[Atom, str, str, Lit]]:
+    """(comparison, variable, sign, literal) of each comparison with a literal, as if the variable were on the left."""
+    for atom in rule.body:
+        sign = COMPARISONS.get(atom.predicate)
+        if sign is not None and len(atom.arguments) == 2:
+            one, other = atom.arguments
+            if isinstance(one, Variable) and isinstance(other, Lit):
+                yield atom, one.name, sign, other
+            elif isinstance(one, Lit) and isinstance(other, Variable):
+                yield atom, other.name, mirrored(sign), one
+
+
+def _is_possible(asked: Iterable[tuple[str, float, str]]) -> bool:
+    """Whether a number satisfies all comparisons: one of theirs, one between two of them, or one beyond them."""
+    numbers = sorted({number for _, number, _ in asked})
+    tried = [numbers[0] - 1.0, *numbers, numbers[-1] + 1.0, *((low + high) / 2.0 for low, high in pairwise(numbers))]
+    return any(all(_COMPARE[sign](each, number) for sign, number, _ in asked) for each in tried)
+
+
+@check(Level.WARN, Scope.MISSIONS)
+def comparisons_decided_by_signals(material: Material) -> Iterator[Found]:
+    """Find the user's comparisons of a measured value with a number beyond all that missions measure."""
+    ranges = material.subject.ranges
+    if material.content.head_properties() & {HAS_QA_VALUE, IS_QA_TYPE, HAS_VALUE}:
+        return  # groundings have values from elsewhere, too
+    for rule in filter(material.is_own, material.rules):
+        measured = _measured(rule)
+        for atom, name, sign, value in _comparisons(rule):
+            number = number_in(value)
+            if number is None or measured.get(name) not in ranges:
+                continue
+            low, high = ranges[measured[name]]
+            tried = (low, high, min(max(float(number), low), high))
+            outcomes = {_COMPARE[sign](each, float(number)) for each in tried}
+            if len(outcomes) == 1:
+                outcome, reach = "always" if outcomes.pop() else "never", f"is between {low:g} and {high:g}"
+                problem = f"{write_atom(atom)} {outcome} holds in this scenario: {measured[name]} {reach}"
+                yield rule, atom.place(), problem, "check the number and its unit"
+
+
+def _measured(rule: Rule) -> dict[str, str]:
+    """Return the variables of a rule that stand for the number of a grounding's value, with its quality attribute."""
+    pairs = [(atom.predicate, *atom.arguments) for atom in rule.body if len(atom.arguments) == 2]
+    held = {term for predicate, _, term in pairs if predicate == HAS_QA_VALUE}
+    types = {
+        value: local_name(attribute.iri)
+        for predicate, value, attribute in pairs
+        if predicate == IS_QA_TYPE and value in held and isinstance(attribute, Named)
+    }
+    return {
+        number.name: types[value]
+        for predicate, value, number in pairs
+        if predicate == HAS_VALUE and value in types and isinstance(number, Variable)
+    }
+
+
+@check(Level.WARN, Scope.MISSIONS)
+def misspelt_statuses(material: Material) -> Iterator[Found]:
+    """Find the user's rules that ask for a component's status that is nearly one that the simulation reports.
+
+    Statuses that an ontology asserts, or a rule concludes, are known as well.
+    """
+    reported = {*chain.from_iterable((material.subject.reported or {}).values())}
+    by_capitals = {each.upper(): each for each in sorted(reported)}
+    asserted = [value for _, predicate, value in material.content.triples if predicate == C_STATUS]
+    heads = [atom.arguments[-1] for rule in material.rules for atom in rule.head if atom.predicate == C_STATUS]
+    known = {*reported, *(value.text for value in (*asserted, *heads) if isinstance(value, Lit))}
+    for rule in filter(material.is_own, material.rules):
+        asked = [(atom, atom.arguments[-1]) for atom in rule.body if atom.predicate == C_STATUS]
+        statuses = {status for _, status in asked if isinstance(status, Variable)}
+        for atom in rule.body:  # and in a comparison
+            if atom.predicate in (COMPARISON_OF["="], COMPARISON_OF["!="]) and not statuses.isdisjoint(atom.arguments):
+                asked += [(atom, term) for term in atom.arguments]
+        for atom, status in asked:
+            if isinstance(status, Lit) and status.datatype == XSD + "string" and status.text not in known:
+                meant = similar(status.text.upper(), by_capitals)
+                if meant is not None:
+                    problem = f'nothing in the simulation reports c_status "{status.text}"'
+                    yield rule, atom.place(1), problem, f'did you mean "{by_capitals[meant]}"?'
+
+
+@check(Level.INFO, Scope.RULES)
+def status_updatable(material: Material) -> Iterator[Found]:
+    """Note the rules that conclude the status UPDATABLE."""
+    for rule, atom in rules_of_2023(material.content):
+        problem = "contradicts any other status that an objective has in the same state; the files of 2023 do so"
+        yield rule, atom.place(), f"{write_atom(atom)} {problem}", "later files conclude o_updatable(?o, true)"
 
 
 def findings_on_rule(
@@ -157,28 +388,8 @@ def findings_on_rule(
         reported: the statuses that the simulation reports, by component.
         measured: the quality attributes that the scenario measures.
     """
+    files = [rule.file for rule in base.rules if rule.name == name]
+    subject = Subject(rules=files, reported=reported, measured=measured)
     content = replace(base.content, triples=(*base.content.triples, *base.model.triples()))
-    sources = {source.path: source for source in base.sources}
-    given = {rule.file.resolve() for rule in base.rules if rule.name == name}
-    found = chain(
-        rule_problems(content, base.vocabulary, sources),
-        rules_that_cannot_fire(content, base.model, given, sources, measured),
-        misspelt_statuses(content, reported, given, sources),
-    )
-    return (each for each in found if each.rule == name)
-
-
-def _about(
-    rule: Rule,
-    sources: Mapping[Path, OntologyFile],
-    level: Level,
-    message: str,
-    remedy: str | None = None,
-    at: Place | None = None,
-) -> Finding:
-    """Make a finding about a rule, with the line where it begins, or where an atom of it is."""
-    if rule.place is None:
-        line = sources[rule.file].line_of_rule(rule.name) if rule.file in sources else None
-    else:
-        line = int(rule.place.removeprefix("line ")) if at is None else at.line
-    return Finding(level, message, str(rule.file), line, rule.name, at.column if at else None, remedy)
+    material = Material(subject, base.sources, content, base.model, base.vocabulary)
+    return (each for each in run_checks(material, Scope.RULES, Scope.MISSIONS) if each.rule == name)

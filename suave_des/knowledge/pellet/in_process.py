@@ -16,9 +16,9 @@ from typing import Any, Final, NamedTuple
 from suave_des.errors import KnowledgeError
 from suave_des.knowledge.content import RULE_IRI, Terms
 from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet import jvm
+from suave_des.knowledge.pellet import java
 from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, canonical, facts_of, for_pellet, n_triple
-from suave_des.knowledge.rules.syntax import Atom, Rule
+from suave_des.knowledge.rules import Atom, Rule
 from suave_des.knowledge.state import ContradictionError
 
 _LITERAL: Final = re.compile(r"literal\((.*),([^,]*),([^,]*)\)", re.DOTALL)
@@ -32,15 +32,15 @@ one_at_a_time: Final = threading.RLock()
 
 def load_n_triples(text: str, *, explain: bool = False) -> Any:
     """Load a Pellet knowledge base; call this with the lock held."""
-    model = jvm.java_class("com.hp.hpl.jena.rdf.model.ModelFactory").createDefaultModel()
+    model = java.java_class("com.hp.hpl.jena.rdf.model.ModelFactory").createDefaultModel()
     if "\\U" in text:
         text = _ESCAPE.sub(lambda found: chr(int(found[1], 16)) if found[1] else found[0], text)
-    model.read(jvm.java_class("java.io.StringReader")(text), None, "N-TRIPLES")
-    knowledge_base = jvm.java_class(_PELLET + "KnowledgeBase")()
+    model.read(java.java_class("java.io.StringReader")(text), None, "N-TRIPLES")
+    knowledge_base = java.java_class(_PELLET + "KnowledgeBase")()
     knowledge_base.setDoExplanation(explain)
-    loader = jvm.java_class(_PELLET + "jena.graph.loader.DefaultGraphLoader")()
+    loader = java.java_class(_PELLET + "jena.graph.loader.DefaultGraphLoader")()
     loader.setKB(knowledge_base)
-    loader.load(jvm.java_class("java.util.Collections").singleton(model.getGraph()))
+    loader.load(java.java_class("java.util.Collections").singleton(model.getGraph()))
     return knowledge_base
 
 
@@ -49,7 +49,7 @@ def _java_errors(ontology: Ontology) -> Iterator[None]:
     """Convert Java's exceptions, if Pellet cannot use the ontologies at all, to an error for the user."""
     try:
         yield
-    except jvm.JavaError as error:
+    except java.JavaError as error:
         reason = " ".join(str(error).split()).rpartition("Exception: ")[2]
         raise KnowledgeError(
             f"Pellet cannot use the ontologies: {reason}",
@@ -75,8 +75,8 @@ class InProcessPellet:
         self._ontology = ontology
         terms = terms or ontology.content.decision_terms()
         with one_at_a_time, _java_errors(ontology):
-            jvm.start()
-            self._terms = jvm.java_class(_PELLET + "utils.ATermUtils")
+            java.start()
+            self._terms = java.java_class(_PELLET + "utils.ATermUtils")
             self._term = cache(self._terms.makeTermAppl)
             self._base = load_n_triples(ontology.content.n_triples())
             self._properties = [(name, self._term(name)) for name in terms.properties]
@@ -89,7 +89,7 @@ class InProcessPellet:
             self._known = self._collections(self._base)
             self._always = frozenset(self._read(self._base))
             self._refuse_dropped_rules()
-        jvm.make_archive_later()
+        java.make_archive_later()
 
     def infer(self, assertions: Sequence[Triple]) -> frozenset[Triple]:
         """Return all values of the properties to read, and members of the classes to read.
@@ -100,7 +100,7 @@ class InProcessPellet:
         Raises:
             KnowledgeError: they contradict one another, or the ontologies.
         """
-        jvm.start()  # an error in a process that was forked since
+        java.start()  # an error in a process that was forked since
         with one_at_a_time, _java_errors(self._ontology):
             copy = self._base.copy()
             for subject, predicate, value in assertions:
@@ -140,12 +140,12 @@ class InProcessPellet:
         """The (subject, values) entries of each property to read, and the members of each class to read."""
         return [
             *(knowledge_base.getPropertyValues(term).entrySet() for _, term in self._properties),
-            *(jvm.java_class("java.util.HashSet")(knowledge_base.getInstances(term)) for _, term in self._classes),
+            *(java.java_class("java.util.HashSet")(knowledge_base.getInstances(term)) for _, term in self._classes),
         ]
 
     def _refuse_dropped_rules(self) -> None:
         """Raise an error if Pellet logged that it drops a rule; warnings that name the rule come first."""
-        warnings = sorted(jvm.take_warnings(), key=lambda warning: _RULE.search(warning) is None)
+        warnings = sorted(java.take_warnings(), key=lambda warning: _RULE.search(warning) is None)
         for warning in warnings:
             named = _RULE.search(warning)
             if named is not None:
@@ -174,13 +174,13 @@ def entailed(text: str, asked: Iterable[Atom]) -> frozenset[Triple]:
     with one_at_a_time:
         knowledge_base = load_n_triples(text)
         found: set[Triple] = set()
-        term = jvm.java_class(_PELLET + "utils.ATermUtils").makeTermAppl
+        term = java.java_class(_PELLET + "utils.ATermUtils").makeTermAppl
         for kind, name in {(atom.kind, atom.predicate) for atom in asked} if knowledge_base.isConsistent() else ():
             if kind in ("object", "data"):
                 found.update(_values(knowledge_base.getPropertyValues(term(name)).entrySet(), name))
             elif kind == "class":
                 found.update(_members(knowledge_base.getInstances(term(name)), name))
-        jvm.take_warnings()
+        java.take_warnings()
         return frozenset(found)
 
 
@@ -200,7 +200,7 @@ class Trace(NamedTuple):
 
 def trace_contradiction(text: str) -> Trace:
     """Load contradictory N-Triples with Pellet's tracing, which is off otherwise, because it takes time."""
-    options = jvm.java_class(_PELLET + "PelletOptions")
+    options = java.java_class(_PELLET + "PelletOptions")
     options.USE_TRACING = True
     try:
         knowledge_base = load_n_triples(text, explain=True)
@@ -211,7 +211,7 @@ def trace_contradiction(text: str) -> Trace:
         return Trace(message, tuple(axioms), tuple(sorted(numbers)))
     finally:
         options.USE_TRACING = False
-        jvm.take_warnings()
+        java.take_warnings()
 
 
 def contradiction(ontology: Ontology, assertions: Sequence[Triple]) -> ContradictionError:

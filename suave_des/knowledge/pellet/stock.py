@@ -6,7 +6,6 @@ Slow (about a second each) and simple: the reference for the reasoner in this pr
 from __future__ import annotations
 
 import io
-import os
 import subprocess
 from collections.abc import Iterator, Sequence
 from decimal import Decimal
@@ -21,11 +20,10 @@ from rdflib.namespace import OWL, RDF, RDFS
 from rdflib.term import Node
 
 from suave_des.errors import KnowledgeError
-from suave_des.knowledge import java_archive
 from suave_des.knowledge.content import Terms
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import unescape
-from suave_des.knowledge.pellet.java import SHORT_LIVED, java_executable, launcher_environment
+from suave_des.knowledge.pellet.java import java_executable, launcher_environment
 from suave_des.knowledge.rdf import RDF as RDF_IRI
 from suave_des.knowledge.rdf import RDF_TYPE, XSD, Lit, Triple, n_triple, reached, term_of
 
@@ -38,15 +36,11 @@ class StockPellet:
 
     Args:
         terms: what to read after an inference; None: what decisions depend on, and what rules assert.
-        options: of Java.
     """
 
-    def __init__(self, ontology: Ontology, terms: Terms | None = None, options: Sequence[str] = ()) -> None:
+    def __init__(self, ontology: Ontology, terms: Terms | None = None) -> None:
         self._text = ontology.content.n_triples()
         self._properties, self._classes = terms or ontology.content.decision_terms()
-        jars = owlready2.reasoning._PELLET_CLASSPATH.split(os.pathsep)
-        self._archive = java_archive.archive_path(jars, SHORT_LIVED)
-        self._options = (*SHORT_LIVED, *options)
 
     def infer(self, assertions: Sequence[Triple], limit_s: float | None = None) -> frozenset[Triple] | None:
         """Return the values and members of the properties and classes to read; None for a contradiction.
@@ -55,8 +49,7 @@ class StockPellet:
             TimeoutError: it took longer than the limit; its Java process is ended.
         """
         # owlready2 passes these on to subprocess.run, and has no other parameter for it.
-        environment = launcher_environment(*self._options, *java_archive.options_for(self._archive))
-        owlready2.reasoning._subprocess_kargs.update(timeout=limit_s, env=environment)
+        owlready2.reasoning._subprocess_kargs.update(timeout=limit_s, env=launcher_environment())
         owlready2.JAVA_EXE = str(java_executable())
         world = owlready2.World()
         try:
@@ -67,7 +60,6 @@ class StockPellet:
                 _add_exactly(world, ontology, triple)
             if not _reason(world):
                 return None
-            java_archive.make_later(self._archive, "owlready2")
             return frozenset(self._read(world)) - {_as_float(triple) for triple in lossy}
         finally:
             world.close()

@@ -1,1 +1,338 @@
-"""SWRL rules: their parts, their text form, their RDF form, and checks of what Pellet would ignore."""
+"""SWRL rules: atoms over variables, named things and literals; their text; Pellet's built-ins.
+
+Rules of ontologies and rules as text have the same form, so that the same functions write and check both.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Final, Literal, NamedTuple
+
+from rdflib.term import Node
+
+from suave_des.errors import KnowledgeError
+from suave_des.knowledge.rdf import ESCAPES, OWL, PREFIXES, SWRL, SWRLB, XSD, Lit, RdfTriple, local_name, namespace
+
+
+class RuleError(KnowledgeError):
+    """A rule that cannot be read or used; the place names line and column."""
+
+
+class Variable(NamedTuple):
+    """A variable, by its name without the question mark."""
+
+    name: str
+
+
+class Named(NamedTuple):
+    """An individual by its IRI; as the parser returns it, perhaps by its bare name."""
+
+    iri: str
+
+
+class Place(NamedTuple):
+    """A position in a text; both numbers count from 1."""
+
+    line: int
+    column: int
+
+    def __str__(self) -> str:
+        """Return the form that error messages show."""
+        return f"line {self.line}, column {self.column}"
+
+
+Term = Variable | Named | Lit
+#: The kinds of atoms that SWRL has; "" is an atom whose name has not been looked up yet.
+AtomKind = Literal["", "class", "object", "data", "range", "same", "different", "builtin"]
+#: Kind by the name of the RDF class of an atom.
+KINDS: Final[dict[str, AtomKind]] = {
+    SWRL + "ClassAtom": "class",
+    SWRL + "IndividualPropertyAtom": "object",
+    SWRL + "DatavaluedPropertyAtom": "data",
+    SWRL + "DataRangeAtom": "range",
+    SWRL + "SameIndividualAtom": "same",
+    SWRL + "DifferentIndividualsAtom": "different",
+    SWRL + "BuiltinAtom": "builtin",
+}
+SAME: Final = OWL + "sameAs"
+DIFFERENT: Final = OWL + "differentFrom"
+#: The predicate of an atom on a class expression, which has no name.
+EXPRESSION: Final = "_:expression"
+
+
+@dataclass(frozen=True, slots=True)
+class Atom:
+    """One atom.
+
+    Attributes:
+        kind: what the predicate is used as.
+        predicate: IRI of a class, property, datatype or builtin; as the parser returns it, perhaps a bare name.
+        arguments: in order.
+        places: of the predicate and of each argument; empty when it was not read from text.
+    """
+
+    kind: AtomKind
+    predicate: str
+    arguments: tuple[Term, ...]
+    places: tuple[Place, ...] = field(default=(), compare=False)
+
+    def place(self, argument: int | None = None) -> Place | None:
+        """Place of the predicate, or of an argument."""
+        number = 0 if argument is None else argument + 1
+        return self.places[number] if number < len(self.places) else None
+
+    @property
+    def computes(self) -> bool:
+        """Whether it is a built-in that computes its first argument, and does not only test it."""
+        return self.kind == "builtin" and self.predicate not in TESTERS
+
+    def takes_value(self, argument: int) -> bool:
+        """Whether an argument stands for a value, not for an individual."""
+        return self.kind in ("builtin", "range") or (self.kind == "data" and argument == 1)
+
+    def variables(self) -> Iterator[str]:
+        """Names of the variables among the arguments."""
+        return (term.name for term in self.arguments if isinstance(term, Variable))
+
+
+@dataclass(frozen=True, slots=True)
+class ParsedRule:
+    """A rule as text, before its names are looked up.
+
+    Attributes:
+        body: atoms that must hold.
+        head: atoms that then hold.
+        enabled: whether it is enabled.
+        place: where it begins.
+    """
+
+    name: str
+    body: tuple[Atom, ...]
+    head: tuple[Atom, ...]
+    enabled: bool = True
+    place: Place = field(default=Place(1, 1), compare=False)
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One SWRL rule.
+
+    Attributes:
+        name: its rdfs:label, else the last part of its IRI, else its number among the unnamed of the file.
+        text: the rule in the human-readable syntax, body -> head.
+        file: the ontology file, or the file of rules as text.
+        enabled: false when swrla:isRuleEnabled says so; Pellet itself ignores that mark.
+        node: its node in the graph.
+        triples: its RDF.
+        body: atoms that must hold, each with its place: in the text for a rule from a graph, else in its file.
+        head: atoms that then hold.
+        place: "line 12" in a file of rules as text; None for a rule of an ontology.
+    """
+
+    name: str
+    text: str
+    file: Path
+    enabled: bool
+    node: Node = field(repr=False)
+    triples: tuple[RdfTriple, ...] = field(repr=False)
+    body: tuple[Atom, ...] = field(repr=False)
+    head: tuple[Atom, ...] = field(repr=False)
+    place: str | None = field(default=None, repr=False)
+
+    @property
+    def atoms(self) -> tuple[Atom, ...]:
+        """Body and head."""
+        return (*self.body, *self.head)
+
+    def read_values(self) -> Iterator[tuple[str, str]]:
+        """(variable, data property) of each atom of the body that reads a value."""
+        for atom in self.body:
+            if atom.kind == "data" and len(atom.arguments) == 2 and isinstance(atom.arguments[1], Variable):
+                yield atom.arguments[1].name, atom.predicate
+
+    @property
+    def properties(self) -> frozenset[tuple[str, bool]]:
+        """(property, whether it is used as a data property) of all atoms."""
+        return _properties(self.atoms)
+
+    @property
+    def head_properties(self) -> frozenset[tuple[str, bool]]:
+        """(property, whether its values are data) that the head asserts."""
+        return _properties(self.head)
+
+    @property
+    def head_classes(self) -> frozenset[str]:
+        """Classes that the head asserts membership in."""
+        return frozenset(atom.predicate for atom in self.head if atom.kind == "class" and atom.predicate != EXPRESSION)
+
+
+def _properties(atoms: Iterable[Atom]) -> frozenset[tuple[str, bool]]:
+    return frozenset(
+        (atom.predicate, atom.kind == "data") for atom in atoms if atom.kind in ("object", "data") and atom.predicate
+    )
+
+
+def texts_of(atoms: Iterable[Atom], predicate: str) -> set[str]:
+    """Texts that atoms mention as values of a property."""
+    terms = (term for atom in atoms if atom.predicate == predicate for term in atom.arguments)
+    return {term.text for term in terms if isinstance(term, Lit) and term.datatype == XSD + "string"}
+
+
+#: The sign of each built-in that compares two values.
+COMPARISONS: Final[Mapping[str, str]] = {
+    SWRLB + "equal": "=",
+    SWRLB + "notEqual": "!=",
+    SWRLB + "lessThan": "<",
+    SWRLB + "lessThanOrEqual": "<=",
+    SWRLB + "greaterThan": ">",
+    SWRLB + "greaterThanOrEqual": ">=",
+}
+#: The built-in of each sign.
+COMPARISON_OF: Final[Mapping[str, str]] = {sign: name for name, sign in COMPARISONS.items()}
+_TESTING_TEXT: Final = ["contains", "containsIgnoreCase", "endsWith", "matches", "startsWith", "stringEqualIgnoreCase"]
+#: Built-ins that compare, so that every argument must be bound; the others compute their first one.
+TESTERS: Final = frozenset((*COMPARISONS, *(SWRLB + name for name in _TESTING_TEXT)))
+#: Pellet's built-ins, with the least and the largest number of arguments.
+BUILTINS: Final[Mapping[str, tuple[int, int]]] = dict.fromkeys(TESTERS, (2, 2)) | {
+    SWRLB + name: counts
+    for names, counts in (
+        ("abs ceiling cos floor round sin tan unaryMinus unaryPlus booleanNot", (2, 2)),
+        ("lowerCase normalizeSpace stringLength upperCase", (2, 2)),
+        ("divide integerDivide mod pow subtract", (3, 3)),
+        ("add multiply", (3, 99)),
+        ("roundHalfToEven", (2, 3)),
+        ("stringConcat", (2, 99)),
+        ("substring", (3, 4)),
+        ("substringAfter substringBefore tokenize", (3, 3)),
+        ("replace translate", (4, 4)),
+        ("anyURI resolveURI", (2, 99)),
+        ("date", (4, 5)),
+        ("dateTime", (7, 8)),
+        ("time", (4, 5)),
+        ("dayTimeDuration", (2, 5)),
+        ("yearMonthDuration", (2, 3)),
+    )
+    for name in names.split()
+}
+
+
+def mirrored(sign: str) -> str:
+    """The sign of a comparison with its sides exchanged: > for <."""
+    return sign.translate(str.maketrans("<>", "><"))
+
+
+# Rules as text: for messages on one line, and for files so that they read back the same.
+
+_WORD: Final = re.compile(r"[^\W\d](?:[\w.-]*\w)?")
+#: Literals without quotes, by the datatype that the parser gives them.
+_BARE: Final = {
+    XSD + "boolean": re.compile(r"true|false"),
+    XSD + "integer": re.compile(r"[+-]?[0-9]+"),
+    XSD + "decimal": re.compile(r"[+-]?(?:[0-9]+\.[0-9]*|\.[0-9]+)"),
+    XSD + "double": re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)[eE][+-]?[0-9]{1,4}"),
+}
+#: Gives the text of an IRI.
+Naming = Callable[[str], str]
+
+
+def full_name(iri: str) -> str:
+    """Write an IRI with a known prefix, or in angle brackets: that reads back with any vocabulary."""
+    for prefix, start in PREFIXES.items():
+        if iri.startswith(start) and _WORD.fullmatch(iri[len(start) :]):
+            return f"{prefix}:{iri[len(start) :]}"
+    return f"<{iri}>"
+
+
+def naming(shared: Callable[[str], bool]) -> Naming:
+    """Write bare names, but full ones for IRIs whose last part alone is ambiguous or unknown.
+
+    Args:
+        shared: whether the bare name of an IRI means something else, or nothing.
+    """
+
+    def name(iri: str) -> str:
+        bare = local_name(iri)
+        if ":" not in iri or (namespace(iri) == SWRLB and not shared(iri)):
+            return bare
+        return bare if _WORD.fullmatch(bare) and bare not in ("true", "false") and not shared(iri) else full_name(iri)
+
+    return name
+
+
+def write_rule(name: str, body: Sequence[Atom], head: Sequence[Atom], named: Naming, *, enabled: bool = True) -> str:
+    """Write a rule for a rules file, one atom a line where one line would be long."""
+    word = name if _WORD.fullmatch(name) and name not in ("prefix", "disabled") else _quoted(name)
+    start = f"{'' if enabled else 'disabled '}{word}:"
+    sides = [[write_atom(atom, named) for atom in side] for side in (body, head)]
+    line = f"{start} {' ^ '.join(sides[0])}{' ' if body else ''}-> {' ^ '.join(sides[1])}"
+    if len(line) <= 110:
+        return line + "\n"
+    return f"{start}\n    " + "\n    ^ ".join(sides[0]) + "\n    -> " + "\n    ^ ".join(sides[1]) + "\n"
+
+
+def line_of_rule(body: Sequence[Atom], head: Sequence[Atom]) -> tuple[str, tuple[Atom, ...], tuple[Atom, ...]]:
+    """Write a rule on one line, body -> head; also return body and head with the places of their atoms in it."""
+    text = ""
+    placed: list[list[Atom]] = [[], []]
+    for side, atoms in enumerate((body, head)):
+        for number, atom in enumerate(atoms):
+            text += " ^ " if number else (" -> " if side and body else "-> " if side else "")
+            places = [Place(1, len(text) + 1)]
+            text += f"{_predicate(atom, local_name)}("
+            for count, argument in enumerate(atom.arguments):
+                text += ", " if count else ""
+                places.append(Place(1, len(text) + 1))
+                text += _term(argument, local_name)
+            text += ")"
+            placed[side].append(replace(atom, places=tuple(places)))
+    return text, tuple(placed[0]), tuple(placed[1])
+
+
+def write_atom(atom: Atom, named: Naming = local_name) -> str:
+    """Write one atom."""
+    return f"{_predicate(atom, named)}({', '.join(_term(term, named) for term in atom.arguments)})"
+
+
+def _predicate(atom: Atom, named: Naming) -> str:
+    return named(atom.predicate) if atom.predicate else "nothing"
+
+
+def _term(term: Term, named: Naming) -> str:
+    if isinstance(term, Variable):
+        return f"?{term.name}"
+    if isinstance(term, Named):
+        return named(term.iri)
+    bare = _BARE.get(term.datatype)
+    if bare is not None and bare.fullmatch(term.text):
+        return term.text
+    if term.datatype.startswith("@"):
+        return _quoted(term.text) + term.datatype
+    if term.datatype == XSD + "string":
+        return _quoted(term.text)
+    return f"{_quoted(term.text)}^^{full_name(term.datatype)}"
+
+
+def _quoted(text: str) -> str:
+    return f'"{text.translate(ESCAPES)}"'
+
+
+def distinct_variables(atoms: Iterable[Atom]) -> dict[str, str]:
+    """Choose a different short name for each variable, which is named by its IRI so far."""
+    chosen: dict[str, str] = {}
+    taken: set[str] = set()
+    for variable in dict.fromkeys(name for atom in atoms for name in atom.variables()):
+        wish = re.sub(r"[^\w-]", "_", local_name(variable)).lstrip("-") or "v"
+        name, number = wish, 2
+        while name in taken:
+            name, number = f"{wish}_{number}", number + 1
+        chosen[variable] = name
+        taken.add(name)
+    return chosen
+
+
+def literal_text(value: Lit) -> str:
+    """Write a literal as in a rule."""
+    return _term(value, local_name)

@@ -1,26 +1,34 @@
-"""Checks of rules: mistakes that Pellet silently drops or ignores, or that no reasoner could use.
+"""The names that rules may use, and checks of one rule for mistakes that Pellet drops in silence, or that none can use.
 
 Which mistakes Pellet ignores was found by giving it each of them (owlready2 0.51's Pellet).
 """
 
 from __future__ import annotations
 
-import re
-import warnings
-from collections import Counter
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from decimal import Decimal
-from operator import gt, lt
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Final
 
 from suave_des.errors import KnowledgeError, nearest
-from suave_des.knowledge.rdf import NUMERIC, OWL, RDF_TYPE, XSD, Lit, Triple, local_name, reached
-from suave_des.knowledge.rules.names import Vocabulary
-from suave_des.knowledge.rules.syntax import (
+from suave_des.findings import Finding, Level
+from suave_des.knowledge.rdf import (
+    LANGUAGE_NAMESPACES,
+    MROS,
+    OWL,
+    RDF_TYPE,
+    RDFS,
+    SWRLB,
+    TOMASYS,
+    XSD,
+    Lit,
+    Triple,
+    is_well_formed,
+    local_name,
+    reached,
+)
+from suave_des.knowledge.rules import (
     BUILTINS,
-    COMPARISON_OF,
-    COMPARISONS,
     EXPRESSION,
     TESTERS,
     Atom,
@@ -30,65 +38,146 @@ from suave_des.knowledge.rules.syntax import (
     RuleError,
     Term,
     Variable,
-    mirrored,
+    literal_text,
 )
-from suave_des.knowledge.rules.writer import literal_text
 
-_DECLARED_AS: Final = {"class": "class", "object": "object property", "data": "data property"}
-_ARGUMENTS: Final = {"class": 1, "range": 1, "object": 2, "data": 2, "same": 2, "different": 2}
-#: What a comparison with a number says of the value on its left, by its sign.
-_BOUNDS: Final = {"=": (">=", "<="), "<": ("<",), "<=": ("<=",), ">": (">",), ">=": (">=",)}
-#: Arguments of built-ins that are regular expressions, and divisors, by the built-in and the argument's number.
-_PATTERNS: Final = {("matches", 1), ("tokenize", 2)}
-_DIVISORS: Final = {("divide", 2), ("integerDivide", 2), ("mod", 2)}
-_DOUBLE: Final = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?INF|NaN")
-_LEXICAL: Final = {
-    XSD + "boolean": re.compile(r"true|false|0|1"),
-    XSD + "decimal": re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)"),
-    XSD + "integer": re.compile(r"[+-]?[0-9]+"),
-    XSD + "double": _DOUBLE,
-    XSD + "float": _DOUBLE,
+_DECLARED: Final = {
+    OWL + "Class": "class",
+    RDFS + "Class": "class",
+    OWL + "ObjectProperty": "object property",
+    OWL + "DatatypeProperty": "data property",
+    OWL + "AnnotationProperty": "annotation property",
+    RDFS + "Datatype": "datatype",
+    OWL + "NamedIndividual": "individual",
 }
 
 
-@dataclass(frozen=True, slots=True)
-class RuleProblem:
-    """Something wrong with a rule.
+@dataclass(frozen=True)
+class Vocabulary:
+    """The names that rules may use.
 
     Attributes:
-        message: what is wrong.
-        place: where in the rule's file (rules as text), or in the rule's own text (rules of ontologies).
-        remedy: how to correct it.
-        is_fatal: whether the rule cannot work; otherwise it is only suspicious.
+        kinds: what each IRI is declared as or used as: class, object property, data property, annotation property,
+            datatype, individual.
+        by_name: IRIs by their last part.
+        ranges: datatypes that the values of a data property can have, where that is one datatype or a choice of them.
+        enumerations: the values that a data property can have, where its range lists them.
     """
 
-    message: str
-    place: Place | None
-    remedy: str | None = None
-    is_fatal: bool = True
+    kinds: Mapping[str, frozenset[str]]
+    by_name: Mapping[str, tuple[str, ...]]
+    ranges: Mapping[str, frozenset[str]]
+    enumerations: Mapping[str, frozenset[str]] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        triples: Collection[Triple],
+        individuals: Iterable[str] = (),
+        enumerations: Mapping[str, frozenset[str]] | None = None,
+    ) -> Vocabulary:
+        """Collect the names in triples.
+
+        Args:
+            triples: of the ontologies.
+            individuals: further ones, that exist only in states.
+            enumerations: the values that data properties can have, where their ranges list them.
+        """
+        kinds: dict[str, set[str]] = defaultdict(set, {OWL + "Thing": {"class"}, OWL + "Nothing": {"class"}})
+        ranges: dict[str, set[str]] = defaultdict(set)
+        by_name: dict[str, list[str]] = defaultdict(list)
+        for subject, predicate, value in triples:
+            if predicate == RDF_TYPE and isinstance(value, str):
+                if value in _DECLARED or not value.startswith(LANGUAGE_NAMESPACES):
+                    kinds[subject].add(_DECLARED.get(value, "individual"))
+            elif not predicate.startswith(LANGUAGE_NAMESPACES):
+                kinds[subject].add("individual")
+                if isinstance(value, str):
+                    kinds[value].add("individual")
+            elif predicate == RDFS + "range" and isinstance(value, str) and value.startswith(XSD):
+                ranges[subject].add(value)
+        for iri in individuals:
+            kinds[iri].add("individual")
+        for iri in sorted(kinds):
+            by_name[local_name(iri)].append(iri)
+        return cls(
+            {iri: frozenset(found) for iri, found in kinds.items()},
+            {name: tuple(found) for name, found in by_name.items()},
+            # All ranges of a property hold at once; which values several of them leave is not worked out.
+            {name: frozenset(found) for name, found in ranges.items() if len(found) == 1}
+            | dict.fromkeys(enumerations or (), frozenset((XSD + "string",))),
+            enumerations or {},
+        )
+
+    def candidates(self, name: str) -> tuple[str, ...]:
+        """IRIs that a bare name can mean: those of TOMASys and mros take precedence over others."""
+        found = self.by_name.get(name, ())
+        shared = tuple(iri for iri in found if iri.startswith((TOMASYS, MROS)))
+        return shared or found or ((SWRLB + name,) if SWRLB + name in BUILTINS else ())
+
+    def means_itself(self, iri: str) -> bool:
+        """Whether the bare name of an IRI means that IRI."""
+        return self.candidates(local_name(iri)) == (iri,)
+
+    def guess(self, name: str, wanted: Collection[str]) -> str | None:
+        """Suggest a name of the wanted kinds, as a question."""
+        bare = local_name(name)
+        known = [each for each, iris in self.by_name.items() if any(self.kinds[iri] & {*wanted} for iri in iris)]
+        if "builtin" in wanted:
+            known += map(local_name, BUILTINS)
+        if bare in known and bare != name:
+            return f"did you mean {' or '.join(self.candidates(bare))}?"
+        return nearest(bare, known)
 
 
-def check_rule(rule: Rule, vocabulary: Vocabulary) -> list[RuleProblem]:
-    """Find all problems of one rule, in the order of its text."""
-    problems = list(_check_variables(rule))
-    for number, atom in enumerate(rule.atoms):
-        problems += _check_atom(atom, vocabulary, is_head=number >= len(rule.body))
-    problems += _check_comparisons(rule, vocabulary)
-    if not rule.head:
-        problems.append(RuleProblem("the rule concludes nothing", None, "write at least one atom after ->"))
-    return sorted(problems, key=lambda problem: (problem.place or Place(0, 0), problem.message))
+#: What is wrong in a rule: where, in words, and what would be right, if that is known.
+Problem = tuple[Place | None, str, str | None]
+_DECLARED_AS: Final = {"class": "class", "object": "object property", "data": "data property"}
+_WRITTEN: Final = {
+    "class": "write {}(?x, ?y)",
+    "data": "its second argument is an individual, not a value",
+    "object": "its second argument is a value, not an individual",
+}
+_ARGUMENTS: Final = {"class": 1, "range": 1, "object": 2, "data": 2, "same": 2, "different": 2}
 
 
-def fatal_problems(rule: Rule, vocabulary: Vocabulary) -> list[RuleProblem]:
+def about_rule(
+    rule: Rule,
+    message: str,
+    place: Place | None = None,
+    remedy: str | None = None,
+    level: Level = Level.ERROR,
+    line: int | None = None,
+) -> Finding:
+    """Make a finding about a rule, with the line where it begins, or where an atom of it is.
+
+    Args:
+        rule: the rule.
+        message, remedy, level: of the finding.
+        place: of the atom or argument.
+        line: of the rule in its file, if it is one of an ontology.
+    """
+    if rule.place is not None:
+        line = int(rule.place.removeprefix("line ")) if place is None else place.line
+    return Finding(level, message, str(rule.file), line, rule.name, place.column if place else None, remedy)
+
+
+def fatal_problems(rule: Rule, vocabulary: Vocabulary) -> list[Finding]:
     """Find the problems with which a rule cannot work, in the order of its text."""
-    return [problem for problem in check_rule(rule, vocabulary) if problem.is_fatal]
+    found = list(_variable_problems(rule))
+    for number, atom in enumerate(rule.atoms):
+        found += _atom_problems(atom, vocabulary, is_head=number >= len(rule.body))
+    if not rule.head:
+        found.append((None, "the rule concludes nothing", "write at least one atom after ->"))
+    ordered = sorted(found, key=lambda problem: (problem[0] or Place(0, 0), problem[1]))
+    return [about_rule(rule, message, place, remedy) for place, message, remedy in ordered]
 
 
 def first_error(rule: Rule, vocabulary: Vocabulary) -> RuleError | None:
     """The first fatal problem of a rule of a text file, as an error."""
-    for problem in fatal_problems(rule, vocabulary):
-        place = str(problem.place) if problem.place else rule.place
-        return RuleError(f"rule {rule.name}: {problem.message}", file=rule.file, place=place, remedy=problem.remedy)
+    for each in fatal_problems(rule, vocabulary):
+        place = f"line {each.line}, column {each.column}" if each.column else rule.place
+        return RuleError(f"rule {rule.name}: {each.message}", file=rule.file, place=place, remedy=each.remedy)
     return None
 
 
@@ -111,170 +200,96 @@ def check_property_use(triples: Iterable[Triple], rules: Iterable[Rule]) -> None
                 raise KnowledgeError(f"{local_name(name)} is {used}", file=rule.file, place=where, remedy=remedy)
 
 
-def _check_atom(atom: Atom, vocabulary: Vocabulary, *, is_head: bool) -> Iterator[RuleProblem]:
+def _atom_problems(atom: Atom, vocabulary: Vocabulary, *, is_head: bool) -> Iterator[Problem]:
     name = local_name(atom.predicate)
-    if atom.kind == "builtin":
-        yield from _check_builtin(atom, name, is_head=is_head)
-        return
-    if atom.kind == "" or not atom.predicate:
-        yield RuleProblem("an atom without a kind that SWRL knows, or without a name", atom.place())
-        return
-    if atom.kind == "range":
-        if not atom.predicate.startswith(XSD) and "datatype" not in vocabulary.kinds.get(atom.predicate, ()):
-            yield RuleProblem(f"datatype {name} is not defined", atom.place())
-    elif atom.kind in _DECLARED_AS and atom.predicate != EXPRESSION:
-        wrong = _check_predicate(atom, name, vocabulary)
-        if wrong is not None:
-            yield wrong
-            return
-    wanted = _ARGUMENTS[atom.kind]
-    if len(atom.arguments) != wanted:
-        words = "one argument" if wanted == 1 else "two arguments"
-        yield RuleProblem(f"{name} takes {words}, not {len(atom.arguments)}", atom.place())
-        return
     for number, term in enumerate(atom.arguments):
-        yield from _check_argument(atom, number, term, vocabulary, is_head=is_head)
+        if isinstance(term, Lit) and not is_well_formed(term):
+            yield atom.place(number), f"{term.text!r} is not an xsd:{local_name(term.datatype)}", None
+            return
+    if atom.kind == "builtin":
+        yield from _builtin_problems(atom, name, is_head=is_head)
+    elif atom.kind == "" or not atom.predicate:
+        yield atom.place(), "an atom without a kind that SWRL knows, or without a name", None
+    elif (wrong := _predicate_problem(atom, name, vocabulary)) is not None:
+        yield wrong
+    elif len(atom.arguments) != (wanted := _ARGUMENTS[atom.kind]):
+        words = "one argument" if wanted == 1 else "two arguments"
+        yield atom.place(), f"{name} takes {words}, not {len(atom.arguments)}", None
+    else:
+        for number, term in enumerate(atom.arguments):
+            yield from _argument_problems(atom, number, term, vocabulary, is_head=is_head)
 
 
-def _check_predicate(atom: Atom, name: str, vocabulary: Vocabulary) -> RuleProblem | None:
-    """Check that a class or property is declared, and used as declared."""
+def _predicate_problem(atom: Atom, name: str, vocabulary: Vocabulary) -> Problem | None:
+    """Check that a class, property or datatype is declared, and used as declared."""
     declared = vocabulary.kinds.get(atom.predicate, frozenset())
-    wanted = _DECLARED_AS[atom.kind]
-    if wanted in declared:
+    if atom.kind == "range":
+        is_known = atom.predicate.startswith(XSD) or "datatype" in declared
+        return None if is_known else (atom.place(), f"datatype {name} is not defined", None)
+    wanted = _DECLARED_AS.get(atom.kind)
+    if wanted is None or wanted in declared or atom.predicate == EXPRESSION:
         return None
+    if not declared:
+        kinds = ("class",) if atom.kind == "class" else ("object property", "data property")
+        remedy = vocabulary.guess(atom.predicate, kinds) or f"declare it as {wanted} in the ontology"
+        return atom.place(), f"{wanted} {name} is not defined", remedy
     if "class" in declared:
-        return RuleProblem(f"{name} is a class, but is used as a property", atom.place(), f"write {name}(?x)")
+        return atom.place(), f"{name} is a class, but is used as a property", f"write {name}(?x)"
     found = next((kind for kind in ("object property", "data property") if kind in declared), None)
-    if found is not None:
-        remedy = {
-            "class": f"write {name}(?x, ?y)",
-            "data": "its second argument is an individual, not a value",
-            "object": "its second argument is a value, not an individual",
-        }[atom.kind]
-        return RuleProblem(f"{name} is {_a(found)}, but is used as {_a(wanted)}", atom.place(), remedy)
-    if declared:
-        return RuleProblem(f"{name} is {_a(min(declared))}, but is used as {_a(wanted)}", atom.place())
-    kinds = ("class",) if atom.kind == "class" else ("object property", "data property")
-    remedy = vocabulary.guess(atom.predicate, kinds) or f"declare it as {wanted} in the ontology"
-    return RuleProblem(f"{wanted} {name} is not defined", atom.place(), remedy)
+    problem = f"{name} is {_a(found or min(declared))}, but is used as {_a(wanted)}"
+    return atom.place(), problem, _WRITTEN[atom.kind].format(name) if found else None
 
 
 def _a(kind: str) -> str:
     return f"{'an' if kind[0] in 'aio' else 'a'} {kind}"
 
 
-def _check_argument(
+def _argument_problems(
     atom: Atom, number: int, term: Term, vocabulary: Vocabulary, *, is_head: bool
-) -> Iterator[RuleProblem]:
+) -> Iterator[Problem]:
     """Check that an argument is an individual or a value, as required, and possible for that property."""
     name, place, takes_value = local_name(atom.predicate), atom.place(number), atom.takes_value(number)
     if isinstance(term, Lit) and not takes_value:
-        yield RuleProblem(f"{name}: {literal_text(term)} is a value, but an individual is needed", place)
+        yield place, f"{name}: {literal_text(term)} is a value, but an individual is needed", None
     elif isinstance(term, Named):
         thing = local_name(term.iri)
         if takes_value:
             problem = f"{name}: {thing} is an individual where a value is needed"
-            yield RuleProblem(problem, place, f'a text needs quotes: "{thing}"')
+            yield place, problem, f'a text needs quotes: "{thing}"'
         elif "individual" not in vocabulary.kinds.get(term.iri, ()):
-            remedy = vocabulary.guess(term.iri, ("individual",))
-            yield RuleProblem(f"individual {thing} is not defined", place, remedy)
+            yield place, f"individual {thing} is not defined", vocabulary.guess(term.iri, ("individual",))
     elif isinstance(term, Lit) and atom.kind == "data":
-        lexical = _LEXICAL.get(term.datatype)
+        consequence = "contradicts whatever it is concluded of" if is_head else "never matches"
         ranges = vocabulary.ranges.get(atom.predicate, frozenset({term.datatype}))
+        values = vocabulary.enumerations.get(atom.predicate, frozenset({term.text}))
         whole = term.datatype == XSD + "integer" and XSD + "decimal" in ranges  # matches no decimal, but is one
-        if lexical is not None and not lexical.fullmatch(term.text.strip()):
-            yield RuleProblem(f"{term.text!r} is not {_a(local_name(term.datatype))}", place)
-        elif term.datatype not in ranges and not (whole and is_head):
+        if term.datatype not in ranges and not (whole and is_head):
             wanted = " or ".join(sorted(map(local_name, ranges)))
-            consequence = "contradicts whatever it is concluded of" if is_head else "never matches"
             problem = f"{literal_text(term)} is not {_a(wanted)}, the range of {name}: it {consequence}"
-            yield RuleProblem(problem, place, f"write {term.text}.0" if whole else f"a value of {wanted}")
-        elif term.text not in (values := vocabulary.enumerations.get(atom.predicate, frozenset({term.text}))):
-            consequence = "contradicts whatever it is concluded of" if is_head else "never matches"
+            yield place, problem, f"write {term.text}.0" if whole else f"a value of {wanted}"
+        elif term.text not in values:
             problem = f"{literal_text(term)} is not among the values of {name}: it {consequence}"
-            yield RuleProblem(problem, place, nearest(term.text, values) or f"one of {', '.join(sorted(values))}")
+            yield place, problem, nearest(term.text, values) or f"one of {', '.join(sorted(values))}"
 
 
-def _check_comparisons(rule: Rule, vocabulary: Vocabulary) -> Iterator[RuleProblem]:
-    """Find comparisons that no value satisfies, alone or together, so that the rule never fires."""
-    holders = dict(rule.read_values())
-    least: dict[str, tuple[Decimal, bool, str]] = {}  # number, whether it is excluded, how it is written
-    most: dict[str, tuple[Decimal, bool, str]] = {}
-    for atom in rule.body:
-        sign = COMPARISONS.get(atom.predicate, "")
-        if not sign or len(atom.arguments) != 2:
-            continue
-        one, other = atom.arguments
-        if isinstance(one, Lit) and isinstance(other, Variable):
-            one, other, sign = other, one, mirrored(sign)
-        if not (isinstance(one, Variable) and isinstance(other, Lit)):
-            continue
-        values = vocabulary.enumerations.get(holders.get(one.name, ""))
-        if values is not None and sign in ("=", "!=") and other.text not in values:
-            where, consequence = local_name(holders[one.name]), "never" if sign == "=" else "always"
-            problem = f"{literal_text(other)} is not among the values of {where}: the comparison {consequence} holds"
-            remedy = nearest(other.text, values) or f"one of {', '.join(sorted(values))}"
-            yield RuleProblem(problem, atom.place(), remedy, is_fatal=False)
-        if sign not in _BOUNDS:
-            continue
-        ranges = vocabulary.ranges.get(holders.get(one.name, ""), frozenset())
-        if ranges and ranges <= NUMERIC and other.datatype not in NUMERIC:
-            name = local_name(COMPARISON_OF[sign])
-            problem = f"{name} compares ?{one.name}, a number, with the text {literal_text(other)}: it never holds"
-            yield RuleProblem(problem, atom.place(), f"write {other.text} without quotes", is_fatal=False)
-        elif other.datatype in NUMERIC and _LEXICAL[XSD + "decimal"].fullmatch(other.text.strip()):
-            number = Decimal(other.text.strip())
-            for side in _BOUNDS[sign]:
-                bounds, is_tighter = (least, gt) if side[0] == ">" else (most, lt)
-                bound = number, "=" not in side, f"{'=' if sign == '=' else side} {other.text}"
-                known = bounds.get(one.name)
-                if known is None or is_tighter(number, known[0]) or (number == known[0] and bound[1]):
-                    bounds[one.name] = bound
-            if one.name in least and one.name in most:
-                low, high = least[one.name], most[one.name]
-                if low[0] > high[0] or (low[0] == high[0] and (low[1] or high[1])):
-                    problem = f"no value of ?{one.name} is {low[2]} and {high[2]}: the rule never fires"
-                    yield RuleProblem(problem, atom.place(), "reverse one of the comparisons", is_fatal=False)
-
-
-def _check_builtin(atom: Atom, name: str, *, is_head: bool) -> Iterator[RuleProblem]:
+def _builtin_problems(atom: Atom, name: str, *, is_head: bool) -> Iterator[Problem]:
     counts = BUILTINS.get(atom.predicate)
     if counts is None:
-        known = f"known: {', '.join(sorted(map(local_name, BUILTINS)))}"
-        suggestion = nearest(name, map(local_name, BUILTINS)) or known
-        yield RuleProblem(f"there is no builtin {name} in Pellet", atom.place(), suggestion)
+        known = sorted(map(local_name, BUILTINS))
+        suggestion = nearest(name, known) or f"known: {', '.join(known)}"
+        yield atom.place(), f"there is no builtin {name} in Pellet", suggestion
         return
     if is_head:
-        yield RuleProblem(f"builtin {name} occurs in the head", atom.place(), "Pellet takes builtins in bodies only")
+        yield atom.place(), f"builtin {name} occurs in the head", "Pellet takes builtins in bodies only"
     least, most = counts
     if not least <= len(atom.arguments) <= most:
         wanted = str(least) if least == most else f"{least} or more" if most == 99 else f"{least} to {most}"
         has_comma = [isinstance(term, Lit) and term.datatype == XSD + "integer" for term in atom.arguments[-2:]]
         remedy = "write decimals with a point" if has_comma == [True, True] else None
-        yield RuleProblem(f"{name} takes {wanted} arguments, not {len(atom.arguments)}", atom.place(), remedy)
+        yield atom.place(), f"{name} takes {wanted} arguments, not {len(atom.arguments)}", remedy
     for number, term in enumerate(atom.arguments):
         if isinstance(term, Named):
-            problem = f"{name}: {local_name(term.iri)} is an individual where a value is needed"
-            yield RuleProblem(problem, atom.place(number))
-        elif isinstance(term, Lit) and (name, number) in _PATTERNS and _is_broken(term.text):
-            problem = f"{name}: {literal_text(term)} is not a regular expression, so it never holds"
-            yield RuleProblem(problem, atom.place(number), is_fatal=False)
-        elif isinstance(term, Lit) and (name, number) in _DIVISORS and re.fullmatch(r"[+-]?[0.]+", term.text):
-            problem = f"{name} by {term.text} has no result, so it never holds"
-            yield RuleProblem(problem, atom.place(number), is_fatal=False)
-
-
-def _is_broken(pattern: str) -> bool:
-    """Whether a regular expression is wrong in any language; Pellet uses Java's."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # about what Java has and Python may have one day
-            re.compile(pattern)
-    except re.error as error:
-        if error.msg == "nothing to repeat":  # Java repeats anchors, such as ^
-            return pattern[: error.pos][-1:] in ("", "(", "|")
-        return error.msg.startswith(("unterminated character set", "missing )", "unbalanced"))
-    return False
+            yield atom.place(number), f"{name}: {local_name(term.iri)} is an individual where a value is needed", None
 
 
 def _uses(atoms: Iterable[Atom]) -> Iterator[tuple[Atom, int, str]]:
@@ -285,22 +300,14 @@ def _uses(atoms: Iterable[Atom]) -> Iterator[tuple[Atom, int, str]]:
                 yield atom, number, term.name
 
 
-def _check_variables(rule: Rule) -> Iterator[RuleProblem]:
+def _variable_problems(rule: Rule) -> Iterator[Problem]:
     """Find unbound variables, and variables that stand for both an individual and a value."""
     individuals: dict[str, Place] = {}
     values: dict[str, Place] = {}
     for atom, number, name in _uses(rule.atoms):
         (values if atom.takes_value(number) else individuals).setdefault(name, atom.place(number) or Place(0, 0))
     for name in sorted(individuals.keys() & values.keys()):
-        place = max(individuals[name], values[name])
-        yield RuleProblem(f"?{name} stands for an individual and for a value", place)
-    uses = [(name, atom.place(number)) for atom, number, name in _uses(rule.atoms)]
-    counts = Counter(name for name, _ in uses)
-    for name, at in uses:
-        others = [each for each in counts if each != name and each.casefold() == name.casefold()]
-        if counts[name] == 1 and others:
-            problem = f"?{name} occurs only here, and is another variable than ?{others[0]}"
-            yield RuleProblem(problem, at, f"did you mean ?{others[0]}?", is_fatal=False)
+        yield max(individuals[name], values[name]), f"?{name} stands for an individual and for a value", None
     bound = {
         name for atom in rule.body if atom.kind in ("class", "object", "data", "same") for name in atom.variables()
     }
@@ -312,11 +319,11 @@ def _check_variables(rule: Rule) -> Iterator[RuleProblem]:
         if name not in bound:
             reason = "" if number or atom.predicate in TESTERS else ", nor can be computed"
             problem = f"?{name} has no value in {local_name(atom.predicate)}: no other atom binds it{reason}"
-            yield RuleProblem(problem, atom.place(number), nearest(name, known - {name}))
+            yield atom.place(number), problem, nearest(name, known - {name})
     for atom, number, name in _uses(rule.head):
         if name not in bound:
             problem = f"?{name} occurs in the head, but the body does not bind it"
-            yield RuleProblem(problem, atom.place(number), nearest(name, bound))
+            yield atom.place(number), problem, nearest(name, bound)
 
 
 def _computed(builtins: Iterable[Atom], bound: set[str]) -> set[str]:

@@ -16,32 +16,19 @@ from __future__ import annotations
 
 import re
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from suave_des.errors import nearest
-from suave_des.knowledge.rdf import MROS, OWL, RDF, RDFS, SUAVE, SWRL, SWRLA, SWRLB, TOMASYS, XSD, Lit, local_name
-from suave_des.knowledge.rules.syntax import BUILTINS, Atom, Named, ParsedRule, Place, RuleError, Term, Variable
+from suave_des.knowledge.rdf import PREFIXES, XSD, Lit, is_well_formed, local_name
+from suave_des.knowledge.rules import BUILTINS, Atom, Named, ParsedRule, Place, RuleError, Term, Variable
 
 if TYPE_CHECKING:
     from lark import Lark, Token
 
-#: Prefixes that need not be declared.
-PREFIXES: Final[Mapping[str, str]] = {
-    "mros": MROS,
-    "owl": OWL,
-    "rdf": RDF,
-    "rdfs": RDFS,
-    "suave": SUAVE,
-    "swrl": SWRL,
-    "swrla": SWRLA,
-    "swrlb": SWRLB,
-    "tomasys": TOMASYS,
-    "xsd": XSD,
-}
 #: Prefixes of further built-ins, which Protégé's SWRLTab has and Pellet has not.
 _FOREIGN_BUILTINS: Final = ("sqwrl", "swrlm", "swrlx", "temporal")
 MAX_DIGITS: Final = 400
@@ -295,7 +282,10 @@ class _Builder:
         datatype = more[0][1]
         if ":" not in datatype:
             raise self._wrong(token, f"datatype {datatype} without a prefix", f"write xsd:{datatype}")
-        return Lit(text, datatype)
+        literal = Lit(text, datatype)
+        if not is_well_formed(literal):
+            raise self._wrong(token, f"{text!r} is not an xsd:{local_name(datatype)}")
+        return literal
 
     def _place(self, token: Token) -> Place:
         assert token.line is not None and token.column is not None

@@ -1,1 +1,0 @@
-"""Calibration: fits parameters of a scenario to published runs."""

@@ -1,0 +1,282 @@
+"""Executors on this machine: this process, or worker processes that are replaced when they die."""
+
+from __future__ import annotations
+
+import errno
+import os
+import pickle
+import signal
+import sys
+import time
+import traceback
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field
+from itertools import islice, repeat
+from multiprocessing import Pipe, resource_tracker
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
+from typing import Any, Self
+
+from suave_des.campaign.missions import Campaign, Chunk, Finished, WorkerError
+from suave_des.errors import SuaveDesError
+from suave_des.imports import main_hidden
+from suave_des.interrupts import INTERRUPTS, signals_deferred
+from suave_des.records.store import MissionKey
+from suave_des.registry import is_built_in
+
+_LARGEST_CHUNK = 10
+"""Missions: few, as chunks under way are lost when a campaign is stopped, and workers are to end together."""
+_AHEAD = 2
+"""Chunks at a worker at any time: one under way, one waiting, so that it is never idle."""
+_ATTEMPTS = 3
+"""How many times a worker may die with a mission before the mission has failed."""
+_IN_A_ROW = 8
+"""Workers that may end one after the other without an outcome in between."""
+_MARGIN_S = 60.0
+"""Added to the time that a chunk's missions may take, such as for starting Java, before its worker is killed."""
+_START_S = 300.0
+"""The same while it is starting: Python, perhaps from a slow shared disk, and the compiler."""
+_STOP_TIMEOUT_S = 5.0
+_SAFE_PATH, _MAIN = "PYTHONSAFEPATH", "__main__:"
+_Task = tuple[Chunk, int]
+"""Missions to run, and how many times a worker has died with them."""
+
+
+def in_process(campaign: Campaign, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
+    """Run missions one after the other in this process; an Executor."""
+    from suave_des.campaign.missions import MissionRunner  # with it comes the compiler, which takes a while
+
+    for finished in MissionRunner(campaign).each(missions):
+        yield [finished]
+
+
+class LocalWorkers:
+    """Runs chunks of missions in worker processes; an Executor, and a context at whose end they are stopped.
+
+    Workers are spawned, never forked: a forked child would hang on its parent's Java virtual machine. One that dies
+    before its work is done (killed, out of memory, a crash of Java) is replaced, and the missions that it was running
+    are run again one by one. A mission during which that happens _ATTEMPTS times has failed; so has one that its own
+    time-out does not end.
+
+    Each worker has a pipe of its own. A ProcessPoolExecutor has one for all, and waits for ever when a worker is killed
+    while it writes into it; it does not say either which chunk a worker had.
+
+    Args:
+        managers: whose missions are run.
+        workers: number of processes; they start at once, and import what they need.
+    """
+
+    def __init__(self, managers: Sequence[str], workers: int) -> None:
+        self._may_be_killed = all(map(is_built_in, managers))
+        self._size, self._workers, self._is_done, self._in_a_row = workers, list[_Worker](), False, 0
+
+    def __enter__(self) -> Self:
+        """Start the workers."""
+        with ExitStack() as stack:
+            stack.push(self.__exit__)
+            for _ in range(self._size):
+                self._start()
+            stack.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop the workers: at once, unless a user's manager may have files to close."""
+        for worker in self._workers:
+            worker.stop(at_once=self._may_be_killed or not self._is_done)
+        for worker in self._workers:
+            worker.join()
+
+    def outcomes(self, campaign: Campaign, missions: Iterable[MissionKey], total: int) -> Iterator[list[Finished]]:
+        """Yield outcomes chunk by chunk; see Executor."""
+        size = max(1, min(_LARGEST_CHUNK, total // (self._size * 10)))
+        remaining = iter(missions)
+        self._campaign, self._packed = campaign, packed(campaign)
+        self._tasks = zip(iter(lambda: tuple(islice(remaining, size)), ()), repeat(0))
+        self._again: deque[_Task] = deque()
+        for worker in self._workers:
+            worker.send(self._packed)
+        self._hand_out()
+        while busy := [worker for worker in self._workers if worker.tasks]:
+            due_s = min(worker.due_s(campaign.spec.time_out_s) for worker in busy)
+            ready = wait([worker.connection for worker in busy], max(0.0, due_s - time.monotonic()))
+            for worker in (worker for worker in busy if worker.connection in ready):
+                try:
+                    found = worker.connection.recv()
+                except (EOFError, OSError):  # also in the middle of a message
+                    yield from self._replace(worker)
+                    continue
+                if isinstance(found, BaseException):
+                    raise found
+                worker.since_s, worker.is_starting = time.monotonic(), False
+                if found is not None:
+                    worker.tasks.popleft()
+                    self._in_a_row = 0
+                    self._hand_out()
+                    yield found
+            for worker in busy:
+                if worker.tasks and time.monotonic() >= worker.due_s(campaign.spec.time_out_s):
+                    worker.is_overdue = True
+                    worker.process.kill()  # its pipe then ends
+        self._is_done = True
+
+    def _start(self) -> _Worker:
+        """Start a worker and note it, before an interruption can come in between."""
+        try:
+            with _quietly():
+                here, there = Pipe()
+                process = SpawnProcess(target=work, args=(there,))
+                process.start()
+                there.close()
+                self._workers.append(worker := _Worker(process, here))
+            return worker
+        except OSError as error:  # the system's limit of processes, files or memory
+            problem = f"a worker process cannot be started: {error.strerror}"
+            raise WorkerError(f"{problem} (raise the limit, see ulimit -a, or give --workers 1)") from None
+
+    def _hand_out(self) -> None:
+        """Give every worker its share while there are missions to run."""
+        for share in range(1, _AHEAD + 1):
+            for worker in self._workers:
+                if len(worker.tasks) < share:
+                    task = self._again.popleft() if self._again else next(self._tasks, None)
+                    if task is None:
+                        return
+                    if not worker.tasks:
+                        worker.since_s = time.monotonic()
+                    worker.tasks.append(task)
+                    worker.send(task[0])
+
+    def _replace(self, worker: _Worker) -> Iterator[list[Finished]]:
+        """Replace a worker that died; the first of its chunks was running."""
+        worker.stop(at_once=True)
+        status = worker.join()
+        self._workers.remove(worker)
+        self._in_a_row += 1
+        if self._in_a_row >= _IN_A_ROW:
+            what = f"{_IN_A_ROW} worker processes in a row ended before a mission was done"
+            raise WorkerError(f"{what}, the last with status {status} (killed, or out of memory?)")
+        (suspects, died), *others = worker.tasks
+        attempts = died + 1
+        if len(suspects) == 1 and worker.is_overdue:
+            yield [self._campaign.timed_out(suspects[0])]
+        elif len(suspects) == 1 and attempts >= _ATTEMPTS:
+            cause = f"its worker process ended with status {status}, {attempts} times (killed, or out of memory?)"
+            yield [self._campaign.failed(suspects[0], cause)]
+        else:
+            self._again.extend(((key,), attempts) for key in suspects)
+        self._again.extend(others)
+        self._start().send(self._packed)
+        self._hand_out()
+
+
+@dataclass
+class _Worker:
+    """One worker process.
+
+    Attributes:
+        process: the process.
+        connection: this end of its pipe; it ends when the process does.
+        tasks: what it was given, oldest first.
+        since_s: when the oldest began.
+        is_starting: whether it is not ready for them yet.
+        is_overdue: whether it was killed because it took too long.
+    """
+
+    process: SpawnProcess
+    connection: Connection[Any, Any]
+    tasks: deque[_Task] = field(default_factory=deque)
+    since_s: float = 0.0
+    is_starting: bool = True
+    is_overdue: bool = False
+
+    def send(self, message: object) -> None:
+        """Send a message; a process that has ended is noticed when its pipe is read."""
+        with suppress(OSError):
+            self.connection.send(message)
+
+    def due_s(self, time_out_s: float) -> float:
+        """Return the time by which its oldest chunk must be done."""
+        return self.since_s + time_out_s * len(self.tasks[0][0]) + _MARGIN_S + self.is_starting * _START_S
+
+    def stop(self, *, at_once: bool) -> None:
+        """Stop the process: at once, or when it has finished its chunks."""
+        if at_once:
+            self.process.kill()
+        self.connection.close()
+
+    def join(self) -> int | None:
+        """Wait for the process to end, and return its exit status; it is killed if that takes long."""
+        self.process.join(_STOP_TIMEOUT_S)
+        self.process.kill()
+        self.process.join()
+        return self.process.exitcode
+
+
+@contextmanager
+def _quietly() -> Iterator[None]:
+    """Let a process start that leaves Ctrl-C and kill to this one, and imports neither its script nor its files.
+
+    It inherits that the signals are blocked. A file such as signal.py in the current folder would be taken for Python's
+    own module of that name while Python starts.
+    """
+    was_safe = os.environ.get(_SAFE_PATH)
+    os.environ[_SAFE_PATH] = "1"
+    try:
+        resource_tracker.ensure_running()  # or the first start does it, which lets the signals through again
+        with main_hidden(), signals_deferred():
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
+            try:
+                yield
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    finally:
+        if was_safe is None:
+            del os.environ[_SAFE_PATH]
+
+
+def packed(campaign: Campaign) -> bytes:
+    """Pack a campaign, and the classes of it that the main program defines, which no other process can import."""
+    own = [name.removeprefix(_MAIN) for name in campaign.code() if name.startswith(_MAIN)]
+    if not own:
+        return pickle.dumps(({}, campaign))
+    import cloudpickle  # takes a class by its content where it cannot be imported
+
+    content: bytes = cloudpickle.dumps(({name: getattr(sys.modules["__main__"], name) for name in own}, campaign))
+    return content
+
+
+def unpacked(content: bytes) -> Campaign:
+    """Unpack a campaign, and define the classes that came with it where missions look for them."""
+    definitions, campaign = pickle.loads(content)
+    for name, each in definitions.items():
+        setattr(sys.modules["__main__"], name, each)
+    assert isinstance(campaign, Campaign)
+    return campaign
+
+
+# What runs in a worker process.
+
+
+def work(connection: Connection[Any, Any]) -> None:
+    """Receive a campaign, then chunks of its missions, and send back their outcomes, until the other end is closed."""
+    from suave_des.campaign.missions import MissionRunner  # everything that missions need, before the campaign arrives
+
+    with suppress(EOFError, BrokenPipeError, ConnectionResetError):  # the campaign is over, or its process has ended
+        each = None
+        while True:
+            message = connection.recv()
+            answer: object = None
+            try:
+                if each is None:
+                    each = MissionRunner(unpacked(message)).each
+                else:
+                    answer = list(each(message))
+            except MemoryError:
+                os._exit(errno.ENOMEM)  # as if it had been killed for it: a new worker begins with little
+            except SuaveDesError as error:
+                answer = error
+            except Exception:
+                answer = RuntimeError(traceback.format_exc())
+            connection.send(answer)

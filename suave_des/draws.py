@@ -1,0 +1,97 @@
+"""What is random in one mission: each random quantity has a stream of its own, so that adding one changes no other."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import random
+from collections.abc import Callable, Mapping
+from functools import cache
+from operator import attrgetter
+
+from suave_des.scenario.models import Scenario
+from suave_des.scenario.quantities import Distribution, Drawn, draw
+
+_entry = cache(attrgetter)
+
+
+class Streams:
+    """The random streams of one run of a campaign.
+
+    A stream depends on the campaign's seed, the run's number and its own name only: not on the manager, so that runs
+    with the same number use common random numbers, and not on which other streams exist or in which order they are
+    created.
+
+        visibility = Streams(seed=1, run=7).stream("visibility")
+    """
+
+    def __init__(self, seed: int, run: int) -> None:
+        self._key = f"{seed}/{run}/"
+
+    def stream(self, name: str) -> random.Random:
+        """Create the generator of a name; two of the same name draw the same values."""
+        digest = hashlib.blake2b((self._key + name).encode(), digest_size=16).digest()
+        return random.Random(int.from_bytes(digest, "big"))
+
+
+class Draws(Streams):
+    """The random streams of a run, and the values that are drawn once for the whole run.
+
+    Where a scenario gives a plain number instead of a distribution, the number is the value.
+
+    Args:
+        scenario: gives numbers or distributions.
+        seed: the campaign's.
+        run: number of the run, from 1.
+        runs_per_draw: how many runs in a row share the value drawn for a key path; one, if the path is not in it.
+
+    Attributes:
+        drawn: values that hold for the whole run, by key path.
+
+    Example:
+        >>> draws = Draws(load_scenario("seams2023").scenario, seed=1, run=7)
+        >>> draws.value("calibration.altitude_error_m") == draws.drawn["calibration.altitude_error_m"]
+        True
+    """
+
+    def __init__(self, scenario: Scenario, seed: int, run: int, runs_per_draw: Mapping[str, int] = {}) -> None:
+        super().__init__(seed, run)
+        self._scenario, self._seed, self._run, self._runs_per_draw = scenario, seed, run, runs_per_draw
+        self.drawn: dict[str, float] = {}
+
+    def value(self, key: str, distribution: Distribution | None = None, least: float = -math.inf) -> float:
+        """Draw the run's value for a key of the scenario.
+
+        Args:
+            key: key path, which names the stream.
+            distribution: None: the scenario's entry at that path.
+            least: values below count as this.
+        """
+        found = self.entry(key) if distribution is None else distribution
+        if not isinstance(found, float):
+            shared_by = self._runs_per_draw.get(key, 1)
+            first = (self._run - 1) // shared_by * shared_by + 1  # of the runs that share the value
+            found = found.draw(Streams(self._seed, first).stream(_stream_name(key, found)))
+        value = self.drawn[key] = max(least, found)
+        return value
+
+    def entry(self, key: str) -> Distribution:
+        """Return the scenario's entry at a key path."""
+        found: Distribution = _entry(key)(self._scenario)
+        return found
+
+    def each_time(self, key: str, distribution: Distribution) -> Callable[[], float]:
+        """Make a function that draws a new value at each call."""
+        if isinstance(distribution, float):
+            return lambda: distribution
+        stream = self.stream(_stream_name(key, distribution))
+        return lambda: draw(distribution, stream)
+
+    def phase(self, timer: str, period_s: float) -> float:
+        """Draw the phase of a periodic timer: nodes start at arbitrary times, others in each run."""
+        return self.stream(f"phase/{timer}").random() * period_s
+
+
+def _stream_name(key: str, distribution: Drawn) -> str:
+    """Name the stream that a key's values are drawn from: its own, or that of a draw that several keys share."""
+    return key if distribution.shared is None else f"shared/{distribution.shared}"

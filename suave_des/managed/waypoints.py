@@ -1,0 +1,184 @@
+"""Functions that fly the vehicle along way-points, one after the other, without an event for each.
+
+The exemplar's functions check at every tick of a timer whether their way-point is reached; then they send the next one.
+Nothing else changes at most ticks, so a function looks ahead: it queues the next way-points, knows the tick at which
+each will be reached, and sets an alarm for the tick at which it has to act. When the vehicle's control changes earlier,
+it counts the ticks until then, and looks ahead again from there.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass, field
+from enum import Enum, auto
+from typing import Final
+
+from suave_des.clock import Alarm
+from suave_des.compiling import Array
+from suave_des.managed.node import FunctionNode, SetPointSender
+from suave_des.vehicle.vehicle import ArrivalCheck
+
+QUEUED_WAYPOINTS: Final = 20
+"""Number of way-points queued in addition to the current one; with 10, missions take 7% more CPU time."""
+
+
+class Due(Enum):
+    """What is done with the current way-point at the next tick at which the function acts."""
+
+    SEND = auto()
+    """It is sent, as it is a new one."""
+    RESEND = auto()
+    """It is sent again, as it was not reached in time."""
+    LOOK = auto()
+    """Nothing is sent, but looked ahead again: the way-points have changed, or the last one sent is resumed."""
+
+
+@dataclass(eq=False)
+class WaypointFunction(FunctionNode):
+    """Base of functions that generate way-points, each sent when the one before is reached.
+
+    It ticks from `start_at` until `stop`, or until no way-point is left. Between two ticks at which it acts, the
+    vehicle flies through the way-points that were queued; then the last of them is reached (SEND), or one is not
+    reached in time (RESEND).
+
+    Attributes:
+        sender: the connection to the autopilot.
+    """
+
+    sender: SetPointSender
+    _check: ArrivalCheck | None = field(default=None, init=False)  # None before the first tick and after the last
+    _due: Due = field(default=Due.SEND, init=False)
+    _act_at: int = field(default=0, init=False)  # the next tick at which it acts
+    _arrivals: list[int] = field(default_factory=list, init=False)  # ticks that will find the queued ones reached
+    _sent: int = field(default=-1, init=False)  # tick at which the current way-point was sent last
+    _is_sent_again: bool = field(default=False, init=False)  # whether that was not the first time
+
+    def __post_init__(self) -> None:
+        self._alarm, self._looking_again = Alarm(self.env, self._act), Alarm(self.env, self._look_again)
+        self.sender.vehicle.control_listeners.append(self._control_changed)
+
+    # What a function says of its way-points.
+
+    def arrival_check(self, start_s: float) -> ArrivalCheck:
+        """Return when and where a way-point counts as reached, with tick 0 at a mission time."""
+        raise NotImplementedError
+
+    def waypoints(self, count: int) -> Array:
+        """Return at most `count` way-points from the current one on, shape (n, >= 3); the first columns are x, y, z.
+
+        None is left when the last one has been reached.
+        """
+        raise NotImplementedError
+
+    def set_point_z_m(self) -> float:
+        """Return the z to send, which may differ from the way-point's."""
+        raise NotImplementedError
+
+    def reached(self, count: int) -> None:
+        """Advance by `count` way-points, which have been reached, starting with the current one."""
+
+    def not_reached(self) -> None:
+        """React to a way-point that was not reached in time, and will be sent again."""
+
+    def tick(self) -> None:
+        """React to a tick at which the function acts, before it does."""
+
+    def completed(self) -> None:
+        """React to the end of the way-points."""
+
+    # How they are flown.
+
+    def start_at(self, t_s: float, *, resumes: bool = False) -> None:
+        """Start ticking at mission time t, and send the current way-point, unless the last one sent is resumed."""
+        self._due, self._is_sent_again = Due.LOOK if resumes else Due.SEND, self._is_sent_again and resumes
+        self._arrivals, self._act_at = [], 0
+        if t_s > self.env.now:
+            self._alarm.set(t_s)
+        else:
+            self._act()
+
+    def stop(self) -> None:
+        """Stop ticking, and cancel the queued way-points."""
+        self.catch_up()
+        self._alarm.cancel()
+        self._looking_again.cancel()
+        check, self._check = self._check, None
+        if check is not None:
+            self.sender.vehicle.cancel_waypoints(self.env.now, check)
+            self._sent -= self._last_tick(check) + 1  # on resumption the first tick is 0 again
+
+    def catch_up(self) -> None:
+        """Count the way-points that have been reached by now."""
+        if self._check is not None:
+            self._count_arrivals(self._last_tick(self._check))
+
+    def waypoints_changed(self) -> None:
+        """Look ahead again at the next tick after the way-points change (call `catch_up` before they do)."""
+        check = self._check
+        if check is not None and self._act_at > (tick := self._last_tick(check)):
+            self.sender.vehicle.cancel_waypoints(self.env.now, check)
+            self._looking_again.cancel()
+            self._arrivals, self._due = [], Due.LOOK
+            self._set_alarm(check, tick + 1)
+
+    def _act(self) -> None:
+        """Do what is due at this tick, and look ahead to the next tick at which something is."""
+        check = self._check = self._check or self.arrival_check(self.env.now)
+        tick = self._act_at
+        self._count_arrivals(tick)
+        self.tick()
+        while self._check is not None and self._act_at == tick:
+            if self._due is Due.RESEND:
+                self.not_reached()
+                self._is_sent_again = True
+            if self._due is Due.LOOK:
+                self._look_ahead(check, tick, first=tick)
+            else:
+                self._sent = tick
+                self._look_ahead(check, tick, first=tick + check.first_check_ticks)
+
+    def _look_ahead(self, check: ArrivalCheck, tick: int, first: int) -> None:
+        """Queue the way-points, the current one included if it is due, and see when they will be reached."""
+        waypoints = self.waypoints(1 + QUEUED_WAYPOINTS)
+        if len(waypoints) == 0:
+            self._check = None
+            self.completed()
+            return
+        last = self._sent + (check.resend_again_ticks if self._is_sent_again else check.resend_ticks)
+        z_m, send = self.set_point_z_m(), self._due is not Due.LOOK
+        self._arrivals, act_at = self.sender.queue(waypoints, z_m, check, first=first, last=last, send=send)
+        self._due = Due.SEND if self._arrivals[-1:] == [act_at] else Due.RESEND
+        if act_at > tick:
+            self._set_alarm(check, act_at)
+        else:
+            self._act_at = tick
+            self._count_arrivals(tick)
+
+    def _control_changed(self, row: int, check: ArrivalCheck | None) -> None:
+        """Look ahead again after a change of control by somebody else, and all others in the same event."""
+        if self._check is not None and self._check is not check and self._due is not Due.LOOK:
+            self._looking_again.set_now()
+
+    def _look_again(self) -> None:
+        check = self._check
+        if check is not None and self._act_at > (tick := self._last_tick(check)):
+            self._count_arrivals(tick)
+            self._due = Due.LOOK
+            self._look_ahead(check, tick, first=tick + 1)
+
+    def _count_arrivals(self, tick: int) -> None:
+        reached = bisect_right(self._arrivals, tick)
+        if reached:
+            self._sent = self._arrivals[reached - 1]
+            del self._arrivals[:reached]
+            is_sent_separately = self._due is Due.SEND and not self._arrivals  # the set-point after the last one queued
+            self.sender.queued_were_sent(reached - is_sent_separately)
+            self._is_sent_again = False
+            self.reached(reached)
+
+    def _last_tick(self, check: ArrivalCheck) -> int:
+        return check.last_tick_until(self.env.now)
+
+    def _set_alarm(self, check: ArrivalCheck, tick: int) -> None:
+        self._act_at = tick
+        self._alarm.set(check.time_s(tick))

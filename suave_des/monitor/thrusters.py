@@ -1,0 +1,120 @@
+"""The vehicle's thrusters, which fail and recover; and the exemplar's thruster monitor, which makes them do so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import simpy
+
+from suave_des.clock import Process, tick_at_or_after, until
+from suave_des.domain import THRUSTER_NAMES
+from suave_des.draws import Draws
+from suave_des.monitor.diagnostics import FAILED, RECOVERED, Diagnostic, DiagnosticsBus, Kind
+from suave_des.monitor.measurements import Timing
+from suave_des.scenario.models import Scenario
+from suave_des.scenario.physical import ThrusterEvent
+from suave_des.scenario.revision import ThrusterFailureRevision
+from suave_des.vehicle.vehicle import Vehicle
+
+
+@dataclass(eq=False)
+class Thrusters:
+    """The health of the vehicle's thrusters.
+
+    Attributes:
+        env: the mission's clock.
+        vehicle: the vehicle.
+        revision: says whether a mission's first failure may have no effect.
+        draws: of the run.
+        log: adds an event to the mission's record.
+        unrecoverable: thrusters that f_maintain_motion cannot recover at present.
+        working: mission times at which thrusters failed or recovered, and how many worked from then on.
+    """
+
+    env: simpy.Environment
+    vehicle: Vehicle
+    revision: ThrusterFailureRevision
+    draws: Draws
+    log: Callable[[str, str, str], None]
+    unrecoverable: set[int] = field(default_factory=set, init=False)
+    working: list[tuple[float, int]] = field(default_factory=list, init=False)
+    _had_failure: bool = field(default=False, init=False)
+
+    def apply(self, event: ThrusterEvent) -> None:
+        """Let one of the scenario's events happen to the vehicle now."""
+        fails = event.event == "failure"
+        is_first_failure = fails and not self._had_failure
+        self._had_failure |= fails
+        if is_first_failure and self._has_no_effect():
+            self.log("thruster_monitor", "failure_without_effect", THRUSTER_NAMES[event.thruster - 1])
+            return
+        if fails and not event.recoverable:
+            self.unrecoverable.add(event.thruster)
+        else:
+            self.unrecoverable.discard(event.thruster)
+        self._set_health(event.thruster, 0.0 if fails else 1.0)
+
+    def recover(self, thruster: int) -> bool:
+        """Recover a thruster; return whether it can be recovered."""
+        if thruster in self.unrecoverable:
+            return False
+        self._set_health(thruster, 1.0)
+        return True
+
+    def _set_health(self, thruster: int, health: float) -> None:
+        self.vehicle.set_thruster_health(self.env.now, thruster, health)
+        self.working.append((self.env.now, self.vehicle.working_thrusters))
+
+    def _has_no_effect(self) -> bool:
+        """Decide whether the mission's first failure, which happens now, has no effect on the vehicle."""
+        if self.env.now < self.revision.effective_from_s:
+            return True
+        probability = self.revision.loss_probability
+        return probability > 0.0 and self.draws.stream("thruster_failures").random() < probability
+
+
+Schedule = Sequence[tuple[ThrusterEvent, float]]
+"""A scenario's thruster events, each with its time in a run, as the revision counts it, s."""
+
+
+def draw_schedule(scenario: Scenario, draws: Draws) -> Schedule:
+    """Draw the times of the thruster events for a run."""
+    keys = [f"thruster_events.{number}.time_s" for number in range(len(scenario.thruster_events))]
+    events = zip(scenario.thruster_events, keys, strict=True)
+    return [(event, draws.value(key, event.time_s, least=0.0)) for event, key in events]
+
+
+def thruster_monitor(
+    thrusters: Thrusters,
+    bus: DiagnosticsBus,
+    schedule: Schedule,
+    timing: Timing,
+    after_previous: bool,
+    is_lost: Callable[[float], bool] | None = None,
+) -> Process:
+    """Let the scheduled failures and recoveries happen, and publish them.
+
+    Once a period the monitor checks the first event of the list that has not happened yet: so several that are due
+    come one period apart, in list order, and a later one waits for the one before it.
+
+    Args:
+        thrusters: what happens to them.
+        bus: where it is published.
+        schedule: the events.
+        timing: when the monitor checks.
+        after_previous: whether each time counts from the event before it (revision 2023) or from the start (1.5).
+        is_lost: says whether the message at a mission time is not published; None: each one is.
+    """
+    env, counted_from_s, earliest_s = thrusters.env, 0.0, 0.0
+    for event, time_s in schedule:
+        due_s = max(counted_from_s + time_s, earliest_s)
+        tick_s = tick_at_or_after(due_s, timing.phase_s, timing.period_s)
+        yield until(env, tick_s)
+        thrusters.apply(event)
+        if is_lost is None or not is_lost(env.now):
+            status = FAILED if event.event == "failure" else RECOVERED
+            bus.publish(Diagnostic(env.now, Kind.COMPONENT_STATUS, THRUSTER_NAMES[event.thruster - 1], status))
+        earliest_s = tick_s + timing.period_s
+        if after_previous:
+            counted_from_s = tick_s

@@ -1,0 +1,1 @@
+"""Files of results: what stands in them, and how each is written and read."""

@@ -1,0 +1,376 @@
+"""Missions, real or simulated, in the CSV files in which they come: how they are read, and the exemplar's written.
+
+The exemplar's runner (kas-lab/suave) writes a file for each manager and mission, MANAGER_MISSION.csv, which its scripts
+look for by name.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas
+from numpy.typing import NDArray
+
+from suave_des.errors import InputError, line_error, number_of, shown
+from suave_des.files import csv_pieces, read_csv
+from suave_des.records.metrics import COLUMN_TYPES, DISTANCE, FOUND, REACTION_TIME, SEARCH_TIME, metric_of
+
+COLUMNS = (*("scenario", "manager", SEARCH_TIME, DISTANCE, "detection_x_m", FOUND, REACTION_TIME, "run", "seed"),)
+"""Columns that every frame of missions has.
+
+detection_x_m is nan where it is not known or nothing was detected; pipeline_found 1 or 0, and nan where the file does
+not say; mean_reaction_time_s nan where nothing was reacted to or the file does not say. run is nan, and scenario and
+seed, which are text, empty where the file does not say.
+"""
+_LIMIT, _DURATION = "time_limit_s", "mission_duration_s"
+SIZE_LIMIT_BYTES = 500_000_000
+"""Of a file of results."""
+_GREATEST = 1e12
+"""Of numbers, as in scenarios."""
+
+_Mission = Mapping[str, Any]
+"""A row of runs.csv by column, and with it time_limit_s, stamp, month, position, and the exemplar's name."""
+
+
+def _whole(seconds: float) -> float:
+    """Whole seconds without a point, as the exemplar has them."""
+    return int(seconds) if seconds == int(seconds) else seconds
+
+
+# The exemplar's columns: by which name we read each, if we do, and how it is written.
+_Layout = Mapping[str, tuple[str, Callable[[_Mission], object]]]
+_LAYOUT_2023: _Layout = {
+    "mission_name": ("manager", lambda of: of["name"]),
+    "datetime": ("", lambda of: f"{of['month']}-{of['stamp']:%d-%Y-%H-%M-%S}"),
+    "initial pos (x,y)": ("", lambda of: of["position"]),
+    "time budget (s)": (_LIMIT, lambda of: _whole(of[_LIMIT])),
+    # The program wrote -1 when the pipeline was not found; the published table has the limit instead.
+    "time search (s)": (SEARCH_TIME, lambda of: _whole(of[SEARCH_TIME]) if of[FOUND] else -1),
+    "distance inspected (m)": (DISTANCE, lambda of: of[DISTANCE]),
+}
+_LAYOUT_1_5: _Layout = {
+    "mission name": ("manager", lambda of: of["name"]),
+    "datetime": ("", lambda of: f"{of['stamp']:%d}-{of['month']}-{of['stamp']:%Y-%H-%M-%S}"),
+    "initial pos (x,y)": ("", lambda of: of["position"]),
+    "mission duration (s)": ("", lambda of: int(of[_DURATION])),
+    "pipeline found": (FOUND, lambda of: of[FOUND]),
+    # The program writes the mission's duration when the pipeline was not found.
+    "time searching pipeline (s)": (
+        SEARCH_TIME,
+        lambda of: _whole(of[SEARCH_TIME]) if of[FOUND] else int(of[_DURATION]),
+    ),
+    "distance inspected (m)": (DISTANCE, lambda of: of[DISTANCE]),
+    # The exemplar writes 0.0 when no reaction was completed.
+    "mean reaction time (s)": (REACTION_TIME, lambda of: of[REACTION_TIME] or 0.0),
+}
+_OWN = {name: name for name in (*COLUMNS, _LIMIT)}
+_LAYOUTS: tuple[Mapping[str, str], ...] = (
+    _OWN,
+    *({ours: column for column, (ours, _) in layout.items() if ours} for layout in (_LAYOUT_2023, _LAYOUT_1_5)),
+)
+"""Names of the columns in each kind of file, by ours; the three of _NEEDED are in every one."""
+_NEEDED = ("manager", SEARCH_TIME, DISTANCE)
+_INFERRED_PLACE = "detection_x_m_inferred"
+"""Column of published runs, of which it is concluded what they saw first."""
+_AVERAGES = ("average", "mean", "std")
+"""First words of rows that sum up the missions of the exemplar's files."""
+_SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars"}
+"""What programs separate columns by, besides commas."""
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Missions read from a file.
+
+    Attributes:
+        path: the file.
+        frame: a row for each mission, indexed by its line, with COLUMNS and the further columns of the file.
+        sha256: of the file's bytes, in hex.
+        averages: lines of rows that are averages rather than missions, and were left out.
+    """
+
+    path: Path
+    frame: pandas.DataFrame
+    sha256: str
+    averages: tuple[int, ...] = ()
+
+    @property
+    def managers(self) -> tuple[str, ...]:
+        """In the order of their first missions."""
+        return tuple(self.frame["manager"].unique())
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader of a comparison should know about the file."""
+        if not self.averages:
+            return ()
+        lines = ", ".join(map(str, self.averages))
+        return (f"{self.path}: line{'s' * (len(self.averages) > 1)} {lines} left out: averages, not missions",)
+
+    def error(self, column: str, name: str, problem: str, remedy: str | None) -> InputError:
+        """Make an error about the first mission that has a name in a column."""
+        line = self.frame.index[self.frame[column] == name][0]
+        return line_error(self.path, line, problem, remedy)
+
+    def check_simulated(self, managers: Sequence[str], scenario: str | None) -> None:
+        """Check that these missions are of one scenario, and that there are some of each manager.
+
+        Args:
+            managers: that are needed.
+            scenario: that is needed; none: any one.
+
+        Raises:
+            InputError: they are not, or there are none.
+        """
+        names = [name for name in self.frame["scenario"].unique() if name]
+        if len(names) > 1:
+            problem = f"has missions of several scenarios: {names[0]} and {names[1]}"
+            raise self.error("scenario", names[1], problem, "give the missions of one scenario")
+        if names and scenario not in (None, names[0]):
+            problem = f"has missions of scenario {names[0]}, not of {scenario}"
+            raise self.error("scenario", names[0], problem, f"name scenario {names[0]}, or give another file")
+        for manager in managers:
+            if manager not in self.managers:
+                remedy = f"it has {', '.join(self.managers)}; choose among them with --managers"
+                raise InputError(f"has no mission of manager {manager!r}", file=self.path, remedy=remedy)
+
+
+def read_runs(path: str | Path, needed: Sequence[str] = ()) -> Runs:
+    """Read missions from a runs.csv, a file like the published seams2023_runs.csv, or the exemplar's own results.
+
+    Search times are taken as they stand, but for the -1 with which revision 2023 says that nothing was found: the time
+    limit stands for it, as in the published table. A file that has a time limit, but does not say which missions found
+    the pipeline, has found it in those whose search took less. In files that are no campaign's a reaction time of 0
+    stands for no reaction. Rows of averages, blank rows and repeated headers of the exemplar's files are left out.
+
+    Args:
+        path: of the file; columns that are no metrics are numbers where all their values are, and else text.
+        needed: further columns that it must have, such as those of a sweep.
+
+    Raises:
+        InputError: with file and line: the file cannot be read, has other columns, no mission, or an impossible value.
+    """
+    path = Path(path)
+    remedy = "one line for each mission, cells separated by commas"
+    header, numbered, digest = read_csv(path, SIZE_LIMIT_BYTES, remedy)
+    part = _Part(path, header, 1, needed)
+    parts, averages = [part], []
+    for line, cells in numbered:
+        if part.layout is not _OWN and _first_word(cells) in _AVERAGES:
+            averages.append(line)
+        elif any(layout[DISTANCE] in cells and layout["manager"] in cells for layout in _LAYOUTS):
+            part = _Part(path, cells, line, needed)  # a header again, as in files that were put together
+            parts.append(part)
+        else:
+            part.add(line, cells)
+    frames = [each.frame() for each in parts if each.lines]
+    if not frames:
+        raise line_error(path, 1, "has no missions under its header", "one line for each mission is needed")
+    return Runs(path, pandas.concat(frames), digest, tuple(averages))
+
+
+def is_foreign(path: Path) -> bool:
+    """Return whether a file has none of the columns that name a manager.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    header, _, _ = read_csv(path, SIZE_LIMIT_BYTES, "separate cells by commas")
+    return not {layout["manager"] for layout in _LAYOUTS} & set(header)
+
+
+def _first_word(cells: Sequence[str]) -> str:
+    return next((word for cell in cells for word in cell.split()), "").rstrip(":").lower()
+
+
+class _Part:
+    """Rows under one header.
+
+    Args:
+        path: of the file.
+        cells: the header.
+        line: of it.
+        needed: further columns that it must have.
+
+    Raises:
+        InputError: with the line, here and in all methods: about the header, or about a row.
+    """
+
+    def __init__(self, path: Path, cells: Sequence[str], line: int, needed: Sequence[str]) -> None:
+        self.path, self.header = path, [name.strip() for name in cells]
+        self.rows: list[Sequence[str]] = []
+        self.lines: list[int] = []
+        for column in filter(None, self.header):
+            if self.header.count(column) > 1:
+                raise line_error(path, line, f"has column {shown(column)} twice", "name each column once")
+        apart = next((mark for mark in _SEPARATORS if len(self.header) == 1 and mark in self.header[0]), None)
+        if apart is not None:
+            problem = f"has its columns separated by {_SEPARATORS[apart]}"
+            raise line_error(path, line, problem, "separate them by commas, and write numbers with a decimal point")
+        self.layout = max(_LAYOUTS, key=lambda layout: sum(layout[name] in self.header for name in _NEEDED))
+        for column in (wanted := (*(self.layout[name] for name in _NEEDED), *needed)):
+            if column not in self.header:
+                remedy = f"the columns {', '.join(wanted)} are needed"
+                raise line_error(path, line, f"has no column {column!r}", remedy)
+
+    def add(self, line: int, cells: Sequence[str]) -> None:
+        """Add a row."""
+        if len(cells) != len(self.header):
+            problem = f"has {number_of(len(cells), 'value')}, but the header has {len(self.header)}"
+            raise line_error(self.path, line, problem, "give each column a value, if only an empty one")
+        self.rows.append(cells)
+        self.lines.append(line)
+
+    def frame(self) -> pandas.DataFrame:
+        """Check and convert the cells; a frame with COLUMNS and the further ones, indexed by line."""
+        text = pandas.DataFrame(self.rows, columns=self.header, index=self.lines, dtype=str)
+        text = text.apply(lambda column: column.str.strip())
+        ours = {column: name for name, column in self.layout.items()}
+        if "detection_x_m" not in text:
+            ours[_INFERRED_PLACE] = "detection_x_m"
+        self.text = text.rename(columns=ours)
+        self.names = {name: column for column, name in ours.items()}
+        is_own, is_campaigns = self.layout is _OWN, "scenario" in self.text
+        managers = [str(name) for name in self.text["manager"].unique()]
+        are_names = {name: len(name.split()) == 1 or bool(name and not is_own) for name in managers}
+        self._check("manager", self.text["manager"].map(are_names), "a manager's name")
+        self.text["manager"] = self.text["manager"].map({name: manager_of(name) for name in managers})
+        search_time_s = self._numbers(SEARCH_TIME)
+        limit_s = self._numbers(_LIMIT, least=0.0) if _LIMIT in self.text else None
+        if limit_s is not None and not is_own:
+            search_time_s = np.where(search_time_s == -1.0, limit_s, search_time_s)
+        self._check(SEARCH_TIME, search_time_s >= 0.0, "a finite number, at least 0")
+        found: Any = math.nan
+        if FOUND in self.text:
+            words = self.text[FOUND].str.lower()
+            self._check(FOUND, words.isin(("true", "false")), "True or False")
+            found = (words == "true").to_numpy(float)
+        elif limit_s is not None:
+            found = (search_time_s < limit_s).astype(float)
+        values: dict[str, Any] = {name: "" if name in ("scenario", "seed") else math.nan for name in COLUMNS}
+        values |= {name: self._converted(name) for name in self.text if name and name not in (_LIMIT, FOUND)}
+        values |= {SEARCH_TIME: search_time_s, DISTANCE: self._numbers(DISTANCE, least=0.0), FOUND: found}
+        frame = pandas.DataFrame(values, index=text.index)
+        if not is_campaigns:  # the exemplar writes 0.0 for none, a campaign nothing
+            frame[REACTION_TIME] = frame[REACTION_TIME].where(frame[REACTION_TIME] > 0.0)
+        return frame
+
+    def _converted(self, name: str) -> Any:
+        """Convert a column: a metric to numbers; another to numbers if all its cells are, to integers if these are."""
+        text = self.text[name]
+        if name in ("scenario", "manager", "seed"):
+            return text
+        if name == "run" or metric_of(name) is not None:
+            is_whole = COLUMN_TYPES.get(name) == "int"
+            return self._numbers(name, least=0.0 if is_whole else -math.inf, may_be_empty=True, is_whole=is_whole)
+        numbers = _as_numbers(text)
+        if not np.isfinite(numbers).all():
+            return text
+        are_whole = text.str.fullmatch("[+-]?[0-9]+").all() and np.abs(numbers).max() <= _GREATEST
+        return pandas.Series(numbers.astype(np.int64) if are_whole else numbers, text.index)
+
+    def _numbers(
+        self, name: str, *, least: float = -math.inf, may_be_empty: bool = False, is_whole: bool = False
+    ) -> NDArray[np.float64]:
+        """Convert a column; empty cells are nan."""
+        numbers = _as_numbers(self.text[name])
+        is_right = np.isfinite(numbers) & (numbers >= least) & (np.abs(numbers) <= _GREATEST)
+        if is_whole:
+            is_right &= numbers == np.round(numbers)
+        if may_be_empty:
+            is_right |= (self.text[name] == "").to_numpy()
+        wanted = "a whole number" if is_whole else "a finite number"
+        self._check(name, is_right, wanted + (f", at least {least:g}" if least > -math.inf else ""))
+        return numbers
+
+    def _check(self, name: str, is_right: Iterable[bool], wanted: str) -> None:
+        """Check a column; the error is about the first line that is wrong."""
+        wrong = np.flatnonzero(~np.asarray(is_right, dtype=bool))
+        if len(wrong):
+            problem = f"{self.names.get(name, name)}: expected {wanted}, got {shown(self.text[name].iloc[wrong[0]])}"
+            remedy = "correct it, or leave the mission out"
+            raise line_error(self.path, int(self.text.index[wrong[0]]), problem, remedy)
+
+
+def _as_numbers(text: pandas.Series[str]) -> NDArray[np.float64]:
+    """Convert cells to numbers; other cells, and those without a finite value, become nan or inf."""
+    cells = text.to_list()
+    together = "".join(cells)
+    if together.isascii() and "_" not in together:  # else float() would accept more than numbers of a CSV file
+        with suppress(ValueError):
+            return np.array([float(cell) if cell else math.nan for cell in cells])
+    return pandas.to_numeric(text, errors="coerce").to_numpy(float)
+
+
+# The exemplar's files, written.
+
+_EXTENDED = "suave_extended"
+"""The exemplar's mission with a battery and recharging; its other mission is called suave."""
+_TREES = {"bt": "suave", "bt_extended": _EXTENDED}
+"""Missions of the behaviour trees, of which the exemplar has one for each: both are its manager bt."""
+_OUTSIDE_NAME = re.compile(r"[^A-Za-z0-9_.-]+")
+_FIRST_STAMP = datetime(2000, 1, 1)
+"""The exemplar stamps each row with the time of day. Ours must be the same each time: a second for each mission."""
+_MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
+"""strftime's %b depends on the user's language; the exemplar's files are in English."""
+
+
+def exemplar_names(managers: Sequence[str], revision: str, *, has_battery: bool) -> Iterator[tuple[str, str]]:
+    """Yield for each manager the name of its file, without .csv, and that of its missions in it.
+
+    Args:
+        managers: of a campaign.
+        revision: the scenario's.
+        has_battery: whether the scenario has one: then the mission is the extended one, except for manager bt.
+    """
+    used: set[str] = set()
+    for number, manager in enumerate(managers, 1):
+        mission = _TREES.get(manager, _EXTENDED if has_battery else "suave")
+        mission = "time constrained" if revision == "2023" else mission
+        name = "bt" if manager in _TREES else manager
+        file = _OUTSIDE_NAME.sub("_", f"{name}_{mission}")
+        if file in used:  # another manager's, which differs in signs that file names may not have
+            file += f"_{number}"
+        used.add(file)
+        yield file, f"{mission} {name}"
+
+
+def manager_of(mission_name: str) -> str:
+    """Return the manager of a mission that the exemplar calls by this name: the last word of it."""
+    words = mission_name.split()
+    return "bt_extended" if words == [_EXTENDED, "bt"] else words[-1]
+
+
+def suave_pieces(
+    revision: str, name: str, columns: Sequence[str], rows: Iterable[tuple[int, Sequence[object]]], time_limit_s: float
+) -> Iterator[str]:
+    """Yield the content of a file of the exemplar's, piece by piece.
+
+    Seconds and metres are as in runs.csv, but for durations, which are whole seconds, and for the search time when the
+    pipeline was not found.
+
+    Args:
+        revision: the scenario's; all but 2023 have the current layout, that of 1.5.
+        name: of the missions in it.
+        columns: of runs.csv.
+        rows: rows of runs.csv, each with the number of its mission in the campaign, from 1.
+        time_limit_s: of the missions.
+    """
+    layout = _LAYOUT_2023 if revision == "2023" else _LAYOUT_1_5
+
+    def cells(number: int, row: Sequence[object]) -> list[object]:
+        stamp = _FIRST_STAMP + timedelta(seconds=number)
+        mission: dict[str, Any] = dict(zip(columns, row, strict=False))  # drawn and swept parameters follow
+        mission |= {_LIMIT: time_limit_s, "stamp": stamp, "month": _MONTHS[stamp.month - 1], "name": name}
+        mission["position"] = str((round(mission["initial_x_m"], 2), round(mission["initial_y_m"], 2)))
+        return [make(mission) for _, make in layout.values()]
+
+    return csv_pieces(tuple(layout), (cells(number, row) for number, row in rows))

@@ -1,0 +1,450 @@
+"""The output folder of a campaign: the store of its outcomes, so that no finished mission is lost, and its files.
+
+The store is an SQLite database rather than a Parquet file, because transactions are atomic even after a kill, appending
+needs no new file, damage is noticed, a folder is locked for one campaign, and it comes with Python. In addition, each
+outcome carries a checksum.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import time
+import zlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager, suppress
+from pathlib import Path
+from typing import Any, NamedTuple
+from weakref import WeakSet
+
+from suave_des.errors import InputError, MissionError, SuaveDesError
+from suave_des.files import check_own, csv_pieces, make_output_folder, read_json, write_files
+from suave_des.records.knowledge import CAMPAIGN_KNOWLEDGE_FILE
+from suave_des.records.metrics import COLUMNS, Row
+
+STORE_FILE = "campaign.sqlite"
+RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE = "runs.csv", "summary.csv", "manifest.json"
+ENSEMBLE_FILE, PARQUET_FILE = "ensemble.csv", "runs.parquet"
+FILES = (RUNS_FILE, SUMMARY_FILE, MANIFEST_FILE, ENSEMBLE_FILE, PARQUET_FILE, CAMPAIGN_KNOWLEDGE_FILE)
+SUAVE_FOLDER = "suave"
+"""Folder of the exemplar's own files, for its scripts."""
+_ENDINGS = ("", "-wal", "-shm", "-journal")
+"""Of the database's files."""
+_VERSION = 3
+_COMMIT_PERIOD_S = 0.1
+"""A kill loses at most the missions of this time, besides those under way."""
+_ROW, _LASTING, _PASSING = 0, 1, 2
+"""Kinds of outcome: a row of runs.csv, a failure, a failure that may not happen again."""
+_TABLES = (
+    "CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL, crc INTEGER NOT NULL) WITHOUT ROWID",
+    "CREATE TABLE outcomes (point INTEGER, manager INTEGER, run INTEGER, kind INTEGER NOT NULL, content TEXT NOT NULL,"
+    " crc INTEGER NOT NULL, PRIMARY KEY (point, manager, run)) WITHOUT ROWID",
+    f"PRAGMA user_version = {_VERSION}",
+)
+_ALL = "SELECT * FROM outcomes ORDER BY point, manager, run"
+
+
+class MissionKey(NamedTuple):
+    """The key of a mission in a campaign; missions and their rows are in the order of their keys.
+
+    Attributes:
+        point: number of the sweep's point, from 0; 0 without a sweep.
+        manager: index among the campaign's managers, from 0.
+        run: number of the run, from 1; runs with the same number use common random numbers under all managers and at
+            all points.
+    """
+
+    point: int
+    manager: int
+    run: int
+
+
+class MissionFailure(NamedTuple):
+    """A mission that has no row.
+
+    Attributes:
+        manager: name of the managing subsystem.
+        run: number of the run.
+        time_s: mission time at which it happened; None if that is not known.
+        cause: the manager's exception, or another reason why the mission ended.
+        lasting: whether the mission itself failed; a time-out or a worker that was killed may not happen again, so a
+            resumed campaign runs such a mission once more.
+        point: of the sweep, from 0.
+    """
+
+    manager: str
+    run: int
+    time_s: float | None
+    cause: str
+    lasting: bool = True
+    point: int = 0
+
+    def __str__(self) -> str:
+        """Return all that is known, in one line."""
+        if self.time_s is None:
+            return f"manager {self.manager}, run {self.run}: {self.cause}"
+        return str(MissionError(self.manager, self.run, self.time_s, self.cause))
+
+
+Outcome = tuple[MissionKey, Row | MissionFailure]
+Content = str | bytes | Iterable[str]
+
+
+class StoreError(SuaveDesError):
+    """Outcomes can no longer be kept; earlier ones are safe."""
+
+
+class Store:
+    """The outcomes of one campaign; no other process can use the file until it is closed.
+
+    Example:
+        store = Store(folder / STORE_FILE)
+        store.begin({"seed": 1})
+        store.append([(MissionKey(0, 0, 1), row)])
+        store.close()
+
+    Args:
+        path: the database's file, made if it is missing; None for a temporary one, which is gone when this is closed.
+        replace: whether one that cannot be used is removed; what else is in it goes with `begin`.
+
+    Raises:
+        InputError: another campaign uses it, it is damaged, another version's, or no file of its own, such as a link.
+        StoreError: it cannot be opened or made.
+    """
+
+    def __init__(self, path: Path | None, *, replace: bool = False) -> None:
+        self.path, self._committed_s, self._is_open = path, time.monotonic(), False
+        self._cursors: WeakSet[sqlite3.Cursor] = WeakSet()
+        own = [] if path is None else _own(path)
+        check_own(own)
+        was_there = path is not None and path.exists()
+        try:
+            self._connect()
+        except BaseException as error:
+            is_damaged = isinstance(error, InputError) and error.file == str(path)
+            if not was_there or (replace and is_damaged):
+                for each in own:
+                    each.unlink(missing_ok=True)
+            if not (replace and is_damaged):
+                raise
+            self._connect()
+
+    def _connect(self) -> None:
+        with self.reading():
+            self._db = sqlite3.connect(self.path or "", timeout=0.0, isolation_level=None)
+            try:
+                self._check()
+            except BaseException:
+                self._db.close()
+                raise
+        self._is_open = True
+
+    def _check(self) -> None:
+        self._db.execute("PRAGMA locking_mode = EXCLUSIVE")
+        self._db.execute("PRAGMA journal_mode = WAL")
+        # With this a kill of the process loses nothing; loss of power perhaps the last transactions, whole ones.
+        self._db.execute("PRAGMA synchronous = NORMAL")
+        self._db.execute("BEGIN EXCLUSIVE")
+        if self.is_new:
+            return
+        (version,) = self._db.execute("PRAGMA user_version").fetchone()
+        if version != _VERSION:
+            raise InputError(
+                f"is a campaign's store of version {version}, and this suave-des has version {_VERSION}",
+                file=self.path,
+                remedy="resume it with the suave-des version that began it, or start a new one with --overwrite",
+            )
+        (verdict,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
+        if verdict != "ok":
+            raise _damaged(self.path, verdict)
+
+    @property
+    def is_new(self) -> bool:
+        """Whether no campaign was begun in it; one that was killed at its very start leaves that, too."""
+        return bool(self._db.execute("SELECT count(*) FROM sqlite_master").fetchone() == (0,))
+
+    @contextmanager
+    def reading(self) -> Iterator[None]:
+        """Turn whatever is unexpected while what is stored is used into one error about the store.
+
+        Whoever interprets its content does so in this, as there is no end to what a file from elsewhere can hold.
+        """
+        try:
+            yield
+        except (SuaveDesError, MemoryError):
+            raise
+        except sqlite3.OperationalError as error:
+            code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF  # none: what is read is no text
+            if code == sqlite3.SQLITE_BUSY and self.path is not None:
+                problem, remedy = "another campaign is running in the output folder", "wait for it, or give another"
+                raise InputError(problem, file=self.path.parent, remedy=remedy) from None
+            if code not in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR):
+                raise StoreError(f"{self.path or 'temporary files'}: results cannot be kept: {error}") from None
+            raise _damaged(self.path, error) from None
+        except Exception as error:
+            raise _damaged(self.path, error) from error
+
+    def begin(self, about: Mapping[str, Any]) -> None:
+        """Begin a new campaign, in place of an earlier one; atomic.
+
+        Args:
+            about: what is noted about the campaign, by name.
+
+        Raises:
+            StoreError: it cannot be written.
+        """
+        was_new = self.is_new
+        with self.reading():
+            try:
+                for kind, name in self._db.execute("SELECT type, name FROM sqlite_master").fetchall():
+                    if kind in ("table", "view"):
+                        self._db.execute(f'DROP {kind} "{name}"')
+                for statement in _TABLES:
+                    self._db.execute(statement)
+                self._db.executemany("INSERT INTO about VALUES (?, ?, ?)", (_note(name, about[name]) for name in about))
+            except BaseException:
+                self._db.execute("ROLLBACK")
+                self._db.execute("BEGIN")
+                raise
+            self._db.execute("COMMIT")
+            if not was_new:
+                self._db.execute("VACUUM")
+            self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+            self._db.execute("BEGIN")
+
+    # What it is about.
+
+    def about(self, name: str, default: Any = None) -> Any:
+        """Return what was noted under a name.
+
+        Raises:
+            InputError: nothing was and there is no default, or it is damaged.
+        """
+        with self.reading():
+            found = self._db.execute("SELECT value, crc FROM about WHERE name = ?", (name,)).fetchone()
+            if found is None and default is not None:
+                return default
+            if found is None or _crc(name, found[0]) != found[1]:
+                raise _damaged(self.path, f"its {name} is {'missing' if found is None else 'not what was written'}")
+            return json.loads(found[0])
+
+    def note(self, name: str, value: Any) -> None:
+        """Note something about the campaign, at once and durably."""
+        with self.reading():
+            self._db.execute("INSERT OR REPLACE INTO about VALUES (?, ?, ?)", _note(name, value))
+        self.commit()
+
+    # Outcomes.
+
+    def append(self, outcomes: Iterable[Outcome]) -> None:
+        """Keep outcomes; they are safe after _COMMIT_PERIOD_S at the latest, if more are appended, or after commit().
+
+        Raises:
+            StoreError: the disk is full, or the output folder was removed.
+        """
+        with self.reading():
+            self._db.executemany("INSERT OR REPLACE INTO outcomes VALUES (?, ?, ?, ?, ?, ?)", map(_record, outcomes))
+        if time.monotonic() - self._committed_s > _COMMIT_PERIOD_S:
+            self.commit()
+
+    def commit(self) -> None:
+        """Make appended outcomes durable."""
+        if self.path is not None and not self.path.exists():  # the system would let this write on, and throw it away
+            problem = f"{self.path} was removed while the campaign ran; its content is lost, so start a new campaign"
+            raise StoreError(problem)
+        with self.reading():
+            if self._db.in_transaction:  # or an interruption came between these two
+                self._db.execute("COMMIT")
+            self._db.execute("BEGIN")
+        self._committed_s = time.monotonic()
+
+    def forget_passing_failures(self) -> None:
+        """Remove failures that may not recur."""
+        with self.reading():
+            self._db.execute("DELETE FROM outcomes WHERE kind = ?", (_PASSING,))
+
+    def settled(self, point: int, manager: int) -> set[int]:
+        """Return the runs of a manager at a point that have an outcome."""
+        query = "SELECT run FROM outcomes WHERE point = ? AND manager = ?"
+        with self.reading():
+            return {run for (run,) in self._db.execute(query, (point, manager))}
+
+    def count(self) -> int:
+        """Return the number of outcomes."""
+        with self.reading():
+            return int(self._db.execute("SELECT count(*) FROM outcomes").fetchone()[0])
+
+    def outcomes(self) -> Iterator[Outcome]:
+        """Yield all outcomes in the order of their keys, read as they are requested; also of a store that is closed.
+
+        Raises:
+            InputError: the store is damaged.
+        """
+        with self.reading():
+            if self._is_open:
+                self._cursors.add(cursor := self._db.execute(_ALL))
+                yield from (_outcome(record, self.path) for record in cursor)
+                return
+            assert self.path is not None
+            with closing(_read_only(self.path)) as db:
+                yield from (_outcome(record, self.path) for record in db.execute(_ALL))
+
+    def close(self, *, keep_empty: bool = True) -> None:
+        """Leave one plain file behind. If the disk is full, a journal stays beside it, from which the rest is read.
+
+        Args:
+            keep_empty: whether the file stays if it has no outcomes.
+        """
+        is_empty = False
+        with suppress(SuaveDesError):
+            is_empty = not keep_empty and (self.is_new or self.count() == 0)
+        self._is_open = False
+        for cursor in list(self._cursors):  # one that an interruption left unread would keep the file locked
+            cursor.close()
+        with suppress(sqlite3.Error):
+            self._db.execute("COMMIT")
+        self._db.close()
+        if self.path is not None and self.path.exists():
+            with suppress(sqlite3.Error), closing(sqlite3.connect(self.path, isolation_level=None)) as db:
+                db.execute("PRAGMA journal_mode = DELETE")
+            if is_empty:
+                self.path.unlink()
+
+
+def has_campaign(folder: Path) -> bool:
+    """Return whether a campaign was begun in a folder; damaged and busy ones count."""
+    if not (folder / STORE_FILE).is_file():
+        return False
+    try:
+        with closing(_read_only(folder / STORE_FILE)) as db:
+            return bool(db.execute("SELECT count(*) FROM sqlite_master").fetchone() != (0,))
+    except Exception:  # there is no end to what a file from elsewhere leads to
+        return True
+
+
+def stored_identity(folder: Path) -> str | None:
+    """Return the identity of the campaign whose missions are kept in a folder; None where it cannot be read."""
+    path = folder / STORE_FILE
+    try:
+        with closing(_read_only(path)) as db:
+            (kept,) = db.execute("SELECT value FROM about WHERE name = 'identity'").fetchone()
+        return str(json.loads(kept))
+    except Exception:
+        return None
+
+
+def _own(path: Path) -> list[Path]:
+    """Return the files of a database."""
+    return [path.with_name(f"{path.name}{ending}") for ending in _ENDINGS]
+
+
+def _read_only(path: Path) -> sqlite3.Connection:
+    check_own(_own(path))
+    return sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)
+
+
+def _damaged(path: Path | None, what: object) -> InputError:
+    remedy = "restore it from a copy, or start a new campaign with --overwrite; result files beside it are complete"
+    what = " ".join(str(what).split()) or type(what).__name__
+    return InputError(f"is damaged: {what}", file=path, remedy=remedy)
+
+
+def _note(name: str, value: Any) -> tuple[str, str, int]:
+    text = json.dumps(value)
+    return name, text, _crc(name, text)
+
+
+def _record(outcome: Outcome) -> tuple[int, int, int, int, str, int]:
+    key, found = outcome
+    kind = _ROW if not isinstance(found, MissionFailure) else _LASTING if found.lasting else _PASSING
+    content = json.dumps(found)
+    return (*key, kind, content, _crc(*key, kind, content))
+
+
+def _outcome(record: tuple[int, int, int, int, str, int], path: Path | None) -> Outcome:
+    *numbers, kind, content, crc = record
+    key = MissionKey(*map(int, numbers))
+    if _crc(*key, kind, content) != crc:
+        raise _damaged(path, f"the outcome of run {key.run} is not what was written")
+    cells = json.loads(content)
+    return key, tuple(cells) if kind == _ROW else MissionFailure(*cells)
+
+
+def _crc(*parts: object) -> int:
+    return zlib.crc32(" ".join(map(str, parts)).encode(errors="replace"))
+
+
+# The files beside it.
+
+
+def write_campaign(folder: Path, files: Mapping[str, Content], suave: Mapping[str, Content]) -> None:
+    """Write a campaign's files into its folder, replacing those of an earlier campaign.
+
+    Args:
+        folder: an existing one.
+        files: content by name, names of FILES.
+        suave: content of the exemplar's own files by name. They have a folder to themselves: scripts that take all
+            files of a folder, or compare one file with the others, find what they expect.
+
+    Raises:
+        InputError: they cannot be written; nothing half-written stays.
+    """
+    write_files(folder, files, stale=FILES)
+    inner = folder / SUAVE_FOLDER
+    if suave:
+        make_output_folder(inner)
+    if inner.is_dir():
+        write_files(inner, suave, stale=[path.name for path in inner.glob("*.csv")])
+        with suppress(OSError):  # something is in it
+            inner.rmdir()
+
+
+def check_no_link(folder: Path) -> None:
+    """Check that the folder of the exemplar's files is no link, whose files would be replaced.
+
+    Raises:
+        InputError: it is.
+    """
+    if (folder / SUAVE_FOLDER).is_symlink():
+        raise InputError("is a link, which is not followed", file=folder / SUAVE_FOLDER, remedy="remove it")
+
+
+def is_left_over(name: str) -> bool:
+    """Return whether a file of a folder that has no campaign was left by one that was killed at its start."""
+    return name in (SUAVE_FOLDER, *FILES) or name.startswith(STORE_FILE)
+
+
+def runs_pieces(columns: Sequence[str], rows: Iterable[Row]) -> Iterator[str]:
+    """Yield the content of runs.csv, piece by piece.
+
+    Metrics are rounded; what varies has all its digits, so that it can be given again.
+    """
+    metrics = len(COLUMNS)
+
+    def exact(row: Row) -> Row:
+        return (*row[:metrics], *(repr(cell) if isinstance(cell, float) else cell for cell in row[metrics:]))
+
+    return csv_pieces(columns, map(exact, rows))
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Read a campaign's manifest.json; empty without one.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    path = folder / MANIFEST_FILE
+    found = read_json(path) if path.exists() else None
+    return found if isinstance(found, dict) else {}
+
+
+def check_one_campaign(folder: Path) -> None:
+    """Check that the result files of a folder are of the campaign whose missions are kept in it, as far as both say so.
+
+    Raises:
+        InputError: they are of another campaign.
+    """
+    written, kept = read_manifest(folder).get("campaign_sha256"), stored_identity(folder)
+    if written is not None and kept is not None and written != kept:
+        remedy = f"suave-des campaign --resume {folder} writes those of the campaign that is kept there"
+        raise InputError(f"{RUNS_FILE} and {STORE_FILE} are of different campaigns", file=folder, remedy=remedy)

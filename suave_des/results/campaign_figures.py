@@ -1,0 +1,461 @@
+"""Figures of a campaign's missions, with a curve, cloud or panel for each manager."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from textwrap import fill
+from typing import Any
+
+import matplotlib
+import numpy as np
+import pandas
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.font_manager import FontProperties
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.textpath import TextPath
+from matplotlib.ticker import MaxNLocator, PercentFormatter
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from suave_des.errors import InputError
+from suave_des.estimates import CONFIDENCE, mean_of, percent
+from suave_des.records.metrics import FOUND, METRICS, PAPER_METRICS, SEARCH_TIME
+from suave_des.results import style
+from suave_des.results.missions import Group, Missions, first_alike, runs_sharing_draw, time_limit_s
+from suave_des.results.statistics import Sample
+from suave_des.results.style import folded, key_words, value_words
+
+_ROW_IN = 0.62
+"""Height of a row of a figure that has one for each manager."""
+_LEGEND_LINE_IN, _HANDLE_IN = 0.2, 0.6
+"""Height of a line of a legend, and width of an entry without its text."""
+_DOTS = 400
+"""More missions are drawn as so many, evenly taken in the order of their values."""
+_DENSITY_BINS = 3_000
+"""Values are counted in so many bins before their density is estimated."""
+_CURVE_POINTS = 2_000
+"""A curve over more runs is drawn through so many of them: it looks the same, and is written at once."""
+_FEWEST = 5
+"""Values for a density, or for an interval of a mean."""
+_TIME_BIN_S = 5.0
+_LEGEND_SHARE = 0.1
+_FAR_APART = 50.0
+"""Reaction times that differ by more than this factor are drawn on a logarithmic axis."""
+
+
+def draw_distributions(groups: Sequence[Group]) -> style.Picture:
+    """Draw the empirical distribution functions of search time and inspected distance, a curve for each group."""
+    labels = [*map(_label, groups), "marks at 0%: means"]
+    figure = _figure(labels)
+    for axes, metric, title in _metric_panels(figure, sharey=True):
+        end = max(1.0, max(float(group.known_values(metric).max()) for group in groups) * 1.06)
+        for number, group in _looks(groups):
+            values = np.sort(group.known_values(metric))
+            shares = np.arange(1, len(values) + 1) / len(values)
+            look = style.line(number)
+            axes.step([0.0, *values, end], [0.0, *shares, 1.0], where="post", label=_label(group), **look)
+            mark = {"marker": style.marker(number), "color": look["color"], "ms": 5, "mec": "white", "mew": 0.5}
+            axes.plot(float(values.mean()), 0.0, clip_on=False, zorder=5, **mark)
+        axes.set(xlabel=title, xlim=(0.0, end))
+    _mark_limit(figure.axes[0], groups)
+    figure.axes[0].set(ylabel="share of missions at or below", ylim=(0.0, 1.02))
+    figure.axes[0].yaxis.set_major_formatter(PercentFormatter(1.0))
+    handles = [*_handles(groups), Line2D([], [], lw=0, marker="o", mfc="none", ms=4, color=style.GREY)]
+    _legend(figure, handles, labels)
+    return figure
+
+
+def _mark_limit(axes: Axes, groups: Sequence[Group]) -> None:
+    """Mark the end of missions that never found the pipeline on an axis of search times, if there are any."""
+    if any((group.values(FOUND) < 1.0).any() for group in groups):
+        limit_s = time_limit_s(groups)
+        axes.axvline(limit_s, color=style.GREY, lw=0.7, ls=":", zorder=1)
+        look: dict[str, Any] = {"color": "#555555", "fontsize": 7, "rotation": 90, "ha": "right", "va": "bottom"}
+        axes.text(limit_s, 0.03, "not found ", transform=axes.get_xaxis_transform(), **look)
+
+
+def draw_rainclouds(groups: Sequence[Group], published: Mapping[str, Group]) -> style.Picture:
+    """Draw for each group a cloud (density), a box (quartiles, median, mean) and rain (missions).
+
+    Args:
+        groups: to draw, a row for each.
+        published: real missions to show beside a group, by its name.
+    """
+    height = _ROW_IN * len(groups) + 0.55 + _LEGEND_LINE_IN
+    figure = style.Picture(figsize=(style.WIDTH_IN, height), layout="constrained")
+    for axes, metric, title in _metric_panels(figure, sharey=True):
+        for row, (number, group) in enumerate(_looks(groups)):
+            _raincloud(axes, row, number, group, metric, published.get(group.name))
+        axes.set_xlabel(title)
+        axes.set_xlim(left=0.0)
+    left = figure.axes[0]
+    left.set_yticks(range(len(groups)), [_label(group) for group in groups])
+    left.set_ylim(len(groups) - 0.45, -0.6)
+    _mark_limit(left, groups)
+    handles: list[Artist] = [
+        Patch(facecolor="#BBBBBB", label="density"),
+        Line2D([], [], color=style.BLACK, lw=4, alpha=0.35, label="quartiles"),
+        Line2D([], [], color=style.BLACK, marker="|", ms=8, lw=0, label="median"),
+        Line2D([], [], color=style.BLACK, marker="D", ms=3, mfc="white", lw=0, label="mean"),
+        Line2D([], [], color=style.GREY, marker="o", ms=2, lw=0, label="mission"),
+    ]
+    if published:
+        handles.append(Line2D([], [], color=style.BLACK, marker="x", ms=4, lw=0, label="published run"))
+    _legend(figure, handles, [str(handle.get_label()) for handle in handles])
+    return figure
+
+
+def _raincloud(axes: Axes, row: int, number: int, group: Group, metric: str, published: Group | None) -> None:
+    values = np.sort(group.known_values(metric))
+    colour = style.line(number)["color"]
+    if len(values) >= _FEWEST and np.ptp(values) > 0.0:
+        grid = np.linspace(values[0], values[-1], 300)
+        heights = _density(values, grid)
+        heights *= 0.38 / heights.max()
+        axes.fill_between(
+            grid, row - 0.12 - heights, row - 0.12, color=colour, alpha=0.55, lw=0, hatch=style.hatch(number)
+        )
+        axes.plot(grid, row - 0.12 - heights, color=colour, lw=0.8)
+    low, median, high = np.percentile(values, (25, 50, 75))
+    axes.plot([low, high], [row, row], color=style.BLACK, lw=4, alpha=0.35, solid_capstyle="butt")
+    axes.plot(median, row, color=style.BLACK, marker="|", ms=8)
+    axes.plot(values.mean(), row, color=style.BLACK, marker="D", ms=3, mfc="white", mew=0.7)
+    rain = values if len(values) <= _DOTS else values[np.linspace(0, len(values) - 1, _DOTS).astype(int)]
+    axes.plot(rain, row + 0.1 + _jitter(len(rain), 0.12), "o", color=colour, ms=1.6, alpha=0.6, mew=0)
+    if published is not None:
+        real = np.sort(published.known_values(metric))
+        axes.plot(real, row + 0.3 + _jitter(len(real), 0.06), "x", color=style.BLACK, ms=2.8, mew=0.7)
+
+
+def _density(values: Sample, grid: Sample) -> Sample:
+    """Estimate the density of values at the points of a grid.
+
+    The kernel is narrow, so that the clusters of search times, a turn of the spiral each, stay apart.
+    """
+    from scipy.stats import gaussian_kde
+
+    counts, edges = np.histogram(values, bins=_DENSITY_BINS)
+    middles = (edges[:-1] + edges[1:]) / 2.0
+    return np.asarray(gaussian_kde(middles, bw_method=0.6 * len(values) ** -0.2, weights=counts)(grid))
+
+
+def _jitter(number: int, height: float) -> NDArray[np.floating]:
+    """Spread points evenly over a height by the golden ratio: no random numbers, equal data give equal figures."""
+    places: NDArray[np.floating] = height * ((np.arange(number) * (math.sqrt(5.0) - 1.0) / 2.0) % 1.0)
+    return places
+
+
+def draw_convergence(groups: Sequence[Group]) -> style.Picture:
+    """Draw the mean of the first n runs and its 95% interval over n, a curve for each group."""
+    labels = [*map(_label, groups), "95% interval of the mean"]
+    figure = _figure(labels)
+    for axes, metric, title in _metric_panels(figure):
+        for number, group in _looks(groups):
+            frame = group.frame.sort_values("run", kind="stable")
+            n, means, halves = running_means(frame[metric].dropna().to_numpy(float))
+            look = style.line(number)
+            (line,) = axes.plot(n, means, label=_label(group), **look)
+            if len(n) == 1:
+                line.set(marker=style.marker(number), ms=5, clip_on=False)
+            low, high = means - halves, means + halves
+            axes.fill_between(n, low, high, where=n >= _FEWEST, color=look["color"], alpha=0.18, lw=0)
+        shares = any(runs_sharing_draw(group.frame) > 1 for group in groups)
+        axes.set(xlabel=f"number of {'draws' if shares else 'runs'}", ylabel=f"mean {title}")
+        axes.set_xlim(left=1.0)
+        axes.set_ylim(bottom=0.0)
+        axes.xaxis.set_major_locator(MaxNLocator(6, integer=True, min_n_ticks=1))
+        axes.xaxis.set_major_formatter("{x:,.0f}")
+    _legend(figure, [*figure.axes[0].lines, Patch(color=style.GREY, alpha=0.3)], labels)
+    return figure
+
+
+def running_means(values: Sample) -> tuple[NDArray[np.int_], Sample, Sample]:
+    """Return sample sizes n, the means of the first n values, and half their 95% intervals by Student's t.
+
+    Of many values only some sizes are there, the first and the last among them, as dense at the beginning as a figure
+    over all shows them.
+    """
+    n = np.arange(1, len(values) + 1)
+    off = values - values[0]  # which is rounded less than the values
+    means = np.cumsum(off) / n
+    with np.errstate(divide="ignore", invalid="ignore"):  # one value has no spread
+        variances = np.maximum(np.cumsum(off**2) - n * means**2, 0.0) / (n - 1)
+        halves = stdtrit(n - 1, (1.0 + CONFIDENCE) / 2.0) * np.sqrt(variances / n)
+    shown = n
+    if len(n) > _CURVE_POINTS:
+        half = _CURVE_POINTS // 2
+        shown = np.unique(np.r_[np.geomspace(1, len(n), half), np.linspace(1, len(n), half)].round().astype(int))
+    return shown, values[0] + means[shown - 1], halves[shown - 1]
+
+
+def draw_detections(groups: Sequence[Group]) -> style.Picture:
+    """Draw when missions found the pipeline against the point of it that they saw first, a panel for each group.
+
+    Areas are shares of the group's missions; the bars above are shares by that point.
+    """
+    columns = style.columns(len(groups))
+    rows = math.ceil(len(groups) / columns)
+    width = style.WIDTH_IN if columns > 1 else style.WIDTH_IN / 2
+    figure = style.Picture(figsize=(width, 2.6 * rows + 0.4), layout="constrained")
+    parts = figure.subfigures(rows, columns, squeeze=False).ravel()
+    known = pandas.concat([group.frame.loc[group.frame["detection_x_m"].notna()] for group in groups])
+    ends = (
+        [float(known["detection_x_m"].min()) - 0.7, float(known["detection_x_m"].max()) + 0.7] if len(known) else [0, 1]
+    )
+    top_s = max(float(group.known_values(SEARCH_TIME).max()) for group in groups) * 1.2
+    bars = []
+    for place, (part, (number, group)) in enumerate(zip(parts, _looks(groups), strict=False)):
+        above, below = part.subplots(2, 1, sharex=True, height_ratios=(1.0, 3.0))
+        _draw_detections(above, below, number, group)
+        bars.append(above)
+        above.set_title(_label(group, 26), fontsize=8)
+        below.set(xlim=ends, ylim=(0.0, top_s), xlabel="x of the point seen first (m)")
+        if place % columns == 0:
+            below.set_ylabel("search time (s)")
+            above.set_ylabel("share")
+    top = max(above.get_ylim()[1] for above in bars)
+    for above in bars:
+        above.set_ylim(0.0, top)  # shares of one panel are to be compared with those of another
+    area = Line2D([], [], lw=0, marker="o", ms=style.bubble_size(_LEGEND_SHARE), color=style.GREY, alpha=0.6, mew=0)
+    figure.legend([area], [f"area: {percent(_LEGEND_SHARE)} of a manager's missions"], loc="outside lower right")
+    return figure
+
+
+def _draw_detections(above: Axes, below: Axes, number: int, group: Group) -> None:
+    frame = group.frame[group.frame["detection_x_m"].notna()]
+    colour, n = style.line(number)["color"], len(group.frame)
+    x_m = frame["detection_x_m"].round(2)
+    shares = x_m.value_counts() / n
+    above.bar(shares.index.to_numpy(float), shares.to_numpy(float), width=0.4, color=colour, lw=0)
+    above.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
+    above.yaxis.set_major_locator(MaxNLocator(2))
+    look = {"color": colour, "alpha": 0.6, "lw": 0}
+    style.bubbles(below, group.frame, "detection_x_m", SEARCH_TIME, (0.01, _TIME_BIN_S), look)
+    lost = 1.0 - len(frame) / n
+    below.set_title(f"not found: {percent(lost)}", fontsize=7.5, fontweight="normal", pad=3)  # above all bubbles
+
+
+def draw_reactions(groups: Sequence[Group]) -> style.Picture:
+    """Draw the number of adaptations per mission, and the reaction times, with a curve for each group."""
+    labels = list(map(_label, groups))
+    figure = _figure(labels)
+    left, right = figure.subplots(1, 2)
+    for number, group in _looks(groups):
+        look = style.line(number)
+        if "adaptations" in group.frame and len(counts := group.known_values("adaptations")):
+            missions = np.bincount((counts - counts.min()).astype(int))  # 0 where no mission has a number
+            numbers = counts.min() + np.arange(len(missions))
+            left.plot(numbers, missions / len(counts), marker=style.marker(number), ms=3.5, label=_label(group), **look)
+        times_s = np.sort(group.known_values("mean_reaction_time_s"))
+        if len(times_s):
+            shares = np.arange(1, len(times_s) + 1) / len(times_s)
+            right.step([times_s[0], *times_s], [0.0, *shares], where="post", **look)
+        else:
+            right.plot([], [], **look)
+    left.set(xlabel="adaptations in a mission", ylabel="share of missions")
+    left.set_ylim(bottom=0.0)
+    left.yaxis.set_major_formatter(PercentFormatter(1.0))
+    left.xaxis.set_major_locator(MaxNLocator(8, integer=True))
+    left.set_title("a   Adaptations")
+    right.set(
+        xlabel="mean reaction time, where there was one (s)", ylabel="share of missions at or below", ylim=(0.0, 1.02)
+    )
+    known = np.concatenate([group.known_values("mean_reaction_time_s") for group in groups])
+    if len(known) and known.min() > 0.0 and known.max() > _FAR_APART * known.min():
+        right.set_xscale("log")  # else the curves of quick managers would all be at the left edge
+        right.xaxis.set_major_formatter("{x:g}")
+    else:
+        right.set_xlim(left=0.0)
+    right.yaxis.set_major_formatter(PercentFormatter(1.0))
+    right.set_title("b   Reaction time")
+    _legend(figure, _handles(groups), labels)
+    return figure
+
+
+def _figure(labels: Sequence[str]) -> style.Picture:
+    """Make a figure of one row of panels, with room for a legend above them."""
+    rows = math.ceil(len(labels) / _legend_columns(labels))
+    legend_in = _LEGEND_LINE_IN * rows * max(label.count("\n") + 1 for label in labels)
+    return style.Picture(figsize=(style.WIDTH_IN, 2.5 + legend_in), layout="constrained")
+
+
+def _metric_panels(figure: style.Picture, *, sharey: bool = False) -> Iterator[tuple[Axes, str, str]]:
+    """Make the panels a and b for the metrics of the paper's table; yield each with its metric, and the axis' title."""
+    panels = figure.subplots(1, 2, sharey=sharey)
+    for axes, letter, metric in zip(panels, "ab", PAPER_METRICS, strict=True):
+        axes.set_title(f"{letter}   {METRICS[metric].title.capitalize()}")
+        yield axes, metric, METRICS[metric].heading
+
+
+def _looks(groups: Sequence[Group]) -> Iterator[tuple[int, Group]]:
+    """Yield each group with the number of its look."""
+    return zip(style.looks([group.name for group in groups]), groups, strict=True)
+
+
+def _handles(groups: Sequence[Group]) -> list[Artist]:
+    """Make the lines with markers that a legend shows for each group."""
+    return [Line2D([], [], marker=style.marker(number), ms=3.5, **style.line(number)) for number, _ in _looks(groups)]
+
+
+def _label(group: Group, width: int = 40) -> str:
+    return style.text(folded(f"{group.name} (n = {len(group.frame):,})", width))
+
+
+def _legend(figure: style.Picture, handles: Sequence[Artist], labels: Sequence[str]) -> None:
+    figure.legend(handles, labels, loc="outside upper right", ncols=_legend_columns(labels), handlelength=2.8)
+
+
+def _legend_columns(labels: Sequence[str]) -> int:
+    """Return the number of columns with which a legend fits the width of a figure."""
+    most = len(labels) if len(labels) <= 4 else 3
+    widths_in = [_HANDLE_IN + _text_width_in(label) for label in labels]
+    for columns in range(most, 1, -1):
+        if sum(max(column) for column in np.array_split(widths_in, columns)) <= style.WIDTH_IN:
+            return columns
+    return 1
+
+
+def _text_width_in(label: str) -> float:
+    font = FontProperties(size=matplotlib.rcParams["legend.fontsize"])
+    return max(float(TextPath((0.0, 0.0), part, prop=font).get_extents().x1) for part in label.split("\n")) / 72.0
+
+
+# Sweeps
+
+_MOST_PARAMETERS, _COLUMNS = 9, 3
+_MOST_VALUES = 16
+"""A parameter with more values is a sampled one: its missions are drawn in so many bins of equal numbers at most."""
+_BINS = 8
+_MOST_TICKS = 6
+"""With more swept values, or where two are closer than so many would be, the axis has round numbers instead."""
+_APART = 0.012
+"""Between managers at the same value, as a share of the axis, so that their intervals do not hide each other."""
+
+
+def draw_sweep(missions: Missions, parameters: Sequence[str] = ()) -> style.Picture:
+    """Draw means with their 95% intervals over each parameter, the others averaged over, a line for each manager.
+
+    All points of a sweep share the random numbers of a run, so that the runs are the independent values: intervals are
+    those of the means that each run has over the points.
+
+    Args:
+        missions: of a sweep.
+        parameters: to draw; empty: all that are swept.
+
+    Raises:
+        InputError: one of them is not swept, or there are too many for one figure.
+    """
+    parameters = list(parameters or missions.swept)
+    missions.check_swept(parameters, "parameters")
+    for source, part in missions.frame.groupby("source", sort=False):
+        if fixed := [name for name in parameters if part[name].isna().all()]:
+            problem = f"{source} does not vary {', '.join(fixed)}"
+            raise InputError(problem, place="parameters", remedy="leave it out, or choose what all of the sweeps vary")
+    if len(parameters) > _MOST_PARAMETERS:
+        problem = f"{len(parameters)} parameters do not fit into one figure: {', '.join(parameters)}"
+        raise InputError(problem, place="parameters", remedy=f"choose {_MOST_PARAMETERS} or fewer of them")
+    frame = missions.frame
+    names = _names(frame)
+    managers = list(dict.fromkeys(names))
+    columns = min(len(parameters), _COLUMNS)
+    blocks = math.ceil(len(parameters) / columns)
+    width_in = style.WIDTH_IN if columns > 1 else style.WIDTH_IN / 2
+    height_in = 4.0 * blocks + 0.2 * math.ceil((len(managers) + 1) / 3)
+    figure = style.Picture(figsize=(width_in, height_in), layout="constrained")
+    panels = figure.subplots(len(PAPER_METRICS) * blocks, columns, sharey="row", squeeze=False)
+    for place, parameter in enumerate(parameters):
+        block, column = divmod(place, columns)
+        for row, metric in enumerate(PAPER_METRICS):
+            axes = panels[len(PAPER_METRICS) * block + row, column]
+            _draw_panel(axes, frame, names, parameter, metric)
+            axes.tick_params(labelbottom=row == len(PAPER_METRICS) - 1)
+            if column == 0:
+                axes.set_ylabel(f"mean {METRICS[metric].heading}")
+        panels[len(PAPER_METRICS) * block + len(PAPER_METRICS) - 1, column].set_xlabel(_folded(key_words(parameter)))
+    for row in range(len(PAPER_METRICS)):
+        own = panels[row :: len(PAPER_METRICS)].ravel()
+        top = max(axes.get_ylim()[1] for axes in own if axes.has_data())
+        for axes in own:
+            axes.set_ylim(0.0, top)
+    for axes in panels.ravel():
+        axes.set_visible(bool(axes.has_data()))
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    handles.append(Line2D([], [], lw=0, marker="|", ms=8, color=style.GREY))
+    labels.append("95% interval of the mean")
+    ncols = min(3 if columns > 1 else 2, _legend_columns(labels))
+    figure.legend(handles, labels, loc="outside upper right", ncols=ncols, handlelength=2.8)
+    return figure
+
+
+def _names(frame: pandas.DataFrame) -> pandas.Series[str]:
+    """Name the curve of each mission: its manager, with its source where there are several."""
+    if frame["source"].nunique() > 1:
+        return frame["manager"] + " (" + frame["source"] + ")"
+    return frame["manager"]
+
+
+def _draw_panel(axes: Axes, frame: pandas.DataFrame, names: pandas.Series[str], parameter: str, metric: str) -> None:
+    places, words = _places(frame[parameter])
+    apart = _APART * float(places.max() - places.min())
+    managers = list(dict.fromkeys(names))
+    for place, (number, manager) in enumerate(zip(style.looks(managers), managers, strict=True)):
+        own = names == manager
+        beside = (place - (len(managers) - 1) / 2) * apart
+        _draw_means(axes, frame[own].assign(place=places[own]), metric, beside, number, manager)
+    if words:
+        shown_words = [_folded(style.text(value_words(word)), 14) for word in words]
+        long = max(map(len, words)) > 6 and len(words) > 2
+        axes.set_xticks(range(len(words)), shown_words, rotation=30 if long else 0, ha="right" if long else "center")
+        axes.set_xlim(-0.5, len(words) - 0.5)
+    elif _fit_as_ticks(values := np.unique(places)):
+        axes.set_xticks(values, [f"{value:g}" for value in values])
+    else:
+        axes.xaxis.set_major_locator(MaxNLocator(4))
+
+
+def _fit_as_ticks(values: Sample) -> bool:
+    """Return whether swept values are few enough, and far enough apart, to be written at the axis."""
+    return 1 < len(values) <= _MOST_TICKS and bool(np.diff(values).min() > np.ptp(values) / _MOST_TICKS)
+
+
+def _places(parameter: pandas.Series) -> tuple[pandas.Series[float], list[str]]:
+    """Place missions on the horizontal axis: at the value, or at the number of the word in the order of the sweep."""
+    if pandas.api.types.is_numeric_dtype(parameter) and not pandas.api.types.is_bool_dtype(parameter):
+        return parameter.astype(float), []
+    codes, words = pandas.factorize(parameter)
+    return pandas.Series(codes, parameter.index, dtype=float), [str(word) for word in words]
+
+
+def _draw_means(axes: Axes, frame: pandas.DataFrame, metric: str, beside: float, number: int, label: str) -> None:
+    """Draw the mean at each place; of very many places, those of equally many missions at their mean place."""
+    key = frame["place"]
+    if key.nunique() > _MOST_VALUES:
+        key = pandas.qcut(key.rank(method="first"), _BINS, labels=False)
+    found, middles = [], []
+    for _, part in frame.groupby(key):
+        has_runs = part["run"].notna().all()
+        runs = first_alike(part, runs_sharing_draw(part))
+        by_run = part.groupby(["seed", runs])[metric].mean() if has_runs else part[metric]
+        found.append(mean_of(by_run.dropna().tolist()))
+        middles.append(float(part["place"].mean()) + beside)
+    means = np.array([each.value for each in found])
+    low, high = np.array([each.interval or (each.value, each.value) for each in found]).T
+    axes.errorbar(
+        middles,
+        means,
+        yerr=(means - low, high - means),
+        label=style.text(folded(label)),
+        marker=style.marker(number),
+        ms=3.2,
+        capsize=2,
+        elinewidth=0.8,
+        **style.line(number),
+    )
+
+
+def _folded(text: str, width: int = 26) -> str:
+    """Break a long name into lines, so that names stay apart."""
+    return fill(text, width, break_long_words=False)

@@ -1,0 +1,296 @@
+"""Compare managers: group missions, estimate each metric of each group and their differences, and conclude.
+
+Groups are compared run by run where runs share their random numbers, and else as independent samples.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self, TypedDict, Unpack
+
+import numpy as np
+import pandas
+
+from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.estimates import share_of
+from suave_des.files import as_number
+from suave_des.records.metrics import DISTANCE, FOUND, METRICS, REACTION_TIME, SEARCH_TIME, Metric, metric_of
+from suave_des.results import statistics
+from suave_des.results.comparison import Comparison, Difference, Summary
+from suave_des.results.conclusions import conclusion, overall_conclusion
+from suave_des.results.missions import (
+    SHARING,
+    Group,
+    Missions,
+    caveats,
+    counted,
+    grouped,
+    missions_of,
+    read_missions,
+    time_limit_s,
+)
+from suave_des.results.statistics import Sample
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_USUAL = (SEARCH_TIME, DISTANCE, FOUND, REACTION_TIME)
+
+
+class Choices(TypedDict, total=False):
+    """What to compare, and how.
+
+    Attributes:
+        managers: names of managers; left out: all.
+        metrics: columns of runs.csv; left out: search time, distance, reaction time and the share that found the
+            pipeline.
+        by: swept parameters whose values are compared, too; the others of a sweep are averaged over, run by run.
+        against: the one that all others are compared with, as tables name it; None: each with each.
+        half_widths: METRIC:HALF_WIDTH of the intervals for which the number of runs is to be given.
+        unpaired: whether runs are taken as independent though they share their random numbers.
+    """
+
+    managers: Sequence[str]
+    metrics: Sequence[str]
+    by: Sequence[str]
+    against: str | None
+    half_widths: Sequence[str]
+    unpaired: bool
+
+
+def compare_folders(paths: Sequence[Path], **choices: Unpack[Choices]) -> Comparison:
+    """Compare the missions in folders or files of results.
+
+    Args:
+        paths: folders of `suave-des campaign` or `reproduce`, folders of the exemplar's own CSV files, or CSV files.
+        choices: what to compare, and how; see Choices.
+
+    Raises:
+        InputError: results cannot be read, a name is not in them, or an extra is not installed.
+    """
+    return compare(read_missions(paths), **choices)
+
+
+def compare_frame(frame: pandas.DataFrame, **choices: Unpack[Choices]) -> Comparison:
+    """Compare the missions of a data frame with the columns of runs.csv; see compare_folders."""
+    return compare(missions_of(frame), **choices)
+
+
+class CampaignFrame(pandas.DataFrame):
+    """Missions, a row for each, with the columns of runs.csv.
+
+    What pandas makes of it, such as a selection of rows, can be compared and drawn, too.
+
+    Example:
+        frame = run_campaign("seams2023", ["none", "bt", "metacontrol"], runs=100)
+        print(frame.compare().conclusion)
+        frame[frame["run"] <= 50].compare(metrics=["distance_inspected_m"], against="none")
+        frame.figure().savefig("distributions.pdf")
+    """
+
+    @property
+    def _constructor(self) -> type[CampaignFrame]:
+        return CampaignFrame
+
+    def __finalize__(self, other: Any, method: str | None = None, **keywords: Any) -> Self:
+        """Keep how many runs share a draw where frames are joined: pandas keeps attrs only if all are equal."""
+        found: Self = super().__finalize__(other, method, **keywords)  # type: ignore[misc]
+        parts: Iterable[Any] = getattr(other, "objs", getattr(other, "input_objs", ())) if method == "concat" else ()
+        known = {part.attrs[SHARING] for part in parts if SHARING in part.attrs}
+        if known:
+            found.attrs[SHARING] = math.lcm(*known)
+        return found
+
+    def compare(self, **choices: Unpack[Choices]) -> Comparison:  # type: ignore[override]
+        """Compare the managers, as `suave-des compare` does, in place of pandas' comparison cell by cell.
+
+        Args:
+            choices: what to compare, and how; see Choices.
+
+        Raises:
+            InputError: a name is not there, or an extra is not installed.
+        """
+        return compare_frame(self, **choices)
+
+    def figure(self, kind: str = "auto") -> Figure:
+        """Draw the missions, as `suave-des figure` does.
+
+        Args:
+            kind: as of `suave-des figure --kind`; "auto": means over what was swept, or distributions.
+
+        Raises:
+            InputError: there is no such kind of figure.
+        """
+        from suave_des.results.figures import draw_frame
+
+        return draw_frame(self, kind)
+
+
+def compare(missions: Missions, **choices: Unpack[Choices]) -> Comparison:
+    """Compare missions; see compare_folders."""
+    for module in ("statsmodels", "lifelines"):
+        statistics.library(module)
+    groups, notes = grouped(missions, choices.get("managers", ()), choices.get("by", ()))
+    metrics = _metrics(choices.get("metrics", ()), groups)
+    half_widths = _half_widths(choices.get("half_widths", ()), metrics)
+    pairs = _pairs(groups, choices.get("against"))
+    unpaired, horizon_s = choices.get("unpaired", False), time_limit_s(groups)
+    summaries = tuple(_summarise(group, metric, horizon_s) for metric in metrics for group in groups)
+    found = [
+        _difference(*pair, metric, half_widths.get(metric.name), unpaired=unpaired)
+        for metric in metrics
+        for pair in pairs
+    ]
+    adjusted = iter(statistics.holm([each.p for each in found if each.test]))
+    found = [replace(each, p_holm=next(adjusted)) if each.test else each for each in found]
+    by_name = {metric.name: metric for metric in metrics}
+    differences = [replace(each, conclusion=conclusion(each, by_name[each.metric])) for each in found]
+    means = {each.group: each.mean.value for each in summaries if each.metric == metrics[0].name and each.n}
+    sentence = overall_conclusion(metrics[0], differences, means, [group.name for group in groups])
+    notes = [*missions.notes, *notes, *caveats(groups, metrics)]
+    return Comparison(sentence, summaries, tuple(differences), tuple(notes), metrics, counted(groups))
+
+
+def _metrics(wanted: Sequence[str], groups: Sequence[Group]) -> tuple[Metric, ...]:
+    """Return the metrics to compare: those named, or those of the usual ones that at least one mission has."""
+    found = []
+    for name in dict.fromkeys(wanted or _USUAL):
+        metric = metric_of(name)
+        if metric is None:
+            remedy = did_you_mean(name, METRICS, "there are")
+            raise InputError(f"there is no metric {shown(name)}", place="metrics", remedy=remedy)
+        if any(len(group.known_values(name)) for group in groups):
+            found.append(metric)
+        elif wanted:
+            raise InputError(f"no mission has a value of {name}", place="metrics", remedy="leave it out")
+    return tuple(found)
+
+
+def _half_widths(texts: Sequence[str], metrics: Sequence[Metric]) -> dict[str, float]:
+    """Read METRIC:HALF_WIDTH, for instance search_time_s:2."""
+    names = [metric.name for metric in metrics]
+    found = {}
+    for text in texts:
+        name, _, number = (part.strip() for part in text.partition(":"))
+        half_width = as_number(number)
+        if name not in names:
+            remedy = did_you_mean(name, names, "compared are")
+            raise InputError(f"{shown(name)} is not compared", place="half-width", remedy=remedy)
+        if not 0.0 < half_width < math.inf:
+            remedy = f"give METRIC:HALF_WIDTH with a number above 0, for instance {SEARCH_TIME}:2"
+            raise InputError(f"{shown(text)} has no half-width", place="half-width", remedy=remedy)
+        found[name] = half_width
+    return found
+
+
+def _pairs(groups: Sequence[Group], against: str | None) -> list[tuple[Group, Group]]:
+    if against is None:
+        return list(combinations(groups, 2))
+    by_name = {group.name: group for group in groups}
+    if against not in by_name:
+        remedy = did_you_mean(against, by_name, "there are")
+        raise InputError(f"nothing is called {shown(against)}", place="against", remedy=remedy)
+    return [(group, by_name[against]) for name, group in by_name.items() if name != against]
+
+
+def _summarise(group: Group, metric: Metric, horizon_s: float) -> Summary:
+    """Estimate one metric of one group; the restricted mean of search times reaches to horizon_s."""
+    sample = group.known_values(metric.name)
+    found = Summary(group.name, metric.name, len(sample), len(group.frame) - len(sample))
+    if not len(sample):
+        return found
+    if metric.name == FOUND and group.is_of_missions:
+        mean = share_of(int(sample.sum()), len(sample))
+    else:
+        mean = statistics.mean_interval(sample)
+    if metric.name == FOUND:
+        mean = mean.cut(0.0, 1.0)
+    q1, median, q3 = map(float, np.percentile(sample, (25.0, 50.0, 75.0)))
+    std = float(sample.std(ddof=1)) if len(sample) > 1 else math.nan
+    found = replace(found, mean=mean, std=std, median=median, q1=q1, q3=q3)
+    if metric.name == SEARCH_TIME and group.is_of_missions:
+        was_found = group.values(FOUND)[~np.isnan(group.values(metric.name))]
+        if not np.isnan(was_found).any():
+            restricted, half = statistics.search_times(sample, was_found > 0.0, horizon_s)
+            found = replace(found, horizon_s=horizon_s, restricted_mean_s=restricted, censored_median_s=half)
+    return found
+
+
+def _difference(first: Group, second: Group, metric: Metric, half_width: float | None, *, unpaired: bool) -> Difference:
+    """Estimate the difference of two groups in one metric, and test it.
+
+    Args:
+        first: the one group.
+        second: the other.
+        metric: to compare.
+        half_width: of the interval for which the number of runs is given; None: as usual for the metric.
+        unpaired: whether runs are taken as independent though they share their random numbers.
+    """
+    is_paired, why, x, y = _samples(first, second, metric.name, unpaired=unpaired)
+    found = Difference(first.name, second.name, metric.name, is_paired, why, len(x), len(y))
+    if not len(x) or not len(y):
+        return found
+    is_share = metric.name == FOUND and first.is_of_missions and second.is_of_missions
+    if is_paired and is_share:
+        difference = statistics.paired_share_difference(x > 0.0, y > 0.0)
+        test = statistics.paired_shares_test(x > 0.0, y > 0.0)
+    elif is_paired:
+        difference = statistics.mean_interval(x - y)
+        test = statistics.signed_rank_test(x, y)
+    elif is_share:
+        counts = (int(x.sum()), len(x)), (int(y.sum()), len(y))
+        difference, test = statistics.share_difference(*counts), statistics.shares_test(*counts)
+    else:
+        difference = statistics.difference_interval(x, y)
+        test = statistics.rank_sum_test(x, y)
+    if metric.name == FOUND:
+        difference = difference.cut(-1.0, 1.0)
+    found = replace(found, difference=difference, test=test.name, p=test.p, p_less=test.p_less)
+    found = replace(found, p_greater=test.p_greater, effect_name=test.effect.method, effect=test.effect)
+    usual = metric.half_width or 0.05 * max(abs(float(x.mean())), abs(float(y.mean())))
+    return _with_runs_needed(found, x, y, half_width or usual)
+
+
+def _with_runs_needed(found: Difference, x: Sample, y: Sample, half_width: float) -> Difference:
+    """Add the gain from pairing, and the number of runs that an interval needs."""
+    if min(len(x), len(y)) < 2 or half_width <= 0.0:
+        return found
+    apart = float(x.var(ddof=1) + y.var(ddof=1))
+    if apart == 0.0:  # equal values say nothing about the spread of others
+        return found
+    unpaired = statistics.runs_for(math.sqrt(apart), half_width)
+    found = replace(found, half_width=half_width, runs_needed_unpaired=unpaired)
+    together = float((x - y).var(ddof=1)) if found.paired else 0.0
+    if together > 0.0:
+        paired = statistics.runs_for(math.sqrt(together), half_width)
+        found = replace(found, runs_needed_paired=paired, variance_ratio=apart / together)
+    return found
+
+
+def _samples(first: Group, second: Group, metric: str, *, unpaired: bool) -> tuple[bool, str, Sample, Sample]:
+    """Return whether two groups are paired, why, and their values, those of the same runs in the same order if so."""
+    x, y = first.by_run(metric), second.by_run(metric)
+    apart = first.known_values(metric), second.known_values(metric)
+    if unpaired:
+        return False, "not paired: as asked", *apart
+    if x is None or y is None:
+        return False, "not paired: real missions, or missions without seed, share no random numbers", *apart
+    common = pandas.concat({"x": x, "y": y}, axis=1, join="inner")
+    if common.empty:
+        seeds = [", ".join(each.index.unique("seed")[:3]) for each in (x, y)]
+        if seeds[0] != seeds[1]:
+            why = f"not paired: the seeds {seeds[0]} and {seeds[1]} differ, so no random numbers are shared"
+        else:
+            why = "not paired: they have no run number in common"
+        return False, why, *apart
+    both = common.dropna()
+    if len(both) < 2 <= min(map(len, apart)):
+        return False, "not paired: fewer than two runs have a value under both", *apart
+    left = max(map(len, apart)) - len(both)
+    rest = f"; {left} of one without a counterpart are left out" if left and len(both) else ""
+    why = f"paired by run number, as runs with the same seed and number share their random numbers{rest}"
+    return True, why, both["x"].to_numpy(), both["y"].to_numpy()

@@ -1,0 +1,167 @@
+"""Draw the contents of results folders: missions, a campaign, or a sweep."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from textwrap import fill
+
+import pandas
+from matplotlib.figure import Figure
+
+from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.records.mission_folder import TRAJECTORY_FILE, MissionRecord, read_mission
+from suave_des.results import campaign_figures, style
+from suave_des.results.mission_figures import Rules, draw_map, draw_paths, draw_timeline
+from suave_des.results.missions import Group, Missions, grouped, missions_of, read_missions
+from suave_des.results.paper import published_runs
+from suave_des.results.style import key_words
+
+ENDINGS = (".png", ".pdf", ".svg")
+_UNDATED = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
+AUTO, SWEEP, PATHS, MAP, TIMELINE = "auto", "sweep", "paths", "map", "timeline"
+_PUBLISHED_SCENARIO = "seams2023"
+
+
+def _rainclouds(groups: Sequence[Group]) -> Figure:
+    scenarios = {name for group in groups if "scenario" in group.frame for name in group.frame["scenario"].unique()}
+    published = grouped(read_missions([published_runs()]))[0] if scenarios == {_PUBLISHED_SCENARIO} else []
+    names = [group.name for group in groups]
+    return campaign_figures.draw_rainclouds(groups, {group.name: group for group in published if group.name in names})
+
+
+CAMPAIGN_KINDS: Mapping[str, Callable[[Sequence[Group]], Figure]] = {
+    "distributions": campaign_figures.draw_distributions,
+    "raincloud": _rainclouds,
+    "detections": campaign_figures.draw_detections,
+    "convergence": campaign_figures.draw_convergence,
+    "reactions": campaign_figures.draw_reactions,
+}
+"""Figures of a campaign's missions by their names."""
+_OF_MEANS = "convergence"
+"""What shows means, with their intervals: of runs, as all points of a sweep share a run's random numbers. The others
+show missions, and means over the points would be what no mission did."""
+KINDS = (AUTO, MAP, TIMELINE, *CAMPAIGN_KINDS, SWEEP, PATHS)
+"""All figures by their names."""
+
+
+def draw_folder(folder: Path, out: Path) -> None:
+    """Draw the contents of a results folder, and write the picture; see draw_results."""
+    draw_results([folder], out)
+
+
+def draw_results(
+    folders: Sequence[Path],
+    out: Path,
+    kind: str = AUTO,
+    parameters: Sequence[str] = (),
+    rules_of: Callable[[MissionRecord], Rules] = lambda record: {},
+) -> None:
+    """Draw the contents of results folders, and write the picture.
+
+    Args:
+        folders: of missions (trajectory.csv), or of campaigns (runs.csv) and files like these.
+        out: picture to write; its ending says which kind.
+        kind: one of KINDS; "auto": of one mission its map, of several their paths, of a campaign the distributions, of
+            a sweep the means.
+        parameters: of a sweep: those to draw; empty: all.
+        rules_of: finds the rules behind the adaptations of a mission, for its timeline.
+
+    Raises:
+        InputError: there are no results of that kind in the folders, or the picture cannot be written.
+    """
+    check_picture(out)
+    if kind not in KINDS:
+        raise InputError(f"there is no figure {shown(kind)}", place="kind", remedy=did_you_mean(kind, KINDS))
+    missions = [folder for folder in folders if (folder / TRAJECTORY_FILE).is_file()]
+    with style.publication():
+        if len(missions) == len(folders) and kind in (AUTO, MAP, TIMELINE, PATHS):
+            figure = _of_records([read_mission(folder) for folder in folders], kind, rules_of)
+        elif missions:
+            problem = "has a mission, where the figure needs missions of a campaign"
+            raise InputError(problem, file=missions[0], remedy="give folders of suave-des campaign")
+        elif kind in (MAP, TIMELINE, PATHS):
+            problem = f"has no {TRAJECTORY_FILE}: the figure needs a mission"
+            raise InputError(problem, file=folders[0], remedy="give a folder of suave-des run")
+        else:
+            for folder in folders:
+                if folder.is_dir() and not list(folder.glob("*.csv")):
+                    remedy = "give the --out folder of suave-des run, campaign or reproduce"
+                    raise InputError(f"has neither {TRAJECTORY_FILE} nor runs.csv", file=folder, remedy=remedy)
+            figure = _of_missions(read_missions(folders), kind, parameters)
+        write_picture(figure, out)
+
+
+def check_picture(out: Path) -> None:
+    """Check that a name is a picture's.
+
+    Raises:
+        InputError: it has another ending.
+    """
+    if out.suffix.lower() not in ENDINGS:
+        problem = f"expected a picture, got {out.suffix or 'a file without an ending'}"
+        raise InputError(problem, file=out, remedy=f"one of {', '.join(ENDINGS)}")
+
+
+def write_picture(figure: Figure, out: Path, *, bbox_inches: str | None = None) -> None:
+    """Write a figure atomically, and without the time of writing.
+
+    Args:
+        figure: to write.
+        out: .png, .pdf or .svg.
+        bbox_inches: "tight" trims it to what is drawn; None: it has the figure's own size.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    temporary = out.with_name(f".{os.getpid()}{out.suffix}")
+    try:
+        figure.savefig(temporary, bbox_inches=bbox_inches, metadata=_UNDATED.get(out.suffix.lower()))
+        temporary.replace(out)
+    except OSError as error:
+        remedy = "give a path in a folder that is yours"
+        raise InputError(f"cannot be written: {error.strerror}", file=out, remedy=remedy) from None
+    finally:
+        with suppress(OSError):  # there may not even be a folder
+            temporary.unlink()
+
+
+def _of_records(records: Sequence[MissionRecord], kind: str, rules_of: Callable[[MissionRecord], Rules]) -> Figure:
+    if kind == PATHS or (kind == AUTO and len(records) > 1):
+        return draw_paths(records)
+    if len(records) > 1:
+        problem = f"the figure {kind} is of one mission, and {len(records)} are given"
+        raise InputError(problem, remedy=f"give one of them, or --kind {PATHS}")
+    return draw_timeline(records[0], rules_of(records[0])) if kind == TIMELINE else draw_map(records[0])
+
+
+def draw_frame(frame: pandas.DataFrame, kind: str = AUTO) -> Figure:
+    """Draw the missions of a data frame with the columns of runs.csv.
+
+    Raises:
+        InputError: there is no such figure of a campaign, or the frame lacks what it needs.
+    """
+    with style.publication():
+        return _of_missions(missions_of(frame), kind, ())
+
+
+def _of_missions(missions: Missions, kind: str, parameters: Sequence[str]) -> Figure:
+    if kind == SWEEP or (kind == AUTO and missions.swept):
+        if not missions.swept:
+            raise InputError("nothing is swept in these results", place="kind", remedy="give a campaign with a sweep")
+        return campaign_figures.draw_sweep(missions, parameters)
+    if parameters:
+        raise InputError("parameters are those of a sweep", place="parameters", remedy="leave them out")
+    name = "distributions" if kind == AUTO else kind
+    if name not in CAMPAIGN_KINDS:
+        raise InputError(f"the figure {name} is of a mission", place="kind", remedy=did_you_mean(name, CAMPAIGN_KINDS))
+    groups = grouped(missions, averages=name == _OF_MEANS)[0]
+    figure = CAMPAIGN_KINDS[name](groups)
+    if missions.swept:
+        shown_are = "missions at" if all(group.is_of_missions for group in groups) else "means of each run over"
+        swept = ", ".join(key_words(parameter) for parameter in missions.swept)
+        width = int(16 * figure.get_figwidth())
+        figure.supxlabel(fill(f"{shown_are} all points of the sweep: {swept}", width), fontsize=7.5, color="#555555")
+    return figure

@@ -1,0 +1,519 @@
+"""Missions of several sources: read from folders, files or a data frame, and grouped for a comparison or a figure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pandas
+from numpy.typing import NDArray
+
+from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.records.metrics import DISTANCE, FOUND, SEARCH_TIME, Metric, metric_of
+from suave_des.records.runs import COLUMNS, is_foreign, read_runs
+from suave_des.records.store import RUNS_FILE, STORE_FILE, check_one_campaign, read_manifest
+
+SHARING = "runs_sharing_draw"
+"""Column of missions, and attribute of a frame: how many runs in a row share their draws."""
+PAPER_ORDER = {"none": 0, "random": 1, "metacontrol": 2}
+_MOST_GROUPS = 60
+"""More make tables that nobody reads, and thousands of tests."""
+_MEMBER = "ensemble_member"
+"""Column of runs.csv: the parameter set of a run."""
+_FEW = 20
+_SAME_LIMIT_S = 1.5
+"""Programs write limits that differ by a second for the same one."""
+
+
+@dataclass(frozen=True)
+class Missions:
+    """Missions to compare, a row for each.
+
+    Attributes:
+        frame: with `source`, the columns of records.runs.COLUMNS, further metrics, and what a sweep varies; with
+            `runs_sharing_draw` where that is known.
+        swept: columns that a sweep varies.
+        notes: what readers of the comparison should know about the files.
+    """
+
+    frame: pandas.DataFrame
+    swept: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def managers(self) -> list[str]:
+        """In the order of their first missions."""
+        return list(dict.fromkeys(self.frame["manager"]))
+
+    def check_swept(self, names: Sequence[str], place: str) -> None:
+        """Check that a sweep varies these columns.
+
+        Raises:
+            InputError: it does not vary one of them; `place` says where that was asked for.
+        """
+        for name in names:
+            if name not in self.swept:
+                remedy = did_you_mean(name, self.swept, "swept are")
+                raise InputError(f"{shown(name)} is not what a sweep varies here", place=place, remedy=remedy)
+
+
+def _checked(missions: Missions, path: Path | None = None) -> Missions:
+    """Return missions none of which is there twice."""
+    known = missions.frame[missions.frame["run"].notna() & (missions.frame["seed"] != "")]
+    twice = known.duplicated(["manager", "seed", "run", *missions.swept])
+    if twice.any():
+        row = known[twice].iloc[0]
+        problem = f"run {row['run']:.0f} of {row['manager']} with seed {row['seed']} is there twice"
+        raise InputError(problem, file=path, remedy="give each mission once")
+    return missions
+
+
+def read_missions(paths: Sequence[Path]) -> Missions:
+    """Read the missions in folders or files of results.
+
+    Args:
+        paths: folders of `suave-des campaign` or `reproduce`, of the exemplar's own CSV files, or single CSV files.
+
+    Raises:
+        InputError: one of them has no missions, is given twice, or has missions of several scenarios.
+    """
+    if not paths:
+        raise InputError("no results are given", remedy="give the --out folders of suave-des campaign, or CSV files")
+    resolved = [path.resolve() for path in paths]
+    for place, path in enumerate(paths):
+        if resolved[place] in resolved[:place]:
+            raise InputError("is given twice", file=path, remedy="name each folder of results once")
+    sources = [_read_source(path) for path in paths]
+    frames = [each.frame.assign(source=name) for each, name in zip(sources, _short_names(paths), strict=True)]
+    swept = tuple(dict.fromkeys(name for source in sources for name in source.swept))
+    notes = tuple(note for source in sources for note in source.notes)
+    return Missions(pandas.concat(frames, ignore_index=True), swept, notes)
+
+
+def missions_of(frame: pandas.DataFrame) -> Missions:
+    """Take the missions of a data frame with the columns of runs.csv, as run_campaign returns it or pandas reads it.
+
+    Raises:
+        InputError: it has no missions, lacks a column, or has a mission twice.
+    """
+    for column in ("manager", SEARCH_TIME, DISTANCE):
+        if column not in frame.columns:
+            raise InputError(f"the data frame has no column {column!r}", remedy="it needs the columns of runs.csv")
+    if frame.empty:
+        raise InputError("the data frame has no missions", remedy="one row for each mission is needed")
+    plain = pandas.DataFrame(frame).reset_index(drop=True)
+    texts = ("scenario", "manager", "seed")
+    missing = {name: "" if name in texts else math.nan for name in COLUMNS if name not in plain}
+    plain = plain.assign(**missing, source="", **{SHARING: int(frame.attrs.get(SHARING, 1))})
+    plain = plain.assign(**{name: plain[name].astype(str) for name in texts})
+    for name in plain:
+        if name == "run" or (name not in texts and metric_of(str(name)) is not None):
+            try:
+                plain[name] = plain[name].astype("Float64").to_numpy(float, na_value=math.nan)
+            except (ValueError, TypeError) as error:
+                problem = f"the data frame's column {name!r} has something that is no number: {error}"
+                raise InputError(problem, remedy="it needs the columns of runs.csv") from None
+    return _checked(Missions(plain, _swept({}, plain)))
+
+
+def _read_source(path: Path) -> Missions:
+    if not path.is_dir():
+        return _read_file(path, read_manifest(path.parent))
+    manifest = read_manifest(path)
+    check_one_campaign(path)
+    if (path / RUNS_FILE).exists():
+        found = _read_file(path / RUNS_FILE, manifest)
+        frame = found.frame.assign(**{SHARING: _sharing(manifest)})
+        return Missions(frame, found.swept, (*found.notes, *_unfinished(path, manifest)))
+    if (path / STORE_FILE).is_file():
+        remedy = f"suave-des campaign --resume {path} runs the rest and writes them"
+        raise InputError("the campaign ended before its result files were written", file=path, remedy=remedy)
+    return _read_exemplars_folder(path)
+
+
+def _read_file(path: Path, manifest: Mapping[str, Any] = MappingProxyType({})) -> Missions:
+    """Read one file, with the manifest of its campaign."""
+    runs = read_runs(path)
+    runs.check_simulated((), None)
+    frame = runs.frame.reset_index(drop=True)
+    if frame["scenario"].iloc[0]:
+        return _checked(Missions(frame, _swept(manifest, frame), runs.notes), path)
+    return _checked(Missions(_in_papers_order(frame), (), runs.notes), path)
+
+
+def _in_papers_order(frame: pandas.DataFrame) -> pandas.DataFrame:
+    """Sort real missions by manager as in the paper's table, others after these in their own order."""
+    ranks = frame["manager"].map(PAPER_ORDER).fillna(len(PAPER_ORDER))
+    return frame.iloc[ranks.argsort(kind="stable")].reset_index(drop=True)
+
+
+def _read_exemplars_folder(folder: Path) -> Missions:
+    """Read all CSV files of a folder that are results; others, such as the exemplar's statistics, are left out."""
+    found, notes, errors = [], [], []
+    try:
+        paths = sorted(folder.glob("*.csv"))
+        inner = sorted(child.name for child in folder.iterdir() if (child / RUNS_FILE).is_file())
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", file=folder, remedy="check its rights") from None
+    for path in paths:
+        try:
+            found.append(_read_file(path))
+        except InputError as error:
+            if not is_foreign(path):
+                raise
+            errors.append(error)
+            notes.append(f"{path} is left out: it has no columns of missions")
+    if found:
+        frame = pandas.concat([each.frame for each in found], ignore_index=True)
+        notes += [note for each in found for note in each.notes]
+        return Missions(_in_papers_order(frame), (), tuple(notes))
+    if errors:
+        raise errors[0]
+    if inner:
+        names = " ".join(str(folder / name) for name in inner[:4])
+        raise InputError("has no results itself", file=folder, remedy=f"give the folders in it: {names}")
+    remedy = "give the --out folder of suave-des campaign, or a folder with the exemplar's CSV files"
+    raise InputError("has no result files" if folder.exists() else "no such folder", file=folder, remedy=remedy)
+
+
+def _sharing(manifest: Mapping[str, Any]) -> int:
+    """Return how many runs in a row share the draws of perturbations; 1 if none do."""
+    try:
+        return max(1, int(manifest["runs_per_draw"])) if manifest["perturbations"] else 1
+    except (ValueError, KeyError, TypeError):
+        return 1
+
+
+def _unfinished(folder: Path, manifest: Mapping[str, Any]) -> Iterator[str]:
+    """Say how many missions a campaign lacks."""
+    try:
+        left_out, failed, planned = (int(manifest["missions"][key]) for key in ("left_out", "failed", "planned"))
+    except (ValueError, KeyError, TypeError):
+        return
+    if left_out:
+        how = f"suave-des campaign --resume {folder} runs the rest"
+        are = "is" if left_out == 1 else "are"
+        yield f"{folder} is not finished: {left_out} of {planned} missions {are} missing; {how}"
+    if failed:
+        yield f"{folder}: {failed} of {planned} missions failed and {'is' if failed == 1 else 'are'} missing"
+
+
+def _swept(manifest: Mapping[str, Any], frame: pandas.DataFrame) -> tuple[str, ...]:
+    """Return the columns that a sweep varies: those that the manifest names, or else those that seem to vary.
+
+    These differ between missions of one manager, seed and run, and are no metrics.
+    """
+    columns = [str(name) for name in frame if name not in COLUMNS and metric_of(str(name)) is None]
+    if "missions" in manifest:
+        with suppress(AttributeError, TypeError):
+            forms = manifest.get("sweep", {})
+            ranges = (forms.get("sample") or {}).get("ranges", {})
+            named = [name for form in (forms.get("grid", {}), forms.get("zip", {}), ranges) for name in form]
+            return tuple(name for name in named if name in columns)
+    if not columns or frame["run"].isna().any():
+        return ()
+    counts = frame.groupby(["manager", "seed", "run"], sort=False, observed=True)[columns].nunique(dropna=False)
+    return tuple(name for name in columns if (counts[name] > 1).any())
+
+
+def _short_names(paths: Sequence[Path]) -> list[str]:
+    """Name sources by the last parts of their paths that tell them apart."""
+    parts = [path.resolve().with_suffix("").parts for path in paths]
+    for depth in range(1, max(map(len, parts))):
+        names = ["/".join(each[-depth:]) for each in parts]
+        if len(set(names)) == len(names):
+            return names
+    return [str(path) for path in paths]
+
+
+# Groups
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Missions that are compared with those of other groups.
+
+    Attributes:
+        name: the manager's, with its source or its value of a sweep where several have the same.
+        frame: a row for each independent value: for each mission, or, where points of a sweep are averaged, for each
+            run, whose random numbers all points share; or for each draw that several runs share.
+        is_of_missions: whether each row is one mission.
+    """
+
+    name: str
+    frame: pandas.DataFrame
+    is_of_missions: bool = True
+
+    def values(self, metric: str) -> NDArray[np.float64]:
+        """Return the values of a metric, nan where there is none."""
+        return self.frame[metric].to_numpy(float)
+
+    def known_values(self, metric: str) -> NDArray[np.float64]:
+        """Return the values of a metric without missing ones; empty if it is not there at all."""
+        return self.frame[metric].dropna().to_numpy(float) if metric in self.frame else np.empty(0)
+
+    def by_run(self, metric: str) -> pandas.Series[float] | None:
+        """Return the values by (seed, run); None for missions without these."""
+        if self.frame["run"].isna().any() or (self.frame["seed"] == "").any():
+            return None
+        return pandas.Series(self.values(metric), self._runs)
+
+    @cached_property
+    def _runs(self) -> pandas.MultiIndex:
+        return pandas.MultiIndex.from_frame(self.frame[["seed", "run"]])
+
+
+def counted(groups: Sequence[Group]) -> str:
+    """Return what the rows of groups are: "mission", "run", "draw", or "value" where they differ."""
+    if all(group.is_of_missions for group in groups):
+        return "mission"
+    if any(group.is_of_missions for group in groups):
+        return "value"
+    return "draw" if any(runs_sharing_draw(group.frame) > 1 for group in groups) else "run"
+
+
+def time_limit_s(groups: Sequence[Group]) -> float:
+    """Return the whole seconds that missions of every group had; where all found the pipeline, the longest search."""
+    lost = [group.frame.loc[group.frame[FOUND] == 0.0, SEARCH_TIME] for group in groups]
+    limits_s = [float(times.max()) for times in lost if times.notna().any()]
+    ends_s = [float(times_s.max()) for group in groups if len(times_s := group.known_values(SEARCH_TIME))]
+    limit_s = min(limits_s) if limits_s else max(ends_s, default=0.0)
+    return math.floor(limit_s) or limit_s
+
+
+def grouped(
+    missions: Missions, managers: Sequence[str] = (), by: Sequence[str] = (), *, averages: bool = True
+) -> tuple[list[Group], list[str]]:
+    """Group missions by manager, source and the chosen parameters of a sweep.
+
+    Args:
+        missions: of all sources.
+        managers: names of the managers to include; empty: all.
+        by: swept parameters each of whose values is a separate group.
+        averages: whether a run's values are averaged over the other swept parameters.
+
+    Returns:
+        The groups in the order of their first missions, and notes for the reader.
+
+    Raises:
+        InputError: a name is not there, or there are too many groups.
+    """
+    frame, known = missions.frame, missions.managers
+    for name in managers:
+        if name not in known:
+            raise InputError(f"there is no mission of {shown(name)}", remedy=did_you_mean(name, known, "there are"))
+    missions.check_swept(by, "by")
+    if managers:
+        frame = frame[frame["manager"].isin(managers)]
+    found = list(frame.groupby(["manager", "source", *by], sort=False, dropna=False, observed=True))
+    if managers:
+        found.sort(key=lambda item: list(managers).index(str(item[0][0])))
+    if len(found) > _MOST_GROUPS:
+        problem = f"{len(found)} groups are too many to compare with each other"
+        raise InputError(problem, remedy=f"choose {_MOST_GROUPS} or fewer with managers and by")
+    averaged = [name for name in missions.swept if averages and name not in by]
+    names = _names([key for key, _ in found], by)
+    alike = _alike_by_source(frame) if averages else {}
+    points = {
+        key: len(part[averaged].drop_duplicates()) if averaged else 1
+        for key, part in frame.groupby(["source", *by], dropna=False, observed=True)
+    }
+    groups, lacking = [], []
+    for name, (key, part) in zip(names, found, strict=True):
+        source, number = str(key[1]), points[key[1:]]
+        rows = _means(part, number) if number > 1 else part
+        if number > 1 and (left := len(part.groupby(["seed", "run"], observed=True)) - len(rows)):
+            lacking.append(f"{name} {left} of {left + len(rows)}")
+        if (sharing := alike.get(source, 1)) > 1:
+            rows = _means(rows.assign(run=first_alike(rows, sharing)), _runs_of_draws(frame, source, sharing))
+        groups.append(Group(name, rows, number == sharing == 1))
+    if lacking and not any(len(group.frame) for group in groups):
+        remedy = f"compare the points with --by {','.join(averaged)}, or resume the campaign"
+        raise InputError("no manager has a run with missions at all points of the sweep", remedy=remedy)
+    notes = list(_notes(groups, averaged, frame, alike))
+    if lacking:
+        notes.append(f"runs that lack a point of the sweep ({', '.join(lacking)}) are left out")
+    return groups, notes
+
+
+def _names(keys: Sequence[tuple[object, ...]], by: Sequence[str]) -> list[str]:
+    sources: dict[object, set[object]] = {}
+    for manager, source, *_ in keys:
+        sources.setdefault(manager, set()).add(source)
+    return [
+        printable(str(manager))
+        + (f" ({printable(str(source))})" if len(sources[manager]) > 1 else "")
+        + "".join(f", {name} {_short(value)}" for name, value in zip(by, values, strict=True))
+        for manager, source, *values in keys
+    ]
+
+
+def _short(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else printable(str(value))
+
+
+# Runs that share their draws
+
+
+def runs_sharing_draw(frame: pandas.DataFrame) -> int:
+    """Return how many runs in a row share their draws; of several campaigns, as many as have whole draws of each."""
+    return math.lcm(*frame[SHARING].dropna().astype(int).unique()) if SHARING in frame else 1
+
+
+def first_alike(frame: pandas.DataFrame, alike: int) -> pandas.Series[float]:
+    """Return of each mission the first run that shares its draws."""
+    return (frame["run"] - 1) // alike * alike + 1
+
+
+def _alike_by_source(frame: pandas.DataFrame) -> dict[str, int]:
+    """Return how many runs of each source are averaged, because they share a draw.
+
+    Campaigns with a seed in common are compared run by run, and so by means over the same runs. Other sources, such as
+    real missions, keep their own number.
+    """
+    parts = {str(source): part for source, part in frame.groupby("source", observed=True)}
+    seeds = {source: set(part.loc[part["run"].notna(), "seed"]) - {""} for source, part in parts.items()}
+    return {
+        source: math.lcm(
+            runs_sharing_draw(part),
+            *(runs_sharing_draw(parts[other]) for other in parts if seeds[source] & seeds[other]),
+        )
+        for source, part in parts.items()
+        if part["run"].notna().all()
+    }
+
+
+def _runs_of_draws(frame: pandas.DataFrame, source: str, alike: int) -> pandas.Series[int]:
+    """Return by (seed, first run) how many runs of a draw there are under any manager of a source."""
+    runs = frame[frame["source"] == source]
+    draws = runs.assign(draw=first_alike(runs, alike)).groupby(["seed", "draw"], observed=True)
+    return draws["run"].nunique()
+
+
+def _means(frame: pandas.DataFrame, wanted: int | pandas.Series[int]) -> pandas.DataFrame:
+    """Average rows of the same seed and run.
+
+    A mean over other points, or other runs of a draw, than that of another manager would compare these points and not
+    the managers. So a metric is missing where not all of the wanted rows have a value; a row is left out where a
+    whole mission is missing.
+
+    Args:
+        frame: rows to average.
+        wanted: how many rows each run has where none is missing.
+    """
+    numbers = list(frame.select_dtypes("number").columns.difference(["run"]))
+    by_run = frame.groupby(["seed", "run"], sort=False, observed=True)
+    sizes = by_run.size()
+    whole = sizes * 0 + wanted if isinstance(wanted, int) else wanted.reindex(sizes.index)
+    means = by_run[numbers].mean().where(by_run[numbers].count().eq(whole, axis=0))
+    return means[sizes == whole].reset_index()
+
+
+# What a reader should know
+
+
+def _notes(
+    groups: Sequence[Group], averaged: Sequence[str], frame: pandas.DataFrame, alike_by_source: Mapping[str, int]
+) -> Iterator[str]:
+    for alike in sorted({each for each in alike_by_source.values() if each > 1}):
+        sources = [source for source, each in alike_by_source.items() if each == alike]
+        is_one = frame.loc[frame["source"].isin(sources), SHARING].eq(alike).all()
+        what = f"the {alike} runs that share each draw" if is_one else f"every {alike} runs, of which some share a draw"
+        of = "" if len(sources) == frame["source"].nunique() else f" of {', '.join(map(printable, sources))}"
+        yield (
+            f"the values of {what} (runs_per_draw){of} are averaged: draws are independent, and runs are not; n and the"
+            f" runs needed{of and ' there'} are numbers of {'draws' if is_one else 'these averages'}"
+        )
+    if averaged and not all(group.is_of_missions for group in groups):
+        yield (
+            f"the values of a run are averaged over {', '.join(averaged)}: all points of a sweep share its random"
+            " numbers, so that runs are independent and missions are not"
+        )
+    members = frame[_MEMBER].nunique() if _MEMBER in frame else 0
+    if members > 1:
+        yield (
+            f"runs have {members} sets of parameters (an ensemble): intervals and tests are for chance among runs with"
+            " these sets; how much the sets differ is in ensemble.csv"
+        )
+    scenarios = [name for name in dict.fromkeys(frame["scenario"]) if name]
+    if len(scenarios) > 1:
+        yield f"the missions are of different scenarios: {', '.join(scenarios)}"
+    few = min(len(group.frame) for group in groups)
+    if few < _FEW:
+        rough = f"intervals and numbers of runs needed from fewer than {_FEW} are rough"
+        yield f"the fewest runs of one of them are {few}: {rough}"
+    if any(not len(group.known_values(FOUND)) for group in groups):
+        yield "some files do not say which missions found the pipeline"
+
+
+def caveats(groups: Sequence[Group], metrics: Sequence[Metric]) -> Iterator[str]:
+    """Yield what is to be known of missions that never found the pipeline, and of those without a value of a metric."""
+    for metric in metrics:
+        if metric.name == SEARCH_TIME:
+            yield from _never_found(groups)
+        elif metric.name != FOUND:
+            yield from _left_out(groups, metric)
+
+
+def _never_found(groups: Sequence[Group]) -> Iterator[str]:
+    counts, ends_s, early = [], {}, []
+    for group in groups:
+        found, times_s = group.values(FOUND), group.values(SEARCH_TIME)
+        lost = found < 1.0
+        if lost.any() and group.is_of_missions:
+            counts.append(f"{group.name} {int(lost.sum())} of {len(found)}")
+            first_s, last_s = float(times_s[lost].min()), float(times_s[lost].max())
+            ends_s[group.name] = float(np.median(times_s[lost]))
+            if last_s - first_s > _SAME_LIMIT_S:
+                early.append(f"{group.name} after {first_s:.0f} to {last_s:.0f} s")
+        elif lost.any():
+            counts.append(f"{group.name} {1.0 - np.nanmean(found):.1%}")
+    ended = (
+        f"the search time of missions that never found the pipeline ({listed(counts)}) is the time at which they ended"
+    )
+    if early:
+        yield (
+            f"{ended}, some of them before others ({listed(early)}): a mean search time is then not the mean up to one"
+            " limit, and a mission that ends early counts as a short search; compare the share that found the pipeline"
+        )
+    elif counts:
+        yield f"{ended}: a mean search time is the mean up to that limit, and would be longer without it"
+    if not early and ends_s and max(ends_s.values()) - min(ends_s.values()) > _SAME_LIMIT_S:
+        limits = listed([f"{name} after {end_s:.0f} s" for name, end_s in ends_s.items()])
+        yield (
+            f"missions that never found the pipeline ended at different times ({limits}): means, differences and tests"
+            " of the search time are not comparable, but the means to the same limit are"
+        )
+
+
+def _left_out(groups: Sequence[Group], metric: Metric) -> Iterator[str]:
+    for are_missions, what in (
+        (True, f"missions without a {metric.title}"),
+        (False, f"averages over missions of which some have no {metric.title}"),
+    ):
+        counts = [
+            f"{group.name} {n - known} of {n}"
+            for group in groups
+            if group.is_of_missions is are_missions
+            and 0 < (known := len(group.known_values(metric.name))) < (n := len(group.frame))
+        ]
+        if counts:
+            yield f"{what} ({listed(counts)}) are left out of it; they may be those that went worst"
+
+
+def printable(name: str) -> str:
+    """Return a name from a file without terminal control characters."""
+    return name if name.isprintable() else repr(name)[1:-1]
+
+
+def listed(parts: Sequence[str], most: int = 6) -> str:
+    """Write the first of several parts, and how many more there are."""
+    more = len(parts) - most
+    return ", ".join(parts[:most]) + (f" and {more} more" if more > 0 else "")

@@ -1,0 +1,416 @@
+"""Real missions from one or several files, each with its condition, and what a faithful simulation must be near.
+
+The conditions of a campaign are the points of its sweep: start, time of a failure, shift of the visibility. A real
+mission is compared with simulated ones of its own condition, so that what differs between conditions is not taken for
+chance. Missions come in clusters: a file of targets names regions of search time, distance and place of detection, and
+the share of missions that there may be in them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self, Unpack
+
+import numpy as np
+import pandas
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from suave_des.campaign.spec import read_campaign_file
+from suave_des.campaign.variation import Sweep, Variation, cell_of, check_drawn, vary
+from suave_des.errors import InputError, did_you_mean, line_error, number_of
+from suave_des.records.runs import Runs, read_runs
+from suave_des.registry import manager_class
+from suave_des.resources import shipped_folder
+from suave_des.scenario.loader import LoadedScenario, Replacements, load_scenario
+from suave_des.scenario.quantities import Number, Strict, ordered, wrong
+from suave_des.scenario.yamlfile import read_yaml, validated
+
+PAPERS_RUNS = "seams2023_runs.csv"
+"""The 60 missions published with the SUAVE paper, for scenarios that have none of their own."""
+CONDITION = "condition"
+"""Column of a frame of missions: number of the condition, from 1."""
+NUMBER_COLUMNS = (CONDITION, "block")
+"""Columns of data files that may have that number."""
+_REMEDY = f"add a column {CONDITION} with the number of each mission's condition in the campaign, from 1"
+_RELATIVE, _ABSOLUTE = 1e-3, 0.01
+"""Data files give conditions rounded; values as near as this are the same."""
+_LISTED = 12
+_TOLERANCE = 1e-6
+"""Places come from sums of steps; an interval must contain the values that it names."""
+
+# Targets
+
+Column = Literal["search_time_s", "distance_inspected_m", "detection_x_m", "pipeline_found", "mean_reaction_time_s"]
+Bounds = tuple[Number, Number]
+Region = dict[Column, Annotated[tuple[Bounds, ...], Field(min_length=1)]]
+"""By column the intervals, ends included, one of which must contain the value; an unknown place is in none."""
+
+
+class Share(Strict):
+    """A share of a manager's missions that is compared."""
+
+    manager: str
+    """Managing subsystem."""
+    name: Annotated[str, Field(min_length=1, max_length=100)]
+    """What is counted, in words."""
+    of: Literal["runs", "detections"] = "runs"
+    """Of all runs, or of those whose place of detection is known."""
+    among: Region = Field(default_factory=dict)
+    """Only runs in this region are counted; left out: all."""
+    where: Annotated[Region, Field(min_length=1)]
+    """The region whose share is taken."""
+    target: tuple[Number, Number] | None = None
+    """Least and greatest share that a faithful simulation may have; left out: the share is only printed."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for region in (self.among, self.where):
+            for intervals in region.values():
+                for low, high in intervals:
+                    ordered(low, high)
+        if self.target is not None:
+            ordered(*self.target)
+            if self.target[0] < 0 or self.target[1] > 1:
+                raise wrong("a share is between 0 and 1", "such as target: [0.25, 0.65]", "target")
+        return self
+
+
+class ConditionLimits(Strict):
+    """How near a metric must come where the conditions of the real missions are known."""
+
+    median_difference: Number | None = None
+    """Greatest median over the conditions of |simulated - real median|, in the metric's unit; left out: any."""
+    std_ratio: Number | None = None
+    """Greatest simulated / real standard deviation within a condition, each a median over the conditions."""
+
+
+class Targets(Strict):
+    """A file of shares and of other targets."""
+
+    shares: tuple[Share, ...] = ()
+    """In the order in which they are printed."""
+    conditions: dict[Literal["search_time_s", "distance_inspected_m", "mean_reaction_time_s"], ConditionLimits] = Field(
+        default_factory=dict
+    )
+    """By metric, over all managers."""
+
+
+def read_targets(path: Path) -> Targets:
+    """Read a file of shares and of targets by condition.
+
+    Raises:
+        InputError: with file and line: it cannot be read, or is not valid.
+    """
+    return validated(read_yaml(path), Targets)
+
+
+def targets_beside(data: Path) -> Path | None:
+    """Find the file of targets of a data file: NAME.targets.yaml beside NAME.csv, if it is there."""
+    path = data.with_suffix(".targets.yaml")
+    return path if path.is_file() else None
+
+
+def count(share: Share, runs: pandas.DataFrame) -> tuple[int, int]:
+    """Count the missions in a share, and those that it is a share of.
+
+    Args:
+        share: with its manager.
+        runs: a row for each mission, with the columns of records.runs.COLUMNS.
+    """
+    own = runs[runs["manager"] == share.manager]
+    if share.of == "detections":
+        own = own[own["detection_x_m"].notna()]
+    among = own[_inside(own, share.among)]
+    return int(_inside(among, share.where).sum()), len(among)
+
+
+def _inside(runs: pandas.DataFrame, region: Region) -> pandas.Series[bool]:
+    inside = pandas.Series(True, index=runs.index)
+    for column, intervals in region.items():
+        values = runs[column].astype(float)
+        in_one = [values.between(low - _TOLERANCE, high + _TOLERANCE) for low, high in intervals]
+        inside &= pandas.concat(in_one, axis=1).any(axis=1)
+    return inside
+
+
+# Conditions
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """The conditions of a campaign.
+
+        conditions = Conditions.of(Sweep(zip={"start.y_m": [2.5, 2.8], "thruster_events.0.time_s": [146.4, 91.2]}))
+
+    Attributes:
+        names: parameters that differ between conditions, as the campaign gives them.
+        values: of the parameters, for each condition.
+    """
+
+    names: tuple[str, ...]
+    values: tuple[tuple[Any, ...], ...]
+
+    @classmethod
+    def of(cls, sweep: Sweep) -> Conditions:
+        """Return the points of a sweep as conditions."""
+        points = (sweep.values(point) for point in range(sweep.points))
+        return cls(sweep.parameters, tuple(tuple(map(cell_of, each.values())) for each in points))
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(self.values)
+
+    def text(self, number: int) -> str:
+        """Return a condition's values, such as "start.y_m=2.455"."""
+        return ", ".join(f"{name}={value}" for name, value in zip(self.names, self.values[number - 1], strict=True))
+
+    def listing(self) -> Iterator[str]:
+        """Yield a line for each condition with its values; of very many, only of the first."""
+        for number in range(1, min(len(self), _LISTED) + 1):
+            yield f"Condition {number}: {self.text(number)}"
+        if len(self) > _LISTED:
+            yield f"... and {len(self) - _LISTED} more"
+
+    def numbers(self, runs: pandas.DataFrame) -> NDArray[np.int64] | None:
+        """Return the number of each mission's condition, by what its columns say.
+
+        Args:
+            runs: a row for each mission; of columns named like the parameters, those that are there must agree, and
+                without any a column of NUMBER_COLUMNS may have the numbers.
+
+        Returns:
+            From 1, shape (n,); none if there is no such column.
+
+        Raises:
+            InputError: about a row, counted from 0 as its place: it is of no condition, or of several.
+        """
+        if named := [name for name in self.names if name in runs]:
+            return self._by_values(runs, named)
+        column = next((name for name in NUMBER_COLUMNS if name in runs), None)
+        if column is None:
+            return None
+        numbers = pandas.to_numeric(runs[column], errors="coerce").to_numpy(float)
+        for row in np.flatnonzero(~np.isin(numbers, np.arange(1, len(self) + 1)))[:1]:
+            problem = f"{column}: there is no condition {runs[column].iloc[row]}"
+            raise InputError(problem, place=str(row), remedy=f"the campaign has {len(self)}, counted from 1")
+        return numbers.astype(np.int64)
+
+    def _by_values(self, runs: pandas.DataFrame, named: Sequence[str]) -> NDArray[np.int64]:
+        places = [self.names.index(name) for name in named]
+        fits = np.array(
+            [
+                np.all([_same(runs[name], values[place]) for name, place in zip(named, places, strict=True)], axis=0)
+                for values in self.values
+            ]
+        )
+        for row in np.flatnonzero(fits.sum(axis=0) != 1)[:1]:
+            given = ", ".join(f"{name}={runs[name].iloc[row]}" for name in named)
+            fitting = [str(number) for number in 1 + np.flatnonzero(fits[:, row])]
+            if fitting:
+                remedy = f"add columns for {', '.join(name for name in self.names if name not in named) or CONDITION}"
+                problem = f"conditions {', '.join(fitting)} of the campaign all have {given}"
+            else:
+                shown = "; ".join(map(self.text, range(1, min(len(self), 8) + 1)))
+                problem, remedy = f"no condition of the campaign has {given}", f"it has {shown}"
+            raise InputError(problem, place=str(row), remedy=remedy)
+        return np.asarray(1 + fits.argmax(axis=0), dtype=np.int64)
+
+    def in_order(self, managers: pandas.Series[str]) -> NDArray[np.int64] | None:
+        """Number missions by their order, as the exemplar's runner makes them: equally many runs of each condition.
+
+        Args:
+            managers: of each mission, in the order in which they were made.
+
+        Returns:
+            From 1, shape (n,); none if a manager's missions do not divide evenly.
+        """
+        places = managers.groupby(managers, sort=False).cumcount().to_numpy()
+        sizes = managers.groupby(managers, sort=False).transform("size").to_numpy()
+        if np.any(sizes % len(self)):
+            return None
+        return np.asarray(1 + places // (sizes // len(self)), dtype=np.int64)
+
+
+def _same(column: pandas.Series[Any], value: Any) -> NDArray[np.bool_]:
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        numbers = pandas.to_numeric(column, errors="coerce").to_numpy(float)
+        return np.asarray(np.isclose(numbers, value, rtol=_RELATIVE, atol=_ABSOLUTE), dtype=np.bool_)
+    return (column.astype(str) == ("" if value is None else str(value))).to_numpy(bool)
+
+
+# Missions
+
+
+@dataclass(frozen=True)
+class RealRuns:
+    """Real missions of one or several files.
+
+    Attributes:
+        files: as read, in the order given.
+        frame: a row for each mission with the columns of records.runs.COLUMNS, file by file; with `condition` if the
+            conditions are known.
+        notes: what a reader of the comparison should know about the data.
+    """
+
+    files: tuple[Runs, ...]
+    frame: pandas.DataFrame
+    notes: tuple[str, ...]
+
+    @property
+    def managers(self) -> tuple[str, ...]:
+        """In the order of their first missions."""
+        return tuple(self.frame["manager"].unique())
+
+    def choose(self, wanted: str | None) -> tuple[str, ...]:
+        """Choose the managers to compare: those named, separated by commas, or all.
+
+        Raises:
+            InputError: one is named twice, or has no mission.
+        """
+        if wanted is None:
+            return self.managers
+        source = ", ".join(str(file.path) for file in self.files)
+        names = [name.strip() for name in wanted.split(",") if name.strip()]
+        if not names:
+            raise InputError("no managers are given", remedy=f"of {source}: {', '.join(self.managers)}")
+        for place, manager in enumerate(names):
+            if manager in names[:place]:
+                raise InputError(f"manager {manager!r} is given twice", remedy="name each manager once")
+            if manager not in self.managers:
+                remedy = did_you_mean(manager, self.managers, "its managers")
+                raise InputError(f"has no mission of manager {manager!r}", file=source, remedy=remedy)
+        return tuple(names)
+
+    def check_can_be_run(self, managers: Iterable[str]) -> None:
+        """Check that missions of some of its managers can be simulated.
+
+        Raises:
+            InputError: there is no such manager, with the line that names it.
+        """
+        for name in managers:
+            try:
+                manager_class(name)
+            except InputError as error:
+                remedy = f"{error.remedy}; or choose others with --managers" if error.remedy else None
+                file = next(file for file in self.files if name in file.managers)
+                raise file.error("manager", name, error.problem, remedy) from None
+
+
+def read_real(paths: Sequence[str | Path], conditions: Conditions | None = None) -> RealRuns:
+    """Read real missions.
+
+    Example:
+        real = read_real(["bt.csv", "metacontrol.csv"])
+        print(real.frame.groupby("manager")["search_time_s"].mean())
+
+    Args:
+        paths: of files such as read_runs takes; the exemplar writes one for each manager.
+        conditions: of the campaign in which the missions were made. Which one a mission is of follows from columns that
+            are named like the campaign's parameters, or `condition` or `block` with its number from 1, or else by
+            order: equally many missions of each, one condition after the other, as the exemplar's runner makes them.
+
+    Raises:
+        InputError: with file and line: a file cannot be read, two are the same, or a condition cannot be determined.
+    """
+    files = [read_runs(path) for path in paths]
+    for place, file in enumerate(files):
+        for other in files[:place]:
+            if file.sha256 == other.sha256:
+                raise InputError(f"has the same content as {other.path}", file=file.path, remedy="give each file once")
+    notes = [f"{note}." for file in files for note in file.notes]
+    frame = pandas.concat([file.frame for file in files], ignore_index=True)
+    if conditions is not None:
+        parts = [_numbered(file, conditions) for file in files]
+        known = [part for part in parts if part is not None]
+        if 0 < len(known) < len(parts):
+            lacking = next(file.path for file, part in zip(files, parts, strict=True) if part is None)
+            problem = "does not say under which condition its missions were made"
+            raise InputError(problem, file=lacking, remedy=_REMEDY)
+        if not known:
+            known = [_in_order(files, frame, conditions)]
+            each = f"one after the other, as many missions of each of the {len(conditions)}"
+            notes.append(f"The data do not name the conditions of their missions: they are taken in order, {each}.")
+        named = [name for name in (*conditions.names, *NUMBER_COLUMNS) if name in frame]
+        frame = frame.drop(columns=named).assign(**{CONDITION: np.concatenate(known)})
+    return RealRuns(tuple(files), frame, tuple(notes))
+
+
+def _numbered(file: Runs, conditions: Conditions) -> NDArray[np.int64] | None:
+    try:
+        return conditions.numbers(file.frame)
+    except InputError as error:
+        line = int(file.frame.index[int(error.place or 0)])
+        raise line_error(file.path, line, error.problem, error.remedy) from None
+
+
+def _in_order(files: Sequence[Runs], frame: pandas.DataFrame, conditions: Conditions) -> NDArray[np.int64]:
+    numbers = conditions.in_order(frame["manager"])
+    if numbers is None:
+        counts = frame["manager"].value_counts(sort=False)
+        manager, count = next((name, count) for name, count in counts.items() if count % len(conditions))
+        own = f"{number_of(count, 'mission')} of manager {manager}"
+        problem = f"has {own}, which {len(conditions)} conditions do not share evenly"
+        raise InputError(problem, file=", ".join(str(file.path) for file in files), remedy=_REMEDY)
+    return numbers
+
+
+def read_varied(campaign: str | Path, **replacements: Unpack[Replacements]) -> tuple[LoadedScenario, Variation, str]:
+    """Read a campaign file's scenario, and what the file sweeps and perturbs; of a scenario, that nothing varies.
+
+    Args:
+        campaign: path of a campaign or scenario file, or name of a shipped one.
+        replacements: of the scenario's files, as of load_scenario.
+
+    Returns:
+        The scenario, what varies in it, and the scenario's own file as a further scenario can name it.
+
+    Raises:
+        InputError: a file cannot be used.
+    """
+    file = read_campaign_file(campaign)
+    if file is None:
+        return load_scenario(campaign, **replacements), Variation(), str(campaign)
+    settings, loaded = file.settings, load_scenario(file.scenario, **replacements)
+    try:
+        varied = vary(loaded, settings.sweep, settings.perturbations, settings.runs_per_draw, settings.seed)
+        check_drawn(*varied)
+    except InputError as error:
+        raise file.located(error) from None
+    return *varied, str(file.scenario)
+
+
+def read_conditions(campaign: str | Path, **replacements: Unpack[Replacements]) -> Conditions | None:
+    """Read the conditions that a campaign file sweeps; none of another file, or if it sweeps none.
+
+    Arguments and errors are those of read_varied.
+    """
+    file = read_campaign_file(campaign)
+    if file is None or not file.settings.sweep:
+        return None
+    return Conditions.of(read_varied(campaign, **replacements)[1].sweep)
+
+
+def published_for(scenario: str | Path) -> Path | None:
+    """Return the file of the real missions that were published for a scenario or campaign file, if there are any."""
+    own = shipped_folder("scenarios/published") / f"{Path(scenario).stem.removesuffix('_campaign')}_runs.csv"
+    return own if own.is_file() else None
+
+
+def targets_of(
+    real: RealRuns, given: Path | None = None
+) -> tuple[tuple[Share, ...], Mapping[str, ConditionLimits], tuple[Path, ...]]:
+    """Read the shares and limits of the file given, or of those beside the data, and name the files.
+
+    Raises:
+        InputError: with file and line: one cannot be read, or is not valid.
+    """
+    paths = (given,) if given else tuple(path for file in real.files if (path := targets_beside(file.path)))
+    lists = [read_targets(path) for path in paths]
+    shares: list[Share] = []
+    for each in lists:
+        shares += [share for share in each.shares if share not in shares]
+    limits: dict[str, ConditionLimits] = {metric: limit for each in lists for metric, limit in each.conditions.items()}
+    return tuple(shares), limits, paths

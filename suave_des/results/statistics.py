@@ -1,0 +1,362 @@
+"""Statistics of comparisons, from SciPy, statsmodels and lifelines, in the form in which tables use them.
+
+A sample is a float array of shape (n,) without missing values. Intervals are 95% intervals. What draws takes a
+generator, and is repeatable with its seed.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from importlib import import_module
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from suave_des.errors import InputError
+from suave_des.estimates import CONFIDENCE, Estimate, mean_of, t_quantile
+
+Sample = NDArray[np.float64]
+
+EXTRA = "compare"
+"""The extra that installs statsmodels and lifelines."""
+SIGNIFICANCE = 0.05
+WELCH, NEWCOMBE, BONETT_PRICE = "Welch's t", "Newcombe", "Bonett and Price"
+WILCOXON, MANN_WHITNEY = "Wilcoxon signed-rank", "Mann-Whitney"
+MCNEMAR, FISHER = "McNemar, exact", "Fisher, exact"
+RANK_BISERIAL, A12 = "rank-biserial", "A12"
+RESAMPLES = 9_999
+PERMUTATIONS, SUBSAMPLES = 999, 2_000
+_MOST_RUNS = 10_000_000
+_ROUNDING = 1e-9
+"""A share left of one half is often a little more after rounding."""
+_ALTERNATIVES: tuple[Literal["two-sided", "less", "greater"], ...] = ("two-sided", "less", "greater")
+
+
+def library(module: str) -> Any:
+    """Import a module of statsmodels or lifelines.
+
+    Raises:
+        InputError: it is not installed; the error names the extra that has it.
+    """
+    try:
+        return import_module(module)
+    except ImportError:
+        problem = f"comparisons need {module.split('.')[0]}, which is not installed"
+        raise InputError(problem, remedy=f"pip install 'suave-des[{EXTRA}]'") from None
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Leave out warnings about samples without spread, whose intervals are nan."""
+    with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+# Means
+
+
+def mean_interval(sample: Sample) -> Estimate:
+    """Estimate the mean of a sample of one value or more, with its interval by Student's t.
+
+    Where the values are all equal there is no interval, because nothing is known of their spread.
+    """
+    found = mean_of(sample.tolist())
+    return found if np.ptp(sample) > 0.0 else Estimate(found.value, method=found.method)
+
+
+def difference_interval(first: Sample, second: Sample) -> Estimate:
+    """Estimate the difference of two independent samples' means, first - second, with its interval by Welch (1947)."""
+    from scipy.stats import ttest_ind
+
+    difference = math.fsum(first) / len(first) - math.fsum(second) / len(second)
+    if min(len(first), len(second)) < 2 or np.ptp(first) == np.ptp(second) == 0.0:
+        return Estimate(difference)
+    with _quiet():
+        welch = ttest_ind(first, second, equal_var=False).confidence_interval(CONFIDENCE)
+    return _with_interval(difference, welch.low, welch.high, WELCH)
+
+
+def _with_interval(value: float, low: float, high: float, method: str) -> Estimate:
+    """Return an estimate, without an interval if an end of it is not finite."""
+    is_known = math.isfinite(low) and math.isfinite(high)
+    return Estimate(value, float(low), float(high), method) if is_known else Estimate(value, method=method)
+
+
+def ratio_interval(published: Sample, simulated: Sample, rng: np.random.Generator) -> Estimate:
+    """Estimate simulated / published standard deviation, with its percentile bootstrap interval.
+
+    Both samples are resampled independently and with replacement (Efron and Tibshirani 1993, chapters 13 and 16). There
+    is no value where the published values have no spread to divide by, and no interval where those of a resample do.
+    """
+    from scipy.stats import bootstrap
+
+    if min(len(published), len(simulated)) < 2:
+        return Estimate()
+    spread = float(_std(published, 0))
+    ratio = float(_std(simulated, 0)) / spread if spread else math.nan
+    with _quiet():
+        found = bootstrap(
+            (published, simulated),
+            lambda x, y, axis: _std(y, axis) / _std(x, axis),
+            n_resamples=RESAMPLES,
+            batch=500,  # so that memory stays small
+            vectorized=True,
+            confidence_level=CONFIDENCE,
+            method="percentile",
+            rng=rng,
+        )
+    if not np.isfinite(found.bootstrap_distribution).all():
+        return Estimate(ratio)
+    return _with_interval(ratio, found.confidence_interval.low, found.confidence_interval.high, "percentile bootstrap")
+
+
+def _std(sample: Sample, axis: int) -> Sample:
+    # Means of equal values are rounded; their spread must be zero all the same.
+    return np.where(np.ptp(sample, axis=axis) > 0.0, sample.std(axis=axis, ddof=1), 0.0)
+
+
+# Shares
+
+
+def share_difference(first: tuple[int, int], second: tuple[int, int]) -> Estimate:
+    """Estimate the difference of two independent shares (count, n), with its interval by Newcombe (1998)."""
+    proportion = library("statsmodels.stats.proportion")
+    low, high = proportion.confint_proportions_2indep(
+        *first, *second, method="newcomb", compare="diff", alpha=1.0 - CONFIDENCE
+    )
+    return _with_interval(first[0] / first[1] - second[0] / second[1], low, high, NEWCOMBE)
+
+
+def paired_share_difference(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> Estimate:
+    """Estimate the difference of two shares of the same runs, with its interval by Bonett and Price (2012).
+
+    It is Wald's with a run more of each kind in which the two differ, so that there is one if no run differs, too.
+    """
+    from scipy.special import ndtri
+
+    n = len(first)
+    change = first.astype(float) - second.astype(float)
+    extended = np.append(change, (1.0, -1.0))
+    middle, half = float(extended.mean()), float(ndtri((1.0 + CONFIDENCE) / 2.0) * extended.std()) / math.sqrt(n + 2)
+    return Estimate(math.fsum(change) / n, middle - half, middle + half, BONETT_PRICE).cut(-1.0, 1.0)
+
+
+def search_times(times_s: Sample, found: NDArray[np.bool_], horizon_s: float) -> tuple[Estimate, Estimate]:
+    """Estimate times until the pipeline is found, missions without it being censored (Kaplan and Meier 1958).
+
+    Args:
+        times_s: when it was found, or the mission ended without.
+        found: whether it was found.
+        horizon_s: to which the restricted mean reaches: the shortest time limit of all that is compared.
+
+    Returns:
+        The mean of the time until found or `horizon_s`, whichever is less; and the time by which half of the missions
+        have found it, infinite if less than half do.
+    """
+    fitted = library("lifelines").KaplanMeierFitter(alpha=1.0 - CONFIDENCE)
+    utilities = library("lifelines.utils")
+    with _quiet():
+        fitted.fit(times_s, found)
+        restricted = Estimate(float(utilities.restricted_mean_survival_time(fitted, t=horizon_s)))
+        half = 0.5 + _ROUNDING
+        median_s = float(utilities.qth_survival_time(half, fitted))
+        low, high = sorted(utilities.qth_survival_times(half, fitted.confidence_interval_).to_numpy(float).ravel())
+    if not (~found & (times_s < horizon_s)).any():
+        # None is censored before the horizon, so the restricted mean is that of a sample.
+        restricted = replace(mean_interval(np.minimum(times_s, horizon_s)), value=restricted.value)
+    return restricted, Estimate(median_s, float(low), float(high), "Kaplan-Meier")
+
+
+# Tests
+
+_NONE = Estimate()
+
+
+@dataclass(frozen=True, slots=True)
+class Test:
+    """A test of two samples, and the effect that belongs to it; nan for what the test does not have.
+
+    Attributes:
+        name: of the test.
+        p: two-sided.
+        p_less: one-sided: that the first is not less than the second; likewise p_greater.
+        effect: its size, whose method is what it is.
+    """
+
+    __test__ = False  # for pytest
+
+    name: str
+    p: float
+    p_less: float = math.nan
+    p_greater: float = math.nan
+    effect: Estimate = _NONE
+
+
+def _ps(found: Sequence[Any]) -> tuple[float, float, float]:
+    """Return the p-values of a test with each of _ALTERNATIVES."""
+    p, p_less, p_greater = (float(each.pvalue) for each in found)
+    return p, p_less, p_greater
+
+
+def signed_rank_test(first: Sample, second: Sample) -> Test:
+    """Test paired samples by Wilcoxon's signed ranks, as scipy.stats.wilcoxon does by default.
+
+    The effect is the matched-pairs rank-biserial correlation (Kerby 2014): 1 if the first is greater in all pairs, -1
+    if it is less in all. Pairs without a difference do not count.
+    """
+    from scipy.stats import wilcoxon
+
+    differing = int(np.count_nonzero(first != second))
+    if differing == 0:
+        return Test(WILCOXON, 1.0, 1.0, 1.0, Estimate(0.0, method=RANK_BISERIAL))
+    with _quiet():
+        found = [wilcoxon(first, second, alternative=each) for each in _ALTERNATIVES]
+    effect = 4.0 * float(found[-1].statistic) / (differing * (differing + 1)) - 1.0
+    return Test(WILCOXON, *_ps(found), Estimate(effect, method=RANK_BISERIAL))
+
+
+def mann_whitney(first: Sample, second: Sample, method: Literal["auto", "asymptotic"] = "auto") -> Test:
+    """Test independent samples by Mann and Whitney, as scipy.stats.mannwhitneyu does with that method.
+
+    The effect is A12 (Vargha and Delaney 2000): the probability that a value of the first is greater than one of the
+    second, ties counted half.
+    """
+    from scipy.stats import mannwhitneyu
+
+    if np.ptp(np.concatenate([first, second])) == 0.0:
+        return Test(MANN_WHITNEY, 1.0, 1.0, 1.0, Estimate(0.5, method=A12))
+    found = [mannwhitneyu(first, second, alternative=each, method=method) for each in _ALTERNATIVES]
+    effect = Estimate(float(found[0].statistic) / (len(first) * len(second)), method=A12)
+    return Test(MANN_WHITNEY, *_ps(found), effect)
+
+
+def rank_sum_test(first: Sample, second: Sample) -> Test:
+    """Return the test of mann_whitney with the interval of its effect, by Brunner and Munzel (2000)."""
+    found = mann_whitney(first, second)
+    if min(len(first), len(second)) < 2 or np.ptp(np.concatenate([first, second])) == 0.0:
+        return found
+    with _quiet():
+        ranks = library("statsmodels.stats.nonparametric").rank_compare_2indep(first, second)
+        low, high = ranks.conf_int(alpha=1.0 - CONFIDENCE)
+    effect = _with_interval(found.effect.value, low, high, A12).cut(0.0, 1.0)  # none of samples that do not overlap
+    return replace(found, effect=effect)
+
+
+def shares_test(first: tuple[int, int], second: tuple[int, int]) -> Test:
+    """Test two independent shares (count, n) by Fisher's exact test."""
+    from scipy.stats import fisher_exact
+
+    table = [[count, n - count] for count, n in (first, second)]
+    return Test(FISHER, *_ps([fisher_exact(table, alternative=each) for each in _ALTERNATIVES]))
+
+
+def paired_shares_test(first: NDArray[np.bool_], second: NDArray[np.bool_]) -> Test:
+    """Test two shares of the same runs by McNemar's exact test, which counts the runs in which the two differ."""
+    both = [[int(np.sum((first == row) & (second == column))) for column in (True, False)] for row in (True, False)]
+    found = library("statsmodels.stats.contingency_tables").mcnemar(both, exact=True)
+    return Test(MCNEMAR, min(1.0, float(found.pvalue)))
+
+
+def holm(ps: Sequence[float]) -> list[float]:
+    """Adjust p-values for all tests together (Holm 1979)."""
+    if not ps:
+        return []
+    adjusted = library("statsmodels.stats.multitest").multipletests(ps, method="holm")[1]
+    return [float(p) for p in adjusted]
+
+
+def runs_for(spread: float, half_width: float) -> int | None:
+    """Return how many runs make half the 95% interval of a mean that narrow.
+
+    Args:
+        spread: standard deviation of a run's value; of a difference of two means, the root of the sum of squares.
+        half_width: wanted, above 0.
+
+    Returns:
+        The least number, 2 or more; None for more than ten million.
+    """
+
+    def suffices(runs: int) -> bool:
+        return t_quantile(runs - 1) * spread / math.sqrt(runs) <= half_width
+
+    least = bisect_left(range(_MOST_RUNS + 1), True, lo=2, key=suffices)
+    return least if least <= _MOST_RUNS else None
+
+
+# Distributions, and conclusions from small samples: what a validation asks
+
+
+def kolmogorov_smirnov(first: Sample, second: Sample) -> tuple[float, float]:
+    """Return distance and p of the two-sample, two-sided Kolmogorov-Smirnov test; with ties its p is too high."""
+    from scipy.stats import ks_2samp
+
+    found = ks_2samp(first, second)
+    return float(found.statistic), float(found.pvalue)
+
+
+def anderson_darling(
+    first: Sample, second: Sample, rng: np.random.Generator, permutations: int = PERMUTATIONS
+) -> tuple[float, float]:
+    """Return statistic and p of the two-sample Anderson-Darling test (Scholz and Stephens 1987, equation 7).
+
+    Ties have midranks. The statistic is normalised; p is that of a permutation test, which ties do not disturb. Both
+    are nan for a sample of one.
+    """
+    from scipy.stats import PermutationMethod, anderson_ksamp
+
+    if min(len(first), len(second)) < 2:
+        return math.nan, math.nan
+    if np.ptp(np.concatenate([first, second])) == 0.0:  # all values equal: no test, and no evidence
+        return 0.0, 1.0
+    method = PermutationMethod(n_resamples=permutations, rng=rng)
+    found = anderson_ksamp([first, second], variant="midrank", method=method)
+    return float(found.statistic), float(found.pvalue)
+
+
+def sign_of(p_less: float, p_greater: float) -> int:
+    """Return what one-sided tests show: 1: the first is greater; -1: it is less; 0: neither is shown."""
+    return int(p_greater < SIGNIFICANCE) - int(p_less < SIGNIFICANCE)
+
+
+def agreement(
+    sign: int,
+    samples: Sequence[Sample],
+    sizes: Sequence[int],
+    rng: np.random.Generator,
+    subsamples: int = SUBSAMPLES,
+) -> float:
+    """Return the share of random subsamples of two samples that lead to a conclusion by one-sided Mann-Whitney tests.
+
+    The tests are by the normal approximation, with ties corrected.
+
+    Args:
+        sign: the conclusion; see sign_of.
+        samples: to draw from, without replacement.
+        sizes: of the subsamples of each.
+        rng: to draw with.
+        subsamples: how many to draw.
+
+    Returns:
+        The share; nan if a sample is too small to draw from.
+    """
+    from scipy.stats import mannwhitneyu
+
+    if any(len(sample) < size for sample, size in zip(samples, sizes, strict=True)):
+        return math.nan
+    drawn = [
+        np.array([rng.choice(sample, size, replace=False) for _ in range(subsamples)])
+        for sample, size in zip(samples, sizes, strict=True)
+    ]
+    with np.errstate(divide="ignore", invalid="ignore"):  # all values equal: p is nan, and no evidence
+        less, greater = (
+            mannwhitneyu(*drawn, axis=-1, alternative=each, method="asymptotic").pvalue < SIGNIFICANCE
+            for each in _ALTERNATIVES[1:]
+        )
+    return float(np.mean(greater.astype(int) - less.astype(int) == sign))

@@ -1,0 +1,269 @@
+"""The look and the words of all figures: small type, colours that colour-blind readers tell apart, words and units."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from itertools import count
+from typing import Any
+
+import matplotlib
+import numpy as np
+import pandas
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from suave_des.domain import (
+    DEFAULT_MODE,
+    FOLLOW_PIPELINE,
+    GENERATE_RECHARGE_PATH,
+    GENERATE_SEARCH_PATH,
+    MAINTAIN_MOTION,
+    UNGROUND_MODE,
+)
+from suave_des.results.missions import printable
+from suave_des.tables import broken_name
+
+WIDTH_IN = 7.0
+"""Text width of a two-column paper."""
+
+# Okabe and Ito's palette, safe for colour-blind readers.
+BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+BLUE, VERMILION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#8A8A8A"
+CYCLE = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION)
+"""For what has no colour of its own, in this order."""
+_KNOWN_MANAGERS = ("none", "random", "metacontrol", "bt")
+"""They have the same look in every figure: that of their place here."""
+_DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (6, 1.5, 1, 1.5)), (0, (3, 1, 1, 1, 1, 1)))
+_MARKERS = "osD^v<>PX"
+_HATCHES = ("", "////", "....", "xxxx", "----", "\\\\\\\\")
+
+MODE_COLOURS = {
+    "fd_spiral_low": "#7FB8DA",
+    "fd_spiral_medium": "#2F7FBC",
+    "fd_spiral_high": "#0B3C73",
+    "fd_follow_pipeline": ORANGE,
+    "__DEFAULT__": PURPLE,
+    "normal": GREEN,
+}
+"""The shipped modes: the higher the search, the darker the blue. A user's mode gets one of OTHER_MODES."""
+MODE_WIDTHS = {"fd_spiral_low": 0.8, "fd_spiral_medium": 1.4, "fd_spiral_high": 2.0, "fd_follow_pipeline": 1.2}
+"""Widths of lines, in points: the higher the search, the wider, so that they differ in print without colours, too."""
+OTHER_MODES = (VERMILION, "#6A3D9A", "#B8860B")
+
+_SETTINGS: Any = {
+    "font.family": "sans-serif",
+    "font.size": 8.0,
+    "axes.titlesize": 8.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 8.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.7,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#E3E3E3",
+    "grid.linewidth": 0.5,
+    "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5,
+    "legend.fontsize": 7.5,
+    "legend.frameon": False,
+    "lines.linewidth": 1.2,
+    "figure.dpi": 100,
+    "savefig.dpi": 300,
+    "pdf.fonttype": 42,  # text stays text
+    "svg.fonttype": "none",
+    "svg.hashsalt": "suave-des",  # equal data give equal files
+}
+
+
+def looks(names: Sequence[str]) -> list[int]:
+    """Return for each manager the number of its look, which `line`, `marker` and `hatch` take."""
+    others = count(len(_KNOWN_MANAGERS) if set(names).intersection(_KNOWN_MANAGERS) else 0)
+    return [_KNOWN_MANAGERS.index(name) if name in _KNOWN_MANAGERS else next(others) for name in names]
+
+
+def columns(panels: int) -> int:
+    """Return the number of columns in which panels are arranged."""
+    return 2 if panels == 4 else min(panels, 3)
+
+
+def line(number: int) -> dict[str, Any]:
+    """Return the look of the curve of a manager, by its number from 0: no two of thirty are alike, nor six in grey."""
+    return {"color": CYCLE[number % len(CYCLE)], "linestyle": _DASHES[number % len(_DASHES)]}
+
+
+def marker(number: int) -> str:
+    """Return the marker of a manager, by its number from 0."""
+    return _MARKERS[number % len(_MARKERS)]
+
+
+def hatch(number: int) -> str:
+    """Return the hatching of an area, by the number of its manager, for print without colours."""
+    return _HATCHES[number % len(_HATCHES)]
+
+
+def text(name: str) -> str:
+    """Return a name as matplotlib is to show it: without formulas in it, and not hidden for a leading underscore."""
+    return (f" {name}" if name.startswith("_") else name).replace("$", r"\$")
+
+
+_LARGEST_AREA, _SMALLEST_AREA = 900.0, 1.5
+"""Areas of a marker, in square points: that of all missions of a manager, and the least."""
+
+
+def bubbles(
+    axes: Axes, missions: pandas.DataFrame, across: str, up: str, bins: tuple[float, float], look: Mapping[str, Any]
+) -> None:
+    """Draw how many missions are at each place: areas are shares of them; those without a place are left out.
+
+    Args:
+        axes: to draw on.
+        missions: a row for each.
+        across: column of the horizontal place; likewise up.
+        bins: to whose multiples these are rounded.
+        look: of the markers.
+    """
+    places = [(missions[name] / step).round() * step for name, step in zip((across, up), bins, strict=True)]
+    counts = missions.groupby(places).size()
+    areas = np.maximum(counts.to_numpy(float) / max(1, len(missions)) * _LARGEST_AREA, _SMALLEST_AREA)
+    axes.scatter(counts.index.get_level_values(0), counts.index.get_level_values(1), s=areas, **look)
+
+
+def bubble_size(share: float) -> float:
+    """Return the diameter, in points, of the marker of a share of missions."""
+    return float((share * _LARGEST_AREA) ** 0.5)
+
+
+class Picture(Figure):
+    """A figure that a notebook shows without further settings."""
+
+    def _repr_png_(self) -> bytes:
+        with publication():
+            return png(self, dpi=160)
+
+
+@contextmanager
+def publication() -> Iterator[None]:
+    """Draw figures in the one style; matplotlib's own settings are restored afterwards."""
+    with matplotlib.rc_context(_SETTINGS):
+        yield
+
+
+def png(figure: Figure, dpi: int = 300) -> bytes:
+    """Write a figure as PNG; equal figures give equal bytes."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=dpi, metadata={"Software": None})  # else matplotlib's version is in it
+    return buffer.getvalue()
+
+
+# Words instead of names from files
+
+_UNITS = {
+    "_m_per_s": "m/s",
+    "_per_s": "1/s",
+    "_rad": "rad",
+    "_deg": "degrees",
+    "_kg": "kg",
+    "_m3": "m³",
+    "_s": "s",
+    "_m": "m",
+    "_n": "N",
+}
+"""Units by the ending of a key; the longer endings first."""
+_FUNCTIONS = {
+    GENERATE_SEARCH_PATH: "search",
+    FOLLOW_PIPELINE: "follow",
+    MAINTAIN_MOTION: "thrusters",
+    GENERATE_RECHARGE_PATH: "recharge",
+}
+_MODES = {
+    "": "before the first mode",
+    UNGROUND_MODE: "no function moves it",
+    DEFAULT_MODE: "search, default altitude",
+    "fd_spiral_low": "search, low",
+    "fd_spiral_medium": "search, medium",
+    "fd_spiral_high": "search, high",
+    "fd_follow_pipeline": "follow the pipeline",
+    "normal": "to the recharge station",
+    "inactive": "no function moves it",
+}
+"""Modes of the functions that move the vehicle."""
+_OTHER_MODES = {
+    (MAINTAIN_MOTION, "fd_all_thrusters"): "in use",
+    (MAINTAIN_MOTION, "fd_recover_thrusters"): "recovery",
+    (MAINTAIN_MOTION, DEFAULT_MODE): "recovery, default",
+    (FOLLOW_PIPELINE, DEFAULT_MODE): "off",
+    (FOLLOW_PIPELINE, "fd_follow_pipeline"): "on",
+    (GENERATE_RECHARGE_PATH, "normal"): "on",
+}
+_OFF = (UNGROUND_MODE, "inactive")
+
+
+def key_words(key: str) -> str:
+    """Return what a key of a scenario is called in a figure, with its unit.
+
+    Example:
+        key_words("signals.water_visibility.period_s")  # "water visibility: period (s)"
+    """
+    parts = [part for part in key.split(".") if part not in ("signals", "calibration", "revision")]
+    unit = next((ending for ending in _UNITS if parts and parts[-1].endswith(ending)), "")
+    if unit:
+        parts[-1] = parts[-1].removesuffix(unit)
+    words = []
+    for part in parts:
+        name, _, index = part.partition("[")
+        words.append(_FUNCTIONS.get(name, name).replace("_", " ") + (f" {int(index[:-1]) + 1}" if index else ""))
+        if part.isdecimal():
+            words[-1] = str(int(part) + 1)
+    text = re.sub(r": (\d+)(?=:|$)", r" \1", ": ".join(words))
+    text = text.replace("thruster events", "thruster event")
+    return f"{text}\N{NO-BREAK SPACE}({_UNITS[unit]})" if unit else text
+
+
+def value_words(value: object) -> str:
+    """Return what a value that is a word, such as a mode or a file, is called in a figure."""
+    text = str(value)
+    return mode_words(text) if text else "none"
+
+
+def mode_words(mode: str) -> str:
+    """Return what the mode of the function that moves the vehicle is called."""
+    return _MODES.get(mode, plain(mode))
+
+
+def function_words(function: str) -> str:
+    """Return what a function is called."""
+    return _FUNCTIONS.get(function, plain(function.removeprefix("f_")))
+
+
+def function_mode_words(function: str, mode: str) -> str:
+    """Return what a mode is called beside the name of its function."""
+    if mode in _OFF:
+        return "off"
+    text = _OTHER_MODES.get((function, mode)) or mode_words(mode)
+    return text.removeprefix(f"{function_words(function)}, ")
+
+
+def component_words(component: str) -> str:
+    """Return what a component is called."""
+    return plain(component.removeprefix("c_"))
+
+
+def is_off(function: str, mode: str) -> bool:
+    """Whether a function does nothing in a mode."""
+    return function_mode_words(function, mode) == "off"
+
+
+def plain(name: str) -> str:
+    """Return a name from a file as words, without what LaTeX or a terminal would take for commands."""
+    text = name.removeprefix("fd_").strip("_").replace("_", " ") or name
+    return printable(text)
+
+
+def folded(name: str, width: int = 40) -> str:
+    """Break a long name of a manager into lines, so that it leaves room for the figure beside it."""
+    return broken_name(name, width, "")

@@ -1,0 +1,437 @@
+"""Compare simulated missions with real ones: samples, pairs of managers, clusters, and targets for all of them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pandas
+
+from suave_des.draws import Streams
+from suave_des.errors import InputError
+from suave_des.estimates import interval_names, mean_of, share_of, std_of
+from suave_des.records.metrics import DISTANCE, FOUND, METRICS, REACTION_TIME, SEARCH_TIME
+from suave_des.results import statistics
+from suave_des.results.real import CONDITION, ConditionLimits, Region, Share, count
+from suave_des.results.statistics import SIGNIFICANCE, Sample
+
+COMPARED = (SEARCH_TIME, DISTANCE, REACTION_TIME)
+"""Metrics that are compared where both sides have values."""
+POSITION_STEP_M = 0.5
+"""Spacing of the pipeline points on its long pieces, and so of places of detection."""
+_LEAST_AGREEMENT = 0.5
+_TARGET = ("kind", "subject", "what", "value", "low", "high", "met")
+_SIGNIFICANT_DIGITS = 8
+
+_Generators = Callable[[str], np.random.Generator]
+"""Makes the random generator of each use of chance, by a name of its own: no result depends on the others."""
+
+TABLES = {
+    "cells": "validation.csv",
+    "pairs": "validation_pairs.csv",
+    "shares": "validation_shares.csv",
+    "positions": "validation_positions.csv",
+    "conditions": "validation_conditions.csv",
+    "targets": "validation_targets.csv",
+}
+"""Names of the tables, and their files."""
+JSON_FILE, DISTRIBUTIONS_FIGURE, DETECTIONS_FIGURE = "validation.json", "distributions.png", "detections.png"
+FILES = (*TABLES.values(), JSON_FILE, DISTRIBUTIONS_FIGURE, DETECTIONS_FIGURE)
+"""All files of a validation."""
+
+
+@dataclass(frozen=True)
+class Validation:
+    """The result of a comparison with real missions: data frames with the columns of the files that TABLES names.
+
+    Attributes:
+        managers: compared, in the order given.
+        cells: a row for each metric and manager: both samples, their difference and its tests.
+        pairs: a row for each metric and pair of managers.
+        shares: a row for each cluster or other region, and manager.
+        positions: a row for each manager and place of detection.
+        conditions: a row for each metric, manager and condition, where conditions are known; else empty.
+        targets: a row for each requirement; `met` is True, False, or None if it cannot be judged.
+        not_found_s: search time that counts for missions that never found the pipeline; none if there are none.
+    """
+
+    managers: tuple[str, ...]
+    cells: pandas.DataFrame
+    pairs: pandas.DataFrame
+    shares: pandas.DataFrame
+    positions: pandas.DataFrame
+    conditions: pandas.DataFrame
+    targets: pandas.DataFrame
+    not_found_s: float | None
+
+    @property
+    def all_met(self) -> bool:
+        """Whether every target is met; one that cannot be judged is not."""
+        return all(met is True for met in self.targets["met"])
+
+    def texts(self, provenance: Mapping[str, object]) -> dict[str, str]:
+        """Write each text file, by its name; the JSON file says from what the validation comes (provenance)."""
+        tables = {name: [_rounded(row) for row in getattr(self, name).to_dict("records")] for name in TABLES}
+        met = self.targets["met"].tolist()
+        content = {
+            "provenance": dict(provenance),
+            "targets_summary": {"met": met.count(True), "not_met": met.count(False), "not_judged": met.count(None)},
+            "not_found_counts_as_s": self.not_found_s,
+            **tables,
+        }
+        files = {
+            file: pandas.DataFrame(tables[name], dtype=object).to_csv(index=False, lineterminator="\n")
+            if tables[name]
+            else ""
+            for name, file in TABLES.items()
+            if tables[name] or name != "conditions"
+        }
+        return {**files, JSON_FILE: json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"}
+
+
+def _rounded(row: Mapping[Any, Any]) -> dict[str, Any]:
+    """Round to eight digits, which hides the last ones, in which machines differ; p values of 1e-12 keep theirs."""
+    return {
+        str(name): (float(f"{value:.{_SIGNIFICANT_DIGITS}g}") if math.isfinite(value) else None)
+        if isinstance(value, float)
+        else value
+        for name, value in row.items()
+    }
+
+
+def validate(
+    published: pandas.DataFrame,
+    simulated: pandas.DataFrame,
+    managers: Sequence[str],
+    *,
+    shares: Sequence[Share] = (),
+    limits: Mapping[str, ConditionLimits] = MappingProxyType({}),
+    seed: int = 1,
+) -> Validation:
+    """Compare simulated missions with published ones; the result depends on nothing but the arguments.
+
+    Where both have a column `condition`, a manager's missions are compared condition by condition, too, and simulated
+    ones are left out as needed for the conditions to have the same proportions on both sides.
+
+    Example:
+        real = read_runs("my_real_runs.csv")
+        found = validate(real.frame, read_runs("results/runs.csv").frame, real.managers)
+        print(found.targets[found.targets["met"] != True])
+
+    Args:
+        published: a row for each mission, with the columns of records.runs.COLUMNS.
+        simulated: the same, in any number; further columns do not matter.
+        managers: those to compare; each must have missions on both sides.
+        shares: regions to count.
+        limits: targets by metric for what is compared condition by condition.
+        seed: of bootstrap, permutations and subsamples.
+
+    Raises:
+        InputError: a condition has real missions of a manager, and no simulated one.
+    """
+    streams = Streams(seed, 0)
+
+    def generators(name: str) -> np.random.Generator:
+        return np.random.default_rng(streams.stream(f"validation/{name}").getrandbits(128))
+
+    if CONDITION in published and CONDITION in simulated:
+        simulated = balanced(published, simulated, managers)
+    sides = [side[side["manager"].isin(managers)] for side in (published, simulated)]
+    not_found_s = common_limit(*sides)
+    real, ours = sides = [with_limit(side, not_found_s) for side in sides]
+    samples = {
+        (metric, manager): both
+        for metric in COMPARED
+        for manager in managers
+        if all(map(len, both := [sample(side, manager, metric) for side in sides]))
+    }
+    cells = pandas.DataFrame([_cell(*key, both, generators) for key, both in samples.items()])
+    pairs = pandas.DataFrame(
+        [
+            _pair(pair, metric, [samples[metric, name] for name in pair], generators)
+            for metric in COMPARED
+            for pair in combinations([manager for each, manager in samples if each == metric], 2)
+        ]
+    )
+    counted = compare_shares(shares, real, ours, managers)
+    conditions = compare_conditions(real, ours, managers, COMPARED)
+    found = list(_targets(cells, pairs, counted, over_conditions(conditions), limits))
+    targets = pandas.DataFrame(found, columns=_TARGET).astype({"met": object})
+    places = compare_places(real, ours, managers)
+    return Validation(tuple(managers), cells, pairs, counted, places, conditions, targets, not_found_s)
+
+
+def common_limit(*sides: pandas.DataFrame) -> float | None:
+    """Return one search time for all missions that are known not to have found the pipeline; none if there are none.
+
+    Programs write different numbers for them, such as 250 and 251 s with a limit of 250 s, which a test of
+    distributions would take for a difference. It is the median of those numbers on the last side that has some, but
+    at least as great as every search time with success.
+    """
+    not_found = [side.loc[~_found(side), SEARCH_TIME] for side in sides]
+    numbers = next((each for each in reversed(not_found) if len(each)), None)
+    if numbers is None:
+        return None
+    return max(float(numbers.median()), *(float(side.loc[_found(side), SEARCH_TIME].max()) for side in sides))
+
+
+def with_limit(runs: pandas.DataFrame, limit_s: float | None) -> pandas.DataFrame:
+    """Return missions with the same search time for all that are known not to have found the pipeline."""
+    return runs if limit_s is None else runs.assign(**{SEARCH_TIME: runs[SEARCH_TIME].where(_found(runs), limit_s)})
+
+
+def _found(runs: pandas.DataFrame) -> pandas.Series[bool]:
+    """Whether missions found the pipeline, or may have."""
+    return runs[FOUND].astype("Float64").fillna(1.0) != 0.0
+
+
+def sample(runs: pandas.DataFrame, manager: str, metric: str) -> Sample:
+    """Return a manager's values of a metric, shape (n,); missions without one are left out."""
+    return runs.loc[runs["manager"] == manager, metric].dropna().to_numpy(dtype=float)
+
+
+def described(name: str, sample: Sample, *, intervals: bool = True) -> dict[str, Any]:
+    """Describe a sample by the columns of a file, which begin with a name: n, mean, std and median, with intervals."""
+    values = sample.tolist()
+    row = mean_of(values).columns(f"{name}_mean") | std_of(values).columns(f"{name}_std")
+    left_out = () if intervals else (*interval_names(f"{name}_mean"), *interval_names(f"{name}_std"))
+    row = {column: value for column, value in row.items() if column not in left_out}
+    return {f"{name}_n": len(values), **row, f"{name}_median": float(np.median(sample)) if values else None}
+
+
+def _cell(metric: str, manager: str, samples: Sequence[Sample], generators: _Generators) -> dict[str, Any]:
+    """Compare the real and the simulated sample of a manager."""
+    real, ours = samples
+    simulated = described("simulated", ours)  # their spread is known so well that nothing needs its interval
+    std_interval = {"simulated_std_ci95_low", "simulated_std_ci95_high"}
+    rng, ks = generators(f"bootstrap/{manager}/{metric}"), statistics.kolmogorov_smirnov(real, ours)
+    ad = statistics.anderson_darling(real, ours, generators(f"permutations/{manager}/{metric}"))
+    return {
+        "manager": manager,
+        "metric": metric,
+        **described("published", real),
+        **{name: value for name, value in simulated.items() if name not in std_interval},
+        **statistics.difference_interval(ours, real).columns("difference_of_means"),
+        **statistics.ratio_interval(real, ours, rng).columns("std_ratio"),
+        **dict(zip(("ks_distance", "ks_p", "ad_statistic", "ad_p"), (*ks, *ad), strict=True)),
+    }
+
+
+def _pair(
+    pair: tuple[str, str], metric: str, samples: Sequence[Sequence[Sample]], generators: _Generators
+) -> dict[str, Any]:
+    """Compare two managers, each with its real and its simulated sample."""
+    (real, ours), (other_real, other_ours) = samples
+    test = statistics.mann_whitney(real, other_real, "asymptotic")  # as the subsamples below are tested
+    simulated = statistics.mann_whitney(ours, other_ours, "asymptotic")
+    sign = statistics.sign_of(test.p_less, test.p_greater)
+    is_less_better = METRICS[metric].better < 0  # as the exemplar's own one-sided tests have it
+    sizes = len(real), len(other_real)
+    rng = generators(f"subsamples/{pair[0]}/{pair[1]}/{metric}")
+    better = {0: "neither", 1: pair[is_less_better], -1: pair[not is_less_better]}[sign]
+    effects = (each.effect.value for each in (test, simulated))
+    superiority = [1.0 - each if is_less_better else each for each in effects]
+    ps = (test.p_less, test.p_greater) if is_less_better else (test.p_greater, test.p_less)
+    return {
+        "first": pair[0],
+        "second": pair[1],
+        "metric": metric,
+        "published_superiority": superiority[0],
+        "simulated_superiority": superiority[1],
+        "published_first_better_p": ps[0],
+        "published_second_better_p": ps[1],
+        "published_better": better,
+        "first_n": sizes[0],
+        "second_n": sizes[1],
+        "agreement": statistics.agreement(sign, (ours, other_ours), sizes, rng),
+    }
+
+
+# Shares and places
+
+
+def compare_shares(
+    shares: Sequence[Share], published: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequence[str]
+) -> pandas.DataFrame:
+    """Count shares in published and simulated missions, and that of missions that found the pipeline, where known.
+
+    Returns:
+        A row for each, with the columns of validation_shares.csv.
+    """
+    sides = published, simulated
+    where: Region = {"pipeline_found": ((1.0, 1.0),)}
+    found = [Share(manager=manager, name="pipeline found", where=where) for manager in managers]
+    counted = [(share, [count(share, side) for side in sides]) for share in shares if share.manager in managers]
+    known = [side[side[FOUND].notna()] for side in sides]
+    of_found = [(share, [count(share, side) for side in known]) for share in found]
+    counted += [(share, counts) for share, counts in of_found if all(n for _, n in counts)]
+    rows = []
+    for share, counts in counted:
+        low, high = share.target or (math.nan, math.nan)
+        row = {"manager": share.manager, "name": share.name, **_proportions(*counts)}
+        rows.append({**row, "target_low": low, "target_high": high})
+    return pandas.DataFrame(rows)
+
+
+def _proportions(published: tuple[int, int], simulated: tuple[int, int]) -> dict[str, Any]:
+    """Return counts, sizes and shares, with the exact intervals of these, by column."""
+    row: dict[str, Any] = {}
+    for side, (number, n) in (("published", published), ("simulated", simulated)):
+        row |= {f"{side}_count": number, f"{side}_n": n, **share_of(number, n, "exact").columns(f"{side}_share")}
+    return row
+
+
+def compare_places(
+    published: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequence[str]
+) -> pandas.DataFrame:
+    """Count the detections at each place, to the nearest POSITION_STEP_M.
+
+    Returns:
+        A row for each manager, in the order given, and place, with the columns of validation_positions.csv.
+    """
+    rows = []
+    for manager in managers:
+        sides = [_places(runs, manager) for runs in (published, simulated)]
+        for place in sorted({*sides[0], *sides[1]}):
+            counts = ((side.get(place, 0), sum(side.values())) for side in sides)
+            rows.append({"manager": manager, "detection_x_m": place * POSITION_STEP_M, **_proportions(*counts)})
+    return pandas.DataFrame(rows)
+
+
+def _places(runs: pandas.DataFrame, manager: str) -> Counter[int]:
+    """Count detections by place, in steps."""
+    known = runs.loc[runs["manager"] == manager, "detection_x_m"].dropna()
+    return Counter((known / POSITION_STEP_M).round().astype(int).tolist())
+
+
+# Conditions
+
+
+def balanced(real: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequence[str]) -> pandas.DataFrame:
+    """Leave out simulated missions so that each manager has them in the real missions' proportions of conditions.
+
+    Raises:
+        InputError: a manager has real missions under a condition, and no simulated one.
+    """
+    kept = []
+    for manager in managers:
+        theirs = Counter(real.loc[real["manager"] == manager, CONDITION].tolist())
+        ours = simulated[simulated["manager"] == manager]
+        counts = Counter(ours[CONDITION].tolist())
+        for number in sorted(theirs):
+            if number not in counts:
+                problem = f"there is no simulated mission of manager {manager} under condition {number}"
+                raise InputError(problem, remedy="simulate every condition of the campaign")
+        factor = min(counts[number] / count for number, count in theirs.items())
+        factor = math.floor(factor) or factor  # fewer simulated than real ones: as nearly as can be
+        wanted = {number: max(1, math.floor(factor * count)) for number, count in theirs.items()}
+        place = ours.groupby(CONDITION).cumcount()
+        kept.append(ours[place < ours[CONDITION].map(wanted).fillna(0)])
+    return pandas.concat(kept)
+
+
+def compare_conditions(
+    real: pandas.DataFrame, simulated: pandas.DataFrame, managers: Sequence[str], metrics: Sequence[str]
+) -> pandas.DataFrame:
+    """Compare missions condition by condition.
+
+    Returns:
+        A row for each metric, manager and condition, with the columns of validation_conditions.csv; empty if no
+        conditions are known.
+    """
+    rows = []
+    for metric in metrics if CONDITION in real and CONDITION in simulated else ():
+        for manager in managers:
+            theirs, ours = (
+                side[(side["manager"] == manager) & side[metric].notna()].groupby(CONDITION)[metric]
+                for side in (real, simulated)
+            )
+            samples = [{int(str(number)): own.to_numpy(float) for number, own in side} for side in (theirs, ours)]
+            for number in sorted(set(samples[0]) & set(samples[1])):
+                row: dict[str, Any] = {"manager": manager, "metric": metric, "condition": number}
+                for name, side in zip(("real", "simulated"), samples, strict=True):
+                    row |= described(name, side[number], intervals=False)
+                rows.append(row | {"difference_of_medians": row["simulated_median"] - row["real_median"]})
+    return pandas.DataFrame(rows)
+
+
+def over_conditions(compared: pandas.DataFrame) -> pandas.DataFrame:
+    """Summarise a comparison condition by condition.
+
+    Returns:
+        A row for each metric and manager, and for the metric with manager "all": `conditions` (how many), and medians
+        over these: `difference` (|simulated - real median|), `real_std` and `simulated_std` (standard deviations within
+        a condition), and the ratio of these, simulated / real, `std_ratio`; nan for what is not known.
+    """
+    rows = []
+    for metric in dict.fromkeys(compared["metric"] if len(compared) else ()):
+        of_metric = compared[compared["metric"] == metric]
+        for manager in (*dict.fromkeys(of_metric["manager"]), "all"):
+            own = of_metric if manager == "all" else of_metric[of_metric["manager"] == manager]
+            stds = own[["real_std", "simulated_std"]].astype(float).dropna().median()
+            row = {"manager": manager, "metric": metric, "conditions": len(own)}
+            row["difference"] = own["difference_of_medians"].abs().median()
+            real_std, simulated_std = float(stds["real_std"]), float(stds["simulated_std"])
+            ratio = simulated_std / real_std if real_std else math.nan
+            rows.append({**row, "real_std": real_std, "simulated_std": simulated_std, "std_ratio": ratio})
+    return pandas.DataFrame(rows)
+
+
+# Targets
+
+
+def _targets(
+    cells: pandas.DataFrame,
+    pairs: pandas.DataFrame,
+    shares: pandas.DataFrame,
+    within: pandas.DataFrame,
+    limits: Mapping[str, ConditionLimits],
+) -> Iterator[dict[str, Any]]:
+    """Yield the requirements.
+
+    The mean lies in the 95% t interval of the published one, the std in its chi-square interval; the KS p is 0.05 or
+    more; at least half the subsamples as large as the published samples lead to the published conclusion; shares and
+    figures over conditions are within the limits of a file.
+    """
+    for each in cells.to_dict("records"):
+        for kind in ("mean", "std"):
+            low, high = (each[f"published_{kind}_ci95_{end}"] for end in ("low", "high"))
+            value = math.nan if low is None or low != low else each[f"simulated_{kind}"]
+            yield _target(kind, each["manager"], each["metric"], value, low, high)
+        yield _target("ks", each["manager"], each["metric"], each["ks_p"], SIGNIFICANCE)
+    for each in pairs.to_dict("records"):
+        subject = f"{each['first']}, {each['second']}"
+        yield _target("conclusion", subject, each["metric"], each["agreement"], _LEAST_AGREEMENT)
+    for each in shares.to_dict("records"):
+        if (low := each.get("target_low", math.nan)) == low:
+            yield _target("share", each["manager"], each["name"], each["simulated_share"], low, each["target_high"])
+    for each in within.to_dict("records"):
+        limit = limits.get(each["metric"])
+        if each["manager"] == "all" and limit is not None:
+            for kind, value, most in (
+                ("condition_median", each["difference"], limit.median_difference),
+                ("condition_std", each["std_ratio"], limit.std_ratio),
+            ):
+                if most is not None:
+                    yield _target(kind, "all", each["metric"], value, high=most)
+
+
+def _target(
+    kind: str,
+    subject: str,
+    what: str,
+    value: float | None,
+    low: float | None = math.nan,
+    high: float | None = math.nan,
+) -> dict[str, Any]:
+    """Return the row of a requirement: a value that is to lie between two ends, of which one may be open."""
+    value, low, high = (math.nan if each is None else float(each) for each in (value, low, high))
+    met = None if value != value else not (value < low or value > high)
+    return dict(zip(_TARGET, (kind, subject, what, value, low, high, met), strict=True))

@@ -1,0 +1,175 @@
+"""Tables of text, and how each form of output writes them: terminal, Markdown, LaTeX, CSV, and HTML."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from html import escape
+
+from suave_des.files import csv_text
+
+_LEAST_WIDTH = 12
+"""A column of text is not made narrower than this, so that a table may be wider than it should be."""
+_BREAKS = re.compile(r"(?<=[:_./-])|(?<= )(?=[^\s=\d])|(?<=[^\W\d_A-ZÀ-Þ])(?=[A-ZÀ-Þ])")
+"""Where a name may be broken: after a separator or space, but not in "(n = 20)", and before a capital within a word."""
+_MARKDOWN = str.maketrans({**{character: f"\\{character}" for character in r"\`*_[]|"}, "<": "&lt;", ">": "&gt;"})
+_LATEX = str.maketrans(
+    {
+        **{character: f"\\{character}" for character in "&%$#_{}"},
+        "\\": r"\textbackslash{}",
+        "~": r"\textasciitilde{}",
+        "^": r"\textasciicircum{}",
+        "<": r"\textless{}",
+        ">": r"\textgreater{}",
+        "|": r"\textbar{}",
+    }
+)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Headings and rows of text.
+
+        table = Table(("manager", "n"), [("none", "20"), ("metacontrol", "20")], "missions")
+        print(table.text())
+
+    Attributes:
+        headings: of the columns.
+        rows: cells; a row of a single cell is a heading of the rows below it.
+        title: what the table has; empty: that is said elsewhere.
+        align: "l" or "r" for each column; columns beyond it have numbers, and are aligned to the right.
+    """
+
+    headings: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    title: str = ""
+    align: str = "l"
+
+    @property
+    def _alignment(self) -> str:
+        return self.align + "r" * (len(self.headings) - len(self.align))
+
+    def width(self) -> int:
+        """Return the width of the text if nothing is broken into lines."""
+        return sum(self._widths(None)) + 2 * (len(self.headings) - 1)
+
+    def _widths(self, width: int | None) -> list[int]:
+        """Return the width of each column; of a table that is too wide, columns of text are made narrower."""
+        cells = [self.headings, *(row for row in self.rows if len(row) > 1)]
+        widths = [max(len(line) for cell in column for line in cell.split("\n")) for column in zip(*cells, strict=True)]
+        narrow = [place for place, side in enumerate(self._alignment) if side == "l"]
+        while width is not None and sum(widths) + 2 * (len(widths) - 1) > width:
+            widest = max(narrow, key=lambda place: widths[place], default=None)
+            if widest is None or widths[widest] <= _LEAST_WIDTH:
+                break
+            widths[widest] -= 1
+        for place in narrow:  # what was broken into lines may need even less
+            lines = (line for row in cells for line in broken_name(row[place], widths[place]).split("\n"))
+            widths[place] = max(map(len, lines))
+        return widths
+
+    def text(self, width: int | None = None) -> str:
+        """Write the table for a terminal, without its title.
+
+        Args:
+            width: that it should have at most: longer texts are broken into lines; None: any.
+        """
+        return "\n".join(self._lines(self._widths(width)))
+
+    def _lines(self, widths: Sequence[int]) -> Iterator[str]:
+        for row in (self.headings, *self.rows):
+            if len(row) == 1 < len(widths):
+                yield row[0]
+                continue
+            broken = [broken_name(cell, width).split("\n") for cell, width in zip(row, widths, strict=True)]
+            for number in range(max(map(len, broken))):
+                parts = (lines[number] if number < len(lines) else "" for lines in broken)
+                sides = zip(parts, self._alignment, widths, strict=True)
+                yield "  ".join(f"{part:{'<' if side == 'l' else '>'}{width}}" for part, side, width in sides).rstrip()
+
+    def markdown(self) -> str:
+        """Write the table as Markdown, without its title."""
+        marks = " | ".join("---" if side == "l" else "---:" for side in self._alignment)
+        lines = [f"| {' | '.join(map(markdown_text, self.headings))} |", f"| {marks} |"]
+        for row in self.rows:
+            cells = [*row, *[""] * (len(self.headings) - len(row))]
+            lines.append(f"| {' | '.join(map(markdown_text, cells))} |")
+        return "\n".join(lines)
+
+    def latex(self, over: Sequence[str] = ()) -> str:
+        """Write the table for LaTeX with booktabs, its title as caption.
+
+        Args:
+            over: headings over as many columns each, all but the first.
+        """
+        columns = len(self.headings)
+        lines = [r"\begin{table}", r"  \centering", rf"  \caption{{{latex_text(self.title)}}}"]
+        lines += [rf"  \begin{{tabular}}{{{self._alignment}}}", r"    \toprule"]
+        if over:
+            each = (columns - 1) // len(over)
+            begins = range(2, columns + 1, each)
+            lines.append(
+                "    " + "".join(rf" & \multicolumn{{{each}}}{{c}}{{{latex_text(it)}}}" for it in over) + r" \\"
+            )
+            lines.append("    " + " ".join(rf"\cmidrule(lr){{{begin}-{begin + each - 1}}}" for begin in begins))
+        lines.append(f"    {' & '.join(map(latex_text, self.headings))} \\\\")
+        if not self.rows or len(self.rows[0]) > 1:
+            lines.append(r"    \midrule")
+        for row in self.rows:
+            if len(row) == 1 < columns:
+                lines += [r"    \midrule", rf"    \multicolumn{{{columns}}}{{l}}{{{latex_text(row[0])}}} \\"]
+            else:
+                lines.append(f"    {' & '.join([latex_text(row[0]), *map(_latex_number, row[1:])])} \\\\")
+        return "\n".join([*lines, r"    \bottomrule", r"  \end{tabular}", r"\end{table}"])
+
+    def csv(self) -> str:
+        """Write the table as CSV."""
+        return csv_text(self.headings, self.rows)
+
+    def html(self) -> str:
+        """Write the table as HTML, its title as caption."""
+
+        def line(tag: str, cells: Sequence[str]) -> str:
+            sides = ("" if side == "l" else ' style="text-align: right"' for side in self._alignment)
+            inner = (f"<{tag}{side}>{escape(cell)}</{tag}>" for cell, side in zip(cells, sides, strict=False))
+            return f"<tr>{''.join(inner)}</tr>"
+
+        caption = f"<caption>{escape(self.title)}</caption>" if self.title else ""
+        body = "".join(line("th" if len(row) == 1 else "td", row) for row in self.rows)
+        return f"<table>{caption}<thead>{line('th', self.headings)}</thead><tbody>{body}</tbody></table>"
+
+    def _repr_html_(self) -> str:
+        return self.html()
+
+
+def broken_name(name: str, width: int, indent: str = "  ") -> str:
+    """Break a long name into lines, the further ones indented, so that it leaves room for what is beside it."""
+    if max(map(len, name.split("\n"))) <= width:
+        return name
+    lines = [""]
+    for piece in _BREAKS.split(name):
+        if lines[-1].strip() and len(lines[-1]) + len(piece.rstrip()) > width:
+            lines.append(indent)
+        lines[-1] += piece
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def markdown_text(text: str) -> str:
+    """Write text so that Markdown shows it as it is."""
+    return text.translate(_MARKDOWN)
+
+
+def latex_text(text: str) -> str:
+    """Write text so that LaTeX shows it as it is."""
+    return text.translate(_LATEX)
+
+
+def _latex_number(cell: str) -> str:
+    """Write a cell of numbers: with a minus, and powers of ten."""
+    mantissa, is_power, exponent = cell.partition("e-")
+    if is_power:
+        return rf"${mantissa} \cdot 10^{{-{int(exponent)}}}$"
+    return " to ".join(
+        f"${latex_text(part)}$" if part.startswith("-") else latex_text(part) for part in cell.split(" to ")
+    )

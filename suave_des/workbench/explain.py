@@ -1,0 +1,265 @@
+"""Explain why a fact follows, why a function design is chosen or not, and why a state contradicts itself."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Final
+
+from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet.in_process import InProcessPellet
+from suave_des.knowledge.planning import performance
+from suave_des.knowledge.rdf import RDF_TYPE, Triple, canonical, fact_of, facts_of, local_name, value_of
+from suave_des.knowledge.state import (
+    NO_GROUNDING,
+    ContradictionError,
+    Decision,
+    Fact,
+    KnowledgeState,
+    Reasoning,
+    objective_name,
+    value_text,
+)
+from suave_des.workbench.states import FactReader
+from suave_des.workbench.tracing import Clash, Derivation, Tracer
+from suave_des.workbench.why_not import RuleQuestions, WhyNot
+
+#: Rules that are named for a fact that does not follow.
+NEAREST: Final = 3
+_WHY: Final = re.compile(r"why\s+(not\s+)?([\w.-]+)\s*\??", re.IGNORECASE)
+_FORMS: Final = (
+    'a fact such as fg_status(fg_spiral_high, IN_ERROR_NFR), "why fd_spiral_low?" or "why not fd_spiral_high?"'
+)
+
+
+CHOSEN, LEFT_OUT, NOT_BEST = "chosen", "left out", "not the best"
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """The planner's verdict on a function design.
+
+    Attributes:
+        design: its name.
+        verdict: "chosen", "left out" or "not the best".
+        reason: why.
+        because: derivations of the facts for which it is ruled out.
+    """
+
+    design: str
+    verdict: str
+    reason: str
+    because: tuple[Derivation, ...] = ()
+
+
+def verdicts(base: Ontology, reasoning: Reasoning, decision: Decision) -> Iterator[Candidate]:
+    """Say of each design of a function, by name, what the planner made of it."""
+    rejected = {each.design: each.reason for each in decision.rejected}
+    for design in base.designs(decision.function):
+        if design == decision.design:
+            yield Candidate(design, CHOSEN, decision.reason)
+        elif design in rejected:
+            yield Candidate(design, LEFT_OUT, rejected[design])
+        else:
+            own, best = (performance(reasoning.inference, each) for each in (design, str(decision.design)))
+            tie = f"performance {own}, as {decision.design}, which is first by name"
+            yield Candidate(
+                design, NOT_BEST, tie if own == best else f"performance {own} < {best} of {decision.design}"
+            )
+
+
+@dataclass(frozen=True)
+class DecisionExplanation:
+    """Why a function gets a design.
+
+    Attributes:
+        function: which function.
+        answer: in one sentence.
+        because: derivations of the facts that require adaptation.
+        candidates: all designs of the function, by name; none when there is nothing to decide.
+    """
+
+    function: str
+    answer: str
+    because: tuple[Derivation, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+
+    def lines(self) -> Iterator[str]:
+        """The answer, and below it the reasons and the verdict on each design."""
+        yield f"{self.function}: {self.answer}"
+        for derivation in self.because:
+            yield "  adapted because"
+            yield from derivation.lines("    ")
+        for candidate in self.candidates:
+            yield f"  {candidate.design}: {candidate.verdict}: {candidate.reason}"
+            for derivation in candidate.because:
+                yield from derivation.lines("    ")
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """The answer to a question about a state.
+
+    Attributes:
+        state: the state.
+        facts: how facts follow.
+        decisions: why functions get their designs.
+        contradiction: for a state that contradicts itself, what Pellet says about it.
+        rules: the rules that take part in the contradiction.
+        clashes: the properties that would have two values.
+    """
+
+    state: KnowledgeState
+    facts: tuple[Derivation, ...] = ()
+    decisions: tuple[DecisionExplanation, ...] = ()
+    contradiction: str | None = None
+    rules: tuple[str, ...] = ()
+    clashes: tuple[Clash, ...] = ()
+
+    def __str__(self) -> str:
+        """As `kb explain` prints it."""
+        return "\n".join(self.lines())
+
+    def lines(self) -> Iterator[str]:
+        """All of it, one fact or decision after the other."""
+        if self.contradiction is not None:
+            yield f"contradiction: {self.contradiction}"
+            yield f"rules in it: {', '.join(self.rules) or 'none'}"
+            for clash in self.clashes:
+                yield f"{clash.property} of {clash.subject} would have {len(clash.sides)} values:"
+                for side in clash.sides:
+                    yield from side.lines("  ")
+            return
+        for derivation in self.facts:
+            yield from derivation.lines()
+        for decision in self.decisions:
+            yield from decision.lines()
+        if not self.facts and not self.decisions:
+            yield "nothing is inferred, and nothing is decided"
+
+
+def explain(
+    base: Ontology,
+    state: KnowledgeState,
+    question: str,
+    reasoning: Reasoning | ContradictionError,
+    pellet: InProcessPellet,
+) -> Explanation:
+    """Answer a question about a state; see KnowledgeBase.explain.
+
+    Args:
+        base: the ontologies and rules.
+        state: the state.
+        question: a fact, "why DESIGN?", "why not DESIGN?", or nothing.
+        reasoning: what is inferred of all terms and planned in the state, or that it contradicts itself.
+        pellet: with the ontologies, made by `pellet_for`.
+    """
+    question = question.strip()
+    why = _WHY.fullmatch(question)
+    if question and not why and "(" not in question:
+        raise InputError(f"{shown(question)} is not a question about a state", remedy=_FORMS)
+    tracer = Tracer(base, state, pellet)
+    if isinstance(reasoning, ContradictionError):
+        problem, clashes, rules = tracer.clashes()
+        if not rules and not clashes:
+            raise reasoning  # the message has all there is to say
+        return Explanation(state, contradiction=problem, clashes=clashes, rules=rules)
+    explainer = _Explainer(base, reasoning, tracer)
+    if why:
+        return Explanation(state, decisions=(explainer.design(why.group(2), wanted=why.group(1) is None),))
+    if question:
+        return Explanation(state, facts=(explainer.fact(question),))
+    return Explanation(state, explainer.inferred(), tuple(map(explainer.decision, reasoning.plan.decisions)))
+
+
+class _Explainer:
+    """Finds the facts behind a decision, and how they follow."""
+
+    def __init__(self, base: Ontology, reasoning: Reasoning, tracer: Tracer) -> None:
+        self.base, self.reasoning, self.tracer = base, reasoning, tracer
+        self.triples: dict[Fact, Triple] = {}
+        for triple in sorted(tracer.entailed, key=lambda each: (each not in tracer.asserted, str(each))):
+            for fact in facts_of([triple], base.names):
+                self.triples.setdefault(fact, triple)
+
+    def inferred(self) -> tuple[Derivation, ...]:
+        """How all that is inferred follows."""
+        return tuple(self.derive(fact) for fact in sorted(self.reasoning.inference.facts, key=str))
+
+    def derive(self, fact: Fact) -> Derivation:
+        return self.tracer.derive(self.triples[fact])
+
+    def fact(self, text: str) -> Derivation:
+        """How a fact follows that is written as an atom."""
+        reader = FactReader(self.base)
+        triple = reader.triple(text)
+        if (*triple[:2], canonical(triple[2])) in self.tracer.known:
+            return self.tracer.derive(triple)
+        reader.fact(text)  # a value that the property cannot have is refused
+        fact = fact_of(triple, self.base.names)
+        values = [value for s, p, value in self.tracer.known if (s, p) == triple[:2]]
+        texts = sorted(value_text(value_of(value, self.base.names)) for value in values)
+        name = "type" if triple[1] == RDF_TYPE else local_name(triple[1])
+        near = RuleQuestions(self.base).missing(fact, triple[0], self.tracer.state)
+        remedies = [f"{name} of {fact.subject}: {', '.join(texts) or 'none'}", *map(_near_rule, near[:NEAREST])]
+        raise InputError(f"{fact} does not follow in this state", remedy="; ".join(remedies))
+
+    def design(self, design: str, *, wanted: bool) -> DecisionExplanation:
+        """Why, or why not, a function design."""
+        functions = [name for name in self.base.functions if design in self.base.designs(name)]
+        if not functions:
+            known = [each for name in self.base.functions for each in self.base.designs(name)]
+            raise InputError(f"there is no function design {shown(design)}", remedy=did_you_mean(design, known))
+        function, state = functions[0], self.reasoning.inference.state
+        for decision in self.reasoning.plan.decisions:
+            if decision.function == function:
+                return self.decision(decision, design, wanted=wanted)
+        if function not in {each.function for each in state.objectives}:
+            answer = f"nothing is decided: {function} has no objective in this state"
+        else:
+            present = state.grounded(function) or "it"
+            answer = f"nothing is decided: the objective of {function} requires no adaptation, so {present} stays"
+        return DecisionExplanation(function, answer)
+
+    def decision(self, decision: Decision, asked: str | None = None, *, wanted: bool = True) -> DecisionExplanation:
+        """Why a decision is made; the answer begins with the design that was asked about."""
+        function = decision.function
+        candidates = tuple(
+            replace(each, because=tuple(self._objections(function, each.design))) if each.verdict == LEFT_OUT else each
+            for each in verdicts(self.base, self.reasoning, decision)
+        )
+        answer = f"{decision.design}: {decision.reason}" if decision.design else decision.reason
+        for each in candidates:
+            if each.design == asked and each.verdict != CHOSEN:
+                answer = f"{asked} is {each.verdict}: {each.reason}"
+                if decision.design is None:
+                    present = self.reasoning.inference.state.grounded(function)
+                    stays = f"{present} stays" if present else f"{function} stays {NO_GROUNDING}"
+                    answer = f"no design is left, {stays}; {answer}"
+            elif each.design == asked and not wanted:
+                answer = f"{asked} is chosen: {decision.reason}"
+        return DecisionExplanation(function, answer, tuple(self._trigger(function)), candidates)
+
+    def _trigger(self, function: str) -> Iterator[Derivation]:
+        """How the facts follow for which an objective is adapted."""
+        objective = objective_name(function)
+        for fact in sorted(self.reasoning.inference.facts, key=str):
+            if fact.subject == objective and fact.property in ("o_status", "o_updatable"):
+                yield self.derive(fact)
+
+    def _objections(self, function: str, design: str) -> Iterator[Derivation]:
+        """How the inferred facts follow for which a design was ruled out."""
+        log = Fact(design, "fd_error_log", objective_name(function))
+        for fact in (Fact(design, "fd_realisability", False), log):
+            if fact in self.triples:
+                yield self.derive(fact)
+
+
+def _near_rule(answer: WhyNot) -> str:
+    """The first atom that fails of a rule that could conclude what is missing, in the nearest match."""
+    if not answer.atom:
+        return f"rule {answer.rule}: {answer.answer}"
+    bound = ", ".join(f"?{name} = {value}" for name, value in answer.bindings)
+    return f"rule {answer.rule}: {answer.atom} does not hold{f' with {bound}' if bound else ''}"

@@ -1,1 +1,0 @@
-"""Reasons: why a fact follows or a design is chosen, and why a rule does not fire."""

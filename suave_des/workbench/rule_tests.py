@@ -1,0 +1,478 @@
+"""Tests of rules: read from YAML files, run, and written, as JUnit XML or as new tests.
+
+    rules: [spare.swrl]
+    tests:
+    - name: a search that is too high for the visibility is in error
+      given:
+        groundings: {f_generate_search_path: fd_spiral_high}
+        measurements: {water_visibility: "< 3.25"}
+      follows: ["fg_status(fg_spiral_high, IN_ERROR_NFR)"]
+      decides: {f_generate_search_path: fd_spiral_medium}
+
+The guide docs/guides/test-rules.md describes all keys.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from decimal import Decimal
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import yaml
+from lxml import etree
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet import ReasonerTimeoutError
+from suave_des.knowledge.reasoner import regions_of
+from suave_des.knowledge.state import NONE_LEFT, STAYS, Fact, KnowledgeState
+from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
+from suave_des.scenario.yamlfile import YamlDocument, read_yaml, validated
+from suave_des.workbench.explain import verdicts
+from suave_des.workbench.knowledge_base import KnowledgeBase
+from suave_des.workbench.replay import mission_scenario
+from suave_des.workbench.situations import Decide, Outcome, Situation
+from suave_des.workbench.space import ValueRange, measurements_in, parse_region
+from suave_des.workbench.states import (
+    NEW_INDIVIDUAL,
+    FactReader,
+    StateBuilder,
+    StateContent,
+    recorded_state,
+    recorded_states,
+    state_dict,
+)
+from suave_des.workbench.why_not import RuleQuestions
+
+#: What XML 1.0 has no place for.
+_FORBIDDEN: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
+_Texts = Annotated[list[str], BeforeValidator(lambda given: [given] if isinstance(given, str) else given)]
+#: The arguments of KnowledgeBase.load that say which knowledge base tests are about.
+Tested = Mapping[str, Any]
+
+
+class _Given(StateContent):
+    facts: _Texts = Field(default=[])
+    mission: str | None = None
+    run: int | None = None
+    at_s: float | None = None
+
+
+class _Test(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+    name: str = Field(min_length=1)
+    given: _Given = _Given()
+    follows: _Texts = []
+    follows_not: _Texts = []
+    decides: dict[str, str] = {}
+    contradiction: bool = False
+    without: _Texts = []
+    changes: dict[str, str] = {}
+
+
+class _File(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+    scenario: str = DEFAULT_SCENARIO
+    ontologies: _Texts = []
+    rules: _Texts = []
+    disabled_rules: _Texts = []
+    tests: tuple[_Test, ...] = Field(min_length=1)
+
+
+@dataclass(frozen=True)
+class RuleTest:
+    """One test.
+
+    Attributes:
+        name: what it says of the rules.
+        file, line: where it is.
+        situations: one, or one for each region of measured values.
+        follows: facts that must follow, or be asserted.
+        follows_not: facts that must not.
+        decides: (function, what happens to its grounding: a design, "stays" or "none left").
+        contradicts: whether the situation must contradict itself.
+        without: names of rules of which it says what they change.
+        changes: (function, what happens without these rules, what happens with them).
+        problem: why it cannot be asked of the knowledge base.
+    """
+
+    name: str
+    file: Path
+    line: int
+    situations: tuple[Situation, ...] = field(default=(), repr=False)
+    follows: tuple[Fact, ...] = ()
+    follows_not: tuple[Fact, ...] = ()
+    decides: tuple[tuple[str, str], ...] = ()
+    contradicts: bool = False
+    without: tuple[str, ...] = ()
+    changes: tuple[tuple[str, str, str], ...] = ()
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class TestFile:
+    """A file of tests, read as far as that is possible without its knowledge base."""
+
+    __test__ = False  # pytest takes it for a test otherwise
+    document: YamlDocument
+    content: _File
+
+    @classmethod
+    def read(cls, path: Path) -> TestFile:
+        """Read a file of tests.
+
+        Raises:
+            InputError: it cannot be read, or a key or value is wrong, with line and key.
+        """
+        document = read_yaml(path)
+        content = validated(document, _File)
+        for number, test in enumerate(content.tests):
+            if not (test.follows or test.follows_not or test.decides or test.contradiction or test.changes):
+                remedy = "give one of follows, follows_not, decides, contradiction, changes"
+                raise document.error("this test expects nothing", ("tests", number), remedy)
+            if bool(test.without) != bool(test.changes):
+                remedy = "without: RULE, and changes: {FUNCTION: BEFORE -> AFTER}"
+                raise document.error("`without` and `changes` must be given together", ("tests", number), remedy)
+        return cls(document, content)
+
+    @property
+    def about(self) -> Tested:
+        """The knowledge base that its tests are about; paths are relative to the file.
+
+        Raises:
+            InputError: there is no such file, with line and key.
+        """
+        content, folder = self.content, self.document.path.parent
+
+        def files(key: str) -> Iterator[Path]:
+            for at, name in enumerate(getattr(content, key)):
+                try:
+                    yield find(name, "ontology", beside=folder)
+                except InputError as error:
+                    raise self.document.error(f"{name}: {error.problem}", (key, at), error.remedy) from None
+
+        beside = folder / content.scenario
+        return {
+            "scenario": str(beside) if beside.is_file() else content.scenario,
+            "ontologies": list(files("ontologies")),
+            "rules": list(files("rules")),
+            "disabled_rules": content.disabled_rules,
+        }
+
+    def tests(self, knowledge: KnowledgeBase) -> Iterator[RuleTest]:
+        """Look up all names of the tests in a knowledge base; one that it does not have is a test's problem."""
+        path = self.document.path
+        for number, content in enumerate(self.content.tests):
+            test = RuleTest(content.name.strip(), path, self.document.line(("tests", number)))
+            try:
+                yield replace(test, **_looked_up(content, knowledge, path.parent))
+            except InputError as error:
+                yield replace(test, problem=str(error))
+
+
+def shipped_tests() -> tuple[Path, ...]:
+    """The tests of the shipped rules."""
+    return tuple(sorted((shipped_folder("ontology") / "tests").glob("*.yaml")))
+
+
+def _looked_up(test: _Test, knowledge: KnowledgeBase, folder: Path) -> dict[str, Any]:
+    """What a test is about in terms of a knowledge base."""
+    base, reader = knowledge.base, FactReader(knowledge.base)
+    reader.declare(test.given.facts)
+    triples = tuple(map(reader.triple, test.given.facts))
+    enabled = sorted({rule.name for rule in base.content.enabled_rules})
+    for name in test.without:
+        if name not in enabled:
+            raise InputError(f"there is no enabled rule {shown(name)}", remedy=did_you_mean(name, enabled))
+    changes = []
+    for function, words in test.changes.items():
+        before, arrow, after = words.partition("->")
+        if not arrow:
+            raise InputError(f"{shown(words)} is not a change", remedy="{FUNCTION: BEFORE -> AFTER}")
+        changes.append((function, _choice(base, function, before), _choice(base, function, after)))
+    return {
+        "situations": tuple(Situation(each, triples, words) for each, words in _states(test.given, knowledge, folder)),
+        "follows": tuple(map(reader.fact, test.follows)),
+        "follows_not": tuple(map(reader.fact, test.follows_not)),
+        "decides": tuple((name, _choice(base, name, words)) for name, words in test.decides.items()),
+        "contradicts": test.contradiction,
+        "without": tuple(test.without),
+        "changes": tuple(changes),
+    }
+
+
+def _choice(base: Ontology, function: str, words: str) -> str:
+    """What may happen to a function's grounding."""
+    if function not in base.functions:
+        raise InputError(f"there is no function {shown(function)}", remedy=did_you_mean(function, base.functions))
+    known, choice = (*base.designs(function), STAYS, NONE_LEFT), words.strip()
+    if choice not in known:
+        problem = f"{function} has no function design {shown(choice)}"
+        raise InputError(problem, remedy=did_you_mean(choice, known))
+    return choice
+
+
+def _states(given: _Given, knowledge: KnowledgeBase, folder: Path) -> Iterator[tuple[KnowledgeState, str]]:
+    """The states of a test, one for each region of measured values, with words for it."""
+    builder = StateBuilder(knowledge.base, knowledge.settings)
+    if given.mission is not None and given.at_s is not None:
+        builder.add_state(recorded_state(recorded_states(folder / given.mission, given.run), given.at_s))
+    elif given.mission is not None or given.at_s is not None or given.run is not None:
+        raise InputError("mission and at_s must be given together", remedy="mission: FOLDER, and at_s: 53.7")
+    regions: dict[str, ValueRange] = {}
+    for kind, name, value, _ in given.parts():
+        region = parse_region(value) if kind == "measurements" and isinstance(value, str) else None
+        builder.add(kind, name, 0 if region else value)
+        if region:
+            regions[name] = region
+    for values, words in measurements_in(knowledge.base, regions):
+        for name, value in values.items():
+            builder.measurements.pop(name, None)
+            if value is not None:
+                builder.add("measurements", name, value)
+        yield builder.state(), words
+
+
+@dataclass(frozen=True)
+class Failure:
+    """An expectation that does not hold.
+
+    Attributes:
+        what: in one line.
+        situation: the first one in which it does not hold; None where there is none.
+        fact: the fact that it is about.
+        function: the function that it is about.
+        because: why, as lines.
+    """
+
+    what: str
+    situation: Situation | None = None
+    fact: Fact | None = None
+    function: str | None = None
+    because: tuple[str, ...] = ()
+
+    def lines(self) -> Iterator[str]:
+        """What does not hold, in which situation, and why."""
+        yield self.what
+        if self.situation is not None:
+            where = f" ({self.situation.ranges})" if self.situation.ranges else ""
+            yield f"  in the state{where}: {self.situation.state}"
+        yield from (f"  {line}" for line in self.because)
+
+
+@dataclass(frozen=True)
+class TestResult:
+    """What came of a test: its failures, none if it passed, and how long it took, explanations included."""
+
+    __test__ = False  # pytest takes it for a test otherwise
+    test: RuleTest
+    failures: tuple[Failure, ...]
+    duration_s: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether all that was expected is so."""
+        return not self.failures
+
+
+Without = Callable[[Iterable[str]], Decide[Situation]]
+
+
+def run_test(knowledge: KnowledgeBase, test: RuleTest) -> TestResult:
+    """Run a test on a knowledge base, and explain what fails in the first situation in which something does.
+
+    Raises:
+        ReasonerTimeoutError: the reasoner takes too long.
+    """
+    began = time.perf_counter()
+    found = [Failure(test.problem)] if test.problem else []
+    for situation in () if found else test.situations:
+        found = list(_failures(test, situation, knowledge.outcome, lambda names: knowledge.without(names).outcome))
+        if found:
+            break
+    failures = tuple(replace(each, because=tuple(_because(knowledge, each))) for each in found)
+    return TestResult(test, failures, time.perf_counter() - began)
+
+
+def passes(test: RuleTest, outcome: Decide[Situation], without: Without) -> bool:
+    """Whether all that a test expects is so; nothing is explained.
+
+    Args:
+        test: the test.
+        outcome: concludes what follows and is decided in a situation.
+        without: makes the same without some rules.
+    """
+    return not any(True for situation in test.situations for _ in _failures(test, situation, outcome, without))
+
+
+def _failures(test: RuleTest, situation: Situation, outcome: Decide[Situation], without: Without) -> Iterator[Failure]:
+    """Each expectation that does not hold in a situation."""
+    try:
+        yield from _unmet(test, situation, outcome, without)
+    except ReasonerTimeoutError:
+        raise  # Pellet is still at work: no further state can be decided
+    except KnowledgeError as error:
+        yield Failure(f"the state cannot be decided: {error}", situation)
+
+
+def _unmet(test: RuleTest, situation: Situation, outcome_of: Decide[Situation], without: Without) -> Iterator[Failure]:
+    outcome = outcome_of(situation)
+    if outcome.reasoning is None:
+        if not test.contradicts:
+            yield Failure(f"the situation contradicts itself: {outcome.contradiction}", situation)
+        return
+    if test.contradicts:
+        yield Failure("the situation does not contradict itself", situation)
+    for facts, is_wanted, words in ((test.follows, True, "does not follow"), (test.follows_not, False, "follows")):
+        for fact in facts:
+            if (fact in outcome.known) != is_wanted:
+                yield Failure(f"{fact} {words}", situation, fact)
+    wishes = [(outcome, function, wanted, "") for function, wanted in test.decides]
+    if test.changes:
+        before, names = without(test.without)(situation), ", ".join(test.without)
+        for function, one, other in test.changes:
+            wishes += [(before, function, one, f", without {names}"), (outcome, function, other, f", with {names}")]
+    for each, function, wanted, words in wishes:
+        chosen, present = each.choice(function), situation.state.grounded(function)
+        if chosen != wanted and not (chosen == STAYS and wanted == present):
+            happens = f"{present} stays" if chosen == STAYS and present else chosen
+            yield Failure(f"{function}{words}: {happens}, not {wanted}", situation, function=function)
+
+
+def _because(knowledge: KnowledgeBase, failure: Failure) -> Iterator[str]:
+    """Why something follows or does not, or is decided as it is."""
+    situation, fact, function = failure.situation, failure.fact, failure.function
+    if situation is None or (fact is None and function is None):
+        return
+    try:
+        if situation.facts:
+            knowledge = knowledge.changed(knowledge.base.with_facts(situation.facts))
+        if fact is not None and failure.what.endswith("does not follow"):
+            yield from _missing(knowledge.base, situation, fact)
+        elif fact is not None:
+            yield from knowledge.explain(situation.state, str(fact)).lines()
+        else:
+            reasoning = knowledge.infer(situation.state)
+            decisions = [each for each in reasoning.plan.decisions if each.function == function]
+            for each in (each for one in decisions for each in verdicts(knowledge.base, reasoning, one)):
+                yield f"{each.design}: {each.verdict}: {each.reason}"
+            if not decisions:
+                yield f"the objective of {function} requires no adaptation"
+    except InputError as error:
+        yield str(error)
+
+
+def _missing(base: Ontology, situation: Situation, fact: Fact) -> Iterator[str]:
+    """Why each rule that could conclude a fact does not: of those whose atoms fail, the ones that lack least."""
+    named = {base.names.short(iri): iri for iri in base.vocabulary.kinds}
+    subject = named.get(fact.subject, NEW_INDIVIDUAL + fact.subject)
+    answers = RuleQuestions(base).missing(fact, subject, situation.state)
+    near = min((answer.failing for answer in answers if answer.failing), default=0)
+    yield from (str(answer) for answer in answers if answer.failing in (0, near))
+    if not answers:
+        yield f"no rule concludes {fact}"
+
+
+def junit_xml(results: Sequence[TestResult]) -> bytes:
+    """Return a test suite for each file, in the form that pytest writes."""
+    root = etree.Element("testsuites", name="suave-des kb test")
+    for file in dict.fromkeys(result.test.file for result in results):
+        own = [result for result in results if result.test.file == file]
+        counts = {"tests": len(own), "failures": sum(not each.passed for each in own), "errors": 0, "skipped": 0}
+        time_s = f"{sum(result.duration_s for result in own):.3f}"
+        suite = etree.SubElement(root, "testsuite", name=str(file), time=time_s)
+        suite.attrib.update({name: str(count) for name, count in counts.items()})
+        for result in own:
+            name, line = _clean(result.test.name), str(result.test.line)
+            parts = {"classname": str(file), "name": name, "file": str(file), "line": line}
+            case = etree.SubElement(suite, "testcase", parts, time=f"{result.duration_s:.3f}")
+            if not result.passed:
+                message = _clean("; ".join(failure.what for failure in result.failures))
+                text = _clean("\n".join(line for each in result.failures for line in each.lines()))
+                etree.SubElement(case, "failure", message=message).text = text
+    return etree.tostring(root, xml_declaration=True, encoding="utf-8", pretty_print=True)
+
+
+def _clean(text: str) -> str:
+    return _FORBIDDEN.sub("?", text)
+
+
+def tests_text(
+    about: Tested, knowledge: KnowledgeBase, states: Iterable[tuple[str, KnowledgeState]], comment: str
+) -> str:
+    """Write tests that expect what follows in states now.
+
+    Args:
+        about: the knowledge base, as the file names it.
+        knowledge: the same, loaded.
+        states: each with the name of its test.
+        comment: for the head of the file.
+
+    Raises:
+        KnowledgeError: the reasoner takes too long.
+    """
+    content: dict[str, Any] = {
+        key: value if isinstance(value, str) else list(map(str, value)) for key, value in about.items() if value
+    }
+    content["tests"] = [
+        {"name": name, "given": _given(state), **_expected(state, knowledge.outcome(Situation(state)))}
+        for name, state in states
+    ]
+    text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, allow_unicode=True, width=10**6)
+    return f"# {comment}\n{text}"
+
+
+def _given(state: KnowledgeState) -> dict[str, Any]:
+    given = {kind: content for kind, content in state_dict(state).items() if content}
+    for name, value in state.measurements:  # numbers as numbers, where that is exact
+        if Decimal(repr(float(value))) == value:
+            given["measurements"][name] = float(value)
+    return given
+
+
+def _expected(state: KnowledgeState, outcome: Outcome) -> dict[str, Any]:
+    if outcome.reasoning is None:
+        return {"contradiction": True}
+    follows = {"follows": sorted(map(str, outcome.inferred))} if outcome.inferred else {}
+    return {**follows, "decides": {each.function: outcome.choice(each.function) for each in state.objectives}}
+
+
+def mission_states(folder: Path, knowledge: KnowledgeBase) -> Iterator[tuple[str, KnowledgeState]]:
+    """Return the states of a recorded mission, named, one for each kind that the rules can tell apart.
+
+    Raises:
+        InputError: there is no recorded mission.
+    """
+    regions = regions_of(knowledge.base)
+    kinds = {regions.key(record.state): record for record in reversed(recorded_states(folder))}
+    for record in sorted(kinds.values(), key=lambda record: record.t_s):
+        yield f"{folder.name} at {record.t_s:.2f} s", record.state
+
+
+def mission_knowledge(folder: Path) -> Tested:
+    """The knowledge base of a recorded mission, as a file of tests names it.
+
+    Raises:
+        InputError: there is no recorded mission.
+    """
+    scenario = mission_scenario(folder)
+    knowledge = scenario.knowledge
+    try:
+        find(scenario.name, "scenarios")
+        name = scenario.name
+    except InputError:
+        name = DEFAULT_SCENARIO
+    files = [find(each, "ontology").absolute() for each in knowledge.ontologies]
+    return {
+        "scenario": name,
+        "ontologies": [] if all(file.parent == shipped_folder("ontology") for file in files) else files,
+        "rules": [find(each, "ontology").absolute() for each in knowledge.rules],
+        "disabled_rules": list(knowledge.disabled_rules),
+    }

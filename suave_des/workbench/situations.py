@@ -1,0 +1,212 @@
+"""Situations of a knowledge base: what follows and is decided in them, and in which two knowledge bases differ."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Final, Generic, TypeVar
+
+from rdflib import BNode
+
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet import LOADING, TimeLimit, reasoning_on
+from suave_des.knowledge.pellet.in_process import InProcessPellet
+from suave_des.knowledge.rdf import XSD, Lit, Triple
+from suave_des.knowledge.rules import Atom, Named, Rule
+from suave_des.knowledge.rules.files import with_triples
+from suave_des.knowledge.state import STAYS, ContradictionError, Fact, KnowledgeState, Reasoning
+
+INCONSISTENT: Final = "inconsistent"
+#: Begins the IRIs of what is added to a knowledge base to question it.
+PROBE: Final = "urn:suave-des:probe"
+_HOLDS: Final = f"{PROBE}#holds"
+
+Body = tuple[Atom, ...]
+
+
+@dataclass(frozen=True)
+class Situation:
+    """A situation in which a knowledge base decides.
+
+    Attributes:
+        state: the knowledge state.
+        facts: additional assertions, as triples.
+        ranges: words for the region that the state stands for; empty for a single state.
+    """
+
+    state: KnowledgeState
+    facts: tuple[Triple, ...] = ()
+    ranges: str = ""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What follows and is decided in a situation.
+
+    Attributes:
+        reasoning: what is inferred and planned; None where the situation contradicts itself.
+        contradiction: what contradicts what.
+    """
+
+    reasoning: Reasoning | None
+    contradiction: str = ""
+
+    @property
+    def inferred(self) -> frozenset[Fact]:
+        """What was inferred; nothing where the situation contradicts itself."""
+        return frozenset() if self.reasoning is None else self.reasoning.inference.facts
+
+    @property
+    def known(self) -> frozenset[Fact]:
+        """What was asserted or inferred."""
+        return self.inferred if self.reasoning is None else self.inferred | self.reasoning.inference.asserted
+
+    @property
+    def changes(self) -> dict[str, str]:
+        """New design of each function whose grounding changes, or "none left"."""
+        return {} if self.reasoning is None else self.reasoning.changes
+
+    @cached_property
+    def statuses(self) -> tuple[str, ...]:
+        """What is inferred of objectives and groundings, as text, sorted."""
+        return () if self.reasoning is None else tuple(sorted(self.reasoning.statuses))
+
+    def choice(self, function: str) -> str:
+        """What happens to a function's grounding: a design, "stays", "none left" or "inconsistent"."""
+        return INCONSISTENT if self.reasoning is None else self.changes.get(function, STAYS)
+
+    def is_like(self, other: Outcome) -> bool:
+        """Whether the same follows and is decided."""
+        is_consistent = self.reasoning is not None
+        return is_consistent == (other.reasoning is not None) and (
+            (self.inferred, self.changes) == (other.inferred, other.changes)
+        )
+
+
+S = TypeVar("S")
+Decide = Callable[[S], Outcome]
+
+
+@dataclass(frozen=True)
+class Difference(Generic[S]):
+    """A situation in which two knowledge bases infer or decide differently."""
+
+    situation: S
+    one: Outcome
+    other: Outcome
+
+    @property
+    def functions(self) -> tuple[str, ...]:
+        """Functions whose grounding is decided differently; none where one of them finds a contradiction."""
+        if self.one.reasoning is None or self.other.reasoning is None:
+            return ()
+        names = sorted({*self.one.changes, *self.other.changes})
+        return tuple(name for name in names if self.one.choice(name) != self.other.choice(name))
+
+    @property
+    def is_decided(self) -> bool:
+        """Whether another decision follows, or a contradiction, and not only other facts."""
+        return bool(self.functions) or (self.one.reasoning is None) != (self.other.reasoning is None)
+
+    def __str__(self) -> str:
+        """The first difference, in words about the second knowledge base."""
+        if (self.one.reasoning is None) != (self.other.reasoning is None):
+            return "it contradicts itself" if self.other.reasoning is None else "it no longer contradicts itself"
+        for name in self.functions:
+            return f"{name}: {self.other.choice(name)}, not {self.one.choice(name)}"
+        for missing in sorted(map(str, self.one.inferred - self.other.inferred)):
+            return f"{missing} does not follow"
+        return f"{min(map(str, self.other.inferred - self.one.inferred))} follows"
+
+
+def compare(one: Decide[S], other: Decide[S], situations: Iterable[S]) -> Iterator[Difference[S]]:
+    """Find the situations in which something else follows or is decided.
+
+    Args:
+        one, other: conclude what follows and is decided in a situation, such as KnowledgeBase.outcome.
+        situations: to look at.
+    """
+    for situation in situations:
+        before, after = one(situation), other(situation)
+        if not before.is_like(after):
+            yield Difference(situation, before, after)
+
+
+class Probes:
+    """Asks Pellet which conjunctions of atoms hold.
+
+    Each is the body of a separate rule, whose head has an individual and a property that nothing else mentions, so that
+    it changes nothing.
+
+        probes = Probes(base, TimeLimit(), [rule.body for rule in base.rules])
+        probes.holding(Situation(state))  # numbers of the rules that fire
+
+    Args:
+        base: ontologies and rules.
+        limit: of Pellet's time for one situation.
+        bodies: the conjunctions; each must be safe, as the body of a rule is.
+
+    Raises:
+        KnowledgeError: Pellet cannot use them.
+    """
+
+    def __init__(self, base: Ontology, limit: TimeLimit, bodies: Sequence[Body]) -> None:
+        rules = (
+            Rule(f"probe {number}", "", Path(), True, BNode(), (), body, (_head(number),))
+            for number, body in enumerate(bodies)
+        )
+        self._base, self._limit = base, limit
+        probed = base.with_rules((*base.rules, *map(with_triples, rules)))
+        self._pellet = limit.run(lambda: InProcessPellet(probed), LOADING)
+
+    def holding(self, situation: Situation) -> frozenset[int]:
+        """Return the numbers of the conjunctions that hold; none in a situation that contradicts itself.
+
+        Raises:
+            KnowledgeError: Pellet takes too long.
+        """
+        try:
+            return self._ask((*self._base.assertions(situation.state), *situation.facts), situation.state)
+        except ContradictionError:
+            return frozenset()
+
+    def may_hold(self, states: Sequence[KnowledgeState], wanted: frozenset[int]) -> Iterator[KnowledgeState]:
+        """Remove states in which none of the wanted conjunctions can hold.
+
+        What several states assert is taken together: what does not follow from all of it follows from no part of it.
+        Where they contradict one another, they are divided; states in which different functions are grounded would, as
+        the status of one without a grounding contradicts that of one with it.
+
+        Raises:
+            KnowledgeError: Pellet takes too long.
+        """
+        groups: dict[tuple[str, ...], list[KnowledgeState]] = {}
+        for state in states if wanted else ():
+            ungrounded = (each.function for each in state.objectives if state.grounded(each.function) is None)
+            groups.setdefault(tuple(ungrounded), []).append(state)
+        for group in groups.values():
+            yield from self._may_hold(group, wanted)
+
+    def _may_hold(self, states: Sequence[KnowledgeState], wanted: frozenset[int]) -> Iterator[KnowledgeState]:
+        together = dict.fromkeys(triple for state in states for triple in self._base.assertions(state))
+        try:
+            found = self._ask(tuple(together), states[0])
+        except ContradictionError:
+            if len(states) > 1:
+                middle = len(states) // 2
+                yield from self._may_hold(states[:middle], wanted)
+                yield from self._may_hold(states[middle:], wanted)
+                return
+            found = wanted
+        if not found.isdisjoint(wanted):
+            yield from states
+
+    def _ask(self, assertions: tuple[Triple, ...], state: KnowledgeState) -> frozenset[int]:
+        found = self._limit.run(lambda: self._pellet.infer(assertions), reasoning_on(state))
+        return frozenset(int(value.text) for _, name, value in found if name == _HOLDS and isinstance(value, Lit))
+
+
+def _head(number: int) -> Atom:
+    return Atom("data", _HOLDS, (Named(f"{PROBE}#it"), Lit(str(number), XSD + "string")))

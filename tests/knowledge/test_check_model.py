@@ -1,0 +1,261 @@
+"""kb check: mistakes in the ontology: names, individuals, designs, kinds of things."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from suave_des.cli.main import main
+from suave_des.domain import THRUSTER_NAMES
+from suave_des.findings import Finding, Level
+from suave_des.knowledge.checks import Subject
+from suave_des.monitor.diagnostics import REPORTED_STATUSES
+from suave_des.resources import shipped_folder
+from tests.helpers.checks import SUAVE, TOMASYS, errors, findings_of, found, individual, link, only, value, warnings
+from tests.helpers.exemplar_files import write_as_owlready2_saves_it
+
+
+def test_a_component_that_nothing_reports_is_noted(tmp_path: Path) -> None:
+    status = '<tomasys:c_status xmlns:tomasys="http://metacontrol.org/tomasys#">FALSE</tomasys:c_status>'
+    extra = individual("c_camera", "Component") + individual("c_broken", "Component", status)
+    reported = dict.fromkeys(THRUSTER_NAMES, ("FALSE",))
+    findings = found(tmp_path, extra=extra, reported=reported)
+    assert [one.message for one in findings if "reports the status" in one.message] == [
+        "nothing in the simulation reports the status of component c_camera, so missions never have one"
+    ]
+    assert only(findings, "component c_camera").level is Level.INFO
+    assert not any("reports the status" in one.message for one in found(tmp_path, extra=extra))
+
+
+def test_a_measured_attribute_that_the_ontology_calls_something_else(tmp_path: Path) -> None:
+    text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
+    path = tmp_path / "mine.owl"
+    path.write_text(text.replace('water_visibility"', 'water_visability"'), encoding="utf-8")
+    findings = findings_of(Subject([path], measured=["water_visibility"]))
+    unknown = only(findings, "missions measure water_visibility, but no ontology has")
+    assert (unknown.level, unknown.file, unknown.remedy) == (Level.WARN, str(path), "did you mean water_visability?")
+    assert only(findings, "do not measure water_visability, so what").level is Level.INFO
+    assert not [each for each in found(tmp_path, measured=["water_visibility"]) if "measure" in each.message]
+
+
+def test_the_model(tmp_path: Path) -> None:
+    extra = (
+        individual("f_new", "Function")
+        + individual("fd_new", "FunctionDesign", link("solvesF", "f_follow_pipeline"))
+        + individual("fd_lost", "FunctionDesign", link("hasQAestimation", "qa_empty"))
+        + individual("qa_empty", "QAvalue")
+    )
+    modes = {"f_follow_pipeline": ["fd_follow_pipeline", "fd_unground", "fd_old"]}
+    findings = found(tmp_path, extra=extra, modes=modes, needed=["f_follow_pipeline", "f_gone"])
+    assert only(findings, "function f_new has no function design").level is Level.WARN
+    assert only(findings, "fd_new has no mode").level is Level.ERROR
+    assert only(findings, "metacontrol never chooses: fd_old").level is Level.INFO
+    assert only(findings, "there is no function f_gone").level is Level.ERROR
+    assert only(findings, "fd_new: hasQAestimation: no performance is expected of it").level is Level.WARN
+    assert only(findings, "fd_lost: solvesF: a function design must solve a function").level is Level.ERROR
+    assert only(findings, "qa_empty: isQAtype: a QAvalue must be of exactly one").line is not None
+
+
+UNDEFINED = {
+    "class": (
+        "tomasys#FunctionDesign",
+        "tomasys#FunctionDesgn",
+        "fd_all_thrusters: class FunctionDesgn",
+        "FunctionDesign",
+    ),
+    "property": ("tomasys:solvesF ", "tomasys:solvsF ", "fd_all_thrusters: property solvsF", "solvesF"),
+    "individual": (
+        'solvesF rdf:resource="http://www.metacontrol.org/suave#f_follow_pipeline',
+        'solvesF rdf:resource="http://www.metacontrol.org/suave#f_folow_pipeline',
+        "fd_follow_pipeline: solvesF f_folow_pipeline",
+        "f_follow_pipeline",
+    ),
+    "namespace": ("tomasys:isQAtype ", "mros:isQAtype ", "property isQAtype", f"{TOMASYS}isQAtype"),
+}
+
+
+@pytest.mark.parametrize("case", UNDEFINED)
+def test_names_that_individuals_misspell_are_errors(case: str, tmp_path: Path) -> None:
+    right, wrong, message, meant = UNDEFINED[case]
+    path = tmp_path / "edited.owl"
+    text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
+    path.write_text(text.replace(right, wrong, 1), encoding="utf-8")
+    error = only(findings_of(Subject([path])), f"{message} is not defined")
+    assert (error.level, error.file, error.remedy) == (Level.ERROR, str(path), f"did you mean {meant}?")
+    name = error.message.partition(":")[0]
+    assert f"#{name}" in text.splitlines()[(error.line or 0) - 1]
+
+
+def test_names_of_other_vocabularies_may_be_defined_elsewhere(tmp_path: Path) -> None:
+    note = '<dc:creator xmlns:dc="http://purl.org/dc/elements/1.1/">me</dc:creator>'
+    findings = found(tmp_path, extra=individual("f_new", "Function", note))
+    assert [each.message for each in warnings(findings)] == ["function f_new has no function design"]
+
+
+def test_a_number_with_a_comma(tmp_path: Path) -> None:
+    path = tmp_path / "edited.owl"
+    text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
+    path.write_text(text.replace(">3.25<", ">3,25<"), encoding="utf-8")
+    assert only(findings_of(Subject([path])), "hasValue '3,25' is not an xsd:decimal").remedy == "a number such as 2.25"
+
+
+def test_modes_without_a_design_are_noted(tmp_path: Path) -> None:
+    modes = {"f_follow_pipeline": ["fd_follow_pipeline", "fd_unground", "fd_fast", "normal"]}
+    note = only(found(tmp_path, modes=modes), "modes of f_follow_pipeline without function design")
+    assert note.level is Level.INFO
+    assert note.message.endswith("metacontrol never chooses: fd_fast, normal")
+
+
+@pytest.mark.parametrize("scenario", ["seams2023", "release15", "extended", "planta_exp1", "paper_table_values"])
+def test_shipped_scenarios_have_no_warning(scenario: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["kb", "check", "--scenario", scenario, "--fail-on", "warn"])
+    assert not ended.value.code, capsys.readouterr().out
+
+
+def test_a_design_whose_name_is_nearly_that_of_a_mode(tmp_path: Path) -> None:
+    findings = found(tmp_path, modes={"f_follow_pipeline": ["fd_folow_pipeline"]})
+    assert only(findings, "fd_follow_pipeline has no mode").remedy == "did you mean fd_folow_pipeline?"
+
+
+@pytest.mark.parametrize("kind", ["FunctionDesign", "QAvalue"])
+def test_a_file_as_owlready2_saves_it_with_a_placeholder_has_no_error(kind: str, tmp_path: Path) -> None:
+    assert errors(findings_of(Subject([write_as_owlready2_saves_it(tmp_path / "suave.owl", kind)]))) == []
+
+
+@pytest.mark.parametrize(
+    ("body", "column", "message"),
+    [
+        (
+            "hasQAvalue(?q, ?g) ^ hasValue(?q, 2.0)",
+            25,
+            "?q is a FunctionGrounding in hasQAvalue, but a QAvalue in hasValue",
+        ),
+        (
+            "FunctionDesign(?d) ^ hasQAvalue(?d, ?q)",
+            25,
+            "?d is a FunctionDesign, but a FunctionGrounding in hasQAvalue",
+        ),
+        (
+            'fg_status(fd_spiral_low, "IN_ERROR_NFR")',
+            4,
+            "fd_spiral_low is a FunctionDesign, but a FunctionGrounding in fg_status",
+        ),
+    ],
+)
+def test_a_thing_of_two_kinds_in_a_rule(tmp_path: Path, body: str, column: int, message: str) -> None:
+    finding = only(found(tmp_path, f"A: {body} -> Role(fd_spiral_low)"), message)
+    assert (finding.level, finding.rule, finding.column) == (Level.WARN, "A", column)
+    assert str(finding.remedy).startswith(
+        ("hasValue is a property of", "hasQAvalue leads from", "fg_status is a property of")
+    )
+
+
+def test_a_thing_may_be_of_two_kinds_if_the_ontology_or_a_rule_says_so(tmp_path: Path) -> None:
+    rule = "A: Component(?c) ^ fd_realisability(?c, false) -> Role(?c)\n"
+    assert any("?c is a Component" in one.message for one in found(tmp_path, rule))
+    both = individual("c_and_fd", "Component", f'<rdf:type rdf:resource="{TOMASYS}FunctionDesign"/>')
+    below = "".join(f'<rdfs:subClassOf rdf:resource="{TOMASYS}{name}"/>' for name in ("Component", "FunctionDesign"))
+    subclass = f'<owl:Class rdf:about="{SUAVE}Module">{below}</owl:Class>'
+    for more, extra in (("", both), ("", subclass), ("B: Role(?c) -> FunctionDesign(?c)", "")):
+        assert not any("?c is a Component" in one.message for one in found(tmp_path, rule + more, extra))
+
+
+def test_a_class_that_an_axiom_misspells(tmp_path: Path) -> None:
+    below = f'<rdfs:subClassOf rdf:resource="{TOMASYS}Compnent"/>'
+    error = only(
+        found(tmp_path, extra=f'<owl:Class rdf:about="{SUAVE}Pump">{below}</owl:Class>'), "subClassOf Compnent"
+    )
+    assert (error.level, error.remedy) == (Level.ERROR, "did you mean Component?")
+
+
+def same(name: str) -> str:
+    return f'<owl:sameAs rdf:resource="{SUAVE}{name}"/>'
+
+
+def subclass(name: str, kind: str) -> str:
+    below = f'<rdfs:subClassOf rdf:resource="{TOMASYS}{kind}"/>'
+    return f'<owl:Class rdf:about="{SUAVE}{name}">{below}</owl:Class>'
+
+
+ESTIMATE = individual("fd_spiral_low", inside=link("hasQAestimation", "qa_mine"))
+WRONG = {
+    "design as class": (subclass("fd_quick", "FunctionDesign"), "fd_quick: it is a class without members"),
+    "class named like a design": (
+        f'<owl:Class rdf:about="{SUAVE}fd_spiral_low"/>',
+        "fd_spiral_low: it is the name of a class and of an individual",
+    ),
+    "two estimates": (
+        individual("qa_mine", "QAvalue", link("isQAtype", "water_visibility") + value("hasValue", "2.5")) + ESTIMATE,
+        "fd_spiral_low: several values are expected of one quality attribute",
+    ),
+    "no class": (individual("fd_new"), "fd_new: it has no class, and nothing is said of it"),
+    "status as truth value": (
+        individual("c_thruster_1", inside=value("c_status", "false", "boolean")),
+        "c_thruster_1: c_status: missions and rules write statuses as FALSE",
+    ),
+    "fact of another class": (
+        individual("f_new", "Function", link("hasNFR", "qa_water_visibility_low")) + individual("fd_new"),
+        "f_new: hasNFR: it is of another class than the one that the property is declared for",
+    ),
+    "fact that leads to another class": (
+        individual("c_new", "Component", f'<mros:requiredBy rdf:resource="{SUAVE}qa_water_visibility_low"/>'),
+        "qa_water_visibility_low: requiredBy: it is of another class than the one that the property leads to",
+    ),
+    "measured value that is not measured": (
+        individual("obs_current", "QAvalue", link("isQAtype", "current") + value("hasValue", "2.5"))
+        + individual("current", "QualityAttributeType", value("qa_comparison_operator", "&lt;", "string")),
+        "hasValue of obs_current is not used: current has the value that missions measure",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_an_edit_that_means_something_else(case: str, tmp_path: Path) -> None:
+    extra, message = WRONG[case]
+    findings = found(tmp_path, extra=extra, reported=REPORTED_STATUSES, measured=["water_visibility"])
+    finding = next(each for each in warnings(findings) if each.message.startswith(message))
+    assert finding.line is not None
+
+
+@pytest.mark.parametrize(
+    "extra",
+    [
+        individual("c_thruster_7", "Component", same("c_thruster_1")),
+        subclass("SearchDesign", "FunctionDesign"),
+        subclass("fd_quick", "FunctionDesign")
+        + individual("fd_follow_pipeline", inside=f'<rdf:type rdf:resource="{SUAVE}fd_quick"/>'),
+        individual("qa_mine", "QAvalue", link("isQAtype", "water_visibility") + value("hasValue", "1.25")) + ESTIMATE,
+        individual("fd_spiral_low", inside="<rdfs:comment>no facts</rdfs:comment>"),
+        individual("c_thruster_1", inside=value("c_status", "FALSE", "string")),
+        individual("c_thruster_1", inside=value("c_status", "worn", "string")),
+        individual("obs_water_visibility", "QAvalue", link("isQAtype", "water_visibility") + value("hasValue", "2.5")),
+    ],
+)
+def test_right_edits(extra: str, tmp_path: Path) -> None:
+    assert not warnings(found(tmp_path, extra=extra, reported=REPORTED_STATUSES, measured=["water_visibility"]))
+
+
+def test_a_value_that_nothing_refers_to_is_noted(tmp_path: Path) -> None:
+    spare = individual("qa_spare", "QAvalue", link("isQAtype", "water_visibility") + value("hasValue", "2.5"))
+    assert only(found(tmp_path, extra=spare), "qa_spare: nothing refers to it").level is Level.INFO
+
+
+def test_a_comparison_operator_with_and_without_its_datatype(tmp_path: Path) -> None:
+    def problems(operator: str) -> list[Finding]:
+        return errors(found(tmp_path, extra=individual("current", "QualityAttributeType", operator)))
+
+    assert not problems(value("qa_comparison_operator", "&gt;=", "string"))
+    assert not problems("<tomasys:qa_comparison_operator>&lt;</tomasys:qa_comparison_operator>")
+    assert problems(value("qa_comparison_operator", "==", "string"))
+
+
+def test_a_comparison_operator_that_the_revision_assumes_is_reported_in_one_note(tmp_path: Path) -> None:
+    files = [write_as_owlready2_saves_it(tmp_path / "suave.owl")]
+    note = only(findings_of(Subject(files, operators={"water_visibility": "<"})), "comparison")
+    line = next(n for n, text in enumerate(files[0].read_text().splitlines(), 1) if '#water_visibility">' in text)
+    assert (note.level, note.line) == (Level.INFO, line)
+    assert "water_visibility has no qa_comparison_operator in the ontologies: < is assumed" in note.message
+    (warning,) = warnings(findings_of(Subject(files, measured=["water_visibility"])))
+    assert "has no qa_comparison_operator" in warning.message

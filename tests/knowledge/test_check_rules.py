@@ -1,0 +1,349 @@
+"""kb check: every mistake in a rule that Pellet is silent about is a finding with its place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from suave_des.findings import Level, has_level
+from suave_des.knowledge.checks.rules import are_near
+from suave_des.monitor.diagnostics import REPORTED_STATUSES
+from tests.helpers.checks import OWL, SUAVE, SWRL, TOMASYS, errors, found, only
+
+DECLARE = "declare it as {} property in the ontology"
+
+
+#: What Pellet drops or ignores (the table of its silent cases), each as a rule on one line.
+SILENT = {
+    "unknown builtin": ("A: hasValue(?q, ?v) ^ swrlb:lessThn(?v, 1) -> Role(?q)", 23, "did you mean lessThan?"),
+    "head variable": ("A: Role(?q) -> Role(?p)", 21, None),
+    "builtin variable": ("A: Role(?q) ^ lessThan(?v, 1) -> Role(?q)", 24, None),
+    "undeclared class": ("A: <http://x.org/#Rol>(?q) -> Role(?q)", 4, "did you mean Role?"),
+    "undeclared property": (
+        "A: <http://x.org/#p>(?q, ?r) -> Role(?q)",
+        4,
+        DECLARE.format("object"),
+    ),
+    "undeclared individual": ("A: typeFD(?q, suave:fd_spiral) -> Role(?q)", 15, "did you mean fd_spiral_low?"),
+    "lessThan with one": ("A: hasValue(?q, ?v) ^ lessThan(?v) -> Role(?q)", 23, None),
+    "undeclared in the head": (
+        'A: Role(?q) -> <http://x.org/#p>(?q, "x")',
+        16,
+        DECLARE.format("data"),
+    ),
+    "literal of an object property": ('A: typeFD(?q, "fd") -> Role(?q)', 15, None),
+    "head literal outside the range": ("A: Role(?q) -> fg_status(?q, 1)", 30, "a value of string"),
+    "individual of a data property": ("A: fg_status(?q, energy) -> Role(?q)", 18, 'a text needs quotes: "energy"'),
+    "class as property": ("A: Role(?q, ?r) -> Role(?q)", 4, "write Role(?x)"),
+    "integer for a decimal": ("A: hasValue(?q, 1) -> Role(?q)", 17, "write 1.0"),
+    "misspelt name": ("A: Objectve(?q) -> Role(?q)", 4, "did you mean Objective?"),
+    "syntax": ("A: Role(?q -> Role(?q)", 12, "parentheses must balance"),
+}
+
+
+@pytest.mark.parametrize("case", SILENT)
+def test_silent_cases_are_errors_with_file_rule_and_column(case: str, tmp_path: Path) -> None:
+    rule, column, remedy = SILENT[case]
+    (error,) = errors(found(tmp_path, f"# first line\n{rule}\n"))
+    assert (error.file, error.line, error.column) == (str(tmp_path / "mine.swrl"), 2, column)
+    assert error.rule == ("A" if case != "syntax" else None)
+    assert error.remedy == remedy
+
+
+OWL_RULE = f"""
+    <rdf:Description><rdfs:label>mine</rdfs:label><rdf:type rdf:resource="{SWRL}Imp"/>
+      <swrl:body rdf:parseType="Collection"><swrl:IndividualPropertyAtom>
+        <swrl:propertyPredicate rdf:resource="{TOMASYS}fg_status"/>
+        <swrl:argument1 rdf:resource="urn:swrl:var#x"/><swrl:argument2 rdf:resource="urn:swrl:var#y"/>
+      </swrl:IndividualPropertyAtom></swrl:body>
+      <swrl:head rdf:parseType="Collection"><swrl:ClassAtom>
+        <swrl:classPredicate rdf:resource="{TOMASYS}Roel"/><swrl:argument1 rdf:resource="urn:swrl:var#z"/>
+      </swrl:ClassAtom></swrl:head></rdf:Description>
+"""
+
+
+def test_rules_of_ontologies_are_checked_likewise(tmp_path: Path) -> None:
+    findings = errors(found(tmp_path, extra=OWL_RULE))
+    text = (tmp_path / "suave.owl").read_text(encoding="utf-8")
+    line = text[: text.index("mine</rdfs:label>")].count("\n") + 1
+    assert {(one.file, one.line, one.rule) for one in findings} == {(str(tmp_path / "suave.owl"), line, "mine")}
+    # fg_status(?x, ?y) -> Roel(?z)
+    assert [(one.column, one.message) for one in findings] == [
+        (1, "fg_status is a data property, but is used as an object property"),
+        (22, "class Roel is not defined"),
+        (27, "?z occurs in the head, but the body does not bind it"),
+    ]
+
+
+def test_a_literal_of_an_ontologys_rule_that_is_none_of_its_datatype(tmp_path: Path) -> None:
+    decimal = "http://www.w3.org/2001/XMLSchema#decimal"
+    atom = (
+        f'<swrl:DatavaluedPropertyAtom><swrl:propertyPredicate rdf:resource="{TOMASYS}hasValue"/>'
+        '<swrl:argument1 rdf:resource="urn:swrl:var#z"/>'
+        f'<swrl:argument2 rdf:datatype="{decimal}">1,5</swrl:argument2></swrl:DatavaluedPropertyAtom></swrl:body>'
+    )
+    rule = OWL_RULE.replace("</swrl:body>", atom).replace("Roel", "Role")
+    error = only(found(tmp_path, extra=rule, ranges={"water_visibility": (0.0, 1.0)}), "'1,5' is not an xsd:decimal")
+    assert (error.level, error.rule, error.column) == (Level.ERROR, "mine", 34)
+
+
+def test_all_mistakes_of_a_file_are_reported_at_once(tmp_path: Path) -> None:
+    rules = "A: Rle(?x) -> Role(?x)\nB: Role(?x -> Role(?x)\ndisabled C: Role(?x) -> Role(?y)\n"
+    assert [one.line for one in errors(found(tmp_path, rules))] == [1, 2]
+
+
+TWO_FAILED = 'two: c_status(?a, "FALSE") ^ c_status(?b, "FALSE") ^ differentFrom(?a, ?b) -> Role(?a)\n'
+
+
+def test_different_names_alone_do_not_make_individuals_different(tmp_path: Path) -> None:
+    warning = only(found(tmp_path, TWO_FAILED), "differentFrom(?a, ?b)")
+    assert (warning.level, warning.rule, warning.column) == (Level.WARN, "two", 54)
+    assert "owl:AllDifferent" in str(warning.remedy)
+
+
+@pytest.mark.parametrize(
+    "axiom",
+    [
+        f'''<rdf:Description><rdf:type rdf:resource="{OWL}AllDifferent"/>
+        <owl:distinctMembers rdf:parseType="Collection"><rdf:Description rdf:about="{SUAVE}c_thruster_1"/>
+        <rdf:Description rdf:about="{SUAVE}c_thruster_2"/></owl:distinctMembers></rdf:Description>''',
+        f'''<rdf:Description rdf:about="{SUAVE}c_thruster_1">
+        <owl:differentFrom rdf:resource="{SUAVE}c_thruster_2"/></rdf:Description>''',
+        f'''<rdf:Description rdf:about="{TOMASYS}Component">
+        <owl:disjointWith rdf:resource="{TOMASYS}FunctionDesign"/></rdf:Description>''',
+    ],
+    ids=["all different", "different from", "disjoint classes"],
+)
+def test_individuals_that_are_declared_different(tmp_path: Path, axiom: str) -> None:
+    assert not [each for each in found(tmp_path, TWO_FAILED, axiom) if "differentFrom" in each.message]
+
+
+def test_a_rule_may_conclude_that_individuals_are_different(tmp_path: Path) -> None:
+    concluding = 'other: c_status(?a, "FALSE") ^ c_status(?b, "RECOVERED") -> differentFrom(?a, ?b)\n'
+    assert not [each for each in found(tmp_path, TWO_FAILED + concluding) if "declare" in str(each.remedy)]
+
+
+def test_a_rule_that_never_fires(tmp_path: Path) -> None:
+    rules = "A: requiresO(?g, ?o) -> Role(?g)\nB: Role(?g) -> Binding(?g)\n"
+    rules += 'C: c_status(?c, "ANYTHING") -> Binding(?c)\n'
+    findings = [one for one in found(tmp_path, rules) if one.file and one.file.endswith("mine.swrl")]
+    assert [(one.level, one.rule, one.column) for one in findings] == [(Level.WARN, "A", 4), (Level.WARN, "B", 4)]
+
+
+def test_a_rule_on_an_attribute_that_no_grounding_has_a_value_of(tmp_path: Path) -> None:
+    rule = "A: hasQAvalue(?g, ?q) ^ isQAtype(?q, {}) ^ hasValue(?q, ?v) ^ lessThan(?v, 0.3) -> Role(?g)"
+    finding = only(found(tmp_path, rule.format("battery_level")), "no function design has an estimate of battery_level")
+    assert (finding.level, finding.rule, finding.column) == (Level.WARN, "A", 25)
+    assert not has_level(found(tmp_path, rule.format("water_visibility")), Level.WARN)
+    given = "\nB: FunctionGrounding(?g) ^ isQAtype(?q, battery_level) -> hasQAvalue(?g, ?q)"
+    assert not has_level(found(tmp_path, rule.format("battery_level") + given), Level.WARN)
+
+
+@pytest.mark.parametrize(
+    ("status", "level", "remedy"),
+    [
+        ("FALSE", None, ""),
+        ("LEAK", None, ""),
+        ("WORN", None, ""),  # concluded by another rule
+        ("False", Level.WARN, 'did you mean "FALSE"?'),
+        ("RECOVERD", Level.WARN, 'did you mean "RECOVERED"?'),
+        ("stuck", None, ""),  # a function of the user's may report it
+    ],
+)
+def test_a_component_status_that_nothing_reports(tmp_path: Path, status: str, level: Level, remedy: str) -> None:
+    rules = f'A: c_status(?c, "{status}") -> Role(?c)\nB: Role(?c) -> c_status(?c, "WORN")\n'
+    findings = found(tmp_path, rules, reported=REPORTED_STATUSES)
+    named = [(one.level, one.rule, one.column, one.remedy) for one in findings if "reports c_status" in one.message]
+    assert named == ([] if level is None else [(level, "A", 17, remedy)])
+
+
+def test_a_rule_as_text_that_takes_the_place_of_another_is_reported(tmp_path: Path) -> None:
+    finding = only(found(tmp_path, "S1a: Role(?q) -> Role(?q)"), "replaces the rule of this name in")
+    assert (finding.level, finding.rule, finding.line) == (Level.WARN, "S1a", 1)
+    assert finding.message.endswith("tomasys.owl")
+    same = 'S1a: FunctionGrounding(?fg) ^ fg_status(?fg, "IN_ERROR_COMPONENT") ^ solvesO(?fg, ?o)'
+    findings = found(tmp_path, f'{same} -> o_status(?o, "IN_ERROR_COMPONENT")')
+    assert not [one for one in findings if "replaces the rule of this name" in one.message]
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ("hasQAvalue(?g, ?q) ^ isQAtype(?Q, ?t)", "?Q occurs only here, and is another variable than ?q"),
+        ('o_status(?o, ?s) ^ equal(?s, "OK")', '"OK" is not among the values of o_status: the comparison never holds'),
+        ('o_status(?o, ?s) ^ notEqual("OK", ?s)', "the comparison always holds"),
+        ('c_status(?c, ?s) ^ equal(?s, "False")', 'nothing in the simulation reports c_status "False"'),
+    ],
+)
+def test_slips_of_variables_and_texts(tmp_path: Path, body: str, message: str) -> None:
+    findings = found(tmp_path, f"A: {body} -> Role(fd_spiral_low)", reported=REPORTED_STATUSES)
+    assert only(findings, message).level is Level.WARN
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "hasValue(?q, ?v) ^ hasValue(?Q, ?V) ^ isQAtype(?q, ?t) ^ isQAtype(?Q, ?t) ^ lessThan(?v, ?V)",
+        'o_status(?o, ?s) ^ equal(?s, "UNGROUNDED")',
+        'c_status(?c, ?s) ^ equal("LEAK", ?s)',
+        'c_status(?c, ?s) ^ notEqual(?s, "TRUE")',
+    ],
+)
+def test_right_variables_and_texts(tmp_path: Path, body: str) -> None:
+    findings = found(tmp_path, f"A: {body} -> Role(fd_spiral_low)", reported=REPORTED_STATUSES)
+    assert not has_level(findings, Level.WARN)
+
+
+def test_a_file_without_rules_is_noted(tmp_path: Path) -> None:
+    assert only(found(tmp_path, "# nothing yet\n"), "there is no rule in this file").level is Level.INFO
+
+
+def warned(tmp_path: Path, rule: str, **options: object) -> list[tuple[int | None, str, str | None]]:
+    """Column, message and remedy of the warnings about a rule."""
+    findings = found(tmp_path, rule, reported=REPORTED_STATUSES, **options)  # type: ignore[arg-type]
+    return [(one.column, one.message, one.remedy) for one in findings if one.rule == "A" and one.level is Level.WARN]
+
+
+WITHOUT_FIRING = {
+    "two values asked": (
+        'A: c_status(?c, "FALSE") ^ c_status(?c, "LEAK") -> Role(?c)',
+        (28, 'c_status(?c, "LEAK"): nothing has two values of c_status, so the rule never fires'),
+    ),
+    "two designs": (
+        "A: typeFD(?g, fd_spiral_low) ^ typeFD(?g, fd_spiral_high) -> Role(?g)",
+        (32, "typeFD(?g, fd_spiral_high): nothing has two values of typeFD, so the rule never fires"),
+    ),
+    "value replaced": (
+        "A: isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ lessThan(?v, 1.0) -> hasValue(?q, 1.0)",
+        (77, "hasValue(?q, 1.0) contradicts hasValue in the body, which holds as well"),
+    ),
+    "status replaced": (
+        'A: o_status(?o, "UNGROUNDED") -> o_status(?o, "IN_ERROR_FR")',
+        (34, 'o_status(?o, "IN_ERROR_FR") contradicts o_status in the body, which holds as well'),
+    ),
+    "compared with itself": (
+        "A: hasValue(?q, ?v) ^ greaterThan(?v, ?v) -> Role(?q)",
+        (23, "greaterThan(?v, ?v) compares ?v with itself: it never holds"),
+    ),
+    "compared with the same value": (
+        "A: hasValue(?q, ?v) ^ hasValue(?q, ?w) ^ lessThanOrEqual(?v, ?w) -> Role(?q)",
+        (42, "?v and ?w are the same hasValue: lessThanOrEqual(?v, ?w) always holds"),
+    ),
+    "realisable": (
+        "A: hasValue(?q, ?v) ^ greaterThan(?v, 3.5) -> fd_realisability(fd_spiral_high, true)",
+        (47, "fd_realisability true has no effect: a design counts as realisable unless it is false"),
+    ),
+    "another capital": (
+        "A: hasQAvalue(?g, ?q) ^ isQAtype(?Q, water_visibility) ^ hasValue(?Q, ?v) -> Role(?g)",
+        (19, "?q occurs only here, and is another variable than ?Q"),
+    ),
+    "unmeasured": (
+        "A: hasQAvalue(?g, ?q) ^ isQAtype(?q, performance) -> Role(?g)",
+        (25, "can never fire: missions do not measure performance, so no grounding has a value of it"),
+    ),
+    "no value": (
+        "A: isQAtype(?q, battery_level) ^ hasValue(?q, ?v) -> Role(?q)",
+        (4, "can never fire: missions do not measure battery_level, and no ontology has a value of it"),
+    ),
+    "excluded text": (
+        'A: c_status(?c, ?s) ^ notEqual(?s, "False") -> Role(?c)',
+        (36, 'nothing in the simulation reports c_status "False"'),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WITHOUT_FIRING)
+def test_a_rule_that_cannot_do_what_it_should(case: str, tmp_path: Path) -> None:
+    rule, finding = WITHOUT_FIRING[case]
+    assert [one[:2] for one in warned(tmp_path, rule, measured=["water_visibility"])] == [finding]
+
+
+@pytest.mark.parametrize(
+    "rule",
+    [
+        'A: c_status(?c, "FALSE") ^ c_status(?d, "RECOVERED") -> Role(?c)',
+        "A: hasValue(?q, 2.0) ^ hasValue(?q, 2.00) -> Role(?q)",
+        'A: o_status(?o, "UNGROUNDED") -> o_status(?o, "UNGROUNDED")',
+        'A: fg_status(?g, ?s) ^ equal(?s, "IN_ERROR_NFR") -> fg_status(?g, "IN_ERROR_NFR")',
+        'A: fg_status(?g, "IN_ERROR_NFR") ^ solvesO(?g, ?o) -> o_status(?o, "IN_ERROR_NFR")',
+        "A: hasValue(?q, ?v) ^ hasValue(?r, ?w) ^ lessThan(?v, ?w) -> Role(?q)",
+        "A: requiredBy(?c, ?d) -> fd_realisability(?d, true)\nB: fd_realisability(?d, true) -> Role(?d)",
+        'A: Component(?c) ^ c_status(?c, "RECOVERED") ^ Objective(?o) -> o_updatable(?o, true)',
+        "A: hasQAvalue(?g, ?q) ^ hasQAvalue(?h, ?q) ^ typeFD(?g, fd_spiral_low) -> Role(?h)",
+        "A: hasQAvalue(?g, ?q) ^ isQAtype(?q, water_visibility) -> Role(?g)",
+        "A: isQAtype(?q, performance) ^ hasValue(?q, ?v) -> Role(?q)",
+        "A: isQAtype(?q, battery_level) -> Role(?q)\nB: Role(?q) -> isQAtype(?q, battery_level)",
+        "A: solvesO(?g, ?o) ^ typeFD(?g, fd_spiral_low) ^ solvesO(?h, ?p) ^ o_updatable(?p, true) -> Role(?h)",
+    ],
+)
+def test_a_rule_that_can(rule: str, tmp_path: Path) -> None:
+    assert not warned(tmp_path, rule, measured=["water_visibility"])
+
+
+def test_a_misspelt_variable(tmp_path: Path) -> None:
+    rule = "A: hasQAvalue(?g, ?q) ^ hasValue(?q, ?vlaue) ^ hasValue(?other, ?value) ^ lessThan(?value, 2) -> Role(?g)"
+    finding = (38, "?vlaue occurs only here, and is another variable than ?value", "did you mean ?value?")
+    assert warned(tmp_path, rule) == [finding]
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "are"),
+    [
+        ("design", "desing", True),
+        ("design", "desgn", True),
+        ("design", "dessign", True),
+        ("statu", "status", False),
+        ("value", "valule", True),
+        ("obj", "objj", True),
+        ("speed1", "speed2", False),
+        ("speed12", "speed21", False),
+        ("xpos", "ypos", False),
+        ("goal_a", "goal_b", False),
+        ("goal", "goal2", False),
+        ("value", "qvalue", False),
+        ("fg", "fd", False),
+        ("q", "qq", False),
+        ("measured", "required", False),
+    ],
+)
+def test_names_that_are_misspelt_variants_of_each_other(one: str, other: str, are: bool) -> None:
+    assert are_near(one, other) is are
+    assert are_near(other, one) is are
+
+
+@pytest.mark.parametrize(
+    ("rule", "column", "consequence"),
+    [
+        ('A: FunctionGrounding(?g) -> fg_status(?g, "IN_EROR_NFR")', 43, "contradicts whatever it is concluded of"),
+        ('A: o_status(?o, "IN_EROR_NFR") -> o_updatable(?o, true)', 17, "never matches"),
+    ],
+)
+def test_a_status_outside_its_range_is_an_error(rule: str, column: int, consequence: str, tmp_path: Path) -> None:
+    (error,) = errors(found(tmp_path, rule))
+    assert error.column == column
+    assert error.message.endswith(consequence)
+    assert error.remedy == "did you mean IN_ERROR_NFR?"
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        'greaterThan(?v, "3")',
+        "lessThan(?v, 1) ^ greaterThan(?v, 2)",
+        "lessThan(?v, 2) ^ equal(?v, 2.0)",
+        "lessThan(2, ?v) ^ lessThanOrEqual(?v, 2)",
+    ],
+)
+def test_comparisons_that_no_value_satisfies_are_warnings(body: str, tmp_path: Path) -> None:
+    findings = found(tmp_path, f"A: hasValue(?q, ?v) ^ {body} -> QAvalue(?q)")
+    (warning,) = [one for one in findings if one.level is Level.WARN]
+    assert warning.rule == "A"
+    assert warning.column
+    assert "never" in warning.message
+
+
+@pytest.mark.parametrize("body", ["lessThan(1, ?v) ^ lessThan(?v, 2)", "equal(?v, 2) ^ lessThanOrEqual(?v, 2)"])
+def test_comparisons_that_some_value_satisfies_are_not(body: str, tmp_path: Path) -> None:
+    findings = found(tmp_path, f"A: hasValue(?q, ?v) ^ {body} -> QAvalue(?q)")
+    assert not has_level(findings, Level.WARN)

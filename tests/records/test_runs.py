@@ -1,0 +1,233 @@
+"""Missions are read from every kind of file in which they come; a file that is wrong is named with its line."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from suave_des.errors import InputError
+from suave_des.records.runs import read_runs
+from suave_des.resources import shipped_folder
+
+OWN = "manager,search_time_s,distance_inspected_m"
+
+
+@pytest.fixture
+def write(tmp_path: Path):
+    """Writes a file in a fresh folder."""
+
+    def write_file(name, content):
+        (tmp_path / name).write_text(content, encoding="utf-8")
+        return tmp_path / name
+
+    return write_file
+
+
+def test_the_published_runs_give_the_figures_of_the_papers_table():
+    frame = read_runs(shipped_folder("scenarios/published") / "seams2023_runs.csv").frame
+    table = frame.groupby("manager")[["search_time_s", "distance_inspected_m"]].agg(["mean", "std"]).round(2)
+    assert table.loc["none"].tolist() == [187.85, 42.40, 31.40, 13.00]
+    assert table.loc["random"].tolist() == [180.15, 82.05, 3.88, 3.19]
+    assert table.loc["metacontrol"].tolist() == [106.95, 39.46, 51.15, 12.01]
+
+
+def test_places_of_detection_are_known_for_19_missions_of_none_and_17_of_metacontrol():
+    frame = read_runs(shipped_folder("scenarios/published") / "seams2023_runs.csv").frame
+    assert frame.groupby("manager")["detection_x_m"].count().to_dict() == {"none": 19, "random": 0, "metacontrol": 17}
+
+
+def test_a_campaigns_file_is_read_with_its_places_and_scenario(write):
+    path = write("runs.csv", f"scenario,{OWN},detection_x_m\nsea,none,120,3.5,-17.5\nsea,none,300,0,\n")
+    runs = read_runs(path)
+    assert runs.frame["detection_x_m"].tolist()[0] == -17.5
+    assert math.isnan(runs.frame["detection_x_m"].tolist()[1])
+    assert runs.frame["scenario"].tolist() == ["sea", "sea"]
+    assert runs.frame.index.tolist() == [2, 3]
+
+
+def test_the_exemplars_2023_file_is_read_and_its_minus_one_is_the_time_limit(write):
+    header = 'mission_name,datetime,"initial pos (x,y)",time budget (s),time search (s),distance inspected (m)'
+    row = 'time constrained {},Feb-04-2023-00-56-36,"(-17.0, 2.57)",300,{},{}'
+    path = write("results.csv", "\n".join([header, row.format("none", -1, 0.0), row.format("metacontrol", 83, 51.5)]))
+    frame = read_runs(path).frame
+    assert frame["manager"].tolist() == ["none", "metacontrol"]
+    assert frame["search_time_s"].tolist() == [300.0, 83.0]
+    assert frame["distance_inspected_m"].tolist() == [0.0, 51.5]
+
+
+def test_the_exemplars_1_5_file_is_read(write):
+    header = (
+        "mission name,datetime,mission duration (s),pipeline found,time searching pipeline (s),distance inspected (m)"
+    )
+    path = write("results.csv", f"{header}\nsuave bt,01-Jul-2025-00-43-53,300.5,True,87,40.25\n")
+    frame = read_runs(path).frame
+    assert frame.iloc[0].tolist()[1:4] == ["bt", 87.0, 40.25]
+
+
+def test_blank_lines_and_a_byte_order_mark_do_no_harm(write):
+    path = write("runs.csv", f"\ufeff{OWN}\n\nnone,120,3\n\n")
+    assert len(read_runs(path).frame) == 1
+
+
+@pytest.mark.parametrize(
+    ("content", "line", "problem"),
+    [
+        ("", 1, "has no column 'manager'"),
+        ("manager,search_time_s\nnone,1\n", 1, "has no column 'distance_inspected_m'"),
+        (f"{OWN},manager\nnone,1,2,none\n", 1, "has column 'manager' twice"),
+        (OWN.replace(",", ";") + "\nnone;1;2\n", 1, "has its columns separated by semicolons"),
+        (OWN.replace(",", "\t") + "\nnone\t1\t2\n", 1, "has its columns separated by tabs"),
+        (f"{OWN}\n", 1, "has no mission"),
+        (f"{OWN}\nnone,120,3\nnone,soon,3\n", 3, "search_time_s: expected a finite number, got 'soon'"),
+        (f"{OWN}\nnone,120,\n", 2, "distance_inspected_m: expected a finite number, at least 0, got ''"),
+        (f"{OWN}\nnone,120,3\nnone,1_2,3\n", 3, "search_time_s: expected a finite number, got '1_2'"),
+        (f"{OWN}\nnone,١٢,3\n", 2, "search_time_s: expected a finite number, got '١٢'"),
+        (f"{OWN}\nnone,nan,3\n", 2, "search_time_s: expected a finite number, got 'nan'"),
+        (f"{OWN}\nnone,-1,3\n", 2, "search_time_s: expected a finite number, at least 0, got '-1'"),
+        (f"{OWN}\nnone,120,-3\n", 2, "distance_inspected_m: expected a finite number, at least 0, got '-3'"),
+        (f"{OWN}\nnone,120\n", 2, "has 2 values, but the header has 3"),
+        (f"{OWN}\n ,120,3\n", 2, "manager: expected a manager's name"),
+        (f"{OWN}\nmy manager,120,3\n", 2, "manager: expected a manager's name"),
+        (f"{OWN},detection_x_m\nnone,120,3,west\n", 2, "detection_x_m: expected a finite number, got 'west'"),
+        (f'{OWN}\n"none,120,3\n', 2, "is not valid CSV"),
+    ],
+)
+def test_a_wrong_file_is_named_with_its_line_and_what_would_be_right(write, content, line, problem):
+    path = write("runs.csv", content)
+    with pytest.raises(InputError) as caught:
+        read_runs(path)
+    assert caught.value.file == str(path)
+    assert caught.value.place == f"line {line}"
+    assert problem in caught.value.problem
+    assert caught.value.remedy
+
+
+@pytest.mark.parametrize("name", ["missing.csv", "."])
+def test_a_file_that_is_missing_or_a_folder_is_named(tmp_path: Path, name):
+    with pytest.raises(InputError, match=r"no such file|is a folder"):
+        read_runs(tmp_path / name)
+
+
+def test_a_binary_file_is_refused_with_its_line(tmp_path: Path):
+    path = tmp_path / "runs.csv"
+    path.write_bytes(OWN.encode() + b"\n\xff\xfe\n")
+    with pytest.raises(InputError, match="line 2: is not UTF-8"):
+        read_runs(path)
+
+
+def test_a_simulated_file_must_have_each_manager(write):
+    runs = read_runs(write("runs.csv", f"{OWN}\nnone,1,2\n"))
+    runs.check_simulated(["none"], None)
+    with pytest.raises(InputError, match="no mission of manager 'bt'"):
+        runs.check_simulated(["none", "bt"], None)
+
+
+def test_a_simulated_file_must_be_of_one_scenario_and_of_the_one_named(write):
+    runs = read_runs(write("runs.csv", f"scenario,{OWN}\nsea,none,1,2\n"))
+    runs.check_simulated(["none"], "sea")
+    runs.check_simulated(["none"], None)
+    with pytest.raises(InputError, match="line 2: has missions of scenario sea, not of lake"):
+        runs.check_simulated(["none"], "lake")
+    mixed = read_runs(write("mixed.csv", f"scenario,{OWN}\nsea,none,1,2\nlake,none,1,2\n"))
+    with pytest.raises(InputError, match="line 3: has missions of several scenarios: sea and lake"):
+        mixed.check_simulated(["none"], None)
+
+
+def test_further_columns_are_numbers_where_all_their_values_are(write):
+    path = write("runs.csv", f"{OWN},period,mode\nnone,120,3,40,low\nnone,130,3,80.5,7\n")
+    frame = read_runs(path, ["period", "mode"]).frame
+    assert frame["period"].tolist() == [40.0, 80.5]
+    assert frame["mode"].tolist() == ["low", "7"]
+    with pytest.raises(InputError, match="line 1: has no column 'speed'"):
+        read_runs(path, ["speed"])
+
+
+HEADER_2023 = 'mission_name,datetime,"initial pos (x,y)",time budget (s),time search (s),distance inspected (m)'
+HEADER_1_5 = (
+    'mission name,datetime,"initial pos (x,y)",mission duration (s),pipeline found,time searching pipeline (s),'
+    "distance inspected (m),mean reaction time (s)"
+)
+OF_2023 = 'time constrained {},Feb-04-2023-00-56-36,"(-17.0, 2.57)",300,{},{}'
+OF_1_5 = 'suave {},01-Jul-2025-00-43-53,"(-17.0, 2.57)",250,{},{},{},{}'
+
+
+@pytest.mark.parametrize(
+    ("rows", "averages"),
+    [
+        (["Mean,,,,,87.0,40.25,0.5", "Std,,,,,0.0,0.0,0.0"], (3, 4)),
+        (["AVERAGE,,,,,87.0,40.25", ",,,,,,,", "STD,,,,,0.0,0.0"], (3, 5)),
+        ([",,,AVERAGE,,87", "std:,1"], (3, 4)),
+    ],
+)
+def test_rows_of_averages_and_blank_rows_of_the_exemplars_files_are_left_out(write, rows, averages):
+    runs = read_runs(write("results.csv", "\n".join([HEADER_1_5, OF_1_5.format("bt", True, 87, 40.25, 0.5), *rows])))
+    assert len(runs.frame) == 1
+    assert runs.averages == averages
+    lines = ", ".join(map(str, averages))
+    assert runs.notes == (f"{runs.path}: lines {lines} left out: averages, not missions",)
+
+
+def test_files_of_the_exemplar_that_were_put_together_are_read_under_each_of_their_headers(write):
+    rows = [OF_2023.format("none", 204, 27.1), "", HEADER_2023, OF_2023.format("random", -1, 0.0)]
+    rows += [HEADER_1_5, OF_1_5.format("bt", False, 251, 0.0, 0.0), OF_1_5.format("bt", True, 44, 47.6, 0.05)]
+    runs = read_runs(write("results.csv", "\n".join([HEADER_2023, *rows])))
+    assert runs.frame["manager"].tolist() == ["none", "random", "bt", "bt"]
+    assert runs.frame["search_time_s"].tolist() == [204.0, 300.0, 251.0, 44.0]
+    assert runs.frame["pipeline_found"].tolist() == [1.0, 0.0, 0.0, 1.0]
+    assert runs.frame.index.tolist() == [2, 5, 7, 8]
+    assert runs.frame["mean_reaction_time_s"].isna().tolist() == [True, True, True, False]
+
+
+def test_an_error_below_a_repeated_header_names_its_own_line(write):
+    path = write("results.csv", "\n".join([HEADER_1_5, HEADER_1_5, OF_1_5.format("bt", "perhaps", 44, 47.6, 0.05)]))
+    with pytest.raises(InputError, match="line 3: pipeline found: expected True or False"):
+        read_runs(path)
+
+
+def test_the_behaviour_tree_of_the_extended_mission_is_the_manager_of_that_name_here(write):
+    rows = [OF_1_5.replace("suave", "suave_extended").format(name, True, 44, 47.6, 0.05) for name in ("bt", "none")]
+    runs = read_runs(write("results.csv", "\n".join([HEADER_1_5, *rows, OF_1_5.format("bt", True, 44, 47.6, 0.05)])))
+    assert runs.frame["manager"].tolist() == ["bt_extended", "none", "bt"]
+
+
+def test_a_manager_of_our_own_files_may_be_called_average(write):
+    runs = read_runs(write("runs.csv", f"{OWN}\naverage,120,3\n"))
+    assert runs.managers == ("average",)
+    assert runs.averages == ()
+
+
+@pytest.mark.parametrize(
+    ("header", "rows", "found"),
+    [
+        (f"{OWN},pipeline_found", ["none,251,0,False", "none,20,1,true"], [False, True]),
+        (f"{OWN},time_limit_s", ["none,300,0,300", "none,299,1,300"], [False, True]),
+        (OWN, ["none,300,0"], [None]),
+    ],
+)
+def test_whether_the_pipeline_was_found_is_read_or_follows_from_the_time_limit(write, header, rows, found):
+    frame = read_runs(write("runs.csv", "\n".join([header, *rows]))).frame
+    assert [None if math.isnan(value) else value for value in frame["pipeline_found"]] == found
+
+
+@pytest.mark.parametrize(("scenario", "is_known"), [(None, [False, True, False]), ("sea", [True, True, False])])
+def test_a_reaction_time_of_zero_is_none_unless_a_campaign_wrote_it(write, scenario, is_known):
+    rows = ["none,20,1,0.0", "none,20,1,1.5", "none,20,1,"]
+    if scenario is not None:
+        rows = [f"{scenario},{row}" for row in rows]
+    header = f"{OWN},mean_reaction_time_s" if scenario is None else f"scenario,{OWN},mean_reaction_time_s"
+    times = read_runs(write("runs.csv", "\n".join([header, *rows]))).frame["mean_reaction_time_s"]
+    assert times.notna().tolist() == is_known
+
+
+@pytest.mark.parametrize("number", ["1" * 400, "1e400", "-" + "9" * 30])
+def test_a_number_that_no_sweep_has_is_text_in_a_further_column_and_an_error_in_a_metric(write, number):
+    frame = read_runs(write("runs.csv", f"{OWN},{number},depth\nnone,120,3,1,{number}\n")).frame
+    assert frame[number].tolist() == [1]
+    assert frame["depth"].tolist() in ([number], [float(number)])
+    with pytest.raises(InputError, match="line 2: adaptations: expected a whole number"):
+        read_runs(write("runs.csv", f"{OWN},adaptations\nnone,120,3,{number}\n"))
+
+
+def test_a_word_that_is_neither_true_nor_false_is_named(write):
+    with pytest.raises(InputError, match="pipeline_found: expected True or False, got 'maybe'"):
+        read_runs(write("runs.csv", f"{OWN},pipeline_found\nnone,20,1,maybe\n"))

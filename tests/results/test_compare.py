@@ -1,0 +1,409 @@
+"""Managers are compared from result files: estimates, paired and unpaired differences, and what follows."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas
+import pytest
+from scipy import stats
+
+from suave_des import api
+from suave_des.campaign.campaign import run_campaign
+from suave_des.errors import InputError
+from suave_des.results.compare import Choices, compare_folders, compare_frame
+from suave_des.results.comparison import Comparison, Difference, Summary
+from suave_des.results.paper import published_runs
+
+MANAGERS = ("none", "random", "metacontrol")
+
+
+def holm(ps: list[float]) -> list[float]:
+    """Holm's correction by statsmodels, which takes a while to import."""
+    from statsmodels.stats.multitest import multipletests
+
+    return list(multipletests(ps, method="holm")[1])
+
+
+def difference(comparison: Comparison, first: str, second: str, metric: str = "search_time_s") -> Difference:
+    (found,) = (
+        each for each in comparison.differences if (each.group, each.other, each.metric) == (first, second, metric)
+    )
+    return found
+
+
+def summary(comparison: Comparison, group: str, metric: str = "search_time_s") -> Summary:
+    (found,) = (each for each in comparison.summaries if (each.group, each.metric) == (group, metric))
+    return found
+
+
+@pytest.fixture(scope="module")
+def published() -> Comparison:
+    return compare_folders([published_runs()])
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("campaign") / "out"
+    run_campaign("seams2023", ["none", "bt", "metacontrol"], 25, 1, out=folder)
+    return folder
+
+
+def runs(**values: list[float]) -> pandas.DataFrame:
+    """Missions of managers with given search times, run by run, with seed 1; 300 s: not found."""
+    return pandas.DataFrame(
+        [
+            {
+                "manager": manager,
+                "run": run,
+                "seed": 1,
+                "search_time_s": time_s,
+                "pipeline_found": time_s < 300.0,
+                "distance_inspected_m": 300.0 - time_s,
+            }
+            for manager, times_s in values.items()
+            for run, time_s in enumerate(times_s, 1)
+        ]
+    )
+
+
+class TestPublishedRuns:
+    def test_the_papers_table_is_printed_to_the_last_digit(self, published: Comparison) -> None:
+        lines = [" ".join(line.split()) for line in published.latex().splitlines()]
+        assert [line for line in lines if line.startswith(MANAGERS) and "-" not in line] == [
+            r"none & 187.85 & 42.40 & 31.40 & 13.00 \\",
+            r"random & 180.15 & 82.05 & 3.88 & 3.19 \\",
+            r"metacontrol & 106.95 & 39.46 & 51.15 & 12.01 \\",
+        ]
+
+    def test_p_values_are_scipys(self, published: Comparison) -> None:
+        frame = pandas.read_csv(published_runs())
+        count = 0
+        for first in MANAGERS:
+            for second in MANAGERS[MANAGERS.index(first) + 1 :]:
+                for metric in ("search_time_s", "distance_inspected_m"):
+                    x, y = (frame.loc[frame["manager"] == name, metric] for name in (first, second))
+                    tested = difference(published, first, second, metric)
+                    assert tested.p == pytest.approx(stats.mannwhitneyu(x, y).pvalue, abs=1e-12)
+                    assert tested.p_less == pytest.approx(
+                        stats.mannwhitneyu(x, y, alternative="less").pvalue, abs=1e-12
+                    )
+                    assert tested.effect.value == pytest.approx(
+                        np.mean([(a > b) + 0.5 * (a == b) for a in x for b in y])
+                    )
+                    count += 1
+        assert count == 6
+
+    def test_holms_correction_counts_all_tests(self, published: Comparison) -> None:
+        ps = [each.p for each in published.differences if each.test]
+        assert len(ps) == 9
+        adjusted = holm(ps)
+        assert [each.p_holm for each in published.differences] == pytest.approx(list(adjusted))
+
+    def test_real_missions_are_not_paired_though_the_file_numbers_them(self, published: Comparison) -> None:
+        assert not any(each.paired for each in published.differences)
+        assert "share no random numbers" in published.differences[0].why
+
+    def test_shares_have_wilsons_interval_and_fishers_test(self, published: Comparison) -> None:
+        found = summary(published, "random", "pipeline_found")
+        assert found.mean.value == 0.8
+        assert found.mean.interval == pytest.approx(tuple(stats.binomtest(16, 20).proportion_ci(0.95, "wilson")))
+        tested = difference(published, "none", "random", "pipeline_found")
+        assert tested.p == pytest.approx(stats.fisher_exact([[19, 1], [16, 4]]).pvalue, abs=1e-12)
+
+    def test_the_conclusion_names_the_best_with_an_interval(self, published: Comparison) -> None:
+        assert published.conclusion.startswith("metacontrol finds the pipeline soonest: 80.90 s sooner than none (95%")
+
+
+HEADINGS = {
+    "2023": "mission_name,datetime,initial pos (x;y),time budget (s),time search (s),distance inspected (m)",
+    "1.5": "mission name,datetime,initial pos (x;y),mission duration (s),pipeline found,"
+    "time searching pipeline (s),distance inspected (m),mean reaction time (s)",
+}
+
+
+class TestExemplarsColumns:
+    """Result files as the exemplar writes them, a file for each manager."""
+
+    @staticmethod
+    def line(release: str, manager: str, time_s: float, distance_m: float) -> str:
+        if release == "2023":
+            return f"time constrained {manager},Jan-01-2023-00-00-00,(-17.0; 2.0),300,{time_s},{distance_m}"
+        return f"suave {manager},01-Jan-2025-00-00-00,(-17.0; 2.0),300,True,{time_s},{distance_m},1.5"
+
+    @pytest.mark.parametrize("release", ["2023", "1.5"])
+    def test_p_values_are_scipys(self, release: str, tmp_path: Path) -> None:
+        chance = np.random.default_rng(3)
+        values = {}
+        for manager, mean_s, n in (("none", 180.0, 23), ("random", 160.0, 31), ("metacontrol", 110.0, 20)):
+            times_s = chance.normal(mean_s, 40.0, n).clip(20.0, 290.0).round(0)  # whole seconds: there are ties
+            values[manager] = (times_s, chance.normal(mean_s / 4.0, 9.0, n).clip(0.0).round(2))
+            lines = [self.line(release, manager, *row) for row in zip(*values[manager], strict=True)]
+            (tmp_path / f"{manager}.csv").write_text("\n".join([HEADINGS[release], *lines]) + "\n")
+        comparison = compare_folders([tmp_path])
+        for first, second in (("none", "random"), ("none", "metacontrol"), ("random", "metacontrol")):
+            for metric, x, y in zip(
+                ("search_time_s", "distance_inspected_m"), values[first], values[second], strict=True
+            ):
+                tested = difference(comparison, first, second, metric)
+                assert tested.p == pytest.approx(stats.mannwhitneyu(x, y).pvalue, rel=1e-9, abs=1e-12)
+        ps = [each.p for each in comparison.differences if each.test]
+        assert [each.p_holm for each in comparison.differences if each.test] == pytest.approx(holm(ps), rel=1e-9)
+
+
+class TestCampaign:
+    def test_runs_with_common_random_numbers_are_paired(self, campaign: Path) -> None:
+        comparison = compare_folders([campaign])
+        times = pandas.read_csv(campaign / "runs.csv").pivot(index="run", columns="manager", values="search_time_s")
+        found = difference(comparison, "bt", "metacontrol")
+        assert (found.paired, found.n) == (True, 25)
+        assert found.p == pytest.approx(stats.wilcoxon(times["bt"], times["metacontrol"]).pvalue, abs=1e-12)
+        assert found.difference.value == pytest.approx((times["bt"] - times["metacontrol"]).mean())
+        low, high = stats.ttest_rel(times["bt"], times["metacontrol"]).confidence_interval()
+        assert found.difference.interval == pytest.approx((low, high))
+        apart = difference(compare_folders([campaign], unpaired=True), "bt", "metacontrol")
+        assert apart.p == pytest.approx(stats.mannwhitneyu(times["bt"], times["metacontrol"]).pvalue, abs=1e-12)
+        welch = stats.ttest_ind(times["bt"], times["metacontrol"], equal_var=False).confidence_interval()
+        assert apart.difference.interval == pytest.approx((welch.low, welch.high))
+
+    def test_the_runs_needed_give_that_interval(self, campaign: Path) -> None:
+        times = pandas.read_csv(campaign / "runs.csv").pivot(index="run", columns="manager", values="search_time_s")
+        comparison = compare_folders([campaign], half_widths=["search_time_s:2"])
+        found = difference(comparison, "bt", "metacontrol")
+        assert found.runs_needed_paired is not None
+        apart = (times["bt"] - times["metacontrol"]).std()
+        for n, narrow in ((found.runs_needed_paired, True), (found.runs_needed_paired - 1, False)):
+            assert (stats.t.ppf(0.975, n - 1) * apart / n**0.5 <= 2.0) == narrow
+        ratio = (times["bt"].var() + times["metacontrol"].var()) / apart**2  # what pairs are worth
+        assert found.runs_needed_unpaired == pytest.approx(ratio * found.runs_needed_paired, rel=0.05)
+
+    def test_the_interval_is_narrower_in_pairs_where_the_runs_have_much_in_common(self) -> None:
+        stream = np.random.default_rng(1)
+        start_s = stream.uniform(60.0, 200.0, 30)
+        frame = runs(a=list(start_s + stream.normal(0.0, 5.0, 30)), b=list(start_s + stream.normal(3.0, 5.0, 30)))
+        found = [difference(compare_frame(frame, unpaired=each), "a", "b").difference for each in (False, True)]
+        widths = [each.interval[1] - each.interval[0] for each in found if each is not None]
+        assert 3.0 * widths[0] < widths[1]
+
+    def test_folders_side_by_side_are_told_apart_by_name(self, campaign: Path, tmp_path: Path) -> None:
+        run_campaign("seams2023", ["bt"], 10, 1, out=tmp_path / "again")
+        comparison = compare_folders([campaign, tmp_path / "again"])
+        assert {each.group for each in comparison.summaries} == {"none", "bt (out)", "bt (again)", "metacontrol"}
+        same = difference(comparison, "bt (out)", "bt (again)")
+        assert (same.paired, same.n) == (True, 10)
+        assert "15 of one without a counterpart" in same.why
+        assert same.p == 1.0
+
+    def test_different_seeds_are_not_paired(self, campaign: Path, tmp_path: Path) -> None:
+        run_campaign("seams2023", ["bt"], 10, 2, out=tmp_path / "again")
+        found = difference(compare_folders([campaign, tmp_path / "again"]), "bt (out)", "bt (again)")
+        assert not found.paired
+        assert "seeds 1 and 2 differ" in found.why
+
+    def test_a_data_frame_gives_the_same_as_its_folder(self, campaign: Path) -> None:
+        frame = pandas.read_csv(campaign / "runs.csv", keep_default_na=False, na_values=[""])
+        assert compare_frame(frame).csv() == compare_folders([campaign]).csv()
+
+    def test_the_restricted_mean_is_lifelines(self, campaign: Path) -> None:
+        import lifelines  # takes a while, too
+
+        frame = pandas.read_csv(campaign / "runs.csv")
+        own = frame[frame["manager"] == "metacontrol"]
+        fitted = lifelines.KaplanMeierFitter().fit(own["search_time_s"], own["pipeline_found"])
+        found = summary(compare_folders([campaign]), "metacontrol")
+        assert found.horizon_s == 300.0
+        expected = lifelines.utils.restricted_mean_survival_time(fitted, t=300.0)
+        assert found.restricted_mean_s.value == pytest.approx(expected)
+
+
+class TestSweep:
+    def test_runs_are_independent_and_points_are_not(self, tmp_path: Path) -> None:
+        values = {"visibility.period_s": [60.0, 80.0, 100.0]}
+        frame = run_campaign("seams2023", ["none", "metacontrol"], 5, 1, out=tmp_path / "out", sweep=values).frame()
+        comparison = compare_folders([tmp_path / "out"])
+        found = summary(comparison, "none")
+        assert found.n == 5
+        by_run = frame[frame["manager"] == "none"].groupby("run")["search_time_s"].mean()
+        assert found.std == pytest.approx(by_run.std())
+        assert any("averaged over visibility.period_s" in note for note in comparison.notes)
+
+    def test_points_can_be_compared_with_each_other(self, tmp_path: Path) -> None:
+        values = {"visibility.period_s": [60.0, 80.0]}
+        frame = run_campaign("seams2023", ["none"], 5, 1, out=tmp_path / "out", sweep=values).frame()
+        comparison = compare_folders([tmp_path / "out"], by=["visibility.period_s"])
+        found = difference(comparison, "none, visibility.period_s 60", "none, visibility.period_s 80")
+        times = frame.pivot(index="run", columns="visibility.period_s", values="search_time_s")
+        assert found.paired
+        assert found.difference.value == pytest.approx((times[60.0] - times[80.0]).mean())
+
+
+class TestFewValues:
+    def test_one_run_has_a_mean_and_no_interval(self) -> None:
+        comparison = compare_frame(runs(a=[100.0], b=[120.0]))
+        found = summary(comparison, "a")
+        assert (found.mean.value, found.mean.interval, found.row()["std"]) == (100.0, None, None)
+        assert not any(each.is_significant for each in comparison.differences)
+
+    def test_equal_values_do_not_say_how_many_runs_are_needed(self) -> None:
+        found = difference(compare_frame(runs(a=[100.0] * 4, b=[120.0] * 4)), "a", "b", "pipeline_found")
+        assert (found.runs_needed_paired, found.runs_needed_unpaired) == (None, None)
+        low, high = found.difference.interval
+        assert -1.0 <= low < 0.0 < high <= 1.0
+
+    def test_missions_that_all_never_found_the_pipeline_have_no_median(self) -> None:
+        comparison = compare_frame(runs(a=[300.0] * 25, b=[300.0] * 25))
+        search = summary(comparison, "a")
+        assert (search.restricted_mean_s.value, search.censored_median_s.value) == (300.0, math.inf)
+        assert search.row()["censored_median_s"] is None
+        found = difference(comparison, "a", "b")
+        assert found.p == 1.0
+        assert "No difference in search time is shown" in found.conclusion
+
+    def test_a_difference_that_is_the_same_in_each_pair_is_claimed(self) -> None:
+        a = np.random.default_rng(1).normal(100.0, 5.0, 20)
+        claim = "a finds the pipeline 5.00 s sooner than b (no interval; 20 pairs, Wilcoxon, p < 0.001)."
+        assert difference(compare_frame(runs(a=list(a), b=list(a + 5.0))), "a", "b").conclusion == claim
+        few = difference(compare_frame(runs(a=[100.0], b=[105.0])), "a", "b")
+        assert few.conclusion.startswith("No difference in search time is shown between a and b (")
+
+    def test_missions_without_a_search_time_are_left_out(self) -> None:
+        frame = runs(a=[100.0, 110.0, 120.0], b=[90.0, 95.0, 99.0])
+        frame.loc[0, "search_time_s"] = np.nan
+        found = summary(compare_frame(frame), "a")
+        assert (found.n, found.missing) == (2, 1)
+        assert found.restricted_mean_s.value <= 115.0
+
+    def test_a_number_of_adaptations_is_not_a_factor(self) -> None:
+        frame = runs(a=[100.0] * 20, b=[120.0] * 20).assign(adaptations=[3] * 20 + [1] * 20)
+        found = difference(compare_frame(frame, metrics=["adaptations"]), "a", "b", "adaptations")
+        assert found.conclusion.startswith("a makes 2.00 more adaptations than b (")
+
+    def test_one_manager_has_nothing_to_be_compared_with(self) -> None:
+        comparison = compare_frame(runs(a=[100.0, 110.0]))
+        assert comparison.differences == ()
+        assert comparison.conclusion == "There is only a, so there is nothing to compare it with."
+
+
+def test_a_significant_difference_of_ranks_against_that_of_means_is_reported() -> None:
+    chance = np.random.default_rng(1)
+    a = chance.normal(100.0, 1.0, 60)
+    b = np.where(np.arange(60) < 8, 290.0, a - 5.0)
+    found = difference(compare_frame(runs(a=list(a), b=list(b))), "a", "b")
+    assert found.difference.value < 0.0
+    assert found.is_significant
+    assert "the distributions differ in shape" in found.conclusion
+
+
+class TestConclusions:
+    """What a sentence claims is what the figures beside it show."""
+
+    def test_ranks_alone_are_not_said_of_means(self) -> None:
+        a = np.random.default_rng(1).normal(100.0, 5.0, 60)
+        b = np.where(np.arange(60) < 6, a + 60.0, a - 5.0)
+        comparison = compare_frame(runs(a=list(a), b=list(b)), metrics=["search_time_s"])
+        (found,) = comparison.differences
+        assert found.is_significant
+        assert found.difference.interval[0] < 0.0 < found.difference.interval[1]
+        assert found.conclusion.startswith(
+            "By ranks, b finds the pipeline mostly sooner than a (60 pairs, Wilcoxon, p < 0.001)"
+        )
+        assert "no difference of the means is shown (a - b: " in found.conclusion
+        assert comparison.conclusion == found.conclusion
+
+    def test_the_best_mean_of_all_runs_is_not_called_better_where_its_pairs_are_worse(self) -> None:
+        chance = np.random.default_rng(1)
+        hard = chance.normal(200.0, 5.0, 20)  # b has only these runs, and is sooner in each
+        frame = runs(a=[*hard, *chance.normal(80.0, 5.0, 80)], b=list(hard - chance.normal(10.0, 1.0, 20)))
+        assert compare_frame(frame).conclusion.startswith("b finds the pipeline")
+
+    def test_an_interval_without_0_and_no_significance_are_both_reported(self) -> None:
+        frame = runs(a=[100.0, 101.0, 102.0, 103.0], b=[150.0, 151.5, 152.0, 153.0])
+        found = difference(compare_frame(frame), "a", "b")
+        assert not found.is_significant
+        assert "does not contain 0 (a - b: -50.12 s, 95% interval -50.5" in found.conclusion
+
+    def test_one_pair_and_equal_means_are_named_so(self) -> None:
+        comparison = compare_frame(runs(a=[100.0], b=[100.0]))
+        assert "; 1 pair, Wilcoxon" in comparison.differences[0].conclusion
+        assert "which has, with others, the best mean" in comparison.conclusion
+
+    def test_the_time_of_the_first_sight_has_a_sentence(self) -> None:
+        a = list(np.linspace(90.0, 120.0, 30))
+        frame = runs(a=a, b=[each + 5.0 + each / 50.0 for each in a])
+        frame["detection_time_s"] = frame["search_time_s"]
+        found = compare_frame(frame, metrics=["detection_time_s"])
+        assert found.conclusion.startswith("a first sees the pipeline soonest: 7.10 s sooner than b (95% interval")
+
+
+class TestCaveats:
+    """Missions that never found the pipeline, or have no value, are told of."""
+
+    def test_their_search_time_and_their_number_are_reported(self) -> None:
+        notes = compare_frame(runs(a=[100.0, 300.0, 120.0], b=[90.0, 95.0, 110.0])).notes
+        (note,) = (each for each in notes if "never found" in each)
+        assert "(a 1 of 3) is the time at which they ended" in note
+        frame = runs(a=[100.0, 300.0, 120.0], b=[90.0, 95.0, 110.0])
+        assert f"% Note: {note}.\n" in compare_frame(frame).latex()
+
+    def test_limits_that_differ_are_reported(self) -> None:
+        frame = runs(a=[100.0, 300.0, 120.0], b=[90.0, 95.0, 300.0])
+        frame.loc[(frame["manager"] == "b") & ~frame["pipeline_found"], "search_time_s"] = 400.0
+        notes = compare_frame(frame).notes
+        assert any("ended at different times (a after 300 s, b after 400 s)" in each for each in notes)
+
+    def test_missions_that_are_left_out_are_reported(self) -> None:
+        frame = runs(a=[100.0, 110.0, 120.0], b=[90.0, 95.0, 110.0])
+        frame["mean_reaction_time_s"] = [1.0, float("nan"), 1.2, 0.5, 0.6, 0.7]
+        notes = compare_frame(frame).notes
+        assert any("without a mean reaction time (a 1 of 3) are left out" in each for each in notes)
+
+
+@pytest.mark.parametrize(
+    ("choices", "words"),
+    [
+        (Choices(managers=["nonne"]), "no mission of 'nonne' .*did you mean 'none'"),
+        (Choices(metrics=["search_time"]), "there is no metric 'search_time' .*did you mean 'search_time_s'"),
+        (Choices(against="bt"), "nothing is called 'bt'"),
+        (Choices(by=["visibility"]), "'visibility' is not what a sweep varies"),
+        (Choices(half_widths=["search_time_s"]), "has no half-width .*search_time_s:2"),
+        (Choices(half_widths=["adaptations:1"]), "'adaptations' is not compared"),
+    ],
+)
+def test_a_choice_that_makes_no_sense_is_refused(choices: Choices, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        compare_folders([published_runs()], **choices)
+
+
+def test_the_frame_of_a_campaign_is_compared_and_drawn() -> None:
+    frame = api.run_campaign("seams2023", ["none", "bt"], runs=4, progress=False)
+    comparison = frame[frame["run"] > 1].compare(metrics=["distance_inspected_m"])
+    assert [(each.group, each.other, each.n) for each in comparison.differences] == [("none", "bt", 3)]
+    assert str(comparison).startswith(comparison.conclusion[:60])
+    assert len(frame.figure().axes) == 2
+
+
+def test_tables_with_long_names_of_managers_fit_the_width_and_show_the_names_whole() -> None:
+    long = ["a_module_with_a_long_name:AndAClassWithAnEvenLongerName", "another_module_of_a_thesis:AnotherLongManager"]
+    frame = runs(**{"none": [100.0, 120.0, 140.0], long[0]: [90.0, 95.0, 130.0], long[1]: [80.0, 85.0, 120.0]})
+    for width in (80, 95):
+        text = compare_frame(frame).text(width)
+        assert max(map(len, text.splitlines())) <= width
+        joined = "".join(line.split("  ")[0] or line.strip() for line in text.splitlines())
+        assert all(name in joined for name in long)
+
+
+def test_managers_in_two_folders_are_paired_by_run_number(campaign: Path, tmp_path: Path) -> None:
+    run_campaign("seams2023", ["random"], 5, 1, out=tmp_path / "second")
+    found = compare_folders([campaign, tmp_path / "second"])
+    assert difference(found, "none", "random").paired
+    assert difference(found, "none", "random").n == 5
+
+
+def test_a_manager_that_reacts_at_once_has_a_reaction_time_of_zero(tmp_path: Path) -> None:
+    frame = run_campaign("seams2023", ["oracle"], 3, 1, out=tmp_path / "out").frame()
+    assert (frame["mean_reaction_time_s"] == 0.0).all()
+    for comparison in (compare_folders([tmp_path / "out"]), compare_frame(frame)):
+        found = summary(comparison, "oracle", "mean_reaction_time_s")
+        assert (found.n, found.mean.value) == (3, 0.0)

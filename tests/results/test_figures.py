@@ -1,0 +1,405 @@
+"""Figures are drawn from result files alone."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pandas
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from suave_des.campaign.campaign import run_campaign
+from suave_des.campaign.single import run_mission
+from suave_des.errors import InputError
+from suave_des.estimates import mean_of
+from suave_des.records.mission_folder import MissionRecord, read_mission
+from suave_des.results import style
+from suave_des.results.campaign_figures import (
+    draw_detections,
+    draw_distributions,
+    draw_rainclouds,
+    draw_reactions,
+    draw_sweep,
+)
+from suave_des.results.figures import CAMPAIGN_KINDS, draw_folder, draw_frame, draw_results, write_picture
+from suave_des.results.mission import adaptations, failure_spans, mode_spans
+from suave_des.results.mission_figures import draw_map, draw_timeline
+from suave_des.results.missions import grouped, missions_of, read_missions
+from suave_des.results.paper import published_runs
+from suave_des.results.style import folded, key_words
+
+
+@pytest.fixture(scope="module")
+def mission(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("mission") / "out"
+    run_mission("seams2023", "random", 2, 1, folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("campaign") / "out"
+    run_campaign("seams2023", ["none", "random"], 3, 1, out=folder)
+    return folder
+
+
+@pytest.mark.parametrize(("ending", "begins"), [(".png", b"\x89PNG"), (".pdf", b"%PDF"), (".svg", b"<?xml")])
+def test_the_ending_says_what_kind_of_picture_it_is(ending: str, begins: bytes, mission: Path, tmp_path: Path) -> None:
+    draw_folder(mission, tmp_path / f"map{ending}")
+    assert (tmp_path / f"map{ending}").read_bytes().startswith(begins)
+    assert [path.name for path in tmp_path.iterdir()] == [f"map{ending}"]
+
+
+def test_the_map_shows_every_mode_and_what_happened(mission: Path) -> None:
+    figure = draw_map(read_mission(mission))
+    legend = figure.axes[0].get_legend()
+    assert legend is not None
+    told = [text.get_text() for text in legend.get_texts()]
+    trajectory = (mission / "trajectory.csv").read_text()
+    words = {
+        "fd_spiral_low": "search, low",
+        "fd_spiral_medium": "search, medium",
+        "__DEFAULT__": "search, default altitude",
+        "fd_follow_pipeline": "follow the pipeline",
+    }
+    for mode, text in words.items():
+        assert (text in told) == (mode in trajectory)
+    assert any(text.startswith("thruster 1 failed, 36 s") for text in told)
+    assert any(text.startswith("pipeline detected, ") for text in told)
+
+
+def test_the_distributions_have_a_curve_for_each_manager_that_reaches_1(campaign: Path) -> None:
+    figure = draw_distributions(grouped(read_missions([campaign]))[0])
+    for axes in figure.axes:
+        curves = [line for line in axes.get_lines() if len(line.get_xdata()) > 2]
+        assert [line.get_label() for line in curves] == ["none (n = 3)", "random (n = 3)"]
+        assert all(line.get_ydata()[-1] == 1.0 for line in curves)
+
+
+def test_a_campaign_is_drawn_too(campaign: Path, tmp_path: Path) -> None:
+    draw_folder(campaign, tmp_path / "runs.png")
+    assert (tmp_path / "runs.png").is_file()
+
+
+@pytest.mark.parametrize("missing", ["mission.json", "events.csv"])
+def test_a_missing_file_is_named(missing: str, mission: Path, tmp_path: Path) -> None:
+    shutil.copytree(mission, tmp_path / "copy")
+    (tmp_path / "copy" / missing).unlink()
+    with pytest.raises(InputError, match=f"{missing}: no such file"):
+        draw_folder(tmp_path / "copy", tmp_path / "map.png")
+    assert not (tmp_path / "map.png").exists()
+
+
+def test_a_picture_that_cannot_be_written_is_reported(mission: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"map\.png: cannot be written"):
+        draw_folder(mission, tmp_path / "nowhere" / "map.png")
+
+
+@pytest.mark.parametrize(("ending", "date"), [(".pdf", b"CreationDate"), (".svg", b"dc:date")])
+def test_no_picture_has_the_time_at_which_it_was_written(ending: str, date: bytes, tmp_path: Path) -> None:
+    write_picture(Figure(), tmp_path / f"empty{ending}")
+    assert date not in (tmp_path / f"empty{ending}").read_bytes()
+
+
+def test_a_campaign_without_missions_is_reported(campaign: Path, tmp_path: Path) -> None:
+    header = (campaign / "runs.csv").read_text().splitlines()[0]
+    (tmp_path / "runs.csv").write_text(header + "\n")
+    with pytest.raises(InputError, match=r"runs\.csv: line 1: has no missions"):
+        draw_folder(tmp_path, tmp_path / "runs.png")
+
+
+def test_a_sweep_is_drawn_with_a_mean_for_each_manager_at_each_value(tmp_path: Path) -> None:
+    values = {"visibility.period_s": [40.0, 80.0], "default_modes.f_generate_search_path": ["fd_spiral_low"]}
+    values["default_modes.f_generate_search_path"].append("fd_spiral_medium")
+    result = run_campaign("seams2023", ["none", "random"], 3, 1, out=tmp_path / "out", sweep=values)
+    missions = read_missions([tmp_path / "out"])
+    assert missions.swept == tuple(values)
+    figure = draw_sweep(missions)
+    frame = result.frame()
+    panel = figure.axes[0]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        "none",
+        "random",
+        "95% interval of the mean",
+    ]
+    for manager, container in zip(("none", "random"), panel.containers, strict=True):
+        own = frame[frame["manager"] == manager].groupby("visibility.period_s")["search_time_s"].mean()
+        assert list(container[0].get_ydata()) == pytest.approx(list(own))
+    assert [tick.get_text() for tick in figure.axes[3].get_xticklabels()] == ["search, low", "search, medium"]
+    draw_folder(tmp_path / "out", tmp_path / "sweep.svg")
+    assert "visibility: period" in (tmp_path / "sweep.svg").read_text()
+
+
+def sweep_frame(points: int, runs: int) -> pandas.DataFrame:
+    """Missions in which the run alone decides the search time, at many points of a sweep."""
+    rows = [
+        {
+            "manager": "a",
+            "seed": 1,
+            "run": run,
+            "search_time_s": 100.0 + 10.0 * run,
+            "distance_inspected_m": 1.0,
+            "pipeline_found": True,
+            "start.x_m": float(point),
+            "start.y_m": float(point % 2),
+        }
+        for point in range(points)
+        for run in range(1, runs + 1)
+    ]
+    return pandas.DataFrame(rows)
+
+
+def test_the_intervals_of_a_sweep_are_those_of_its_runs() -> None:
+    figure = draw_sweep(missions_of(sweep_frame(6, 5)), ["start.y_m"])
+    (container,) = figure.axes[0].containers
+    low, high = container[2][0].get_segments()[0][:, 1]
+    expected = mean_of([110.0, 120.0, 130.0, 140.0, 150.0]).interval
+    assert (low, high) == pytest.approx(expected)
+
+
+def test_many_values_are_drawn_in_bins_of_equally_many_missions() -> None:
+    figure = draw_sweep(missions_of(sweep_frame(24, 2)), ["start.x_m"])
+    xs = list(figure.axes[0].containers[0][0].get_xdata())
+    assert xs == pytest.approx([1.0 + 3.0 * number for number in range(8)])
+
+
+def test_no_parameter_is_left_out_silently() -> None:
+    frame = sweep_frame(4, 2)
+    for number in range(3, 10):
+        frame[f"key_{number}"] = frame["start.x_m"] * number
+    figure = draw_sweep(missions_of(frame))
+    labels = {axes.get_xlabel().replace("\n", " ") for axes in figure.axes} - {""}
+    assert len(labels) == 9
+    frame["key_10"] = frame["start.x_m"]
+    with pytest.raises(InputError, match=r"10 parameters do not fit .* \(choose 9 or fewer"):
+        draw_sweep(missions_of(frame))
+
+
+@pytest.mark.parametrize(("points", "labels"), [(4, ["0", "1", "2", "3"]), (9, None)])
+def test_the_axis_of_a_sweep_has_its_values_if_they_are_few(points: int, labels: list[str] | None) -> None:
+    figure = draw_sweep(missions_of(sweep_frame(points, 2)), ["start.x_m"])
+    ticks = figure.axes[-1].get_xticks().tolist()
+    if labels is None:
+        assert len(ticks) < points
+    else:
+        assert [text.get_text() for text in figure.axes[-1].get_xticklabels()] == labels
+
+
+def test_a_manager_looks_the_same_in_every_figure() -> None:
+    assert style.looks(["none", "random", "metacontrol", "bt"]) == [0, 1, 2, 3]
+    assert style.looks(["mine", "metacontrol", "yours", "none"]) == [4, 2, 5, 0]
+    assert style.looks(["mine", "yours"]) == [0, 1]
+    frame = sweep_frame(3, 4)
+    both = missions_of(pandas.concat([frame.assign(manager=name) for name in ("metacontrol", "bt")]))
+    curves = draw_distributions(grouped(both)[0]).axes[0].get_lines()
+    means = draw_sweep(both, ["start.x_m"]).axes[0].containers
+    expected = [style.line(2)["color"], style.line(3)["color"]]
+    assert list(dict.fromkeys(curve.get_color() for curve in curves if len(curve.get_xdata()) > 2)) == expected
+    assert [container[0].get_color() for container in means] == expected
+
+
+def test_more_managers_than_colours_differ_in_their_lines() -> None:
+    names = [f"manager_{number}" for number in range(14)]
+    frame = pandas.DataFrame(
+        {
+            "manager": name,
+            "seed": 1,
+            "run": run,
+            "search_time_s": 10.0 * number + run,
+            "distance_inspected_m": 1.0 * run,
+            "pipeline_found": True,
+        }
+        for number, name in enumerate(names)
+        for run in (1, 2)
+    )
+    figure = draw_distributions(grouped(missions_of(frame))[0])
+    curves = [line for line in figure.axes[0].get_lines() if len(line.get_xdata()) > 2]
+    assert len({(line.get_color(), str(line._unscaled_dash_pattern)) for line in curves}) == 14
+
+
+def test_missions_that_never_found_the_pipeline_are_named_at_the_time_limit() -> None:
+    figure = draw_distributions(grouped(read_missions([published_runs()]))[0])
+    (text,) = [text for text in figure.axes[0].texts if "not found" in text.get_text()]
+    assert text.get_position()[0] == 300.0
+
+
+def test_a_raincloud_shows_the_published_runs_beside_the_missions(campaign: Path) -> None:
+    groups = grouped(read_missions([campaign]))[0]
+    published = grouped(read_missions([published_runs()]))[0]
+    figure = draw_rainclouds(groups, {group.name: group for group in published[:2]})
+    crosses = [line for line in figure.axes[0].get_lines() if line.get_marker() == "x"]
+    assert [len(line.get_xdata()) for line in crosses] == [20, 20]
+
+
+def test_detections_are_shares_of_all_missions(campaign: Path) -> None:
+    groups = grouped(read_missions([campaign]))[0]
+    figure = draw_detections(groups)
+    above = figure.subfigs[0].axes[0]
+    found = groups[0].frame["detection_x_m"].notna().mean()
+    assert sum(bar.get_height() for bar in above.patches) == pytest.approx(found)
+    assert len({part.axes[0].get_ylim() for part in figure.subfigs}) == 1  # bars of two managers can be compared
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["area: 10% of a manager's missions"]
+
+
+def test_a_number_of_adaptations_that_no_mission_has_is_0_and_quick_reactions_are_seen() -> None:
+    frame = pandas.DataFrame({"manager": ["a"] * 4 + ["b"] * 4, "adaptations": [2, 2, 5, 5, 1, 1, 1, 1]})
+    frame = frame.assign(search_time_s=100.0, distance_inspected_m=1.0, run=[1, 2, 3, 4] * 2, seed=1)
+    frame["mean_reaction_time_s"] = [0.5, 0.5, 0.6, 0.6, 30.0, 60.0, 90.0, 200.0]
+    figure = draw_reactions(grouped(missions_of(frame))[0])
+    assert [list(each) for each in figure.axes[0].lines[0].get_data()] == [[2, 3, 4, 5], [0.5, 0.0, 0.0, 0.5]]
+    assert figure.axes[1].get_xscale() == "log"
+
+
+@pytest.mark.parametrize("kind", CAMPAIGN_KINDS)
+def test_every_kind_is_drawn_of_a_single_mission_of_a_manager_with_an_awkward_name(kind: str, tmp_path: Path) -> None:
+    text = "scenario,manager,run,seed,search_time_s,distance_inspected_m,pipeline_found,detection_x_m,adaptations\n"
+    (tmp_path / "runs.csv").write_text(text + "a,_$x^<b>&\\,1,1,300,0,False,,3\n")
+    draw_results([tmp_path], tmp_path / "out.svg", kind)
+    assert "&lt;b&gt;" in (tmp_path / "out.svg").read_text()
+
+
+def test_several_missions_are_drawn_as_paths(mission: Path, tmp_path: Path) -> None:
+    run_mission("seams2023", "none", 1, 1, tmp_path / "none")
+    draw_results([mission, tmp_path / "none"], tmp_path / "paths.svg")
+    text = (tmp_path / "paths.svg").read_text()
+    assert "random: " in text
+    assert "none: " in text
+
+
+class TestTimeline:
+    def test_shows_modes_tasks_failures_and_adaptations(self, mission: Path) -> None:
+        record = read_mission(mission)
+        figure = draw_timeline(record)
+        rows = [tick.get_text() for tick in figure.axes[1].get_yticklabels()]
+        assert rows[:2] == ["task", "search"]
+        assert "thruster 1" in rows
+        listed = [text.get_text() for text in figure.axes[-1].texts]
+        assert len(listed) == len(adaptations(record)) > 3
+        assert listed[0].startswith("A  ")
+
+    def test_names_the_rules_that_are_known(self, mission: Path) -> None:
+        record = read_mission(mission)
+        first = adaptations(record)[0]
+        rules = {(first.t_s, first.function): ("QAWaterVisibility",)}
+        assert "(rule QAWaterVisibility)" in draw_timeline(record, rules).axes[-1].texts[0].get_text()
+
+    def test_a_failure_ends_with_the_recovery(self, tmp_path: Path) -> None:
+        run_mission("seams2023", "metacontrol", 1, 1, tmp_path / "out")
+        (span,) = failure_spans(read_mission(tmp_path / "out"))["c_thruster_1"]
+        assert 35.0 < span.begin_s < 37.0
+        assert 10.0 < span.end_s - span.begin_s < 16.0
+
+
+class TestBattery:
+    @pytest.fixture(scope="class")
+    @staticmethod
+    def record(tmp_path_factory: pytest.TempPathFactory) -> MissionRecord:
+        folder = tmp_path_factory.mktemp("battery")
+        (folder / "battery.yaml").write_text("base: release15\nname: battery\nbattery: {discharge_time_s: 100}\n")
+        run_mission(folder / "battery.yaml", "bt_extended", 1, 1, folder / "out")
+        return read_mission(folder / "out")
+
+    def test_the_mode_is_that_of_the_function_that_moves_the_vehicle(self, record: MissionRecord) -> None:
+        spans = mode_spans(record)["f_generate_search_path"]
+        way = record.trajectory.set_index("t_s")["mode"]
+        for span in spans:
+            if span.what.startswith("fd_spiral"):
+                assert set(way[span.begin_s + 0.1 : span.end_s - 0.1]) == {span.what}
+
+    def test_it_is_drawn_and_named_as_a_cause(self, record: MissionRecord) -> None:
+        assert any("battery" in axes.get_ylabel() for axes in draw_map(record).axes)
+        causes = {each.cause for each in adaptations(record) if each.function == "generate_recharge_path"}
+        assert "battery recharged" in causes
+        assert any(cause.startswith("battery at 2") for cause in causes)
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [
+        ("signals.water_visibility.period_s", "water visibility: period (s)"),
+        ("start.x_m", "start: x (m)"),
+        ("calibration.origin_y_m", "origin y (m)"),
+        ("thruster_events.0.time_s", "thruster event 1: time (s)"),
+        ("default_modes.f_generate_search_path", "default modes: search"),
+    ],
+)
+def test_keys_become_words_with_units(key: str, words: str) -> None:
+    assert key_words(key).replace("\N{NO-BREAK SPACE}", " ") == words
+
+
+LONG = "a_module_with_quite_a_long_name_for_a_paper:AClassThatHasAnEvenLongerName" + "ForItsManager" * 5
+
+
+@pytest.mark.parametrize("kind", sorted(CAMPAIGN_KINDS))
+def test_a_long_name_is_shown_whole(kind: str, campaign: Path, tmp_path: Path) -> None:
+    frame = read_missions([campaign]).frame
+    frame = frame.assign(manager=frame["manager"].astype(str) + LONG)
+    with style.publication():
+        figure = CAMPAIGN_KINDS[kind](grouped(missions_of(frame))[0])
+        figure.savefig(tmp_path / "figure.png", dpi=figure.dpi)
+        width_px = figure.bbox.width
+        texts = [each for each in figure.findobj(Text) if LONG[:8] in each.get_text()]
+        boxes = [each.get_window_extent() for each in texts]
+    assert boxes and all(box.x0 >= 0.0 and box.x1 <= width_px for box in boxes)
+
+
+def test_the_number_of_missions_stays_in_one_piece() -> None:
+    assert "(n = 1,000)" in folded(f"{LONG} (n = 1,000)") and "\n" in folded(LONG)
+
+
+def test_a_campaign_without_the_swept_parameter_is_reported(campaign: Path, tmp_path: Path) -> None:
+    run_campaign("seams2023", managers=["none"], runs=1, sweep={"start.y_m": [2.0, 2.5]}, out=tmp_path / "swept")
+    with pytest.raises(InputError, match=r"does not vary start\.y_m"):
+        draw_results([campaign, tmp_path / "swept"], tmp_path / "figure.png")
+
+
+@pytest.fixture(scope="module")
+def two_limits(tmp_path_factory: pytest.TempPathFactory) -> pandas.DataFrame:
+    """Two runs at each of two points of a sweep: with and without the time to find the pipeline."""
+    folder = tmp_path_factory.mktemp("swept") / "out"
+    swept = {"mission.time_limit_s": [10.0, 300.0]}
+    run_campaign("seams2023", managers=["none"], runs=2, sweep=swept, out=folder)
+    return read_missions([folder]).frame
+
+
+def texts_of(figure: Figure) -> list[str]:
+    return [" ".join(each.get_text().split()) for each in figure.findobj(Text)]
+
+
+def test_the_detections_of_a_sweep_are_those_of_its_missions(two_limits: pandas.DataFrame) -> None:
+    with style.publication():
+        figure = draw_frame(two_limits, "detections")
+    assert "not found: 50%" in texts_of(figure)
+
+
+@pytest.mark.parametrize("kind", ["distributions", "raincloud", "detections", "reactions"])
+def test_what_shows_missions_of_a_sweep_shows_all_of_them_and_says_so(kind: str, two_limits: pandas.DataFrame) -> None:
+    texts = texts_of(draw_frame(two_limits, kind))
+    assert "none (n = 4)" in texts
+    assert any(text.startswith("missions at all points of the sweep: mission: time limit") for text in texts)
+
+
+def test_the_convergence_of_a_sweep_says_that_it_is_of_means_of_runs(two_limits: pandas.DataFrame) -> None:
+    texts = texts_of(draw_frame(two_limits, "convergence"))
+    assert "none (n = 2)" in texts
+    assert any(text.startswith("means of each run over all points of the sweep: mission:") for text in texts)
+
+
+def test_the_convergence_of_a_single_run_is_a_mark(campaign: Path) -> None:
+    frame = read_missions([campaign]).frame
+    for runs, marked in ((1, True), (2, False)):
+        line = draw_frame(frame[frame["run"] <= runs], "convergence").axes[0].lines[0]
+        assert (line.get_marker() not in ("None", None)) is marked
+
+
+def test_no_bubble_of_detections_hides_the_share_of_those_not_found(campaign: Path, tmp_path: Path) -> None:
+    frame = read_missions([campaign]).frame
+    figure = draw_frame(frame[(frame["run"] == 1) & (frame["manager"] == "none")], "detections")
+    figure.savefig(tmp_path / "figure.png", dpi=figure.dpi)
+    below = figure.findobj(lambda artist: isinstance(artist, Axes))[-1]
+    words = next(each for each in figure.findobj(Text) if each.get_text().startswith("not found"))
+    bubble = below.collections[0].get_window_extent()
+    assert words.get_window_extent().y0 >= below.get_window_extent().y1 >= bubble.y1

@@ -1,0 +1,231 @@
+"""suave-des validate: what it prints, writes and refuses."""
+
+import csv
+import json
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from suave_des.cli.main import main
+from suave_des.resources import shipped_folder
+
+pytestmark = pytest.mark.usefixtures("few_resamples")
+DATA = shipped_folder("scenarios/published") / "seams2023_runs.csv"
+HEADER = "manager,search_time_s,distance_inspected_m"
+
+
+@dataclass(frozen=True)
+class Ended:
+    status: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def validate(capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Runs `suave-des validate ARGUMENTS` in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+
+    def run(*arguments: str) -> Ended:
+        with pytest.raises(SystemExit) as ended:
+            main(("validate", *arguments))
+        captured = capsys.readouterr()
+        return Ended(int(ended.value.code or 0), captured.out, captured.err)
+
+    return run
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_three_missions_of_each_manager_are_simulated_and_compared(validate, tmp_path):
+    ended = validate("seams2023", "--runs", "3", "--workers", "1", "--out", "out", "--quiet")
+    assert (ended.status, ended.err) == (0, "")
+    assert "targets are met" in ended.out
+    assert "cannot be judged: too few missions" in ended.out
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "campaign.sqlite",
+        "runs.csv",
+        "summary.csv",
+        "manifest.json",
+        "validation.csv",
+        "validation_pairs.csv",
+        "validation_shares.csv",
+        "validation_positions.csv",
+        "validation_targets.csv",
+        "validation.json",
+        "distributions.png",
+        "detections.png",
+    }
+    cells = rows(tmp_path / "out" / "validation.csv")
+    assert [(cell["manager"], cell["published_n"], cell["simulated_n"]) for cell in cells[:3]] == [
+        ("none", "20", "3"),
+        ("metacontrol", "20", "3"),
+        ("random", "20", "3"),
+    ]
+    sources = json.loads((tmp_path / "out" / "validation.json").read_text())["provenance"]
+    assert (sources["scenario"], sources["runs"], sources["data"]["file"]) == (
+        "seams2023",
+        3,
+        "shipped/seams2023_runs.csv",
+    )
+
+
+def test_the_campaigns_own_file_gives_the_same_tables_without_simulating(validate, tmp_path):
+    options = ("--managers", "none,random")
+    validate("seams2023", "--runs", "3", "--workers", "1", "--out", "simulated", *options)
+    ended = validate("--runs-file", "simulated/runs.csv", "--out", "recorded", *options)
+    assert ended.status == 0
+    assert not (tmp_path / "recorded" / "runs.csv").exists()
+    for name in ("validation.csv", "validation_pairs.csv", "validation_shares.csv", "detections.png"):
+        assert (tmp_path / "recorded" / name).read_bytes() == (tmp_path / "simulated" / name).read_bytes()
+
+
+def test_the_published_runs_against_themselves_meet_every_target(validate):
+    ended = validate("--runs-file", str(DATA), "--strict")
+    assert ended.status == 0
+    assert "28 of 28 targets are met, 0 are not met." in ended.out
+    assert "NOT MET" not in ended.out
+    told = " ".join(ended.out.split())
+    assert "A KS p of 0.05 or more does not show that distributions are equal" in told
+    assert "differ by more than about 43%." in told  # 20 missions against 20: 1.358 * sqrt(2 / 20)
+
+
+def test_a_single_mission_cannot_show_that_distributions_differ(validate):
+    told = " ".join(validate("--runs", "1").out.split())
+    assert "are equal: with so few missions it is hardly ever less." in told
+
+
+def test_a_target_that_is_not_met_is_told_and_counts_only_when_strict(validate, tmp_path):
+    text = DATA.read_text(encoding="utf-8").replace("none,", "x,").replace("random,", "none,").replace("x,", "random,")
+    (tmp_path / "swapped.csv").write_text(text, encoding="utf-8")
+    ended = validate("--runs-file", "swapped.csv")
+    assert ended.status == 0
+    assert "NOT MET" in ended.out
+    assert validate("--runs-file", "swapped.csv", "--strict").status == 1
+
+
+def test_other_data_without_a_file_of_shares_has_no_cluster_targets(validate, tmp_path):
+    (tmp_path / "real.csv").write_text(DATA.read_text(encoding="utf-8"), encoding="utf-8")
+    ended = validate("--data", "real.csv", "--runs-file", "real.csv")
+    assert "24 of 24 targets are met" in ended.out
+    assert "found at" not in ended.out
+    with_shares = validate(
+        "--data", "real.csv", "--runs-file", "real.csv", "--targets", str(DATA.with_suffix(".targets.yaml"))
+    )
+    assert "28 of 28 targets are met" in with_shares.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (
+            ["--data", "missing.csv"],
+            "missing.csv: no such file (give a path, or one of the shipped files: planta_exp1_runs.csv, s",
+        ),
+        (["--data", "unknown.csv"], "unknown.csv: line 2: there is no manager 'magic'"),
+        (["--data", "columns.csv"], "columns.csv: line 1: has no column"),
+        (["--data", "empty.csv"], "empty.csv: line 1: has no missions"),
+        (["--data", "words.csv"], "words.csv: line 2: search_time_s: expected a finite number, got 'soon'"),
+        (["--managers", "nobody"], "has no mission of manager 'nobody'"),
+        (["--managers", ","], "no managers are given"),
+        (["--runs", "0"], "runs: 0 "),
+        (["--targets", "missing.yaml"], "missing.yaml: no such file"),
+        (["--runs-file", "missing.csv"], "missing.csv: no such file"),
+        (["--runs-file", "other.csv"], "other.csv: has no mission of manager 'none'"),
+        (["release15", "--runs-file", "scenario.csv"], "scenario.csv: line 2: has missions of scenario seams2023"),
+        (["--runs-file", "scenario.csv", "--reasoner", "pellet"], "--reasoner cannot be used with --runs-file"),
+        (["no_such_scenario"], "no_such_scenario"),
+        (["--runs-file", str(DATA), "--out", "full"], "full: the output folder is not empty"),
+        (["--runs", "1", "--out", "full"], "full: the output folder is not empty"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2_and_writes_nothing(validate, tmp_path, arguments, told):
+    files = {
+        "unknown.csv": f"{HEADER}\nmagic,1,2\n",
+        "columns.csv": "a,b\n1,2\n",
+        "empty.csv": f"{HEADER}\n",
+        "words.csv": f"{HEADER}\nnone,soon,2\n",
+        "other.csv": f"{HEADER}\nbt,1,2\n",
+        "scenario.csv": f"scenario,{HEADER}\nseams2023,none,1,2\n",
+        "full/results.txt": "mine",
+    }
+    (tmp_path / "full").mkdir()
+    for name, content in files.items():
+        (tmp_path / name).write_text(content, encoding="utf-8")
+    ended = validate(*arguments)
+    assert ended.status == 2
+    assert ended.out == ""
+    assert ended.err.count("\n") == 1
+    assert ended.err.startswith("suave-des: ")
+    assert told in ended.err
+    assert [path.name for path in (tmp_path / "full").iterdir()] == ["results.txt"]
+
+
+def test_overwrite_replaces_the_validation_and_keeps_what_is_not_its_own(validate, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "notes.txt").write_text("mine", encoding="utf-8")
+    (tmp_path / "out" / "validation.csv").write_text("old", encoding="utf-8")
+    assert validate("--runs-file", str(DATA), "--out", "out", "--overwrite").status == 0
+    assert (tmp_path / "out" / "notes.txt").read_text(encoding="utf-8") == "mine"
+    assert len(rows(tmp_path / "out" / "validation.csv")) == 6
+
+
+CAMPAIGN = """campaign: 1
+scenario: seams2023
+sweep: {zip: {start.y_m: [2.5, 2.9], thruster_events.0.time_s: [35, 90]}}
+"""
+
+
+def test_a_campaign_file_compares_each_real_run_with_those_of_its_condition(validate, tmp_path):
+    (tmp_path / "two.yaml").write_text(CAMPAIGN, encoding="utf-8")
+    (tmp_path / "real.csv").write_text(
+        f"{HEADER},pipeline_found,block\nnone,180,30,True,1\nnone,190,31,True,1\nnone,251,0,False,2\n", encoding="utf-8"
+    )
+    ended = validate("two.yaml", "--data", "real.csv", "--runs", "2", "--workers", "1", "--out", "out", "--quiet")
+    assert ended.status == 0
+    assert "Condition 2: start.y_m=2.9, thruster_events.0.time_s=90" in ended.out
+    conditions = rows(tmp_path / "out" / "validation_conditions.csv")
+    assert [(row["metric"], row["condition"], row["real_n"], row["simulated_n"]) for row in conditions] == [
+        ("search_time_s", "1", "2", "2"),
+        ("search_time_s", "2", "1", "1"),
+        ("distance_inspected_m", "1", "2", "2"),
+        ("distance_inspected_m", "2", "1", "1"),
+    ]
+    again = validate("two.yaml", "--data", "real.csv", "--runs-file", "out/runs.csv", "--out", "again")
+    assert again.status == 0
+    same = "validation_conditions.csv"
+    assert (tmp_path / "again" / same).read_bytes() == (tmp_path / "out" / same).read_bytes()
+
+
+def test_runs_of_the_users_own_are_called_real_and_the_papers_published(validate, tmp_path):
+    (tmp_path / "real.csv").write_text(DATA.read_text(encoding="utf-8"), encoding="utf-8")
+    own = validate("--data", "real.csv", "--runs-file", "real.csv").out
+    assert "real runs, then simulated" in own
+    assert "published" not in own
+    assert "published, then simulated" in validate("--runs-file", str(DATA)).out
+
+
+def test_several_files_are_compared_as_one_data_set(validate, tmp_path):
+    header, *lines = DATA.read_text(encoding="utf-8").splitlines()
+    names = []
+    for manager in ("none", "random", "metacontrol"):
+        own = [line for line in lines if line.startswith(f"{manager},")]
+        (tmp_path / f"{manager}.csv").write_text("\n".join([header, *own]), encoding="utf-8")
+        names += ["--data", f"{manager}.csv"]
+    ended = validate(*names, "--runs-file", str(DATA), "--out", "out")
+    assert "24 of 24 targets are met" in ended.out
+    data = json.loads((tmp_path / "out" / "validation.json").read_text())["provenance"]["data"]
+    assert [each["file"] for each in data] == ["none.csv", "random.csv", "metacontrol.csv"]
+
+
+def test_averages_in_the_exemplars_files_are_left_out_with_a_note(validate, tmp_path):
+    text = "mission name,time searching pipeline (s),distance inspected (m)\nsuave none,180,30\nAVERAGE,180,30\n"
+    (tmp_path / "none.csv").write_text(text, encoding="utf-8")
+    ended = validate("--data", "none.csv", "--runs-file", str(DATA))
+    assert ended.out.startswith("none.csv: line 3 left out: averages, not missions.\n")

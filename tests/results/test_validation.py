@@ -1,0 +1,202 @@
+"""A simulation that is like the published runs meets the targets; one that is not fails those that it should."""
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pandas
+import pytest
+
+from analysis.split_check import split_check
+from suave_des.records.runs import read_runs
+from suave_des.resources import shipped_folder
+from suave_des.results.real import Share, read_targets, targets_beside
+from suave_des.results.validation import JSON_FILE, TABLES, validate
+from suave_des.results.validation_output import detections_png, distributions_png
+
+pytestmark = pytest.mark.usefixtures("few_resamples")
+MANAGERS = ("none", "random", "metacontrol")
+DATA = shipped_folder("scenarios/published") / "seams2023_runs.csv"
+
+
+@pytest.fixture(scope="module")
+def published():
+    return read_runs(DATA).frame
+
+
+@pytest.fixture(scope="module")
+def like_published(published):
+    """A simulation with the published distributions: every published mission ten times over."""
+    return pandas.concat([published] * 10, ignore_index=True)
+
+
+@pytest.fixture(scope="module")
+def good(published, like_published, few_resamples):
+    return validate(published, like_published, MANAGERS, shares=read_targets(targets_beside(DATA)).shares)
+
+
+def missed(validation):
+    targets = validation.targets.to_dict("records")
+    return {(each["kind"], each["subject"], each["what"]) for each in targets if each["met"] is not True}
+
+
+def test_a_simulation_with_the_published_distributions_meets_every_target(good):
+    assert missed(good) == set()
+    assert len(good.targets) == 6 * 3 + 6 + 4
+    assert good.all_met
+
+
+def test_conclusions_are_those_of_the_papers_runs(good):
+    better = good.pairs.set_index(["first", "second", "metric"])["published_better"].to_dict()
+    assert better == {
+        ("none", "random", "search_time_s"): "neither",
+        ("none", "metacontrol", "search_time_s"): "metacontrol",
+        ("random", "metacontrol", "search_time_s"): "metacontrol",
+        ("none", "random", "distance_inspected_m"): "none",
+        ("none", "metacontrol", "distance_inspected_m"): "metacontrol",
+        ("random", "metacontrol", "distance_inspected_m"): "metacontrol",
+    }
+
+
+def test_figures_of_a_cell(good):
+    cell = good.cells.set_index(["manager", "metric"]).loc["none", "search_time_s"]
+    assert cell[["published_n", "simulated_n"]].tolist() == [20, 200]
+    assert ends(cell, "published_mean") == pytest.approx([168.01, 207.69], abs=0.01)
+    assert ends(cell, "published_std") == pytest.approx([32.24, 61.92], abs=0.01)
+    assert cell["difference_of_means"] == pytest.approx(0.0)
+    low, high = ends(cell, "difference_of_means")
+    assert low < 0 < high
+    assert cell["std_ratio"] == pytest.approx(1.0, abs=0.03)
+    assert cell["ks_p"] == pytest.approx(1.0)
+
+
+def ends(row, name):
+    return [row[f"{name}_ci95_{end}"] for end in ("low", "high")]
+
+
+def test_a_shifted_manager_fails_in_its_own_cell_alone(published, like_published):
+    shifted = like_published.copy()
+    shifted.loc[shifted["manager"] == "none", "search_time_s"] -= 40
+    found = validate(published, shifted, MANAGERS)
+    assert ("mean", "none", "search_time_s") in missed(found)
+    assert ("ks", "none", "search_time_s") in missed(found)
+    assert {(subject, what) for kind, subject, what in missed(found) if kind != "conclusion"} == {
+        ("none", "search_time_s")
+    }
+
+
+def test_a_wider_manager_fails_in_its_spread(published, like_published):
+    wider = like_published.copy()
+    own = wider["manager"] == "metacontrol"
+    middle = wider.loc[own, "distance_inspected_m"].mean()
+    wider.loc[own, "distance_inspected_m"] = middle + 2 * (wider.loc[own, "distance_inspected_m"] - middle)
+    found = missed(validate(published, wider, MANAGERS))
+    assert ("std", "metacontrol", "distance_inspected_m") in found
+    assert ("mean", "metacontrol", "distance_inspected_m") not in found
+
+
+def test_managers_that_change_places_lead_to_other_conclusions(published, like_published):
+    swapped = like_published.replace({"manager": {"none": "metacontrol", "metacontrol": "none"}})
+    found = validate(published, swapped, MANAGERS)
+    assert ("conclusion", "none, metacontrol", "search_time_s") in missed(found)
+    assert ("conclusion", "none, metacontrol", "distance_inspected_m") in missed(found)
+
+
+def test_a_cluster_that_is_averaged_away_fails_its_share(published, like_published):
+    smeared = like_published.copy()
+    late = smeared["search_time_s"].between(120, 130) & (smeared["manager"] == "metacontrol")
+    smeared.loc[late, "search_time_s"] += 12
+    found = missed(validate(published, smeared, MANAGERS, shares=read_targets(targets_beside(DATA)).shares))
+    assert ("share", "metacontrol", "found at 120 to 130 s") in found
+
+
+def test_the_result_repeats_with_its_seed_and_ignores_the_other_managers(published, like_published, good):
+    shares = read_targets(targets_beside(DATA)).shares
+    assert validate(published, like_published, MANAGERS, shares=shares).texts({}) == good.texts({})
+    alone = validate(published, like_published, ("none",))
+    pandas.testing.assert_frame_equal(alone.cells, good.cells.query("manager == 'none'").reset_index(drop=True))
+    assert alone.pairs.empty
+    other = validate(published, like_published, ("none",), seed=2)
+    assert ends(other.cells.loc[0], "std_ratio") != ends(alone.cells.loc[0], "std_ratio")
+
+
+def test_what_cannot_be_judged_from_few_missions_is_not_met_and_says_so(published):
+    few = published.groupby("manager").head(1)
+    shares = [
+        Share(manager="none", name="of none", of="detections", among={"search_time_s": [(0, 1)]},
+              where={"detection_x_m": [(-19, -18)]}, target=(0, 1))
+    ]  # fmt: skip
+    found = validate(published, few, MANAGERS, shares=shares)
+    judged = found.targets.set_index("kind")["met"].to_dict()
+    assert judged["std"] is None
+    assert judged["conclusion"] is None
+    assert judged["share"] is None
+    assert not found.all_met
+
+
+@pytest.mark.parametrize(("place", "met"), [("low", True), ("high", True), ("below", False), ("above", False)])
+def test_a_target_holds_at_its_limits(published, place, met):
+    own = published[published["manager"] == "none"].assign(pipeline_found=1.0)
+    low, high = ends(validate(own, own, ("none",)).cells.loc[0], "published_mean")
+    wanted = {"low": low, "high": high, "below": low - 1e-6, "above": high + 1e-6}[place]
+    found = validate(own, own.assign(search_time_s=wanted), ("none",)).targets
+    assert found.loc[0, ["kind", "met"]].tolist() == ["mean", met]
+
+
+class TestFiles:
+    def test_every_table_is_written_and_the_json_has_them_all(self, good):
+        files = good.texts({"seed": 1})
+        content = json.loads(files[JSON_FILE])
+        assert content["provenance"] == {"seed": 1}
+        assert content["targets_summary"] == {"met": 28, "not_met": 0, "not_judged": 0}
+        assert [len(content[name]) for name in ("cells", "pairs", "targets")] == [6, 6, 28]
+        assert [cell["manager"] for cell in content["cells"][:3]] == list(MANAGERS)
+        assert len(files[TABLES["cells"]].splitlines()) == 7
+        assert len(files[TABLES["pairs"]].splitlines()) == 7
+        assert files[TABLES["targets"]].startswith("kind,subject,what,value,low,high,met\n")
+
+    def test_what_cannot_be_had_is_null_and_empty(self, published):
+        few = published.groupby("manager").head(1)
+        files = validate(published, few, ("none", "random")).texts({})
+        assert json.loads(files[JSON_FILE])["cells"][0]["simulated_std"] is None
+        assert ",0,nan" not in files[TABLES["cells"]].lower()
+
+    def test_a_number_that_is_not_finite_is_null(self, good):
+        files = dataclasses.replace(good, cells=good.cells.assign(std_ratio=math.inf)).texts({})
+        assert json.loads(files[JSON_FILE])["cells"][0]["std_ratio"] is None
+
+    @pytest.mark.usefixtures("few_resamples")
+    def test_figures_are_pictures_and_repeat(self, good, published, like_published):
+        for draw in (distributions_png, detections_png):
+            picture = draw(good, published, like_published)
+            assert picture.startswith(b"\x89PNG")
+            assert picture == draw(good, published, like_published)
+
+    def test_figures_of_one_manager_without_known_places(self, published, like_published):
+        alone = validate(published, like_published, ("random",))
+        assert detections_png(alone, published, like_published).startswith(b"\x89PNG")
+
+
+class TestSplitCheck:
+    def test_predicted_means_are_told_in_published_standard_deviations(self, missions):
+        published = missions({"none": [(100, 10, 0), (120, 30, 0)], "random": [(50, 5, 0), (60, 6, 0)]})
+        fitted = {"none": missions({"none": [(120, 12, 0), (130, 14, 0)], "random": [(0, 0, 0)]})}
+        table = split_check(fitted, published).set_index("metric")
+        search = table.loc["search_time_s"]
+        assert (search["left_out"], search["published_mean"], search["predicted_mean"]) == ("none", 110, 125)
+        assert search["difference"] == 15
+        assert search["difference_in_std"] == pytest.approx(15 / np.std([100, 120], ddof=1))
+        assert not search["within"]
+        distance = table.loc["distance_inspected_m"]
+        assert distance["difference_in_std"] == pytest.approx(-7 / np.std([10, 30], ddof=1))
+        assert distance["within"]
+
+    def test_six_cells_of_three_left_out_managers(self, published, like_published):
+        table = split_check(dict.fromkeys(MANAGERS, like_published), published)
+        assert len(table) == 6
+        assert table["within"].all()
+
+    def test_a_manager_without_simulated_missions_is_an_error(self, published, missions):
+        with pytest.raises(ValueError, match="manager none: 20 published and 0 simulated"):
+            split_check({"none": missions({"random": [(1, 1, 1)]})}, published)

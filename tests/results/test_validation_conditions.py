@@ -1,0 +1,180 @@
+"""Real missions made under known conditions are compared with simulated ones of their own condition."""
+
+import pandas
+import pytest
+
+from suave_des.campaign.variation import Sweep
+from suave_des.errors import InputError
+from suave_des.results.real import Conditions, read_real, read_targets
+from suave_des.results.validation import balanced, compare_conditions, over_conditions, validate
+
+OWN = "manager,search_time_s,distance_inspected_m"
+FAILURE = "thruster_events.0.time_s"
+CONDITIONS = Conditions.of(Sweep(zip={"start.y_m": [2.455, 2.8, 2.8], FAILURE: [146.4, 91.2, 30]}))
+
+
+def frame(**columns: list) -> pandas.DataFrame:
+    return pandas.DataFrame(columns)
+
+
+def missions(manager: str, by_condition: dict[int, list[float]]) -> pandas.DataFrame:
+    rows = [(manager, value, 1.0, number) for number, values in by_condition.items() for value in values]
+    made = pandas.DataFrame(rows, columns=["manager", "search_time_s", "distance_inspected_m", "condition"])
+    return made.assign(detection_x_m=float("nan"), pipeline_found=True, mean_reaction_time_s=float("nan"))
+
+
+def test_a_mission_is_of_the_condition_whose_rounded_values_its_columns_have():
+    runs = frame(**{"start.y_m": [2.8, 2.46, 2.8], FAILURE: [30.0, 146.39, 91.19]})
+    assert CONDITIONS.numbers(runs).tolist() == [3, 1, 2]
+
+
+@pytest.mark.parametrize("column", ["condition", "block"])
+def test_a_column_may_give_the_number(column):
+    assert CONDITIONS.numbers(frame(**{column: [3, 1]})).tolist() == [3, 1]
+
+
+def test_without_such_columns_nothing_is_reported():
+    assert CONDITIONS.numbers(frame(run=[1, 2])) is None
+
+
+@pytest.mark.parametrize(
+    ("columns", "problem", "row"),
+    [
+        ({"start.y_m": [2.455, 3.9]}, "no condition of the campaign has start.y_m=3.9", "1"),
+        ({"start.y_m": [2.8]}, "conditions 2, 3 of the campaign all have start.y_m=2.8", "0"),
+        ({"block": [1, 4]}, "block: there is no condition 4", "1"),
+        ({"block": [0]}, "block: there is no condition 0", "0"),
+        ({"block": [1.5]}, "block: there is no condition 1.5", "0"),
+        ({"block": ["one"]}, "block: there is no condition one", "0"),
+    ],
+)
+def test_a_mission_of_no_condition_or_of_several_is_named(columns, problem, row):
+    with pytest.raises(InputError, match=problem) as error:
+        CONDITIONS.numbers(frame(**columns))
+    assert error.value.place == row
+
+
+def test_in_order_each_manager_has_as_many_missions_of_each_condition():
+    managers = pandas.Series(["none"] * 3 + ["bt"] * 6)
+    assert CONDITIONS.in_order(managers).tolist() == [1, 2, 3, 1, 1, 2, 2, 3, 3]
+    assert CONDITIONS.in_order(managers[:-1]) is None
+
+
+def test_files_of_several_managers_are_one_data_set(write):
+    paths = [write(f"{name}.csv", f"{OWN},block\n{name},20,1,1\n{name},30,1,3\n") for name in ("bt", "none")]
+    real = read_real(paths, CONDITIONS)
+    assert list(real.managers) == ["bt", "none"]
+    assert real.frame["condition"].tolist() == [1, 3, 1, 3]
+    assert "block" not in real.frame
+    assert real.notes == ()
+
+
+def test_missions_without_a_condition_are_taken_in_order_and_that_is_said(write):
+    real = read_real([write("bt.csv", f"{OWN}\nbt,20,1\nbt,30,1\nbt,40,1\n")], CONDITIONS)
+    assert real.frame["condition"].tolist() == [1, 2, 3]
+    assert "taken in order" in real.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "told"),
+    [
+        (f"{OWN}\nbt,20,1\n", f"{OWN}\nbt,20,1\n", "b.csv: has the same content as .*a.csv"),
+        (f"{OWN},block\nbt,20,1,1\n", f"{OWN}\nnone,20,1\n", "b.csv: does not say under which condition"),
+        (f"{OWN}\nbt,20,1\n", f"{OWN}\nnone,20,1\n", "has 1 mission of manager bt, which 3 conditions do not share"),
+        (f"{OWN},block\nbt,20,1,1\n", f"{OWN},block\n\nnone,20,1,7\n", "b.csv: line 3: block: there is no condition 7"),
+    ],
+)
+def test_data_whose_conditions_cannot_be_told_are_refused(write, first, second, told):
+    with pytest.raises(InputError, match=told):
+        read_real([write("a.csv", first), write("b.csv", second)], CONDITIONS)
+
+
+def test_rows_of_averages_that_were_left_out_are_noted(write):
+    header = "mission name,time searching pipeline (s),distance inspected (m)"
+    real = read_real([write("bt.csv", f"{header}\nsuave bt,20,1\nAVERAGE,20,1\nSTD,0,0\n")])
+    assert real.notes == (f"{real.files[0].path}: lines 3, 4 left out: averages, not missions.",)
+
+
+def test_simulated_missions_are_taken_in_the_real_ones_proportions():
+    real = missions("bt", {1: [1.0] * 2, 2: [1.0]})
+    simulated = missions("bt", {1: [1.0] * 5, 2: [1.0] * 9, 3: [1.0]})
+    assert balanced(real, simulated, ["bt"])["condition"].value_counts().to_dict() == {1: 4, 2: 2}
+
+
+def test_a_condition_without_simulated_missions_is_an_error():
+    with pytest.raises(InputError, match="no simulated mission of manager bt under condition 2"):
+        balanced(missions("bt", {2: [1.0]}), missions("bt", {1: [1.0]}), ["bt"])
+
+
+def test_what_differs_between_conditions_is_not_taken_for_chance():
+    real, simulated = missions("bt", {1: [50, 52, 54], 2: [120, 121, 122]}), missions("bt", {1: [55], 2: [119]})
+    compared = compare_conditions(real, simulated, ["bt"], ["search_time_s"])
+    told = compared[["condition", "real_median", "difference_of_medians"]].to_numpy().tolist()
+    assert told == [[1, 52, 3], [2, 121, -2]]
+    assert over_conditions(compared)[["manager", "difference"]].to_numpy().tolist() == [["bt", 2.5], ["all", 2.5]]
+
+
+def test_spread_within_conditions_is_compared_where_both_sides_have_some():
+    real, simulated = missions("bt", {1: [50, 52], 2: [120]}), missions("bt", {1: [50, 54], 2: [119, 130]})
+    found = over_conditions(compare_conditions(real, simulated, ["bt"], ["search_time_s"]))
+    assert found["std_ratio"].tolist() == pytest.approx([2.0, 2.0])
+
+
+@pytest.mark.parametrize(("limit", "met"), [(2.5, True), (2.4, False)])
+def test_a_file_of_targets_may_limit_differences_within_conditions(write, limit, met):
+    path = write("real.targets.yaml", f"conditions: {{search_time_s: {{median_difference: {limit}, std_ratio: 2}}}}\n")
+    real = missions("bt", {1: [50, 52, 54], 2: [120, 121, 122]})
+    simulated = missions("bt", {1: [55, 55, 55], 2: [119, 119, 119]})
+    found = validate(real, simulated, ["bt"], limits=read_targets(path).conditions)
+    targets = found.targets.set_index("kind")["met"]
+    assert targets["condition_median"] is met
+    assert targets["condition_std"]
+    assert len(found.conditions) == 4
+
+
+def test_missions_that_never_found_the_pipeline_do_not_differ_by_the_number_written_for_them():
+    real = missions("bt", {1: [50.0, 60.0, 251.0] * 30}).assign(pipeline_found=[True, True, False] * 30)
+    simulated = missions("bt", {1: [50.0, 60.0, 250.0] * 30}).assign(pipeline_found=[True, True, False] * 30)
+    found = validate(real, simulated, ["bt"])
+    assert found.not_found_s == 250.0
+    assert found.cells.loc[0, "ks_p"] == 1.0
+    assert found.cells.loc[0, "published_mean"] == pytest.approx(120.0)
+
+
+def test_a_find_after_the_limit_still_counts_as_sooner_than_none():
+    real = missions("bt", {1: [255.0, 251.0]}).assign(pipeline_found=[True, False])
+    assert validate(real, real, ["bt"]).not_found_s == 255.0
+
+
+def test_the_share_that_found_the_pipeline_is_compared():
+    real = missions("bt", {1: [50.0] * 4}).assign(pipeline_found=[True, True, True, False])
+    (share,) = validate(real, real.assign(pipeline_found=True), ["bt"]).shares.to_dict("records")
+    assert (share["name"], share["published_share"], share["simulated_share"]) == ("pipeline found", 0.75, 1.0)
+
+
+def test_it_is_not_compared_where_the_data_do_not_tell():
+    real = missions("bt", {1: [50.0] * 4})
+    unknown = real.assign(pipeline_found=pandas.array([pandas.NA] * 4, dtype="boolean"))
+    assert validate(unknown, real, ["bt"]).shares.empty
+
+
+def test_reaction_times_are_compared_of_the_missions_that_have_one():
+    real = missions("bt", {1: [50.0] * 4}).assign(mean_reaction_time_s=[1.0, 2.0, 3.0, float("nan")])
+    found = validate(real, real, ["bt"])
+    reaction = found.cells.set_index("metric").loc["mean_reaction_time_s"]
+    assert reaction[["published_n", "published_mean"]].tolist() == [3, 2.0]
+
+
+def test_managers_come_in_the_order_of_the_file_unless_chosen(write):
+    real = read_real([write("runs.csv", f"{OWN}\nrandom,1,2\nnone,1,2\nrandom,1,2\n")])
+    assert real.choose(None) == ("random", "none")
+    assert real.choose("none") == ("none",)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "problem"),
+    [("nonw", "no mission of manager 'nonw'"), (",", "no managers"), ("none, none", "twice")],
+)
+def test_managers_without_missions_or_named_twice_are_refused(write, wanted, problem):
+    with pytest.raises(InputError, match=problem):
+        read_real([write("runs.csv", f"{OWN}\nnone,1,2\n")]).choose(wanted)

@@ -1,0 +1,136 @@
+"""Clusters: missions are counted in regions that a file of shares names; a wrong file is named with its line."""
+
+import math
+
+import pytest
+
+from suave_des.errors import InputError
+from suave_des.records.runs import read_runs
+from suave_des.resources import shipped_folder
+from suave_des.results.real import Share, count, read_targets, targets_beside
+from suave_des.results.validation import compare_places, compare_shares
+
+UNKNOWN = math.nan
+
+
+@pytest.fixture
+def frame(missions):
+    return missions(
+        {
+            "metacontrol": [(120, 50, -19.0), (125, 50, -18.5), (130, 50, -17.0), (75, 60, -16.0), (126, 50, UNKNOWN)],
+            "none": [(125, 50, -19.0)],
+        }
+    )
+
+
+def test_runs_are_counted_with_both_ends_of_the_interval(frame):
+    share = Share(manager="metacontrol", name="late", where={"search_time_s": [(120, 130)]})
+    assert count(share, frame) == (4, 5)
+
+
+def test_a_place_that_is_not_known_is_in_no_region_but_is_a_run(frame):
+    where = {"search_time_s": [(120, 130)], "detection_x_m": [(-19.5, -18.5)]}
+    assert count(Share(manager="metacontrol", name="there", where=where), frame) == (2, 5)
+
+
+def test_of_detections_only_those_with_a_known_place_count(frame):
+    share = Share(
+        manager="metacontrol",
+        name="there",
+        of="detections",
+        among={"search_time_s": [(120, 130)]},
+        where={"detection_x_m": [(-19.5, -18.5)]},
+    )
+    assert count(share, frame) == (2, 3)
+
+
+def test_one_of_several_intervals_is_enough(frame):
+    share = Share(manager="metacontrol", name="either", where={"detection_x_m": [(-19.5, -18.9), (-16.1, -15.9)]})
+    assert count(share, frame) == (2, 5)
+
+
+def test_places_that_come_from_sums_of_steps_are_at_the_interval_end(missions):
+    share = Share(manager="none", name="edge", where={"detection_x_m": [(-17.5, -16.0)]})
+    assert count(share, missions({"none": [(1, 1, -17.5 - 1e-9), (1, 1, -17.51)]})) == (1, 2)
+
+
+def test_no_mission_has_no_share(missions):
+    share = Share(manager="none", name="any", among={"search_time_s": [(0, 1)]}, where={"search_time_s": [(0, 1)]})
+    frame = missions({"none": [(5, 1, 1)]})
+    assert count(share, frame) == (0, 0)
+    (row,) = compare_shares([share], frame.assign(pipeline_found=math.nan), frame, ["none"]).to_dict("records")
+    assert row["published_share"] is None
+
+
+def test_shares_of_managers_that_are_not_compared_are_left_out(frame):
+    shares = [Share(manager=name, name="all", where={"search_time_s": [(0, 300)]}) for name in ("none", "metacontrol")]
+    assert compare_shares(shares, frame, frame, ["none"])["manager"].tolist() == ["none"]
+
+
+def test_places_are_counted_to_the_nearest_half_metre_on_both_sides(missions):
+    published = missions({"none": [(1, 1, -19.0), (1, 1, -17.5), (1, 1, UNKNOWN)]})
+    simulated = missions({"none": [(1, 1, -19.0003), (1, 1, -19.0), (1, 1, -16.0), (1, 1, -17.5)]})
+    found = compare_places(published, simulated, ["none"]).set_index("detection_x_m")
+    assert found[["published_count", "published_n", "simulated_count", "simulated_n"]].T.to_dict("list") == {
+        -19.0: [1, 2, 2, 4],
+        -17.5: [1, 2, 1, 4],
+        -16.0: [0, 2, 1, 4],
+    }
+
+
+def test_the_shipped_shares_cover_each_manager_and_the_published_runs_meet_their_targets():
+    data = shipped_folder("scenarios/published") / "seams2023_runs.csv"
+    published = read_runs(data).frame
+    shares = read_targets(targets_beside(data)).shares
+    assert {share.manager for share in shares} == {"none", "random", "metacontrol"}
+    with_target = [share for share in shares if share.target is not None]
+    assert len(with_target) == 4
+    for share in with_target:
+        low, high = share.target
+        counted, n = count(share, published)
+        assert low <= counted / n <= high
+
+
+def test_the_shipped_clusters_hold_the_published_runs_as_known():
+    data = shipped_folder("scenarios/published") / "seams2023_runs.csv"
+    published = read_runs(data).frame
+    counts = {
+        (share.manager, share.name): count(share, published)[0] for share in read_targets(targets_beside(data)).shares
+    }
+    assert counts["metacontrol", "found at 69 to 90 s"] == 10
+    assert counts["metacontrol", "found at 124 to 128 s"] == 9
+    assert counts["metacontrol", "in neither cluster, 300 s included"] == 1
+    none = {name: number for (manager, name), number in counts.items() if manager == "none"}
+    assert (none["found at 124 to 128 s"], none["found at 151 to 191 s"], none["found at 200 to 225 s"]) == (4, 8, 7)
+    assert (none["not found by 300 s"], none["in no cluster"]) == (1, 0)
+
+
+def test_a_data_file_without_a_file_of_shares_beside_it_has_none(tmp_path):
+    assert targets_beside(tmp_path / "runs.csv") is None
+
+
+ENTRY = "shares:\n  - manager: none\n    name: early\n    where: {where}\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "place", "problem"),
+    [
+        ("share: []\n", "line 1", "unknown key 'share'"),
+        ("shares:\n  - manager: none\n    name: early\n", "line 2, shares[0].where", "is missing"),
+        (ENTRY.format(where="{}"), "line 4, shares[0].where", ""),
+        (ENTRY.format(where="{search_time_s: []}"), "line 4, shares[0].where.search_time_s", ""),
+        (ENTRY.format(where="{search_time_s: [[9, 3]]}"), "line 2, shares[0]", ""),
+        (ENTRY.format(where="{search_time_s: [[3]]}"), "line 4, shares[0].where.search_time_s[0]", ""),
+        (ENTRY.format(where="{search_time_s: [[3, soon]]}"), "line 4, shares[0].where.search_time_s[0]", ""),
+        (ENTRY.format(where="{speed: [[3, 4]]}"), "line 4, shares[0].where", ""),
+        (ENTRY.format(where="{search_time_s: [[3, 4]]}") + "    target: [0.2, 1.2]\n", "line 5", "between 0 and 1"),
+        (ENTRY.format(where="{search_time_s: [[3, 4]]}") + "    of: missions\n", "line 5", "not allowed"),
+    ],
+)
+def test_a_wrong_file_of_shares_is_named_with_its_line(write, content, place, problem):
+    path = write("runs.targets.yaml", content)
+    with pytest.raises(InputError) as caught:
+        read_targets(path)
+    assert caught.value.file == str(path)
+    assert caught.value.place.startswith(place)
+    assert problem in caught.value.problem

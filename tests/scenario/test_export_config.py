@@ -1,0 +1,213 @@
+"""The exemplar's files that are written import again to the same, and what they cannot express is named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from suave_des.campaign.spec import read_campaign_file
+from suave_des.cli.main import main
+from suave_des.errors import InputError
+from suave_des.scenario.exemplar import REVISIONS
+from suave_des.scenario.exemplar.exporting import MISSION_FILE, RUNNER_FILE, export_config
+from suave_des.scenario.exemplar.importing import import_config
+from suave_des.scenario.loader import LoadedScenario, load_scenario, with_values
+from suave_des.scenario.yamlfile import parse_yaml
+
+MANAGERS = ("none", "random", "metacontrol", "bt", "bt_extended")
+
+
+def number(low: float, high: float) -> st.SearchStrategy[float]:
+    return st.floats(low, high).map(lambda value: round(value, 3))
+
+
+def blank(revision: str) -> LoadedScenario:
+    """What an import of empty files of a revision gives: all that the exemplar can express is at its defaults."""
+    empty = parse_yaml("mission_node: {ros__parameters: {time_limit: 300}}\n", Path("m.yaml"))
+    return import_config([empty], Path("blank.yaml"), managers=MANAGERS, revision=revision).loaded
+
+
+BLANK = {revision: blank(revision) for revision in REVISIONS}
+UNIFORM = st.tuples(number(-50, 50), number(0, 20)).map(lambda pair: (pair[0], pair[0] + pair[1]))
+
+
+@st.composite
+def expressible(draw, revision: str) -> tuple[LoadedScenario, dict]:
+    """A scenario, and a campaign if the revision has a runner, of values that the exemplar has keys for."""
+    metrics, runner = (revision in list(REVISIONS)[number:] for number in (2, 3))
+    low, high = sorted(draw(st.tuples(number(0.5, 5), number(0.5, 5))))
+    signal = {"minimum": low, "maximum": high, "period_s": float(draw(st.integers(1, 500)))}
+    signal |= {"shift_s": draw(number(-100, 100)), "publishing_period_s": draw(number(0.1, 5))}
+    values = {f"signals.water_visibility.{key}": value for key, value in signal.items()}
+    values["mission.time_limit_s"] = float(draw(st.integers(1, 1000)))
+    values["managers.random.adaptation_period_s"] = float(draw(st.integers(1, 100)))
+    event = st.tuples(st.integers(1, 6), st.sampled_from(["failure", "recovery"]), number(100, 500))
+    events = draw(st.lists(event, max_size=3))
+    values["thruster_events"] = [f"({n},{what},{time_s!r})" for n, what, time_s in events]
+    values["default_modes.f_generate_search_path"] = draw(st.sampled_from(["fd_spiral_low", "fd_spiral_high"]))
+    if metrics:
+        values["battery.discharge_time_s"] = draw(number(1, 1000))
+        values["battery.publishing_period_s"] = draw(number(0.1, 10))
+        values["reaction_metric.battery_limit"] = draw(number(0, 1))
+        values["reaction_metric.visibility_thresholds_m"] = sorted({draw(number(0, 9)), draw(number(0, 9))})[::-1]
+        fitting = st.lists(number(0, 9), min_size=1, max_size=2)
+        count = len(values["reaction_metric.visibility_thresholds_m"])
+        values["reaction_metric.expected_altitudes_m"] = (draw(fitting) * 2)[:count]
+    campaign = {}
+    if runner:
+        values |= {"start.x_m": draw(number(-50, 50)), "start.y_m": draw(number(-50, 50)), "start.z_m": -10.0}
+        managers = draw(st.lists(st.sampled_from(MANAGERS), min_size=1, unique=True))
+        campaign = {"managers": managers, "runs": draw(st.integers(1, 100)), "seed": 100}
+        at = {"start.x_m": values["start.x_m"], "signals.water_visibility.shift_s": signal["shift_s"]}
+        perturbed = {}
+        for path in draw(st.sets(st.sampled_from(sorted(at)))):
+            low, high = draw(UNIFORM)
+            if (low, high) != (0, 0):
+                perturbed[path] = {"distribution": "uniform", "minimum": at[path] + low, "maximum": at[path] + high}
+        if events and draw(st.booleans()):
+            low, high = draw(UNIFORM)
+            shift = {"distribution": "uniform", "shared": "thruster_events_shift"}
+            for index, (_, _, time_s) in enumerate(events if (low, high) != (0, 0) else ()):
+                drawn = {**shift, "minimum": time_s + low, "maximum": time_s + high}
+                perturbed[f"thruster_events.{index}.time_s"] = drawn
+        if perturbed:
+            campaign |= {"perturbations": perturbed, "runs_per_draw": draw(st.integers(1, 20))}
+    if revision == "1.5":
+        campaign["seed"] = draw(st.integers(0, 2**40))
+        ends = draw(st.none() | number(0.01, 0.9))
+        values |= {} if ends is None else {"battery.mission_ends_at_level": ends}
+    return with_values(BLANK[revision], values), campaign
+
+
+@pytest.mark.parametrize("revision", REVISIONS)
+@given(data=st.data())
+@settings(max_examples=25, deadline=None)
+def test_what_the_exemplar_can_express_imports_again_to_the_same(revision: str, data: st.DataObject) -> None:
+    loaded, campaign = data.draw(expressible(revision))
+    texts, lost = export_config(loaded, campaign, revision)
+    assert lost == ()
+    again = import_config(
+        [parse_yaml(text, Path(name)) for name, text in texts.items()],
+        Path("again.yaml"),
+        managers=MANAGERS,
+        revision=revision,
+        campaign=Path("campaign.yaml") if campaign else None,
+    )
+    same = {"name", "description"}
+    assert again.loaded.scenario.model_dump(exclude=same) == loaded.scenario.model_dump(exclude=same)
+    if campaign:
+        content = yaml.safe_load(again.campaign)
+        perturbed, drawn = campaign.pop("perturbations", {}), content.pop("perturbations", {})
+        assert content == {"campaign": 1, "scenario": "again.yaml", **campaign}
+        assert drawn.keys() == perturbed.keys()
+        for path, distribution in perturbed.items():
+            assert drawn[path] == pytest.approx(distribution, abs=1e-6)
+
+
+def lost_lines(scenario: str | LoadedScenario, revision: str | None = None, **campaign) -> str:
+    loaded = load_scenario(scenario)
+    given = {"managers": ["none"], "runs": 20, "seed": 100, **campaign}
+    return "\n".join(export_config(loaded, given, revision)[1])
+
+
+class TestWhatTheExemplarCannotExpress:
+    def test_is_named_for_the_shipped_scenarios(self) -> None:
+        assert lost_lines("release15").startswith("battery: nothing here")
+        assert lost_lines("release15").count("\n") == 0
+        assert "no runner before 1.4" in lost_lines("seams2023")
+        assert "signals.water_visibility: constant here, sinusoid in the exemplar" in lost_lines("planta_exp1")
+        for words in (
+            "revision.spiral.centre",
+            "knowledge.ontologies",
+            "modes_file",
+            "metrics",
+            "requirements.find_early",
+        ):
+            assert f"{words}: " in lost_lines("extended")
+
+    def test_is_named_for_another_revision(self) -> None:
+        lost = lost_lines("seams2023", "1.5")
+        assert "revision: 2023 here; the code that reads the files is 1.5's" in lost
+        assert "calibration.origin_y_m: -0.2 here, 0.0 in the exemplar" in lost
+        assert "managers.metacontrol.reasoning_period_s: 2.0 here, 1.5 in the exemplar" in lost
+        assert "revision." not in lost
+
+    @pytest.mark.parametrize(
+        ("values", "words"),
+        [
+            ({"mission.time_limit_s": 240.5}, "mission.time_limit_s: 240.5 here, 240.0 in the exemplar"),
+            ({"start.x_m": {"distribution": "uniform", "minimum": -3, "maximum": -2}}, "start.x_m: {"),
+            (
+                {"thruster_events": [{"thruster": 1, "event": "failure", "time_s": 3, "recoverable": False}]},
+                "thruster_e",
+            ),
+            ({"current.x_m_per_s": 0.1}, "current.x_m_per_s: 0.1 here, 0.0 in the exemplar"),
+            ({"signals.water_visibility.noise": 0.1}, "signals.water_visibility.noise: 0.1 here"),
+            ({"battery.mission_ends_at_level": 0.0}, "battery.mission_ends_at_level: 0.0 here, nothing in"),
+        ],
+    )
+    def test_is_named_value_by_value(self, values, words) -> None:
+        (line,) = export_config(with_values(BLANK["1.5"], values), {"managers": ["bt"], "runs": 2, "seed": 1})[1]
+        assert line.startswith(words)
+
+    @pytest.mark.parametrize(
+        ("campaign", "words"),
+        [
+            ({"managers": ["oracle", "bt"]}, "managers: ['oracle', 'bt'] here, ['bt'] in the exemplar"),
+            ({"sweep": {"start.x_m": [1, 2]}}, "sweep: {"),
+            (
+                {"perturbations": {"current.x_m_per_s": {"distribution": "uniform", "minimum": 0, "maximum": 1}}},
+                "perturb",
+            ),
+        ],
+    )
+    def test_is_named_for_a_campaign(self, campaign, words) -> None:
+        lost = export_config(BLANK["1.5"], {"managers": ["bt"], "runs": 2, "seed": 1, **campaign})[1]
+        assert lost[0].startswith(words)
+
+    def test_is_refused_where_nothing_is_left(self) -> None:
+        with pytest.raises(InputError, match="none of the managers oracle"):
+            export_config(BLANK["1.5"], {"managers": ["oracle"], "runs": 2, "seed": 1})
+        with pytest.raises(InputError, match=r"no revision '1\.6'.*did you mean '1\.5'"):
+            export_config(BLANK["1.5"], {}, "1.6")
+
+
+class TestCommand:
+    def ended(self, *arguments: str) -> int:
+        with pytest.raises(SystemExit) as ended:
+            main(["export-config", *arguments])
+        return ended.value.code
+
+    def test_writes_files_that_import_config_reads(self, write, capsys) -> None:
+        write("mine.yaml", "base: release15\nbattery: {}\nmission: {time_limit_s: 240}\n")
+        write("c.yaml", "campaign: 1\nscenario: mine.yaml\nmanagers: [bt]\nruns: 3\nseed: 7\n")
+        assert self.ended("c.yaml", "--out", "there") == 0
+        assert capsys.readouterr().out == "written: there/mission_config.yaml, there/runner_config.yml\n"
+        with pytest.raises(SystemExit) as ended:
+            files = [f"there/{MISSION_FILE}", f"there/{RUNNER_FILE}"]
+            main(["import-config", *files, "--out", "again.yaml", "--campaign", "again_c.yaml"])
+        assert ended.value.code == 0
+        assert load_scenario("again.yaml").scenario.mission.time_limit_s == 240
+        settings = read_campaign_file("again_c.yaml").settings
+        assert (settings.managers, settings.runs, settings.seed) == (("bt",), 3, 7)
+
+    def test_values_have_the_types_of_the_nodes_parameters(self, write) -> None:
+        write("mine.yaml", "base: release15\nmission: {time_limit_s: 240}\nstart: {x_m: -16}\n")
+        assert self.ended("mine.yaml", "--out", "there") == 0
+        mission, runner = (yaml.safe_load(Path("there", name).read_text()) for name in (MISSION_FILE, RUNNER_FILE))
+        limit = mission["/mission_node"]["ros__parameters"]["time_limit"]
+        x_m = runner["/suave_runner_node"]["ros__parameters"]["initial_pos_x"]
+        assert (type(limit), type(x_m)) == (int, float)  # ROS 2 refuses a parameter of another type
+
+    def test_tells_what_is_lost_and_replaces_nothing_unasked(self, write, capsys) -> None:
+        write("there/mission_config.yaml", "kept")
+        assert self.ended("release15", "--out", "there") == 2
+        assert "exists already" in capsys.readouterr().err
+        assert Path("there/mission_config.yaml").read_text() == "kept"
+        assert self.ended("release15", "--out", "there", "--overwrite") == 0
+        assert capsys.readouterr().out.startswith("not expressed: battery: nothing here")
+        assert self.ended("release15", "--out", "no/where") == 2

@@ -1,0 +1,96 @@
+"""Files of the cache folder: what is damaged there is left out, and several processes share them."""
+
+from __future__ import annotations
+
+import os
+import random
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import pytest
+
+from suave_des.caches import SharedEntries, read_checked, remove_oldest, with_checksum
+
+ENTRIES = {f"state {number}": [["fg_spiral_high", "fg_status", "str", f"IN_ERROR_{number}"]] for number in range(8)}
+
+
+@pytest.fixture
+def filled(tmp_path: Path) -> Path:
+    entries = SharedEntries(tmp_path, "d")
+    for key, value in ENTRIES.items():
+        entries.add(key, value)
+    (file,) = tmp_path.iterdir()
+    return file
+
+
+def test_what_was_added_is_read(filled: Path) -> None:
+    assert dict(SharedEntries(filled.parent, "d").read()) == ENTRIES
+    assert not list(SharedEntries(filled.parent, "e").read())
+
+
+def test_damaged_entries_are_left_out_and_what_follows_them_is_read(filled: Path) -> None:
+    content = filled.read_bytes().replace(b"IN_ERROR_3", b"IN_ERROR_4") + b"\xff\x00 trash [\n" + b"cut sh"
+    filled.write_bytes(content)
+    entries = SharedEntries(filled.parent, "d")
+    entries.add("new", 1)
+    assert dict(entries.read()) == {key: value for key, value in ENTRIES.items() if key != "state 3"} | {"new": 1}
+
+
+@pytest.mark.parametrize("content", [b"", b"\x80\x04pickled", b"x" * 24 + b" [[],[]]\n"])
+def test_a_file_of_something_else_has_no_entries(filled: Path, content: bytes) -> None:
+    filled.write_bytes(content)
+    assert not list(SharedEntries(filled.parent, "d").read())
+
+
+def test_a_file_of_other_entries_has_none(filled: Path) -> None:
+    filled.rename(filled.with_name("e.jsonl"))
+    assert not list(SharedEntries(filled.parent, "e").read())
+
+
+def test_random_bytes_are_never_read(filled: Path) -> None:
+    original = filled.read_bytes()
+    draw = random.Random(5)
+    for _ in range(300):
+        content = bytearray(original)
+        for _ in range(draw.randint(1, 20)):
+            content[draw.randrange(len(content))] = draw.randrange(256)
+        filled.write_bytes(bytes(content[: draw.randrange(len(content))]))
+        assert dict(SharedEntries(filled.parent, "d").read()).items() <= ENTRIES.items()
+
+
+def _add_many(folder: str, number: int) -> None:
+    entries = SharedEntries(Path(folder), "d")
+    for count in range(200):
+        entries.add(f"{number} {count}", "x" * count)
+
+
+def test_several_processes_share_a_file(tmp_path: Path) -> None:
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        list(pool.map(_add_many, [str(tmp_path)] * 2, range(2)))
+    assert len(dict(SharedEntries(tmp_path, "d").read())) == 400
+
+
+def test_only_the_latest_files_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("suave_des.caches.remove_oldest", lambda folder, pattern: remove_oldest(folder, pattern, 2))
+    for number, digest in enumerate("abc"):
+        SharedEntries(tmp_path, digest).add("key", digest)
+        (tmp_path / f"{digest}.jsonl").touch()
+        os.utime(tmp_path / f"{digest}.jsonl", (number, number))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["b.jsonl", "c.jsonl"]
+
+
+def test_a_file_that_is_full_gets_no_more_entries(filled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("suave_des.caches.MAX_BYTES", filled.stat().st_size)
+    SharedEntries(filled.parent, "d").add("more", 1)
+    assert dict(SharedEntries(filled.parent, "d").read()) == ENTRIES
+
+
+def test_a_file_with_a_checksum(tmp_path: Path) -> None:
+    path = tmp_path / "code"
+    assert read_checked(path) is None
+    path.write_bytes(with_checksum(b"machine code"))
+    assert read_checked(path) == b"machine code"
+    for damaged in (b"", path.read_bytes()[:-1], path.read_bytes().replace(b"code", b"cold")):
+        path.write_bytes(damaged)
+        assert read_checked(path) is None

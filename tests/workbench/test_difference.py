@@ -1,0 +1,197 @@
+"""kb diff: axioms added and removed, states decided differently, and missions compared in pairs."""
+
+import json
+import re
+from dataclasses import replace
+from decimal import Decimal
+from math import nan
+from pathlib import Path
+
+import pandas
+import pytest
+
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.state import Decision, Fact, Inference, KnowledgeState, Plan, Reasoning
+from suave_des.resources import shipped_folder
+from suave_des.workbench import KnowledgeBase
+from suave_des.workbench.difference import METRICS, _joined, compare_axioms, compare_missions, compare_policies, paired
+from suave_des.workbench.policy import PolicyCase
+from suave_des.workbench.situations import Outcome
+from suave_des.workbench.space import ComponentReports, PolicySpace, ranges_between
+from tests.helpers.knowledge_states import FEWER_NUMBERS
+from tests.helpers.owl_text import SUAVE, TOMASYS
+
+SEARCH = "f_generate_search_path"
+VISIBLE = "FunctionGrounding(?fg) ^ hasQAvalue(?fg, ?q) ^ isQAtype(?q, water_visibility) ^ hasValue(?q, ?v)"
+OWL = "http://www.w3.org/2002/07/owl#"
+FAILED = f"""
+<owl:Class rdf:about="{SUAVE}Failed"><owl:equivalentClass><owl:Class><owl:intersectionOf rdf:parseType="Collection">
+<rdf:Description rdf:about="{TOMASYS}Component"/><owl:Restriction>
+<owl:onProperty rdf:resource="{TOMASYS}c_status"/><owl:hasValue>FALSE</owl:hasValue></owl:Restriction>
+</owl:intersectionOf></owl:Class></owl:equivalentClass></owl:Class>
+"""
+
+
+@pytest.fixture
+def bolder(tmp_path):
+    text = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
+    path = tmp_path / "bolder.owl"
+    path.write_text(text.replace(">3.25<", ">2.75<"), encoding="utf-8")
+    return path
+
+
+def test_a_changed_value_is_one_axiom_removed_and_one_added(bolder):
+    found = compare_axioms(Ontology.load(), Ontology.load([bolder]))
+    assert found.removed == ("hasValue(qa_water_visibility_high, 3.25)",)
+    assert found.added == ("hasValue(qa_water_visibility_high, 2.75)",)
+
+
+def test_class_expressions_are_compared_whatever_their_nodes_are_called(edited):
+    one, again = Ontology.load([edited(FAILED)]), Ontology.load([edited(FAILED, "again.owl")])
+    assert compare_axioms(one, again).added == ()
+    (added,) = [text for text in compare_axioms(Ontology.load(), one).added if "equivalentClass" in text]
+    assert 'hasValue "FALSE"' in added
+    assert "onProperty c_status" in added
+
+
+def test_rules_count_with_their_text(tmp_path):
+    rules = tmp_path / "mine.swrl"
+    rules.write_text("S1a: Component(?c) -> fd_realisability(fd_spiral_low, false)\n", encoding="utf-8")
+    found = compare_axioms(Ontology.load(), Ontology.load(rules=[rules]))
+    assert [text.partition(":")[0] for text in (*found.removed, *found.added)] == ["rule S1a", "rule S1a"]
+
+
+def test_missions_with_the_same_rules_do_not_differ():
+    found = compare_missions("seams2023", 3, {}, {})
+    assert (found.missions, found.changed) == (3, ())
+    assert [(each.difference.value, each.difference.interval, each.extremes) for each in found.metrics] == [
+        (0.0, None, ())
+    ] * 2
+
+
+def test_the_command_puts_decisions_and_missions_in_one_table(bolder, command):
+    shipped = shipped_folder("ontology") / "suave.owl"
+    arguments = ("diff", shipped, bolder, "--max-failed", "0", "--quiet", "--missions")
+    status, out, _ = command(*arguments, "2")
+    assert status == 0
+    rows = {line.split("  ")[0]: line for line in out.splitlines()}
+    assert {"decisions", "missions", "search time, s", "distance, m"} <= set(rows)
+    assert rows["decisions"].endswith("24 of 324 states")
+    _, out, _ = command(*arguments, "1", "--format", "json")
+    content = json.loads(out)
+    assert content["axioms"]["added"] == ["hasValue(qa_water_visibility_high, 2.75)"]
+    assert content["missions"]["missions"] == 1
+
+
+def test_the_difference_of_missions_is_the_second_less_the_first() -> None:
+    before = pandas.DataFrame({name: [100.0, 120.0, 90.0] for name in METRICS}, index=[1, 2, 3])
+    after = pandas.DataFrame({name: [104.0, 126.0, 90.0] for name in METRICS}, index=[1, 2, 3])
+    found = paired(before, after)
+    assert found.missions == 3 and found.changed == (1, 2)
+    for metric in found.metrics:
+        interval = metric.difference.interval
+        assert (metric.one, metric.other, metric.difference.value) == pytest.approx((310 / 3, 320 / 3, 10 / 3))
+        assert interval is not None and interval[0] < 10 / 3 < interval[1]
+        assert metric.changed == 2 and (2, 120.0, 126.0) in metric.extremes
+
+
+def test_a_metric_that_differs_has_its_row_whether_or_not_it_is_known_in_all_missions() -> None:
+    before = pandas.DataFrame(
+        {**{name: [1.0, 1.0] for name in METRICS}, "mean_reaction_time_s": [2.0, nan], "adaptations": [3, 4]},
+        index=[1, 2],
+    )
+    after = before.assign(mean_reaction_time_s=[2.5, 3.0])
+    found = paired(before, after)
+    assert [each.metric for each in found.metrics] == [*METRICS, "mean_reaction_time_s"]
+    assert (found.metrics[2].difference.value, found.metrics[2].changed) == (0.5, 2)
+
+
+def test_states_that_only_one_knowledge_base_finds_inconsistent_or_without_design_differ(small: KnowledgeBase) -> None:
+    policy = small.policy(max_failed=0)
+    same = next(case for case in policy.cases if not case.decided.changes and SEARCH in case.asked)
+    reasoning = same.decided.reasoning
+    assert reasoning is not None
+    none_left = Outcome(Reasoning(reasoning.inference, Plan((Decision(SEARCH, None, ""),))))
+    more = Fact("o_generate_search_path", "o_status", "OK")
+    other_status = Outcome(Reasoning(Inference(same.state, frozenset(), frozenset({more})), reasoning.plan))
+    for outcome, is_decided in ((Outcome(None, "two values"), True), (none_left, True), (other_status, False)):
+        cases = tuple(replace(case, outcome=outcome) if case is same else case for case in policy.cases)
+        found = compare_policies(policy, replace(policy, cases=cases))
+        differing, reported = found.differing, found.reported
+        assert [each.situation for each in (differing if is_decided else reported)] == [same]
+        assert not (reported if is_decided else differing)
+        assert found.states == same.reports.combinations * is_decided
+
+
+def rules_file(tmp_path: Path, text: str) -> Path:
+    (tmp_path / "own.swrl").write_text(text + "\n", encoding="utf-8")
+    return tmp_path / "own.swrl"
+
+
+def test_regions_of_two_attributes_are_joined_where_all_else_is_alike() -> None:
+    ranges = {"battery_level": ranges_between([Decimal(1)]), "water_visibility": ranges_between([Decimal(2)])}
+    state = KnowledgeState.of([])
+    places = [(1, 1), (1, 2), *((2, place) for place in range(4))]
+    cases = [
+        PolicyCase(
+            (ranges["battery_level"][one], ranges["water_visibility"][other]), state, ComponentReports((), 2), ()
+        )
+        for one, other in places
+    ]
+    assert list(_joined(cases, list(ranges.values()))) == [(("< 1", "<= 2"), 4), (("1", ""), 8)]
+
+
+class TestDiff:
+    def test_nothing_differs_from_itself(self, knowledge):
+        assert knowledge.diff(knowledge, max_failed=0).differing == ()
+
+    def test_a_moved_threshold_differs_between_old_and_new_only(self, small, tmp_path):
+        file = rules_file(
+            tmp_path, f'QAWaterVisibility: {VISIBLE} ^ lessThan(?v, 3) -> fg_status(?fg, "IN_ERROR_NFR")\n'
+        )
+        difference = small.diff(KnowledgeBase.load(rules=[file], values=FEWER_NUMBERS), max_failed=0)
+        high = [each for each in difference.differing if each.situation.present(SEARCH) == "fd_spiral_high"]
+        assert {str(each.situation.ranges[0]) for each in high} == {"3", "3 < . < 3.25"}
+        assert {(each.one.choice(SEARCH), each.other.choice(SEARCH)) for each in high} == {
+            ("fd_spiral_medium", "stays")
+        }
+
+    def test_the_command_takes_ontologies_and_rules(self, command, edited, tmp_path):
+        same = edited("")
+        status, text, _ = command("diff", same, same, "--max-failed", "0")
+        assert (status, text) == (0, "0 of 288 states are decided differently\n")
+        file = rules_file(
+            tmp_path, f'QAWaterVisibility: {VISIBLE} ^ lessThan(?v, 3) -> fg_status(?fg, "IN_ERROR_NFR")\n'
+        )
+        _, text, _ = command("diff", same, file, "--max-failed", "0")
+        assert f"{SEARCH}, now fd_spiral_high: A fd_spiral_medium, B stays\n  3 <= . < 3.25: 6 states\n" in text
+        _, printed, _ = command("diff", same, file, "--max-failed", "0", "--format", "json")
+        assert json.loads(printed)["states"] == 6
+
+    def test_an_outcome_is_told_once(self, command, edited, tmp_path):
+        file = rules_file(tmp_path, "low: FunctionDesign(?d) -> fd_realisability(fd_spiral_low, false)\n")
+        _, text, _ = command("diff", edited(""), file, "--max-failed", "0")
+        assert f"{SEARCH}, now ungrounded: A fd_spiral_low, B none left\n  1.25 <= . < 2.25: 6 states\n" in text
+        assert "none left, none left" not in text
+
+    def test_a_function_without_designs_on_one_side_is_decided_differently(self, command, edited):
+        same, without = edited(""), edited("", "without.owl")
+        designs = r'(?s)<owl:NamedIndividual rdf:about="[^"]*#fd_spiral_(?:low|medium|high)">.*?</owl:NamedIndividual>'
+        without.write_text(re.sub(designs, "", without.read_text()))
+        for files, texts in (
+            ((same, without), "A fd_spiral_low, B none left"),
+            ((without, same), "A none left, B fd_spiral_low"),
+        ):
+            _, text, _ = command("diff", *files, "--max-failed", "0")
+            assert f"{SEARCH}, now ungrounded: {texts}\n" in text
+            assert not text.startswith("0 of") and " 0 of" not in text
+
+    def test_components_that_only_one_side_has_are_still_alike(self, knowledge):
+        mine = PolicySpace.of(knowledge.base, knowledge.settings)
+        none = replace(mine, alike=())
+        assert mine.common(none).alike == none.common(mine).alike == mine.alike
+
+    def test_a_file_that_is_missing_is_reported(self, command, edited):
+        status, _, error = command("diff", edited(""), "nowhere.owl")
+        assert status == 2
+        assert "nowhere.owl: no such file" in error

@@ -1,0 +1,343 @@
+"""kb test --mutate and --coverage: which mistakes tests notice, what they cover, and the least that covers the rest."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+from decimal import Decimal
+from pathlib import Path
+
+import pytest
+
+from suave_des.campaign.single import run_mission
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rdf import QA_OPERATOR
+from suave_des.workbench import KnowledgeBase
+from suave_des.workbench.coverage import FIRES, Goal, least_cover, measure_coverage
+from suave_des.workbench.mutation import (
+    EQUIVALENT,
+    KILLED,
+    OPERATORS,
+    SURVIVED,
+    Mutant,
+    is_horn,
+    mutants_of,
+    mutate,
+    sample,
+)
+from suave_des.workbench.policy import kinds_of_states
+from suave_des.workbench.rule_tests import RuleTest, TestFile, run_test, shipped_tests
+from suave_des.workbench.situations import Situation, compare
+from suave_des.workbench.space import PolicySpace, interchangeable_components
+from tests.helpers.knowledge_states import FEWER_NUMBERS
+from tests.helpers.owl_text import SUAVE, individual
+
+SEARCH = "f_generate_search_path"
+OWL_CLASSES = f"""
+<owl:Class rdf:about="{SUAVE}Warm"/><owl:Class rdf:about="{SUAVE}Cold"/>
+<rdf:Description rdf:about="{SUAVE}c_thruster_1"><rdf:type><owl:Class><owl:unionOf rdf:parseType="Collection">
+<owl:Class rdf:about="{SUAVE}Warm"/><owl:Class rdf:about="{SUAVE}Cold"/></owl:unionOf></owl:Class></rdf:type>
+</rdf:Description>
+"""
+
+
+def read_tests(tmp_path: Path, knowledge: KnowledgeBase, text: str) -> list[RuleTest]:
+    (tmp_path / "tests.yaml").write_text(text, encoding="utf-8")
+    return list(TestFile.read(tmp_path / "tests.yaml").tests(knowledge))
+
+
+def file(tmp_path: Path, text: str, name: str = "own.swrl") -> Path:
+    (tmp_path / name).write_text(text + "\n", encoding="utf-8")
+    return tmp_path / name
+
+
+def mutant(knowledge: KnowledgeBase, name: str, text: str) -> Mutant:
+    (found,) = (each for each in mutants_of(knowledge.base) if each.name == name and each.text == text)
+    return found
+
+
+NOTHING_WRONG = f"""
+tests:
+- name: high visibility
+  given: {{groundings: {{{SEARCH}: fd_spiral_high}}, measurements: {{water_visibility: 4.0}}}}
+  follows_not: ["fg_status(fg_spiral_high, IN_ERROR_NFR)"]
+"""
+LOW_AND_HIGH = f"""{NOTHING_WRONG}
+- name: low visibility
+  given: {{groundings: {{{SEARCH}: fd_spiral_high}}, measurements: {{water_visibility: 2.0}}}}
+  follows: ["fg_status(fg_spiral_high, IN_ERROR_NFR)"]
+"""
+
+
+def test_a_mutant_may_depend_on_an_attribute_on_which_the_rule_does_not(tmp_path: Path, edited) -> None:
+    """Without isQAtype the rule is about the current, too, which the original does not depend on."""
+    ontology = edited(individual("water_current", "QualityAttributeType", ("qa_comparison_operator", ">")))
+    file(tmp_path, "base: seams2023\nsignals:\n  water_current: {kind: constant, value: 0.05}", "both.yaml")
+    rule = "isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ lessThan(?v, 0.1)"
+    rules = file(tmp_path, f"own: {rule} -> fd_realisability(fd_spiral_high, false)")
+    knowledge = KnowledgeBase.load(
+        [ontology], scenario=tmp_path / "both.yaml", rules=rules, disabled_rules=["QAWaterVisibility"]
+    )
+    assert "water_current" not in PolicySpace.of(knowledge.base, knowledge.settings).attributes
+    dropped = mutant(knowledge, "own", "isQAtype(?q, water_visibility) is left out")
+    (found,), _ = mutate(knowledge, read_tests(tmp_path, knowledge, NOTHING_WRONG), [dropped], max_failed=0)
+    assert found.result == SURVIVED and found.state is not None
+    measured = dict(found.state.measurements)
+    assert measured["water_current"] < Decimal("0.1") <= measured.get("water_visibility", Decimal(1))
+
+
+def test_a_mutant_that_only_the_planner_notices_is_killed_by_a_test_of_the_decision(
+    tmp_path: Path, small: KnowledgeBase
+) -> None:
+    tests = read_tests(
+        tmp_path,
+        small,
+        f"tests:\n- name: medium\n  given: {{objectives: {{{SEARCH}: UNGROUNDED}},"
+        f" measurements: {{water_visibility: 2.5}}}}\n  decides: {{{SEARCH}: fd_spiral_medium}}\n",
+    )
+    assert run_test(small, tests[0]).passed
+    (turned,) = (
+        each
+        for each in mutants_of(small.base)
+        if each.name == "water_visibility" and isinstance(each.old, tuple) and each.old[1] == QA_OPERATOR
+    )
+    (found,), _ = mutate(small, tests, [turned], max_failed=0)
+    assert (found.result, found.reason) == (KILLED, "medium")
+    (without,), _ = mutate(small, read_tests(tmp_path, small, NOTHING_WRONG), [turned], max_failed=0)
+    assert without.result == SURVIVED
+
+
+def test_where_an_axiom_leaves_a_choice_rules_matter_that_never_fire(tmp_path: Path, edited) -> None:
+    """Thruster 1 is Warm or Cold, nobody knows which: what follows from both follows."""
+    rules = file(
+        tmp_path,
+        'warm: Warm(?c) ^ c_status(?c, "FALSE") -> fd_realisability(fd_spiral_high, false)\n'
+        'cold: Cold(?c) ^ c_status(?c, "FALSE") -> fd_realisability(fd_spiral_high, false)',
+    )
+    knowledge = KnowledgeBase.load([edited(OWL_CLASSES)], rules=rules, values=FEWER_NUMBERS)
+    assert not is_horn(knowledge.base) and is_horn(KnowledgeBase.load().base)
+    removed = mutant(knowledge, "warm", "the rule is removed")
+    follows = f"""
+tests:
+- name: never high
+  given: {{groundings: {{{SEARCH}: fd_spiral_low}}, components: {{c_thruster_1: "FALSE"}}}}
+  follows: ["fd_realisability(fd_spiral_high, false)"]
+"""
+    tests = read_tests(tmp_path, knowledge, follows)
+    assert run_test(knowledge, tests[0]).passed
+    assert mutate(knowledge, tests, [removed], max_failed=0)[0][0].result == KILLED
+    (found,), _ = mutate(knowledge, read_tests(tmp_path, knowledge, NOTHING_WRONG), [removed], max_failed=1)
+    assert found.result == SURVIVED and found.state is not None
+    assert dict(found.state.components) == {"c_thruster_1": "FALSE"}
+
+
+@pytest.mark.parametrize(
+    ("ontology", "rule"),
+    [
+        (individual("c_thruster_3", "Component", ("mros:requiredBy", ":fd_spiral_high")), ""),
+        ("", 'own: c_status(c_thruster_3, "FALSE") -> fd_realisability(fd_spiral_high, false)'),
+        (OWL_CLASSES.replace("c_thruster_1", "c_thruster_3"), ""),
+    ],
+    ids=["a fact", "a rule", "an axiom"],
+)
+def test_components_of_which_more_is_said_are_not_exchangeable(
+    tmp_path: Path, edited, ontology: str, rule: str
+) -> None:
+    rules = [file(tmp_path, rule)] if rule else []
+    knowledge = KnowledgeBase.load([edited(ontology)], rules=rules, values=FEWER_NUMBERS)
+    others = tuple(f"c_thruster_{number}" for number in (1, 2, 4, 5, 6))
+    assert interchangeable_components(knowledge.base) == (others, ("c_thruster_3",))
+
+
+def test_a_threshold_of_0_is_moved_to_either_side(tmp_path: Path) -> None:
+    rules = file(tmp_path, "own: hasValue(?q, ?v) ^ lessThan(?v, 0) -> fd_realisability(fd_spiral_high, false)")
+    knowledge = KnowledgeBase.load(rules=rules)
+    moved = {
+        each.text for each in mutants_of(knowledge.base) if each.name == "own" and each.operator == "threshold moved"
+    }
+    becomes = "lessThan(?v, 0) becomes lessThan(?v, {})"
+    assert moved == {becomes.format("-0.1"), becomes.format("0.1")}
+
+
+# The expected performance is the same number as the expected visibility here, so that isQAtype changes nothing.
+EQUIVALENT_ONES = {
+    "QAWaterVisibility: atom dropped: FunctionGrounding(?fg) is left out",
+    "QAWaterVisibility: atom dropped: isQAtype(?eqa, water_visibility) is left out",
+    "QAWaterVisibility: atom dropped: isQAtype(?mqa, water_visibility) is left out",
+    "QAWaterVisibility: variable exchanged: isQAtype(?eqa, water_visibility) becomes isQAtype(?mqa, water_visibility)",
+}
+
+
+def test_equivalent_mutants_of_a_rule_are_known_by_name_and_infer_the_same_in_random_states(
+    tmp_path: Path, small: KnowledgeBase
+) -> None:
+    knowledge = small
+    of_rule = [each for each in mutants_of(knowledge.base) if each.name == "QAWaterVisibility"]
+    results, _ = mutate(knowledge, read_tests(tmp_path, knowledge, NOTHING_WRONG), of_rule, max_failed=1)
+    equivalent = [each.mutant for each in results if each.result == EQUIVALENT]
+    assert set(map(str, equivalent)) == EQUIVALENT_ONES
+    draw = random.Random(7)
+    space = PolicySpace.of(knowledge.base, knowledge.settings)
+    cases = [case for kinds in kinds_of_states(knowledge.base, knowledge.settings, 1, space) for case in kinds]
+    states = [
+        replace(case.state, measurements=(("water_visibility", Decimal(str(round(draw.uniform(0.5, 4.5), 3)))),))
+        for case in draw.sample(cases, 50)
+    ]
+    for each in equivalent:
+        changed = knowledge.changed(each.applied(knowledge.base))
+        for state in states:
+            one, other = knowledge.outcome(Situation(state)), changed.outcome(Situation(state))
+            assert (one.inferred, one.changes) == (other.inferred, other.changes), f"{each}: {state}"
+
+
+def test_stays_is_not_any_design_and_a_fact_that_follows_is_not_absent(
+    tmp_path: Path, knowledge: KnowledgeBase
+) -> None:
+    given = f"given: {{groundings: {{{SEARCH}: fd_spiral_low}}, measurements: {{water_visibility: 2.0}}}}"
+    text = "tests:\n" + "".join(
+        f"- name: {wanted}\n  {given}\n  decides: {{{SEARCH}: {wanted}}}\n"
+        for wanted in ("stays", "fd_spiral_low", "fd_spiral_medium", "fd_spiral_high", "none left")
+    )
+    low = f"given: {{groundings: {{{SEARCH}: fd_spiral_high}}, measurements: {{water_visibility: 2.0}}}}"
+    text += f'- name: not\n  {low}\n  follows_not: ["fg_status(fg_spiral_high, IN_ERROR_NFR)"]\n'
+    text += f'- name: does\n  {low}\n  follows: ["fg_status(fg_spiral_high, IN_ERROR_NFR)"]\n'
+    text += f"- name: asserted\n  {low}\n  follows_not: [FunctionGrounding(fg_spiral_high)]\n"
+    passed = {test.name: run_test(knowledge, test).passed for test in read_tests(tmp_path, knowledge, text)}
+    assert passed == {
+        "stays": True,
+        "fd_spiral_low": True,
+        "fd_spiral_medium": False,
+        "fd_spiral_high": False,
+        "none left": False,
+        "not": False,
+        "does": True,
+        "asserted": False,
+    }
+
+
+def test_a_change_that_alone_makes_a_rule_fire_is_looked_for_in_every_state(tmp_path: Path) -> None:
+    """The body is one atom, which the changed fact says: no other atom is left to ask about."""
+    rule = "own: requiredBy(c_thruster_1, fd_all_thrusters) -> fd_realisability(fd_spiral_high, false)"
+    knowledge = KnowledgeBase.load(rules=file(tmp_path, rule), values=FEWER_NUMBERS)
+    (moved,) = (each for each in mutants_of(knowledge.base) if each.name == "c_thruster_1")
+    (found,), _ = mutate(knowledge, [], [moved], max_failed=0)
+    assert found.result == SURVIVED
+
+
+def test_a_mutant_that_no_longer_contradicts_itself_is_not_equivalent(tmp_path: Path) -> None:
+    rules = file(tmp_path, 'clash: fg_status(?g, "IN_ERROR_NFR") -> fg_status(?g, "IN_ERROR_FR")')
+    knowledge = KnowledgeBase.load(rules=rules, values=FEWER_NUMBERS)
+    (found,), _ = mutate(knowledge, [], [mutant(knowledge, "clash", "the rule is removed")], max_failed=0)
+    assert (found.result, found.reason) == (SURVIVED, "it no longer contradicts itself")
+
+
+def test_a_state_covers_that_an_atom_fails_only_where_those_before_it_hold(tmp_path: Path, edited) -> None:
+    rule = 'own: Component(?c) ^ c_status(?c, "FALSE") ^ requiredBy(?c, ?fd) -> fd_realisability(?fd, false)'
+    disabled = [each.name for each in KnowledgeBase.load().base.rules]
+    lamp = edited(individual("c_lamp", "Component"))
+    knowledge = KnowledgeBase.load(lamp, rules=file(tmp_path, rule), disabled_rules=disabled, values=FEWER_NUMBERS)
+
+    def covered(**components: str) -> set[Goal]:
+        state = knowledge.state(objectives=[SEARCH], components=components)
+        found = measure_coverage(knowledge, [Situation(state)], max_failed=1)
+        missing = {goal for each in found.rules for goal in (*each.missing, *each.unreachable)}
+        goals = {Goal("own", -1, "fires"), Goal("own", -1, "does not fire")} | {
+            Goal("own", number, outcome) for number in range(3) for outcome in ("holds", "fails")
+        }
+        return goals - missing
+
+    # Nobody reports: there are components, of which none is FALSE. requiredBy is not even asked.
+    assert covered() == {Goal("own", -1, "does not fire"), Goal("own", 0, "holds"), Goal("own", 1, "fails")}
+    assert covered(c_thruster_1="FALSE") == {
+        Goal("own", -1, "fires"),
+        *(Goal("own", number, "holds") for number in range(3)),
+    }
+    # Nothing requires the lamp. That thrusters are required does not count.
+    assert covered(c_lamp="FALSE") == {
+        Goal("own", -1, "does not fire"),
+        *(Goal("own", number, outcome) for number, outcome in enumerate(("holds", "holds", "fails"))),
+    }
+
+
+def test_each_operator_makes_mutants_of_the_shipped_rules(knowledge: KnowledgeBase) -> None:
+    found = mutants_of(knowledge.base)
+    assert {mutant.operator for mutant in found} == set(OPERATORS)
+    assert len(OPERATORS) >= 8
+    assert len(sample(found, 10)) == 10
+    assert [str(each) for each in mutants_of(Ontology.load())] == [str(each) for each in found]
+
+
+@pytest.mark.parametrize("operator", list(OPERATORS))
+def test_a_mutant_is_a_knowledge_base_that_pellet_takes(knowledge: KnowledgeBase, operator: str) -> None:
+    mutant = next(each for each in mutants_of(knowledge.base) if each.operator == operator)
+    state = knowledge.state(
+        groundings={"f_generate_search_path": "fd_spiral_high"}, measurements={"water_visibility": 2}
+    )
+    assert knowledge.changed(mutant.applied(knowledge.base)).outcome(Situation(state)).reasoning is not None
+
+
+def test_mutants_are_killed_proved_equivalent_or_survive_with_a_state_that_tells_them_apart(
+    tmp_path: Path, small: KnowledgeBase
+) -> None:
+    chosen = {
+        "lessThan(?measured, ?expected) becomes greaterThan(?measured, ?expected)": KILLED,
+        "lessThan(?measured, ?expected) becomes lessThanOrEqual(?measured, ?expected)": SURVIVED,
+        "FunctionGrounding(?fg) is left out": EQUIVALENT,
+        "the rule is removed": KILLED,
+        "hasValue 3.25 becomes 3.575": SURVIVED,
+    }
+    names = ("QAWaterVisibility", "qa_water_visibility_high")
+    mutants = [each for each in mutants_of(small.base) if each.name in names and each.text in chosen]
+    results, _ = mutate(small, read_tests(tmp_path, small, LOW_AND_HIGH), mutants, max_failed=0)
+    assert {each.mutant.text: each.result for each in results} == chosen
+    for found in (each for each in results if each.state is not None):
+        situation = Situation(found.state)
+        changed = small.changed(found.mutant.applied(small.base))
+        assert [str(each) for each in compare(small.outcome, changed.outcome, [situation])] == [found.reason]
+
+
+@pytest.mark.parametrize("all_rules", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_coverage_names_what_is_missing_and_the_least_set_of_states_for_it(
+    tmp_path: Path, knowledge: KnowledgeBase, all_rules: bool
+) -> None:
+    tests = read_tests(tmp_path, knowledge, LOW_AND_HIGH)
+    if not all_rules:  # what fires depends on these two alone
+        others = {rule.name for rule in knowledge.base.rules} - {"QAWaterVisibility", "S10"}
+        knowledge = KnowledgeBase.load(disabled_rules=sorted(others), values=FEWER_NUMBERS)
+    situations = [situation for test in tests for situation in test.situations]
+    coverage = measure_coverage(knowledge, situations, max_failed=0)
+    rules = {each.rule: each for each in coverage.rules}
+    assert (rules["QAWaterVisibility"].fired, rules["QAWaterVisibility"].not_fired) == (1, 1)
+    assert "equal" in {goal.outcome for goal in rules["QAWaterVisibility"].missing}
+    assert Goal("S10", -1, FIRES) in rules["S10"].unreachable
+    proposed = [Situation(state) for state, _ in coverage.proposed]
+    again = measure_coverage(knowledge, [*situations, *proposed], max_failed=0)
+    assert not any(each.missing for each in again.rules)
+
+
+def test_the_set_that_covers_all_is_the_least() -> None:
+    one, two, three = (Goal("r", number, "holds") for number in range(3))
+    sets = {"a": {one, two}, "b": {two, three}, "c": {three}, "d": {one}}
+    assert len(least_cover({name: frozenset(goals) for name, goals in sets.items()})) == 2
+
+
+def test_decisions_of_a_recorded_mission_become_tests_that_pass(tmp_path: Path, command, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    run_mission("seams2023", "metacontrol", 1, 1, tmp_path / "flown")
+    status, out, _ = command("test", "--from-mission", tmp_path / "flown", "--write", tmp_path / "flown.yaml")
+    assert status == 0
+    assert "tests are in" in out
+    status, out, _ = command("test", tmp_path / "flown.yaml")
+    assert status == 0
+    text = (tmp_path / "flown.yaml").read_text(encoding="utf-8")
+    (tmp_path / "flown.yaml").write_text(text.replace("fd_spiral_low, f_m", "fd_spiral_high, f_m"), encoding="utf-8")
+    assert command("test", tmp_path / "flown.yaml")[0] == 1
+
+
+@pytest.mark.slow
+def test_the_shipped_tests_kill_the_mutants_of_the_shipped_rules(knowledge: KnowledgeBase) -> None:
+    tests = [test for file in shipped_tests() for test in TestFile.read(file).tests(knowledge)]
+    assert all(run_test(knowledge, test).passed for test in tests)
+    results, _ = mutate(knowledge, tests, sample(mutants_of(knowledge.base), 100), max_failed=1)
+    survivors = [str(each.mutant) for each in results if each.result == SURVIVED]
+    assert len(survivors) <= 0.05 * sum(each.result != EQUIVALENT for each in results), survivors

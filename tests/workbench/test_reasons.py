@@ -1,0 +1,322 @@
+"""kb explain: derivations hold in Pellet step by step, decisions name the filter, contradictions name the rules."""
+
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from suave_des.errors import InputError
+from suave_des.knowledge.rdf import C_STATUS, RDF_TYPE, Lit
+from suave_des.knowledge.rules.files import read_rule
+from suave_des.resources import shipped_folder
+from suave_des.workbench import KnowledgeBase
+from suave_des.workbench.matching import Facts, NearestFinder
+from tests.helpers.owl_text import MROS, SUAVE, TOMASYS, XSD
+
+MOTION, SEARCH = "f_maintain_motion", "f_generate_search_path"
+CLASH = (
+    "clash: FunctionGrounding(?fg) ^ hasQAvalue(?fg, ?q) ^ isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ "
+    'lessThan(?v, 2) -> fg_status(?fg, "IN_ERROR_FR")\n'
+)
+
+
+@pytest.fixture(scope="module")
+def in_error(knowledge):
+    return knowledge.state(
+        groundings={SEARCH: "fd_spiral_high", MOTION: "fd_all_thrusters"},
+        components={"c_thruster_1": "FALSE"},
+        measurements={"water_visibility": 1.8},
+    )
+
+
+def nodes(derivation):
+    yield derivation
+    for premise in derivation.premises:
+        yield from nodes(premise)
+
+
+@settings(max_examples=15)
+@given(
+    search=st.sampled_from(["fd_spiral_low", "fd_spiral_medium", "fd_spiral_high"]),
+    motion=st.sampled_from(["fd_all_thrusters", "fd_recover_thrusters"]),
+    statuses=st.lists(st.sampled_from(["FALSE", "RECOVERED"]), max_size=2),
+    visibility=st.sampled_from(["1", "1.25", "1.2500001", "2.25", "3", "4"]),
+)
+def test_every_inferred_fact_has_a_tree_down_to_asserted_facts(knowledge, search, motion, statuses, visibility):
+    state = knowledge.state(
+        groundings={SEARCH: search, MOTION: motion},
+        components={f"c_thruster_{n}": status for n, status in enumerate(statuses, start=1)},
+        measurements={"water_visibility": visibility},
+    )
+    inference = knowledge.infer(state).inference
+    rules = {rule.name: rule for rule in knowledge.base.rules}
+    derived = knowledge.explain(state).facts
+    assert {each.fact for each in derived} == inference.facts
+    for node in (node for each in derived for node in nodes(each)):
+        assert node.fact in inference.facts | inference.asserted
+        if node.source == "rule":
+            body = rules[node.rule].body
+            assert {name for name, _ in node.bindings} == {name for atom in body for name in atom.variables()}
+            assert len(node.premises) == sum(atom.kind in ("class", "object", "data") for atom in body)
+        else:
+            assert node.fact in inference.asserted
+            assert not node.premises
+
+
+def test_a_chain_of_rules_is_told_with_its_bindings(knowledge, in_error):
+    (tree,) = knowledge.explain(in_error, f"o_status(o_{SEARCH[2:]}, IN_ERROR_NFR)").facts
+    assert (tree.rule, tree.rules()) == ("S1b", {"S1b", "QAWaterVisibility"})
+    error = next(each for each in tree.premises if each.source == "rule")
+    assert {("expected", "3.25"), ("measured", "1.8")} <= {(name, str(value)) for name, value in error.bindings}
+
+
+def test_a_fact_that_the_schema_adds_names_it(edited):
+    # Nothing says that c_new is a Component but the domain of requiredBy.
+    knowledge = KnowledgeBase.load(
+        [
+            edited(
+                '<rdf:Description rdf:about="http://www.metacontrol.org/suave#c_new">'
+                '<mros:requiredBy rdf:resource="http://www.metacontrol.org/suave#fd_spiral_low"/></rdf:Description>'
+            )
+        ]
+    )
+    state = knowledge.state(components={"c_new": "FALSE"})
+    (tree,) = knowledge.explain(state, "fd_realisability(fd_spiral_low, false)").facts
+    assert tree.rule == "compError"
+    kind = next(each for each in tree.premises if each.fact.property == "type")
+    assert (kind.source, str(kind.fact)) == ("axioms", "Component(c_new)")
+    assert {each.source for each in kind.premises} <= {"state", "ontology"}
+
+
+def test_a_rule_that_computes_is_traced(tmp_path):
+    rules = tmp_path / "margin.swrl"
+    rules.write_text(
+        "margin: FunctionGrounding(?fg) ^ hasQAvalue(?fg, ?q) ^ hasValue(?q, ?v) ^ add(?w, ?v, 1.0) ^ "
+        'lessThan(?w, 3) -> fg_status(?fg, "IN_ERROR_FR")\n'
+    )
+    knowledge = KnowledgeBase.load(rules=[rules], disabled_rules=["QAWaterVisibility"])
+    state = knowledge.state(groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 1.5})
+    (tree,) = knowledge.explain(state, "fg_status(fg_spiral_high, IN_ERROR_FR)").facts
+    assert tree.rule == "margin"
+
+
+def test_of_several_derivations_the_first_is_told_whatever_pellet_picks(tmp_path):
+    rules = tmp_path / "any.swrl"
+    rules.write_text(
+        "any: isQAtype(?q, water_visibility) ^ hasValue(?q, ?v) ^ lessThan(?v, 9) -> "
+        "fd_realisability(fd_spiral_high, false)\n"
+    )
+    knowledge = KnowledgeBase.load(rules=[rules])
+    trees = [knowledge.explain(knowledge.state(), "fd_realisability(fd_spiral_high, false)").facts[0] for _ in range(3)]
+    assert len(set(trees)) == 1
+    assert dict(trees[0].bindings)["q"] == "qa_water_visibility_high"
+
+
+class TestDecisions:
+    def test_why_not_names_the_filter_and_how_its_fact_follows(self, knowledge, in_error):
+        (decision,) = knowledge.explain(in_error, "why not fd_all_thrusters?").decisions
+        assert decision.answer == "fd_all_thrusters is left out: not realisable"
+        left_out = next(each for each in decision.candidates if each.design == "fd_all_thrusters")
+        assert [each.rule for each in left_out.because] == ["compError"]
+
+    def test_why_tells_the_call_and_every_other_design(self, knowledge, in_error):
+        (decision,) = knowledge.explain(in_error, "why fd_spiral_low?").decisions
+        assert [each.rule for each in decision.because] == ["S1b"]
+        assert [(each.design, each.verdict) for each in decision.candidates] == [
+            ("fd_spiral_high", "left out"),
+            ("fd_spiral_low", "chosen"),
+            ("fd_spiral_medium", "left out"),
+        ]
+
+    def test_a_design_that_is_merely_worse_is_compared_with_the_best(self, knowledge):
+        (decision,) = knowledge.explain(knowledge.state(), "why not fd_spiral_low?").decisions
+        assert decision.answer == "fd_spiral_low is not the best: performance 0.25 < 1.0 of fd_spiral_high"
+
+    def test_where_no_design_is_left_it_is_said_which_one_stays(self, knowledge):
+        state = knowledge.state(groundings={SEARCH: "fd_spiral_low"}, measurements={"water_visibility": 1})
+        for design in ("fd_spiral_low", "fd_spiral_high"):
+            (decision,) = knowledge.explain(state, f"why not {design}?").decisions
+            assert decision.answer.startswith(f"no design is left, fd_spiral_low stays; {design} is left out: ")
+
+    def test_nothing_to_adapt_is_said(self, knowledge):
+        state = knowledge.state(groundings={SEARCH: "fd_spiral_low"}, measurements={"water_visibility": 1.25})
+        (decision,) = knowledge.explain(state, "why not fd_spiral_high?").decisions
+        assert "requires no adaptation, so fd_spiral_low stays" in decision.answer
+        (decision,) = knowledge.explain(state, "why fd_recover_thrusters?").decisions
+        assert "f_maintain_motion has no objective in this state" in decision.answer
+
+
+@pytest.mark.parametrize(
+    ("question", "said"),
+    [
+        ("fg_status(fg_spiral_high, IN_ERROR_FR)", "does not follow in this state (fg_status of fg_spiral_high: IN_E"),
+        ("fg_status(fg_spiral_hi, IN_ERROR_FR)", "there is no individual 'fg_spiral_hi' (did you mean fg_spiral_high?"),
+        ("why fd_spiral_lo?", "there is no function design 'fd_spiral_lo' (did you mean 'fd_spiral_low'"),
+        ("fg_statu(fg_spiral_high, IN_ERROR_FR)", "there is no property 'fg_statu' (did you mean fg_status?"),
+        ("because", "'because' is not a question about a state"),
+        ("fg_status(", "is an incomplete fact"),
+    ],
+)
+def test_a_question_that_has_no_answer_is_told_so(knowledge, in_error, question, said):
+    with pytest.raises(InputError) as error:
+        knowledge.explain(in_error, question)
+    assert said in str(error.value)
+
+
+def test_a_fact_that_does_not_follow_names_the_rule_that_comes_nearest(knowledge, command):
+    clear = ("--at", "water_visibility=3.5", "--at", f"{SEARCH}=fd_spiral_high")
+    status, _, error = command("explain", "fg_status(fg_spiral_high, IN_ERROR_NFR)", *clear)
+    assert (status, error.count("\n")) == (2, 1)
+    assert (
+        "does not follow in this state (fg_status of fg_spiral_high: none; rule QAWaterVisibility: lessThan(" in error
+    )
+    first = error.partition("rule QAWaterVisibility: ")[2].partition("; ")[0]
+    assert "does not hold with " in first
+    assert "?fg = fg_spiral_high" in first and "= 3.5" in first and "= 3.25" in first
+
+
+def test_of_what_does_not_hold_that_is_told_which_no_state_can_make_hold(knowledge):
+    """No thruster is required by fd_spiral_high: whether one has failed does not matter."""
+    with pytest.raises(InputError) as error:
+        knowledge.explain(knowledge.state(), "fd_realisability(fd_spiral_high, false)")
+    assert "rule compError: requiredBy(?c, ?fd) does not hold with ?c = c_thruster_1, ?fd = fd_spiral_high" in str(
+        error.value
+    )
+
+
+def test_before_a_measurement_the_rule_lacks_it(knowledge):
+    state = knowledge.state(groundings={SEARCH: "fd_spiral_high"})
+    with pytest.raises(InputError) as error:
+        knowledge.explain(state, "fg_status(fg_spiral_high, IN_ERROR_NFR)")
+    assert "rule QAWaterVisibility: " in str(error.value)
+    assert "hasQAvalue(" in str(error.value)
+
+
+def test_a_contradiction_names_the_rules_and_derives_both_sides(tmp_path):
+    rules = tmp_path / "clash.swrl"
+    rules.write_text(CLASH)
+    knowledge = KnowledgeBase.load(rules=[rules])
+    state = knowledge.state(groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 1.8})
+    explanation = knowledge.explain(state)
+    assert explanation.rules == ("QAWaterVisibility", "clash")
+    (clash,) = explanation.clashes
+    assert (clash.subject, clash.property) == ("fg_spiral_high", "fg_status")
+    assert {(str(side.fact.value), side.rule) for side in clash.sides} == {
+        ("IN_ERROR_FR", "clash"),
+        ("IN_ERROR_NFR", "QAWaterVisibility"),
+    }
+    above = knowledge.state(groundings={SEARCH: "fd_spiral_high"}, measurements={"water_visibility": 2})
+    assert knowledge.explain(above).contradiction is None
+
+
+def test_the_command_prints_the_tree_and_the_same_as_json(command, tmp_path):
+    words = ("--at", f"{SEARCH}=fd_spiral_high", "--at", "water_visibility=1.8")
+    status, text, _ = command("explain", "fg_status(fg_spiral_high, IN_ERROR_NFR)", *words)
+    assert status == 0
+    assert text.startswith("fg_status(fg_spiral_high, IN_ERROR_NFR)  [by rule QAWaterVisibility with ?eqa = ")
+    assert "\n  hasValue(obs_water_visibility, 1.8)  [given in the state]\n" in text
+    _, printed, _ = command("explain", "why fd_spiral_low?", *words, "--format", "json")
+    assert json.loads(printed)["decisions"][0]["because"][0]["rule"] == "S1b"
+    rules = tmp_path / "clash.swrl"
+    rules.write_text(CLASH)
+    status, text, _ = command("explain", *words, "--rules", rules)
+    assert status == 0
+    assert "fg_status of fg_spiral_high would have 2 values:" in text
+
+
+SCHEMA = """
+<owl:Class rdf:about="http://www.metacontrol.org/suave#FailedComponent"><owl:equivalentClass><owl:Restriction>
+  <owl:onProperty rdf:resource="http://metacontrol.org/tomasys#c_status"/><owl:hasValue>FALSE</owl:hasValue>
+</owl:Restriction></owl:equivalentClass></owl:Class>
+<owl:TransitiveProperty rdf:about="http://www.metacontrol.org/suave#partOf">
+  <rdf:type rdf:resource="http://www.w3.org/2002/07/owl#ObjectProperty"/>
+</owl:TransitiveProperty>
+<owl:ObjectProperty rdf:about="http://www.metacontrol.org/suave#hasPart">
+  <owl:inverseOf rdf:resource="http://www.metacontrol.org/suave#partOf"/>
+</owl:ObjectProperty>
+<owl:NamedIndividual rdf:about="http://www.metacontrol.org/suave#motor">
+  <partOf xmlns="http://www.metacontrol.org/suave#" rdf:resource="http://www.metacontrol.org/suave#c_thruster_1"/>
+</owl:NamedIndividual>
+<rdf:Description rdf:about="http://www.metacontrol.org/suave#c_thruster_1">
+  <partOf xmlns="http://www.metacontrol.org/suave#" rdf:resource="http://www.metacontrol.org/suave#hull"/>
+</rdf:Description>
+<owl:NamedIndividual rdf:about="http://www.metacontrol.org/suave#hull"/>
+"""
+
+
+def test_what_axioms_conclude_is_explained_inferred_and_queried(tmp_path):
+    shipped = (shipped_folder("ontology") / "suave.owl").read_text(encoding="utf-8")
+    owl = tmp_path / "suave.owl"
+    owl.write_text(shipped.replace("</rdf:RDF>", SCHEMA + "</rdf:RDF>"), encoding="utf-8")
+    knowledge = KnowledgeBase.load(owl)
+    state = knowledge.state(components={"c_thruster_3": "FALSE"})
+    inferred = {str(fact) for fact in knowledge.infer(state).inference.facts}
+    wanted = ["FailedComponent(c_thruster_3)", "partOf(motor, hull)", "hasPart(hull, motor)"]
+    assert inferred.issuperset(wanted)
+    for fact in wanted:
+        (derivation,) = knowledge.explain(state, fact).facts
+        assert derivation.source == "axioms"
+        assert derivation.axioms
+    result = knowledge.query("SELECT ?p WHERE { suave:hull suave:hasPart ?p }", state, inferred=True)
+    assert result.rows == (("suave:c_thruster_1",), ("suave:motor",))
+    assert knowledge.decide(state).plan == knowledge.infer(state).plan
+
+
+def test_a_reason_does_not_rest_on_what_it_explains(tmp_path: Path) -> None:
+    """The first two rules alone conclude each other's bodies; only the third starts from a fact."""
+    circular = (
+        'a1: fd_realisability(fd_spiral_high, false) -> fg_status(fg_spiral_high, "IN_ERROR_NFR")\n'
+        'a2: fg_status(fg_spiral_high, "IN_ERROR_NFR") -> fd_realisability(fd_spiral_high, false)\n'
+        'a3: c_status(c_thruster_1, "FALSE") -> fg_status(fg_spiral_high, "IN_ERROR_NFR")'
+    )
+    (tmp_path / "own.swrl").write_text(circular + "\n", encoding="utf-8")
+    knowledge = KnowledgeBase.load(rules=tmp_path / "own.swrl")
+    state = knowledge.state(groundings={SEARCH: "fd_spiral_high"}, components={"c_thruster_1": "FALSE"})
+    found = knowledge.explain(state, "fd_realisability(fd_spiral_high, false)")
+    text = "\n".join(map(str, found.lines()))
+    assert text.index("a2") < text.index("a3") and "a1" not in text and "c_thruster_1" in text
+
+
+def test_the_nearest_binding_is_the_one_whose_value_differs_not_the_one_of_which_nothing_is_known(
+    knowledge: KnowledgeBase,
+) -> None:
+    """Thruster 1 has failed, but nothing requires it; thruster 2 is required, but has recovered."""
+    text = 'own: c_status(?c, "FALSE") ^ requiredBy(?c, ?fd) ^ typeFD(?fg, ?fd) -> fd_realisability(?fd, false)'
+    rule = read_rule(text, knowledge.base.vocabulary, Path("own.swrl"))
+    facts = Facts(
+        (
+            (SUAVE + "c_thruster_1", C_STATUS, Lit("FALSE", XSD + "string")),
+            (SUAVE + "c_thruster_2", C_STATUS, Lit("RECOVERED", XSD + "string")),
+            (SUAVE + "c_thruster_2", MROS + "requiredBy", SUAVE + "fd_all_thrusters"),
+            (SUAVE + "fg", TOMASYS + "typeFD", SUAVE + "fd_all_thrusters"),
+        )
+    )
+    found = NearestFinder(rule, facts).find()
+    assert found[1] == (0,)
+    assert found[0]["c"] == SUAVE + "c_thruster_2"
+    alone = NearestFinder(rule, Facts(facts.all[:1])).find()
+    assert alone == ({"c": SUAVE + "c_thruster_1"}, (1, 2))
+
+
+@pytest.mark.parametrize(
+    ("body", "failing", "binding"),
+    [
+        ('c_status(?x, "FALSE") ^ Binding(?x)', (0,), "b"),  # a class comes last, wherever it is written
+        ("Binding(?x) ^ Role(?x)", (1,), "b"),  # of two alike, the one that is written later fails
+    ],
+)
+def test_of_bindings_as_near_the_one_of_the_class_that_the_rule_is_about_is_told(
+    knowledge: KnowledgeBase, body: str, failing: tuple[int, ...], binding: str
+) -> None:
+    rule = read_rule(f"own: {body} -> fd_realisability(fd_spiral_high, false)", knowledge.base.vocabulary, Path("own"))
+    facts = Facts(
+        (
+            (SUAVE + "b", RDF_TYPE, TOMASYS + "Binding"),
+            (SUAVE + "r", RDF_TYPE, TOMASYS + "Role"),
+            (SUAVE + "c", C_STATUS, Lit("FALSE", XSD + "string")),
+        )
+    )
+    found = NearestFinder(rule, facts).find()
+    assert found == ({"x": SUAVE + binding}, failing)
