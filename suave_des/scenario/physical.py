@@ -255,9 +255,8 @@ class Pipeline(Strict):
     """Evenly spaced points on each straight piece, its first vertex excluded and its last included."""
 
 
-_EVENT_TEXT = re.compile(
-    r"\(\s*(?P<thruster>[0-9]{1,9})\s*,\s*(?P<event>\w+)\s*,\s*(?P<time_s>[-+.0-9eE]+|nan|[-+]?inf)\s*\)", re.ASCII
-)
+_TIME = r"[-+]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?|inf)|nan"
+_EVENT_TEXT = re.compile(rf"\(\s*([0-9]{{1,9}})\s*,\s*(\w+)\s*,\s*({_TIME})\s*\)", re.ASCII)
 
 
 class ThrusterEvent(Strict):
@@ -279,13 +278,10 @@ class ThrusterEvent(Strict):
         if not isinstance(value, str):
             return value
         match = _EVENT_TEXT.fullmatch(value.strip())
-        try:
-            if match is not None:
-                return {"thruster": int(match[1]), "event": match[2], "time_s": float(match[3])}
-        except ValueError:
-            pass
-        remedy = "write (THRUSTER,failure or recovery,TIME), as in (1,failure,35)"
-        raise wrong(f"{shown(value)} is not a thruster event", remedy)
+        if match is None:
+            remedy = "write (THRUSTER,failure or recovery,TIME), as in (1,failure,35)"
+            raise wrong(f"{shown(value)} is not a thruster event", remedy)
+        return {"thruster": int(match[1]), "event": match[2], "time_s": float(match[3])}
 
 
 class Battery(Monitor):
