@@ -25,12 +25,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from suave_des.kb import KnowledgeBase
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.java import make_archive
 from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import Inference, KnowledgeState, ObjectiveState
 from suave_des.resources import shipped_folder
-from suave_des.workbench import KnowledgeBase as Workbench
 
 WARM_UP = 300
 LEAK_STATES = 20_000
@@ -150,9 +150,9 @@ def first_inference_s(name: str) -> float:
 def policy_s() -> tuple[float, int]:
     """To fill an empty memory for the whole policy, and how many states that covers."""
     with empty_memory():
-        workbench = Workbench.load()
+        knowledge = KnowledgeBase.load()
         begin_s = time.perf_counter()
-        policy = workbench.policy(max_failed=2)
+        policy = knowledge.policy(max_failed=2)
         return time.perf_counter() - begin_s, policy.states
 
 

@@ -8,6 +8,10 @@ from decimal import Decimal
 from pathlib import Path
 
 from suave_des.errors import InputError, KnowledgeError
+from suave_des.kb.explain import LEFT_OUT, verdicts
+from suave_des.kb.knowledge_base import KnowledgeBase
+from suave_des.kb.states import ManagingSettings
+from suave_des.kb.tracing import Derivation
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.planning import performance
@@ -22,10 +26,6 @@ from suave_des.results.mission import adaptations
 from suave_des.results.mission_figures import Rules
 from suave_des.scenario.loader import InputFiles
 from suave_des.scenario_knowledge import open_base, read_base
-from suave_des.workbench.explain import LEFT_OUT, verdicts
-from suave_des.workbench.knowledge_base import KnowledgeBase
-from suave_des.workbench.states import ManagingSettings
-from suave_des.workbench.tracing import Derivation
 
 _TIME_DIGITS = 2
 

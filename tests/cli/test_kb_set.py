@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from suave_des.cli.main import main
-from suave_des.workbench import KnowledgeBase
+from suave_des.kb import KnowledgeBase
 
 IMPROVES = "revision.metacontrol.improve_when_exceeded"
 STATE = ("--at", "f_generate_search_path=fd_spiral_low", "--at", "water_visibility=4")

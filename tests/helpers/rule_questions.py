@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from suave_des.kb.states import ManagingSettings, StateBuilder
+from suave_des.kb.why_not import RuleQuestions
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.scenario.loader import load_scenario
-from suave_des.workbench.states import ManagingSettings, StateBuilder
-from suave_des.workbench.why_not import RuleQuestions
 from tests.helpers.owl_text import SUAVE, TOMASYS, XSD
 
 SEARCH, MOTION = "f_generate_search_path", "f_maintain_motion"

@@ -8,10 +8,10 @@ import pytest
 
 from suave_des.errors import KnowledgeError
 from suave_des.findings import Level
+from suave_des.kb.check import check
 from suave_des.resources import shipped_folder
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario_knowledge import open_base, subject_of
-from suave_des.workbench.check import check
 from tests.helpers.checks import OWL, TOMASYS, individual, link
 from tests.helpers.command import command_here
 from tests.helpers.exemplar_files import write_as_owlready2_saves_it, write_exemplar_files, write_files_of_2023

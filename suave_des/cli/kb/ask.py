@@ -30,8 +30,8 @@ from suave_des.interrupts import ends_at_once
 from suave_des.tables import Table
 
 if TYPE_CHECKING:
+    from suave_des.kb.policy import FunctionTable, Policy
     from suave_des.knowledge.state import Reasoning
-    from suave_des.workbench.policy import FunctionTable, Policy
 
 _EXAMPLES = 5
 
@@ -106,7 +106,7 @@ def policy(
 
     Measured values are divided into ranges: at and between the numbers that the knowledge base mentions.
     """
-    from suave_des.workbench.policy import columns_of, function_table, rows_of
+    from suave_des.kb.policy import columns_of, function_table, rows_of
 
     if csv is not None and csv.is_dir():
         raise InputError("is a folder", file=csv, remedy="name a file, such as policy.csv")
@@ -114,7 +114,7 @@ def policy(
     with counted("states", errors()) as on_count:
         found = knowledge.policy(max_failed, on_count, partial(announce, knowledge, 1))
     if png is not None:
-        from suave_des.workbench.policy_figure import draw_policy
+        from suave_des.kb.policy_figure import draw_policy
 
         draw_policy(found, png)
     if csv is not None:
@@ -152,8 +152,8 @@ def _function_table(found: FunctionTable) -> Table:
 
 
 def _policy_summary(found: Policy) -> Iterator[str]:
+    from suave_des.kb.policy import no_proof
     from suave_des.knowledge.state import NONE_LEFT
-    from suave_des.workbench.policy import no_proof
 
     kinds, most = len(found.cases), found.max_failed
     counts = f"{number_of(found.states, 'state')} in {kinds} equivalence class{'' if kinds == 1 else 'es'}"
@@ -229,9 +229,9 @@ def why_not(
 
     The exit status is 0 even if a rule fires.
     """
+    from suave_des.kb.states import ManagingSettings, StateBuilder
+    from suave_des.kb.why_not import RuleQuestions
     from suave_des.knowledge.pellet import TimeLimit
-    from suave_des.workbench.states import ManagingSettings, StateBuilder
-    from suave_des.workbench.why_not import RuleQuestions
 
     loaded = options.loaded()
     questions = RuleQuestions.open(loaded, facts or ())

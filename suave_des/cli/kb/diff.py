@@ -18,7 +18,7 @@ from suave_des.records.metrics import Metric, metric_of
 from suave_des.tables import Table
 
 if TYPE_CHECKING:
-    from suave_des.workbench.difference import MissionDifference, PairedDifference, PolicyDifference
+    from suave_des.kb.difference import MissionDifference, PairedDifference, PolicyDifference
 
 _MOST_RUNS = 10
 """Numbers of missions that are listed; all of them are in the JSON form."""
@@ -54,7 +54,7 @@ def diff(
     --ontology, --rules and --disable-rule apply to both; an ontology given as A or B replaces the
     scenario's. Decisions are compared in every state; missions with the same number use common random numbers.
     """
-    from suave_des.workbench.difference import compare_axioms
+    from suave_des.kb.difference import compare_axioms
 
     both = [options.with_file(file) for file in (one, other)]
     before, after = (each.knowledge() for each in both)
@@ -79,7 +79,7 @@ def diff(
 
 
 def _missions(both: list[ReasonerOptions], options: MissionOptions) -> MissionDifference:
-    from suave_des.workbench.difference import compare_missions
+    from suave_des.kb.difference import compare_missions
 
     assert options.missions is not None
     replaced = [each.replacements | {"modes_file": options.modes} for each in both]
@@ -112,8 +112,8 @@ def _metric(each: PairedDifference) -> Metric:
 
 
 def _mission_lines(both: list[ReasonerOptions], options: MissionOptions, missions: MissionDifference) -> Iterator[str]:
+    from suave_des.kb.difference import METRICS, firing_states
     from suave_des.knowledge.pellet import TimeLimit
-    from suave_des.workbench.difference import METRICS, firing_states
 
     if not missions.changed:
         replaced = [each.replacements | {"modes_file": options.modes} for each in both]

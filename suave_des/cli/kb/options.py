@@ -19,9 +19,9 @@ from suave_des.resources import DEFAULT_SCENARIO
 from suave_des.tables import Table
 
 if TYPE_CHECKING:
+    from suave_des.kb import KnowledgeBase
     from suave_des.knowledge.state import KnowledgeState
     from suave_des.scenario.loader import LoadedScenario
-    from suave_des.workbench import KnowledgeBase
 
 
 #: Seconds for an inference by a reasoner that is slower than the Pellet in this process (which takes 2 to 7 ms).
@@ -83,7 +83,7 @@ class ReasonerOptions(KnowledgeOptions):
 
     def knowledge(self) -> KnowledgeBase:
         """Load the knowledge base and start the reasoner."""
-        from suave_des.workbench import KnowledgeBase
+        from suave_des.kb import KnowledgeBase
 
         return KnowledgeBase.load(
             self.ontology or (),
@@ -115,7 +115,7 @@ At = Annotated[
 
 def state_at(at: Iterable[str] | None, knowledge: KnowledgeBase) -> KnowledgeState:
     """Build the state that the words of --at describe; later ones replace earlier ones."""
-    from suave_des.workbench.states import StateBuilder
+    from suave_des.kb.states import StateBuilder
 
     builder = StateBuilder(knowledge.base, knowledge.settings)
     builder.add_words(at or ())
@@ -159,9 +159,9 @@ def emit(content: object, form: Format, lines: Callable[[], Iterable[str]]) -> N
 
 
 def _plain(value: Any) -> Any:
+    from suave_des.kb.space import ValueRange
+    from suave_des.kb.states import state_dict
     from suave_des.knowledge.state import Fact, KnowledgeState
-    from suave_des.workbench.space import ValueRange
-    from suave_des.workbench.states import state_dict
 
     if isinstance(value, KnowledgeState):
         return state_dict(value)

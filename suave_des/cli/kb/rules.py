@@ -16,8 +16,8 @@ from suave_des.errors import number_of
 
 if TYPE_CHECKING:
     from suave_des.findings import Finding
+    from suave_des.kb.replay import MissionReplay
     from suave_des.knowledge.ontology import Ontology
-    from suave_des.workbench.replay import MissionReplay
 
 FOUND = 1
 """Exit status of `check` when there are findings that --fail-on names."""
@@ -58,9 +58,9 @@ def check(
     Exit status: 0 no findings at the level of --fail-on or above; 1 such findings; 2 something cannot be read.
     """
     from suave_des.findings import Level, has_level, summary
+    from suave_des.kb.check import check as run_checks
     from suave_des.scenario.loader import load_scenario
     from suave_des.scenario_knowledge import subject_of
-    from suave_des.workbench.check import check as run_checks
 
     loaded = load_scenario(options.scenario, **(options.replacements | {"modes_file": modes}))
     findings = run_checks(replace(subject_of(loaded), shapes=shapes or (), time_limit_s=time_limit))
@@ -111,7 +111,7 @@ def add_rule(
     rule: Annotated[str, typer.Argument(metavar="RULE", help='The rule, "name: body -> head", or a .swrl file.')],
 ) -> None:
     """Add a rule, or the rules of a file, to an OWL file, and leave everything else in it as it is."""
-    from suave_des.workbench.rule_editor import add_rules
+    from suave_des.kb.rule_editor import add_rules
 
     names = [added.name for added in add_rules(file, rule)]
     are = f"rule {names[0]} is" if len(names) == 1 else f"rules {', '.join(names)} are"
@@ -120,7 +120,7 @@ def add_rule(
 
 def remove_rule(file: OwlFile, name: RuleName) -> None:
     """Remove a rule from an OWL file, and leave everything else in it as it is."""
-    from suave_des.workbench.rule_editor import remove_rule as remove
+    from suave_des.kb.rule_editor import remove_rule as remove
 
     remove(file, name)
     print(f"rule {name} is not in {file} any more; {file}.bak is the previous version")
@@ -137,7 +137,7 @@ def disable_rule(file: OwlFile, name: RuleName) -> None:
 
 
 def _switch(file: Path, name: str, *, enabled: bool) -> None:
-    from suave_des.workbench.rule_editor import set_enabled
+    from suave_des.kb.rule_editor import set_enabled
 
     word = "enabled" if enabled else "disabled"
     if set_enabled(file, name, enabled=enabled):
@@ -178,7 +178,7 @@ def try_(
     No mission is run again: the reasoner evaluates each recorded state with and without the rule. Only a new run shows
     the consequences of a different decision.
     """
-    from suave_des.workbench.replay import RuleChange, try_rules
+    from suave_des.kb.replay import RuleChange, try_rules
 
     change = RuleChange(
         rule,

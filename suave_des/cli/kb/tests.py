@@ -25,11 +25,11 @@ from suave_des.resources import shipped_folder
 from suave_des.tables import Table
 
 if TYPE_CHECKING:
+    from suave_des.kb import KnowledgeBase
+    from suave_des.kb.coverage import Coverage
+    from suave_des.kb.mutation import MutantResult
+    from suave_des.kb.rule_tests import RuleTest, Tested, TestResult
     from suave_des.knowledge.state import KnowledgeState
-    from suave_des.workbench import KnowledgeBase
-    from suave_des.workbench.coverage import Coverage
-    from suave_des.workbench.mutation import MutantResult
-    from suave_des.workbench.rule_tests import RuleTest, Tested, TestResult
 
 FAILED = 1
 """Exit status when a test fails."""
@@ -56,7 +56,7 @@ class TestOptions(KnowledgeFiles):
 
     def load(self, about: Tested) -> KnowledgeBase:
         """Load a knowledge base."""
-        from suave_des.workbench import KnowledgeBase
+        from suave_des.kb import KnowledgeBase
 
         return KnowledgeBase.load(**about, values=self.values, time_limit_s=self.time_limit)
 
@@ -133,7 +133,7 @@ def test(
     results = _run(console, suites, select)
     _print_failures(console, results)
     if junit_xml is not None:
-        from suave_des.workbench.rule_tests import junit_xml as written
+        from suave_des.kb.rule_tests import junit_xml as written
 
         write_files(junit_xml.parent, {junit_xml.name: written(results)})
     _print_summary(console, results, time.perf_counter() - began)
@@ -151,7 +151,7 @@ def test(
 
 def _write_mission(folder: Path, file: Path | None, options: TestOptions) -> None:
     """Write a recorded mission's decisions as tests, or print them."""
-    from suave_des.workbench.rule_tests import mission_knowledge, mission_states, tests_text
+    from suave_des.kb.rule_tests import mission_knowledge, mission_states, tests_text
 
     about = options.apply(mission_knowledge(folder))
     knowledge = options.load(about)
@@ -167,7 +167,7 @@ def _write_mission(folder: Path, file: Path | None, options: TestOptions) -> Non
 
 def _suites(options: TestOptions, files: Sequence[Path]) -> list[Suite]:
     """Read all files before anything runs, so that a mistake in the last one comes first."""
-    from suave_des.workbench.rule_tests import TestFile, shipped_tests
+    from suave_des.kb.rule_tests import TestFile, shipped_tests
 
     suites: dict[str, Suite] = {}
     for file in [TestFile.read(path) for path in files or shipped_tests()]:
@@ -180,7 +180,7 @@ def _suites(options: TestOptions, files: Sequence[Path]) -> list[Suite]:
 
 def _run(console: Console, suites: Sequence[Suite], select: str | None) -> list[TestResult]:
     """Run tests, with a line of dots for each file, as pytest prints it."""
-    from suave_des.workbench.rule_tests import run_test
+    from suave_des.kb.rule_tests import run_test
 
     chosen = [
         (suite.knowledge, test)
@@ -255,8 +255,8 @@ def _print_summary(console: Console, results: Sequence[TestResult], duration_s: 
 
 def _cover(suites: Sequence[Suite], max_failed: int, file: Path | None) -> None:
     """Show what the tests of each knowledge base cover, and write tests of what they do not."""
-    from suave_des.workbench.coverage import measure_coverage
-    from suave_des.workbench.rule_tests import tests_text
+    from suave_des.kb.coverage import measure_coverage
+    from suave_des.kb.rule_tests import tests_text
 
     if file is not None and len(suites) > 1:
         remedy = "give files of tests of one knowledge base"
@@ -310,7 +310,7 @@ def _coverage_lines(coverage: Coverage, max_failed: int) -> Iterator[str]:
 
 def _mutate(console: Console, suites: Sequence[Suite], options: MutationOptions) -> None:
     """Show which mutants of each knowledge base the tests kill."""
-    from suave_des.workbench.mutation import mutants_of, mutate, sample
+    from suave_des.kb.mutation import mutants_of, mutate, sample
 
     for suite in suites:
         found = mutants_of(suite.knowledge.base)
@@ -333,7 +333,7 @@ def _mutate(console: Console, suites: Sequence[Suite], options: MutationOptions)
 
 def _mutation_lines(results: Sequence[MutantResult], states: int, max_failed: int) -> Iterator[str]:
     """A table of the operators, and each survivor with a state that tells it apart."""
-    from suave_des.workbench.mutation import EQUIVALENT, KILLED, SURVIVED
+    from suave_des.kb.mutation import EQUIVALENT, KILLED, SURVIVED
 
     kinds = (KILLED, SURVIVED, EQUIVALENT)
     by_operator: dict[str, Counter[str]] = {}

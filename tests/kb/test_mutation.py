@@ -10,11 +10,9 @@ from pathlib import Path
 import pytest
 
 from suave_des.campaign.single import run_mission
-from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.rdf import QA_OPERATOR
-from suave_des.workbench import KnowledgeBase
-from suave_des.workbench.coverage import FIRES, Goal, least_cover, measure_coverage
-from suave_des.workbench.mutation import (
+from suave_des.kb import KnowledgeBase
+from suave_des.kb.coverage import FIRES, Goal, least_cover, measure_coverage
+from suave_des.kb.mutation import (
     EQUIVALENT,
     KILLED,
     OPERATORS,
@@ -25,10 +23,12 @@ from suave_des.workbench.mutation import (
     mutate,
     sample,
 )
-from suave_des.workbench.policy import kinds_of_states
-from suave_des.workbench.rule_tests import RuleTest, TestFile, run_test, shipped_tests
-from suave_des.workbench.situations import Situation, compare
-from suave_des.workbench.space import PolicySpace, interchangeable_components
+from suave_des.kb.policy import kinds_of_states
+from suave_des.kb.rule_tests import RuleTest, TestFile, run_test, shipped_tests
+from suave_des.kb.situations import Situation, compare
+from suave_des.kb.space import PolicySpace, interchangeable_components
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.rdf import QA_OPERATOR
 from tests.helpers.knowledge_states import FEWER_NUMBERS
 from tests.helpers.owl_text import SUAVE, individual
 

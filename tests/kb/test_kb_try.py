@@ -8,6 +8,7 @@ import pytest
 
 from suave_des.campaign.single import run_mission
 from suave_des.errors import InputError
+from suave_des.kb.replay import RuleChange, try_rules
 from suave_des.records.knowledge import (
     CAMPAIGN_KNOWLEDGE_FILE,
     KNOWLEDGE_FILE,
@@ -18,7 +19,6 @@ from suave_des.records.knowledge import (
     scenario_line,
 )
 from suave_des.scenario.models import Scenario
-from suave_des.workbench.replay import RuleChange, try_rules
 
 SEARCH = "f_generate_search_path"
 NEAR = (

@@ -7,8 +7,8 @@ from xml.etree import ElementTree
 import pytest
 
 from suave_des.errors import InputError
-from suave_des.workbench.rule_tests import TestFile, run_test, shipped_tests
-from suave_des.workbench.space import measurements_in, parse_region, ranges_between
+from suave_des.kb.rule_tests import TestFile, run_test, shipped_tests
+from suave_des.kb.space import measurements_in, parse_region, ranges_between
 from tests.helpers.owl_text import individual, iri
 
 SPARE = """\

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from suave_des.errors import InputError
-from suave_des.workbench import KnowledgeBase
+from suave_des.kb import KnowledgeBase
 
 SEARCH = "f_generate_search_path"
 

@@ -21,6 +21,7 @@ from math import comb
 from typing import Final
 
 from suave_des.errors import InputError, KnowledgeError, shown
+from suave_des.kb.states import ManagingSettings
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import (
     C_STATUS,
@@ -39,7 +40,6 @@ from suave_des.knowledge.reasoner import Regions, regions_of
 from suave_des.knowledge.rules import COMPARISONS, SAME, Atom, Named, Rule, Term, Variable, texts_of
 from suave_des.knowledge.state import exact
 from suave_des.monitor.diagnostics import FAILED, RECOVERED
-from suave_des.workbench.states import ManagingSettings
 
 _NUMBER: Final = r"([+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+))"
 _REGION: Final = re.compile(rf"(?:{_NUMBER}\s*(<=?)\s*)?\.(?:\s*(<=?)\s*{_NUMBER})?")

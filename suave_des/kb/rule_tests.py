@@ -27,18 +27,12 @@ from lxml import etree
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from suave_des.errors import InputError, KnowledgeError, did_you_mean, shown
-from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.pellet import ReasonerTimeoutError
-from suave_des.knowledge.reasoner import regions_of
-from suave_des.knowledge.state import NONE_LEFT, STAYS, Fact, KnowledgeState
-from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
-from suave_des.scenario.yamlfile import YamlDocument, read_yaml, validated
-from suave_des.workbench.explain import verdicts
-from suave_des.workbench.knowledge_base import KnowledgeBase
-from suave_des.workbench.replay import mission_scenario
-from suave_des.workbench.situations import Decide, Outcome, Situation
-from suave_des.workbench.space import ValueRange, measurements_in, parse_region
-from suave_des.workbench.states import (
+from suave_des.kb.explain import verdicts
+from suave_des.kb.knowledge_base import KnowledgeBase
+from suave_des.kb.replay import mission_scenario
+from suave_des.kb.situations import Decide, Outcome, Situation
+from suave_des.kb.space import ValueRange, measurements_in, parse_region
+from suave_des.kb.states import (
     NEW_INDIVIDUAL,
     FactReader,
     StateBuilder,
@@ -47,7 +41,13 @@ from suave_des.workbench.states import (
     recorded_states,
     state_dict,
 )
-from suave_des.workbench.why_not import RuleQuestions
+from suave_des.kb.why_not import RuleQuestions
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.pellet import ReasonerTimeoutError
+from suave_des.knowledge.reasoner import regions_of
+from suave_des.knowledge.state import NONE_LEFT, STAYS, Fact, KnowledgeState
+from suave_des.resources import DEFAULT_SCENARIO, find, shipped_folder
+from suave_des.scenario.yamlfile import YamlDocument, read_yaml, validated
 
 #: What XML 1.0 has no place for.
 _FORBIDDEN: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")

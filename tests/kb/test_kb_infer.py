@@ -12,11 +12,11 @@ import pytest
 
 import suave_des
 from suave_des.errors import InputError, KnowledgeError
+from suave_des.kb import KnowledgeBase
 from suave_des.knowledge import pellet as limit
 from suave_des.knowledge.pellet import TimeLimit, times_abandoned
 from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import ObjectiveState
-from suave_des.workbench import KnowledgeBase
 
 HIGH = {"groundings": {"f_generate_search_path": "fd_spiral_high"}, "measurements": {"water_visibility": 1.8}}
 _BODY = " ^ ".join(f"isQAtype(?a{n}, ?b{n})" for n in range(12))
@@ -219,7 +219,7 @@ main(["run", "seams2023", "--reasoner", {reasoner!r}, "--rules", {str(rules)!r}]
         program = f"""
 import sys
 from suave_des.errors import KnowledgeError
-from suave_des.workbench import KnowledgeBase
+from suave_des.kb import KnowledgeBase
 from suave_des.knowledge import pellet as limit
 from suave_des.knowledge.pellet import TimeLimit, times_abandoned
 knowledge = KnowledgeBase.load(reasoner="pellet")  # Java starts in another thread than this one

@@ -1,12 +1,12 @@
-"""What the tests of the workbench share: one knowledge base, edited copies, and the command line."""
+"""What the tests of `kb` share: one knowledge base, edited copies, and the command line."""
 
 from __future__ import annotations
 
 import pytest
 
 from suave_des.cli.main import main
+from suave_des.kb import KnowledgeBase
 from suave_des.resources import shipped_folder
-from suave_des.workbench import KnowledgeBase
 from tests.helpers.knowledge_states import FEWER_NUMBERS
 
 

@@ -9,6 +9,14 @@ from typing import Final
 
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.findings import Finding, Level, has_level, ordered
+from suave_des.kb.shapes import check_shapes
+from suave_des.kb.space import (
+    component_statuses,
+    has_effect,
+    interchangeable_components,
+    numbers_in,
+    ranges_between,
+)
 from suave_des.knowledge.checks import Subject, static_findings
 from suave_des.knowledge.checks.model import check_revision, rules_of_2023
 from suave_des.knowledge.ontology import Ontology
@@ -17,14 +25,6 @@ from suave_des.knowledge.pellet import ReasonerTimeoutError, TimeLimit
 from suave_des.knowledge.reasoner import Reasoner, regions_of
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.monitor.diagnostics import RECOVERED
-from suave_des.workbench.shapes import check_shapes
-from suave_des.workbench.space import (
-    component_statuses,
-    has_effect,
-    interchangeable_components,
-    numbers_in,
-    ranges_between,
-)
 
 __all__ = ["MAX_STATES", "Subject", "check", "combined", "simple_states"]
 

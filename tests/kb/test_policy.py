@@ -10,12 +10,11 @@ from pathlib import Path
 import pytest
 
 from suave_des.errors import InputError
-from suave_des.knowledge.state import Decision, Inference, KnowledgeState, ObjectiveState, Plan, Reasoning, exact
-from suave_des.workbench import KnowledgeBase
-from suave_des.workbench.policy import FLIP_FLOP, Policy, PolicyCase, _with_flip_flops, function_table, make_policy
-from suave_des.workbench.policy_figure import draw_policy
-from suave_des.workbench.situations import Outcome, Situation
-from suave_des.workbench.space import (
+from suave_des.kb import KnowledgeBase
+from suave_des.kb.policy import FLIP_FLOP, Policy, PolicyCase, _with_flip_flops, function_table, make_policy
+from suave_des.kb.policy_figure import draw_policy
+from suave_des.kb.situations import Outcome, Situation
+from suave_des.kb.space import (
     ComponentReports,
     Dependence,
     PolicySpace,
@@ -25,7 +24,8 @@ from suave_des.workbench.space import (
     ranges_between,
     values_in,
 )
-from suave_des.workbench.states import ManagingSettings
+from suave_des.kb.states import ManagingSettings
+from suave_des.knowledge.state import Decision, Inference, KnowledgeState, ObjectiveState, Plan, Reasoning, exact
 
 MOTION, SEARCH = "f_maintain_motion", "f_generate_search_path"
 

@@ -13,6 +13,19 @@ from functools import cached_property
 from typing import Final
 
 from suave_des.errors import InputError, did_you_mean, nearest, shown
+from suave_des.kb.matching import (
+    FACT_KINDS,
+    Binding,
+    Facts,
+    NearestFinder,
+    bound,
+    shown_bindings,
+    stated,
+    unified,
+)
+from suave_des.kb.situations import Probes, Situation
+from suave_des.kb.states import FactReader
+from suave_des.kb.tracing import Tracer
 from suave_des.knowledge.checks.model import unmeasured_rules
 from suave_des.knowledge.content import with_rules
 from suave_des.knowledge.ontology import Ontology
@@ -38,19 +51,6 @@ from suave_des.knowledge.rules.files import RulesFile
 from suave_des.knowledge.state import ContradictionError, Fact, KnowledgeState, Value, value_text
 from suave_des.scenario.loader import LoadedScenario
 from suave_des.scenario_knowledge import open_base
-from suave_des.workbench.matching import (
-    FACT_KINDS,
-    Binding,
-    Facts,
-    NearestFinder,
-    bound,
-    shown_bindings,
-    stated,
-    unified,
-)
-from suave_des.workbench.situations import Probes, Situation
-from suave_des.workbench.states import FactReader
-from suave_des.workbench.tracing import Tracer
 
 _WORDS: Final = {
     "<": "less than",

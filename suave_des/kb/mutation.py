@@ -21,6 +21,12 @@ from functools import cached_property, partial
 from typing import Final, NamedTuple, TypeVar
 
 from suave_des.errors import KnowledgeError
+from suave_des.kb.knowledge_base import KnowledgeBase
+from suave_des.kb.matching import instance, matched
+from suave_des.kb.policy import kinds_of_states
+from suave_des.kb.rule_tests import RuleTest, passes
+from suave_des.kb.situations import Body, Outcome, Probes, Situation, compare
+from suave_des.kb.space import PolicySpace
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import ReasonerTimeoutError
 from suave_des.knowledge.planning import plan
@@ -55,12 +61,6 @@ from suave_des.knowledge.rules import (
 from suave_des.knowledge.rules.checks import fatal_problems
 from suave_des.knowledge.rules.files import with_triples
 from suave_des.knowledge.state import Fact, Inference, KnowledgeState, Reasoning
-from suave_des.workbench.knowledge_base import KnowledgeBase
-from suave_des.workbench.matching import instance, matched
-from suave_des.workbench.policy import kinds_of_states
-from suave_des.workbench.rule_tests import RuleTest, passes
-from suave_des.workbench.situations import Body, Outcome, Probes, Situation, compare
-from suave_des.workbench.space import PolicySpace
 
 _NOT_HORN: Final = (
     *("unionOf", "complementOf", "oneOf", "disjointUnionOf", "maxCardinality", "maxQualifiedCardinality"),

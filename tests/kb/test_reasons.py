@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.errors import InputError
+from suave_des.kb import KnowledgeBase
+from suave_des.kb.matching import Facts, NearestFinder
 from suave_des.knowledge.rdf import C_STATUS, RDF_TYPE, Lit
 from suave_des.knowledge.rules.files import read_rule
 from suave_des.resources import shipped_folder
-from suave_des.workbench import KnowledgeBase
-from suave_des.workbench.matching import Facts, NearestFinder
 from tests.helpers.owl_text import MROS, SUAVE, TOMASYS, XSD
 
 MOTION, SEARCH = "f_maintain_motion", "f_generate_search_path"

@@ -23,13 +23,13 @@ from rdflib.term import Node
 
 from suave_des.errors import InputError, KnowledgeError, nearest
 from suave_des.files import write_files
+from suave_des.kb.states import read_rules
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.ontology_file import OntologyFile, read_ontology
 from suave_des.knowledge.rdf import RDF as RDF_NS
 from suave_des.knowledge.rdf import RDFS, SWRL, SWRLA, XSD, RdfTriple, local_name
 from suave_des.knowledge.rules import Rule
 from suave_des.knowledge.rules.files import ENABLED, rules_of
-from suave_des.workbench.states import read_rules
 
 _TAG: Final = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
 _MARK: Final = re.compile(rb"(<[\w.-]*:?isRuleEnabled\b[^>]*>)[^<]*(?=</)")

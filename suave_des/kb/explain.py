@@ -8,6 +8,9 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from suave_des.errors import InputError, did_you_mean, shown
+from suave_des.kb.states import FactReader
+from suave_des.kb.tracing import Clash, Derivation, Tracer
+from suave_des.kb.why_not import RuleQuestions, WhyNot
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import InProcessPellet
 from suave_des.knowledge.planning import performance
@@ -22,9 +25,6 @@ from suave_des.knowledge.state import (
     objective_name,
     value_text,
 )
-from suave_des.workbench.states import FactReader
-from suave_des.workbench.tracing import Clash, Derivation, Tracer
-from suave_des.workbench.why_not import RuleQuestions, WhyNot
 
 #: Rules that are named for a fact that does not follow.
 NEAREST: Final = 3

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from suave_des.errors import InputError
+from suave_des.kb.policy import FLIP_FLOP, FunctionTable, Policy, TableRow, function_table
+from suave_des.kb.situations import INCONSISTENT
+from suave_des.kb.space import ValueRange
 from suave_des.knowledge.state import NO_GROUNDING, NONE_LEFT, STAYS
 from suave_des.results.figures import check_picture, write_picture
 from suave_des.results.style import MODE_COLOURS, OTHER_MODES, WIDTH_IN, publication
-from suave_des.workbench.policy import FLIP_FLOP, FunctionTable, Policy, TableRow, function_table
-from suave_des.workbench.situations import INCONSISTENT
-from suave_des.workbench.space import ValueRange
 
 _FIXED: Final = {INCONSISTENT: "#B00020", NONE_LEFT: "#D9D9D9", NO_GROUNDING: "#FFFFFF"}
 _LEGEND: Final = {NONE_LEFT: "none left: as before", INCONSISTENT: "contradiction"}

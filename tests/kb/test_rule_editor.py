@@ -11,12 +11,12 @@ from rdflib import Graph, URIRef
 from rdflib.namespace import RDF
 
 from suave_des.errors import InputError, KnowledgeError
+from suave_des.kb.rule_editor import add_rules, remove_rule, set_enabled
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.rdf import SWRL, SWRLB
 from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import KnowledgeState, ObjectiveState
 from suave_des.resources import shipped_folder
-from suave_des.workbench.rule_editor import add_rules, remove_rule, set_enabled
 from tests.helpers.exemplar_files import write_exemplar_files
 
 SEARCH = "f_generate_search_path"

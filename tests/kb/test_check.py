@@ -14,10 +14,10 @@ import pytest
 from suave_des.cli.main import main
 from suave_des.errors import InputError, KnowledgeError
 from suave_des.findings import Level, has_level
+from suave_des.kb.check import Subject, check, combined, simple_states
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import InProcessPellet
 from suave_des.resources import shipped_folder
-from suave_des.workbench.check import Subject, check, combined, simple_states
 from tests.helpers.checks import SUAVE, TOMASYS, errors, findings_of, found_by_pellet, only, subject
 
 

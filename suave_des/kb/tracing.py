@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Final
 
+from suave_des.kb.matching import Facts, NearestFinder, matched, shown_bindings, stated
 from suave_des.knowledge.content import Content, Terms
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet.in_process import (
@@ -25,7 +26,6 @@ from suave_des.knowledge.pellet.in_process import (
 from suave_des.knowledge.rdf import OWL, RDF_TYPE, Lit, Triple, canonical, fact_of, is_fact, n_triple
 from suave_des.knowledge.rules import Atom, AtomKind, Rule
 from suave_des.knowledge.state import ContradictionError, Fact, KnowledgeState, Value
-from suave_des.workbench.matching import Facts, NearestFinder, matched, shown_bindings, stated
 
 _FACT: Final = re.compile(r"^(prop|type)\(([^,()]+),([^,()]+)")
 _IRI: Final = re.compile(r"[a-z]+:[^\s,()]+")

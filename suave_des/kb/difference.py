@@ -13,6 +13,9 @@ import rdflib
 from rdflib.term import Node
 
 from suave_des.errors import InputError, number_of
+from suave_des.kb.policy import Policy, PolicyCase, no_proof
+from suave_des.kb.situations import Difference, Probes, Situation, compare
+from suave_des.kb.space import ValueRange
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TimeLimit
 from suave_des.knowledge.rdf import RDF_TYPE, SWRL, Lit, Triple, fact_of, is_fact, local_name, term_of
@@ -21,9 +24,6 @@ from suave_des.knowledge.rules import literal_text
 from suave_des.records.metrics import DISTANCE, SEARCH_TIME
 from suave_des.scenario.loader import Replacements, load_scenario
 from suave_des.scenario_knowledge import open_base
-from suave_des.workbench.policy import Policy, PolicyCase, no_proof
-from suave_des.workbench.situations import Difference, Probes, Situation, compare
-from suave_des.workbench.space import ValueRange
 
 if TYPE_CHECKING:
     import pandas

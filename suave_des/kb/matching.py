@@ -14,13 +14,13 @@ from typing import Final
 
 from rdflib import BNode
 
+from suave_des.kb.situations import PROBE
 from suave_des.knowledge.content import Content
 from suave_des.knowledge.pellet.in_process import entailed
 from suave_des.knowledge.rdf import OWL, RDF_TYPE, XSD, Lit, Names, Triple, canonical, value_of
 from suave_des.knowledge.rules import Atom, Named, Rule, Term, Variable
 from suave_des.knowledge.rules.files import with_triples
 from suave_des.knowledge.state import Value
-from suave_des.workbench.situations import PROBE
 
 #: What the variables of a rule stand for: IRIs and literals by name.
 Binding = Mapping[str, str | Lit]

@@ -16,6 +16,10 @@ from pydantic import ValidationError
 from suave_des.errors import MISTAKES_LOGGER, InputError, KnowledgeError
 from suave_des.files import read_json
 from suave_des.findings import Level, ordered
+from suave_des.kb.knowledge_base import KnowledgeBase
+from suave_des.kb.situations import Situation, compare
+from suave_des.kb.states import ManagingSettings, read_rules
+from suave_des.kb.tracing import Tracer, pellet_for
 from suave_des.knowledge.checks.rules import findings_on_rule
 from suave_des.knowledge.content import with_rules
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
@@ -28,10 +32,6 @@ from suave_des.records.knowledge import CAMPAIGN_KNOWLEDGE_FILE, KNOWLEDGE_FILE,
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario.models import Scenario
 from suave_des.scenario_knowledge import read_base
-from suave_des.workbench.knowledge_base import KnowledgeBase
-from suave_des.workbench.situations import Situation, compare
-from suave_des.workbench.states import ManagingSettings, read_rules
-from suave_des.workbench.tracing import Tracer, pellet_for
 
 _MISSION_FILE = "mission.json"
 

@@ -10,10 +10,8 @@ from itertools import chain
 from typing import Final, NamedTuple
 
 from suave_des.errors import InputError, KnowledgeError
-from suave_des.knowledge.ontology import Ontology
-from suave_des.knowledge.state import NO_GROUNDING, NONE_LEFT, KnowledgeState, ObjectiveState
-from suave_des.workbench.situations import INCONSISTENT, Decide, Outcome, Situation
-from suave_des.workbench.space import (
+from suave_des.kb.situations import INCONSISTENT, Decide, Outcome, Situation
+from suave_des.kb.space import (
     ComponentReports,
     Dependence,
     PolicySpace,
@@ -24,7 +22,9 @@ from suave_des.workbench.space import (
     rules_that_compute,
     values_in,
 )
-from suave_des.workbench.states import LASTING, ManagingSettings
+from suave_des.kb.states import LASTING, ManagingSettings
+from suave_des.knowledge.ontology import Ontology
+from suave_des.knowledge.state import NO_GROUNDING, NONE_LEFT, KnowledgeState, ObjectiveState
 
 #: Beyond this many kinds of states a policy is refused: at a millisecond and a half each it would take ten minutes.
 LARGEST: Final = 400_000

@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from suave_des.errors import InputError
+from suave_des.kb.situations import Probes, Situation
+from suave_des.kb.why_not import RuleQuestions, open_without_unusable
 from suave_des.knowledge.reasoner import Reasoner
 from suave_des.knowledge.state import KnowledgeState
 from suave_des.scenario.loader import load_scenario
-from suave_des.workbench.situations import Probes, Situation
-from suave_des.workbench.why_not import RuleQuestions, open_without_unusable
 from tests.helpers.number_ontology import NS, NUMBERS, numbers_ontology
 from tests.helpers.rule_questions import CASES, prepared
 

@@ -10,12 +10,12 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
+from suave_des.kb.knowledge_base import KnowledgeBase
+from suave_des.kb.matching import testable_order
+from suave_des.kb.policy import kinds_of_states
+from suave_des.kb.situations import Body, Probes, Situation
 from suave_des.knowledge.rules import COMPARISON_OF, COMPARISONS, Rule, write_atom
 from suave_des.knowledge.state import KnowledgeState
-from suave_des.workbench.knowledge_base import KnowledgeBase
-from suave_des.workbench.matching import testable_order
-from suave_des.workbench.policy import kinds_of_states
-from suave_des.workbench.situations import Body, Probes, Situation
 
 FIRES, FIRES_NOT, HOLDS, FAILS = "fires", "does not fire", "holds", "fails"
 #: How the values of a comparison can relate, with the sign that says so and words for it.

@@ -1,4 +1,4 @@
-"""The knowledge workbench: checks and edits rules, and shows what they do.
+"""The `kb` commands: checks and edits rules, and shows what they do.
 
 KnowledgeBase is loaded when the name is first used, and Java starts with its first reasoner.
 """
@@ -8,14 +8,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from suave_des.workbench.knowledge_base import KnowledgeBase
+    from suave_des.kb.knowledge_base import KnowledgeBase
 
 __all__ = ["KnowledgeBase"]
 
 
 def __getattr__(name: str) -> Any:
     if name == "KnowledgeBase":
-        from suave_des.workbench.knowledge_base import KnowledgeBase
+        from suave_des.kb.knowledge_base import KnowledgeBase
 
         return KnowledgeBase
     raise AttributeError(name)

@@ -9,6 +9,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from suave_des.kb.difference import PolicyDifference, compare_policies
+from suave_des.kb.explain import Explanation, explain
+from suave_des.kb.policy import OnCount, Policy, make_policy
+from suave_des.kb.query import QueryResult, answer, graph_of
+from suave_des.kb.situations import Outcome, Situation
+from suave_des.kb.space import PolicySpace
+from suave_des.kb.states import ManagingSettings, StateBuilder
+from suave_des.kb.tracing import pellet_for
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.pellet import TIME_LIMIT_S, TimeLimit
 from suave_des.knowledge.pellet.in_process import InProcessPellet
@@ -18,14 +26,6 @@ from suave_des.knowledge.state import ContradictionError, KnowledgeState, Number
 from suave_des.resources import DEFAULT_SCENARIO
 from suave_des.scenario.loader import load_scenario
 from suave_des.scenario_knowledge import open_base
-from suave_des.workbench.difference import PolicyDifference, compare_policies
-from suave_des.workbench.explain import Explanation, explain
-from suave_des.workbench.policy import OnCount, Policy, make_policy
-from suave_des.workbench.query import QueryResult, answer, graph_of
-from suave_des.workbench.situations import Outcome, Situation
-from suave_des.workbench.space import PolicySpace
-from suave_des.workbench.states import ManagingSettings, StateBuilder
-from suave_des.workbench.tracing import pellet_for
 
 
 def _several(given: str | Path | Sequence[str | Path]) -> Sequence[str | Path]:

@@ -10,14 +10,14 @@ from pathlib import Path
 import pandas
 import pytest
 
+from suave_des.kb import KnowledgeBase
+from suave_des.kb.difference import METRICS, _joined, compare_axioms, compare_missions, compare_policies, paired
+from suave_des.kb.policy import PolicyCase
+from suave_des.kb.situations import Outcome
+from suave_des.kb.space import ComponentReports, PolicySpace, ranges_between
 from suave_des.knowledge.ontology import Ontology
 from suave_des.knowledge.state import Decision, Fact, Inference, KnowledgeState, Plan, Reasoning
 from suave_des.resources import shipped_folder
-from suave_des.workbench import KnowledgeBase
-from suave_des.workbench.difference import METRICS, _joined, compare_axioms, compare_missions, compare_policies, paired
-from suave_des.workbench.policy import PolicyCase
-from suave_des.workbench.situations import Outcome
-from suave_des.workbench.space import ComponentReports, PolicySpace, ranges_between
 from tests.helpers.knowledge_states import FEWER_NUMBERS
 from tests.helpers.owl_text import SUAVE, TOMASYS
 
